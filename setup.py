@@ -3,8 +3,7 @@
 
 from pathlib import Path
 
-from setuptools import find_packages
-from setuptools import setup
+from setuptools import find_packages, setup
 
 NAME = 'nfo_sinus_driver'
 

@@ -57,8 +57,7 @@ def serve(master: int) -> None:
 def ours(port: str) -> Callable[[], bytes]:
     """Return what reads by the driver's link."""
     from nfo_sinus_driver.link.canopen_link import CanopenLink
-    from nfo_sinus_driver.link.interface import Address
-    from nfo_sinus_driver.link.interface import LineSettings
+    from nfo_sinus_driver.link.interface import Address, LineSettings
 
     link = CanopenLink.on_port(port, LineSettings(baud_rate=_RATE, response_timeout=_PATIENCE))
     link.open()

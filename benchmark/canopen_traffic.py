@@ -41,10 +41,8 @@ _STOPPED_BY = (0x2022, 0x2023)
 def drive(port: str, control: str, seconds: float, turns: int, stops: int) -> list[dict[str, Any]]:
     """Run the motor and measure; in a process of its own."""
     from nfo_sinus_driver.bus import Bus
-    from nfo_sinus_driver.drive import Drive
-    from nfo_sinus_driver.drive import DriveSettings
-    from nfo_sinus_driver.link import line_settings
-    from nfo_sinus_driver.link import open_link
+    from nfo_sinus_driver.drive import Drive, DriveSettings
+    from nfo_sinus_driver.link import line_settings, open_link
     from nfo_sinus_driver.simulator.control import Client
 
     class Counting:

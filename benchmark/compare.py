@@ -27,8 +27,7 @@ import tempfile
 
 from driver_rig import DriverRig
 from resources import memory
-from rig import FOLDER
-from rig import use_domain
+from rig import FOLDER, use_domain
 import setpoints
 import speed
 

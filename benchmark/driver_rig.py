@@ -10,21 +10,16 @@ import threading
 import time
 from typing import Any
 
-from nfo_sinus_msgs.msg import BusStatistics
-from nfo_sinus_msgs.msg import DriveStatus
-from nfo_sinus_msgs.msg import Telemetry
+from nfo_sinus_msgs.msg import BusStatistics, DriveStatus, Telemetry
 from rcl_interfaces.srv import ListParameters
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.subscription import Subscription
-from rig import PATIENCE
-from rig import Rig
-from rig import executable
+from rig import PATIENCE, Rig, executable
 from std_msgs.msg import Float32
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 import trace_file
 
 from nfo_sinus_driver.catalog import load_family

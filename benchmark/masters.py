@@ -17,13 +17,11 @@ import struct
 import time
 
 import minimalmodbus
-from pymodbus.client import AsyncModbusSerialClient
-from pymodbus.client import ModbusSerialClient
+from pymodbus.client import AsyncModbusSerialClient, ModbusSerialClient
 from pymodbus.framer import FramerType
 from pymodbus.pdu import ModbusPDU
 import recorded_cycle
-from trace_file import READ_FUNCTIONS
-from trace_file import Line
+from trace_file import READ_FUNCTIONS, Line
 
 #: Two stop bits for the parity: a character is as long, and a pseudo-terminal can do it. With
 #: parity these libraries cannot even open it, for the C library says that it has none.

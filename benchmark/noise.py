@@ -21,11 +21,9 @@ import time
 from driver_rig import DriverRig
 from nfo_sinus_msgs.msg import DriveStatus
 import page
-from rig import PATIENCE
-from rig import use_domain
+from rig import PATIENCE, use_domain
 from std_msgs.msg import Float32
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from nfo_sinus_driver.simulator.control import Client
 

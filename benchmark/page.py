@@ -5,10 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Sequence
-from datetime import datetime
-from datetime import timezone
+from collections.abc import Callable, Sequence
+from datetime import datetime, timezone
 from importlib.metadata import version
 import os
 from pathlib import Path

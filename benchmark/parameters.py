@@ -14,12 +14,9 @@ import argparse
 import statistics
 import time
 
-from driver_rig import NAMES
-from driver_rig import DriverRig
-from rcl_interfaces.srv import GetParameters
-from rcl_interfaces.srv import ListParameters
-from rig import PATIENCE
-from rig import use_domain
+from driver_rig import NAMES, DriverRig
+from rcl_interfaces.srv import GetParameters, ListParameters
+from rig import PATIENCE, use_domain
 import trace_file
 from trace_file import Frame
 

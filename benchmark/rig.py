@@ -18,8 +18,7 @@ import time
 
 import resources
 import trace_file
-from trace_file import Frame
-from trace_file import Line
+from trace_file import Frame, Line
 
 from nfo_sinus_driver.demo.bench import own_domain
 

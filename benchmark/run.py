@@ -16,15 +16,11 @@ import signal
 import sys
 import time
 
-from measurements import Measurement
-from measurements import all_measurements
+from measurements import Measurement, all_measurements
 import page
 import resources
 from rig import use_domain
-from row import Effort
-from row import Row
-from row import blamed
-from row import merged
+from row import Effort, Row, blamed, merged
 
 _WHOLE = Effort(window=5.0, rounds=5, setpoints=500, stops=40, events=3)
 _QUICK = Effort(window=3.0, rounds=3, setpoints=100, stops=10, events=1)

@@ -10,22 +10,17 @@ from itertools import pairwise
 import json
 import statistics
 import subprocess
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from driver_rig import DriverRig
 from rig import Window
-from row import Effort
-from row import Figures
-from row import Row
+from row import Effort, Figures, Row
 import speed
 import trace_file
-from trace_file import Frame
-from trace_file import Line
+from trace_file import Frame, Line
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.families.sinus_g2.words import Status
+from nfo_sinus_driver.families.sinus_g2.words import Scmd, Status
 
 BAUD_RATE = 57600
 DRIVES = (1, 8, 32)

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 import subprocess
@@ -16,11 +15,8 @@ from driver_rig import DriverRig
 import masters
 import recorded_cycle
 import resources
-from rig import Rig
-from rig import Window
-from row import Effort
-from row import Figures
-from row import Row
+from rig import Rig, Window
+from row import Effort, Figures, Row
 import trace_file
 from trace_file import Line
 

@@ -20,8 +20,7 @@ from typing import Any
 
 import rclpy
 from rclpy.client import Client
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 #: How long the driver may take to be there, and to answer, s.
 _PATIENCE = 60.0

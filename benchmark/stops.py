@@ -10,12 +10,8 @@ has to stop one of them, which is then enabled again.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Container
-from collections.abc import Iterator
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
+from collections.abc import Callable, Container, Iterator, Sequence
+from dataclasses import dataclass, replace
 import itertools
 from itertools import pairwise
 import random
@@ -29,20 +25,14 @@ from driver_rig import DriverRig
 from nfo_sinus_msgs.msg import DriveStatus
 from rclpy.qos import QoSProfile
 from rig import PATIENCE
-from row import Effort
-from row import Figures
-from row import Row
+from row import Effort, Figures, Row
 from std_msgs.msg import Float32
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 import trace_file
 from trace_file import Frame
 
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.families.sinus_g2.words import Status
+from nfo_sinus_driver.catalog import Meaning, load_family
+from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd, Status
 from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.simulator.control import Client
 

@@ -20,13 +20,15 @@ import argparse
 from collections.abc import Sequence
 import sys
 
-from drive_client import FOLLOW_TIMEOUT
-from drive_client import ControlNode
-from drive_client import Drive
-from drive_client import control_node
-from drive_client import find
-from drive_client import first_problem
-from drive_client import report
+from drive_client import (
+    FOLLOW_TIMEOUT,
+    ControlNode,
+    Drive,
+    control_node,
+    find,
+    first_problem,
+    report,
+)
 from rclpy.client import Client
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger

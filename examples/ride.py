@@ -17,21 +17,14 @@ its end and the stop is confirmed.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 import itertools
 import math
 import sys
 
-from drive_client import FOLLOW_TIMEOUT
-from drive_client import ControlNode
-from drive_client import Drive
-from drive_client import control_node
-from drive_client import find
-from drive_client import report_fault
+from drive_client import FOLLOW_TIMEOUT, ControlNode, Drive, control_node, find, report_fault
 from rclpy.utilities import remove_ros_args
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 #: How often a set-point is sent, s; many times within the driver's `setpoint_timeout`.
 PERIOD = 0.1

@@ -24,18 +24,19 @@ from dataclasses import dataclass
 import math
 import sys
 
-from drive_client import FOLLOW_TIMEOUT
-from drive_client import SETPOINT_QOS
-from drive_client import ControlNode
-from drive_client import Drive
-from drive_client import control_node
-from drive_client import find
-from drive_client import first_problem
-from drive_client import report
+from drive_client import (
+    FOLLOW_TIMEOUT,
+    SETPOINT_QOS,
+    ControlNode,
+    Drive,
+    control_node,
+    find,
+    first_problem,
+    report,
+)
 from geometry_msgs.msg import Twist
 from rcl_interfaces.msg import ParameterDescriptor
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 #: How long to handle messages before Ctrl-C is looked at again, s.
 PERIOD = 0.1

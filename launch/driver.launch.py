@@ -26,14 +26,12 @@ from pathlib import Path
 import tempfile
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.actions import OpaqueFunction
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
-from nfo_sinus_driver.launch_arguments import number
-from nfo_sinus_driver.launch_arguments import parameter_file
+from nfo_sinus_driver.launch_arguments import number, parameter_file
 
 #: Launch arguments that overrule a parameter of the same name in the parameter file: for which
 #: nodes, and what it is.

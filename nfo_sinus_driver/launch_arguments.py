@@ -9,8 +9,7 @@ Without ROS: the launch files give what they have been given.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 

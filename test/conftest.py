@@ -5,8 +5,7 @@
 
 import gc
 
-from hypothesis import HealthCheck
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from support.examples import FULL
 
 # The machine may be slow, and that is no failure. Always the same examples, whatever the machine

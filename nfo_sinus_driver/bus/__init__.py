@@ -4,11 +4,7 @@
 """Who talks next on one line: the scheduler, what it is given to do, and what it counts."""
 
 from nfo_sinus_driver.bus.statistics import Statistics
-from nfo_sinus_driver.bus.tasks import Cancelled
-from nfo_sinus_driver.bus.tasks import LatestValue
-from nfo_sinus_driver.bus.tasks import Priority
-from nfo_sinus_driver.bus.tasks import Task
-from nfo_sinus_driver.bus.tasks import Transfer
+from nfo_sinus_driver.bus.tasks import Cancelled, LatestValue, Priority, Task, Transfer
 from nfo_sinus_driver.bus.worker import Bus
 
 __all__ = ['Bus', 'Cancelled', 'LatestValue', 'Priority', 'Statistics', 'Task', 'Transfer']

@@ -10,19 +10,12 @@ What waits for the line, and which of it goes next. No thread, no clock and noth
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import math
-from typing import Literal
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
-from nfo_sinus_driver.bus.tasks import LatestValue
-from nfo_sinus_driver.bus.tasks import Priority
-from nfo_sinus_driver.bus.tasks import Task
-from nfo_sinus_driver.bus.tasks import Transfer
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.bus.tasks import LatestValue, Priority, Task, Transfer
+from nfo_sinus_driver.link import LinkError, PortError, Refused
 
 __all__ = ['BACKGROUND_SHARE', 'Scheduler', 'Waiting']
 

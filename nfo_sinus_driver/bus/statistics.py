@@ -9,11 +9,7 @@ from collections import deque
 from dataclasses import dataclass
 import math
 
-from nfo_sinus_driver.link import Clock
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Clock, DamagedAnswer, LinkError, NoAnswer, Refused
 
 #: Of how many of the last transactions the round trips are kept: of a line, and of one unit.
 _ROUND_TRIPS = 1000

@@ -5,11 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Coroutine
-from collections.abc import Generator
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Callable, Coroutine, Generator, Iterator, Sequence
 from concurrent.futures import Future
 import contextlib
 from dataclasses import dataclass
@@ -20,14 +16,16 @@ import logging
 import math
 from typing import Any
 
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import Inquiry
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Watch
+from nfo_sinus_driver.link import (
+    Address,
+    DamagedAnswer,
+    Identification,
+    Inquiry,
+    LinkError,
+    PortError,
+    Reply,
+    Watch,
+)
 
 _log = logging.getLogger(__name__)
 

@@ -14,10 +14,7 @@ and nothing that a coroutine raises can end the worker.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Awaitable
-from collections.abc import Callable
-from collections.abc import Coroutine
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from concurrent.futures import Future
 import contextlib
 import ctypes
@@ -27,37 +24,37 @@ import logging
 import math
 import threading
 import time
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from nfo_sinus_driver.bus.scheduler import Scheduler
-from nfo_sinus_driver.bus.scheduler import Silences
-from nfo_sinus_driver.bus.scheduler import Waiting
-from nfo_sinus_driver.bus.statistics import Recorder
-from nfo_sinus_driver.bus.statistics import Statistics
-from nfo_sinus_driver.bus.tasks import Cancelled
-from nfo_sinus_driver.bus.tasks import LatestValue
-from nfo_sinus_driver.bus.tasks import Pause
-from nfo_sinus_driver.bus.tasks import Priority
-from nfo_sinus_driver.bus.tasks import Sleepers
-from nfo_sinus_driver.bus.tasks import Task
-from nfo_sinus_driver.bus.tasks import Transfer
-from nfo_sinus_driver.bus.tasks import consistent_read
-from nfo_sinus_driver.bus.tasks import inquire
-from nfo_sinus_driver.bus.tasks import log_unexpected
-from nfo_sinus_driver.bus.tasks import set_up
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Clock
-from nfo_sinus_driver.link import Connecting
-from nfo_sinus_driver.link import GatewaySilent
-from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import LineProtocol
-from nfo_sinus_driver.link import Link
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NotReady
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Reconnect
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.bus.scheduler import Scheduler, Silences, Waiting
+from nfo_sinus_driver.bus.statistics import Recorder, Statistics
+from nfo_sinus_driver.bus.tasks import (
+    Cancelled,
+    LatestValue,
+    Pause,
+    Priority,
+    Sleepers,
+    Task,
+    Transfer,
+    consistent_read,
+    inquire,
+    log_unexpected,
+    set_up,
+)
+from nfo_sinus_driver.link import (
+    Address,
+    Clock,
+    Connecting,
+    GatewaySilent,
+    Identification,
+    LineProtocol,
+    Link,
+    LinkError,
+    NotReady,
+    PortError,
+    Reconnect,
+    Reply,
+)
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')

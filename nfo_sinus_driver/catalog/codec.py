@@ -19,14 +19,11 @@ digits in each byte, the high ones first; two decimals are a factor of 0.01.
 from __future__ import annotations
 
 import abc
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 import functools
 import re
 import struct
-from typing import Generic
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 Raw = TypeVar('Raw', int, str)
 

@@ -11,11 +11,8 @@ More folders are found where the search path of that package, its ``__path__``, 
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from collections.abc import Iterator
-from collections.abc import Mapping
-from dataclasses import dataclass
-from dataclasses import replace
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
 from fractions import Fraction
 import functools
 import importlib
@@ -23,18 +20,11 @@ import math
 from pathlib import Path
 
 from nfo_sinus_driver.catalog import table
-from nfo_sinus_driver.catalog.codec import Number
-from nfo_sinus_driver.catalog.codec import codec_of
+from nfo_sinus_driver.catalog.codec import Number, codec_of
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
-from nfo_sinus_driver.catalog.parameter import Access
-from nfo_sinus_driver.catalog.parameter import Address
-from nfo_sinus_driver.catalog.parameter import Parameter
-from nfo_sinus_driver.catalog.parameter import Value
+from nfo_sinus_driver.catalog.parameter import Access, Address, Parameter, Value
 from nfo_sinus_driver.catalog.profile import Profile
-from nfo_sinus_driver.catalog.status import Kind
-from nfo_sinus_driver.catalog.status import Meaning
-from nfo_sinus_driver.catalog.status import Role
-from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.catalog.status import Kind, Meaning, Role, StatusCode
 
 _FAMILIES = 'nfo_sinus_driver.families'
 #: The message InvSt has one byte for a status code.

@@ -5,17 +5,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import functools
 import math
 
 from nfo_sinus_driver.catalog.family import Family
-from nfo_sinus_driver.catalog.status import Fact
-from nfo_sinus_driver.catalog.status import Kind
-from nfo_sinus_driver.catalog.status import Meaning
-from nfo_sinus_driver.catalog.status import State
-from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.catalog.status import Fact, Kind, Meaning, State, StatusCode
 
 #: By so much a frequency has to fall, Hz: less is what it wobbles by.
 _FALL = 0.1

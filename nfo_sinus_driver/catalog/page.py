@@ -10,22 +10,20 @@ The page of all parameters for people, made from the tables.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 import functools
 import re
 
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
-from nfo_sinus_driver.catalog.family import Family
-from nfo_sinus_driver.catalog.family import example_setting
-from nfo_sinus_driver.catalog.family import families
-from nfo_sinus_driver.catalog.family import load_family
-from nfo_sinus_driver.catalog.family import usual_family
-from nfo_sinus_driver.catalog.parameter import NO_SETTINGS
-from nfo_sinus_driver.catalog.parameter import Access
-from nfo_sinus_driver.catalog.parameter import Parameter
+from nfo_sinus_driver.catalog.family import (
+    Family,
+    example_setting,
+    families,
+    load_family,
+    usual_family,
+)
+from nfo_sinus_driver.catalog.parameter import NO_SETTINGS, Access, Parameter
 
 _KINDS = {float: 'double', int: 'integer', str: 'string', bool: 'bool'}
 _ACCESS = {

@@ -11,10 +11,8 @@ is its code.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 import enum
 from fractions import Fraction
 import functools
@@ -22,8 +20,7 @@ import math
 import re
 import struct
 
-from nfo_sinus_driver.catalog.codec import Number
-from nfo_sinus_driver.catalog.codec import Text
+from nfo_sinus_driver.catalog.codec import Number, Text
 
 #: An engineering value: a number, the label of an enumeration, or on/off.
 Value = bool | int | float | str

@@ -14,25 +14,15 @@ wrong with it ends the sequence.
 from __future__ import annotations
 
 import abc
-from collections.abc import Callable
-from collections.abc import Generator
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, field
 import enum
 from fractions import Fraction
 import math
-from typing import Any
-from typing import ClassVar
-from typing import Protocol
-from typing import TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 from nfo_sinus_driver.catalog.parameter import Value
-from nfo_sinus_driver.catalog.status import Role
-from nfo_sinus_driver.catalog.status import State
-from nfo_sinus_driver.catalog.status import StatusCode
-from nfo_sinus_driver.catalog.status import StatusWord
+from nfo_sinus_driver.catalog.status import Role, State, StatusCode, StatusWord
 
 _T = TypeVar('_T')
 

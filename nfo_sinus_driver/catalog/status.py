@@ -10,10 +10,8 @@ The same bit and the same code say different things ([C49] to [C55]): a family's
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from dataclasses import dataclass
-from dataclasses import field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 import enum
 from fractions import Fraction
 import functools

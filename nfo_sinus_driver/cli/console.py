@@ -10,10 +10,7 @@ Remarks go to standard error, so that the output stays what a script wants.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from collections.abc import Iterable
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 import contextlib
 import sys
 import threading
@@ -21,10 +18,8 @@ import unicodedata
 
 from tqdm import tqdm
 
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.wording import Calls
-from nfo_sinus_driver.wording import sentence
+from nfo_sinus_driver.drive import DriveError, Report
+from nfo_sinus_driver.wording import Calls, sentence
 
 #: What takes less needs no bar, s.
 _DELAY = 0.3

@@ -6,34 +6,30 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from collections.abc import Collection
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future
 import contextlib
 import math
 import sys
 import time
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.screen import Screen
-from nfo_sinus_driver.cli.session import Remote
-from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Event
-from nfo_sinus_driver.drive import LogEntry
-from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.drive import Telemetry
-from nfo_sinus_driver.signals import SUSPENDING
-from nfo_sinus_driver.signals import HeldSignals
-from nfo_sinus_driver.signals import signal_name
+from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.drive import (
+    Cause,
+    Drive,
+    DriveError,
+    Event,
+    LogEntry,
+    Report,
+    Severity,
+    Snapshot,
+    Telemetry,
+)
+from nfo_sinus_driver.signals import SUSPENDING, HeldSignals, signal_name
 
 _T = TypeVar('_T')
 

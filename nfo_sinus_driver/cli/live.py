@@ -14,24 +14,22 @@ import sys
 import threading
 import time
 
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.catalog import Kind, State
 from nfo_sinus_driver.cli.console import say
-from nfo_sinus_driver.cli.measure import VALUES
-from nfo_sinus_driver.cli.measure import measure
-from nfo_sinus_driver.cli.measure import statistics_table
-from nfo_sinus_driver.cli.session import Remote
-from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.cli.measure import VALUES, measure, statistics_table
+from nfo_sinus_driver.cli.session import Remote, Session
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.view import terminal
-from nfo_sinus_driver.view.picture import Condition
-from nfo_sinus_driver.view.picture import DriveView
-from nfo_sinus_driver.view.picture import Level
-from nfo_sinus_driver.view.picture import LineView
-from nfo_sinus_driver.view.picture import Measured
-from nfo_sinus_driver.view.picture import Note
-from nfo_sinus_driver.view.picture import Picture
-from nfo_sinus_driver.view.picture import line_view
+from nfo_sinus_driver.view.picture import (
+    Condition,
+    DriveView,
+    Level,
+    LineView,
+    Measured,
+    Note,
+    Picture,
+    line_view,
+)
 
 #: How long the present reading may take at the end, s.
 _LAST_READING = 2.0

@@ -6,9 +6,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
 import io
 import os
@@ -17,24 +15,13 @@ import sys
 import threading
 
 from nfo_sinus_driver.cli.completion import completion
-from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.console import UsageError
-from nfo_sinus_driver.cli.console import remark
-from nfo_sinus_driver.cli.console import say
+from nfo_sinus_driver.cli.console import CliError, UsageError, remark, say
 from nfo_sinus_driver.cli.monitor import monitor
 from nfo_sinus_driver.cli.options import parse
-from nfo_sinus_driver.cli.read import errors
-from nfo_sinus_driver.cli.read import get
-from nfo_sinus_driver.cli.read import info
-from nfo_sinus_driver.cli.read import list_
-from nfo_sinus_driver.cli.read import set_
-from nfo_sinus_driver.cli.run import ack
-from nfo_sinus_driver.cli.run import run
-from nfo_sinus_driver.cli.run import stop
+from nfo_sinus_driver.cli.read import errors, get, info, list_, set_
+from nfo_sinus_driver.cli.run import ack, run, stop
 from nfo_sinus_driver.cli.scan import scan
-from nfo_sinus_driver.cli.transfer import diff
-from nfo_sinus_driver.cli.transfer import dump
-from nfo_sinus_driver.cli.transfer import load
+from nfo_sinus_driver.cli.transfer import diff, dump, load
 from nfo_sinus_driver.cli.tune import tune
 from nfo_sinus_driver.drive import DriveError
 

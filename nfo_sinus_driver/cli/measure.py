@@ -5,16 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import dataclasses
 import math
 
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Statistics
+from nfo_sinus_driver.bus import Priority, Statistics
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.cli.session import Remote
-from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.cli.session import Remote, Session
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.link import Refused
 

@@ -18,19 +18,11 @@ import sys
 import time
 
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.cli.console import UsageError
-from nfo_sinus_driver.cli.console import put
-from nfo_sinus_driver.cli.console import remark
-from nfo_sinus_driver.cli.console import say
+from nfo_sinus_driver.cli.console import UsageError, put, remark, say
 from nfo_sinus_driver.cli.live import live
-from nfo_sinus_driver.cli.measure import VALUES
-from nfo_sinus_driver.cli.measure import as_facts
-from nfo_sinus_driver.cli.measure import measure
-from nfo_sinus_driver.cli.measure import statistics_table
-from nfo_sinus_driver.cli.session import Remote
-from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import InverterStatus
+from nfo_sinus_driver.cli.measure import VALUES, as_facts, measure, statistics_table
+from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.drive import DriveError, InverterStatus
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.view import terminal
 

@@ -10,16 +10,11 @@ from collections.abc import Sequence
 import math
 import shlex
 
-from nfo_sinus_driver.catalog import example_setting
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import usual_family
+from nfo_sinus_driver.catalog import example_setting, families, usual_family
 from nfo_sinus_driver.cli.tune import PROCEDURES
 from nfo_sinus_driver.drive import CONTROL_METHODS
-from nfo_sinus_driver.drive.settings import CONTROL_MODES
-from nfo_sinus_driver.drive.settings import MONITOR
-from nfo_sinus_driver.drive.settings import REFERENCES
-from nfo_sinus_driver.link import BIT_RATES
-from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.drive.settings import CONTROL_MODES, MONITOR, REFERENCES
+from nfo_sinus_driver.link import BIT_RATES, PROTOCOLS
 from nfo_sinus_driver.version import VERSION
 
 #: Where the line and the drive are, unless it is said: as the parameters of the nodes.

@@ -11,11 +11,8 @@ whose parameters these are; a file without one, such as ``ros2 param dump`` writ
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
-from collections.abc import Iterator
-from collections.abc import Mapping
-from dataclasses import dataclass
-from dataclasses import field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from decimal import Decimal
 import difflib
 from pathlib import Path
@@ -25,12 +22,8 @@ from typing import Any
 
 import yaml
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.console import listed
+from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
+from nfo_sinus_driver.cli.console import CliError, listed
 from nfo_sinus_driver.drive.parameter_writer import show
 
 #: What the header says, in this order.

@@ -7,38 +7,34 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Iterable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 import json
 import math
 
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.console import UsageError
-from nfo_sinus_driver.cli.console import columns
-from nfo_sinus_driver.cli.console import listed
-from nfo_sinus_driver.cli.console import progress
-from nfo_sinus_driver.cli.console import put
-from nfo_sinus_driver.cli.console import require_yes
-from nfo_sinus_driver.cli.console import say
-from nfo_sinus_driver.cli.control_session import NO_TIMEOUT
-from nfo_sinus_driver.cli.control_session import control_session
-from nfo_sinus_driver.cli.parameter_file import BARRED
-from nfo_sinus_driver.cli.parameter_file import is_barred
-from nfo_sinus_driver.cli.parameter_file import measured
-from nfo_sinus_driver.cli.parameter_file import parse_value
-from nfo_sinus_driver.cli.parameter_file import readable
-from nfo_sinus_driver.cli.parameter_file import require_names
-from nfo_sinus_driver.cli.parameter_file import same
-from nfo_sinus_driver.cli.parameter_file import shown
-from nfo_sinus_driver.cli.session import Remote
-from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import LogEntry
+from nfo_sinus_driver.catalog import Parameter, Role, Value
+from nfo_sinus_driver.cli.console import (
+    CliError,
+    UsageError,
+    columns,
+    listed,
+    progress,
+    put,
+    require_yes,
+    say,
+)
+from nfo_sinus_driver.cli.control_session import NO_TIMEOUT, control_session
+from nfo_sinus_driver.cli.parameter_file import (
+    BARRED,
+    is_barred,
+    measured,
+    parse_value,
+    readable,
+    require_names,
+    same,
+    shown,
+)
+from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.drive import Cause, DriveError, LogEntry
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.link import Refused
 

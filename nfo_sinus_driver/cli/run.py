@@ -10,27 +10,20 @@ import json
 import math
 import time
 
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.console import UsageError
-from nfo_sinus_driver.cli.console import say
-from nfo_sinus_driver.cli.control_session import NO_TIMEOUT
-from nfo_sinus_driver.cli.control_session import RELEASED
-from nfo_sinus_driver.cli.control_session import SHUTDOWN_TIMEOUT
-from nfo_sinus_driver.cli.control_session import ControlSession
-from nfo_sinus_driver.cli.control_session import Ended
-from nfo_sinus_driver.cli.control_session import Stopping
-from nfo_sinus_driver.cli.control_session import control_session
-from nfo_sinus_driver.cli.control_session import spoken
-from nfo_sinus_driver.cli.screen import as_json
-from nfo_sinus_driver.cli.screen import as_line
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import InverterStatus
-from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.catalog import Kind, Meaning, Role
+from nfo_sinus_driver.cli.console import CliError, UsageError, say
+from nfo_sinus_driver.cli.control_session import (
+    NO_TIMEOUT,
+    RELEASED,
+    SHUTDOWN_TIMEOUT,
+    ControlSession,
+    Ended,
+    Stopping,
+    control_session,
+    spoken,
+)
+from nfo_sinus_driver.cli.screen import as_json, as_line
+from nfo_sinus_driver.drive import Cause, Drive, DriveError, InverterStatus, Report
 from nfo_sinus_driver.drive.commands import read_limits
 
 #: How often the set-point is sent anew, s; it is given up as old after 2.5 s.

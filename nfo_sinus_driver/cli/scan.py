@@ -6,39 +6,22 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import copy
 from datetime import datetime
 import json
 from pathlib import Path
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.console import UsageError
-from nfo_sinus_driver.cli.console import listed
-from nfo_sinus_driver.cli.console import progress
-from nfo_sinus_driver.cli.console import put
-from nfo_sinus_driver.cli.console import remark
-from nfo_sinus_driver.cli.console import say
+from nfo_sinus_driver.catalog import Role, load_family
+from nfo_sinus_driver.cli.console import CliError, UsageError, listed, progress, put, remark, say
 from nfo_sinus_driver.cli.options import DEFAULTS
-from nfo_sinus_driver.cli.parameter_file import STANDARD
-from nfo_sinus_driver.cli.parameter_file import write_file
-from nfo_sinus_driver.cli.session import Remote
-from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.cli.parameter_file import STANDARD, write_file
+from nfo_sinus_driver.cli.session import Remote, Session
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link.interface import BAUD_RATES
-from nfo_sinus_driver.link.interface import NeverSilent
+from nfo_sinus_driver.link import PROTOCOLS, DamagedAnswer, NoAnswer, PortError, Refused
+from nfo_sinus_driver.link.interface import BAUD_RATES, NeverSilent
 
 #: Parity and stop bits that are tried [M0 §6.2.2].
 _PARITIES = ('E1', 'O1', 'N2')

@@ -6,41 +6,31 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from collections.abc import Collection
-from collections.abc import Coroutine
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Coroutine, Mapping
 import math
 import time
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Statistics
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.console import UsageError
-from nfo_sinus_driver.cli.console import progress
-from nfo_sinus_driver.cli.console import remark
-from nfo_sinus_driver.cli.console import say
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Event
-from nfo_sinus_driver.drive import Identity
-from nfo_sinus_driver.drive import InverterStatus
-from nfo_sinus_driver.drive import Listener
-from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.bus import Bus, Statistics
+from nfo_sinus_driver.catalog import Family, Value
+from nfo_sinus_driver.cli.console import CliError, UsageError, progress, remark, say
+from nfo_sinus_driver.drive import (
+    Cause,
+    Drive,
+    DriveError,
+    DriveSettings,
+    Event,
+    Identity,
+    InverterStatus,
+    Listener,
+    Report,
+    Severity,
+    Snapshot,
+    Telemetry,
+)
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.snapshot import LogEntry
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.link import Refused, line_settings, open_link
 
 _T = TypeVar('_T')
 

@@ -6,9 +6,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 import contextlib
 from dataclasses import dataclass
 from datetime import datetime
@@ -18,35 +16,32 @@ import signal
 import sys
 import threading
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.console import Interrupted
-from nfo_sinus_driver.cli.console import UsageError
-from nfo_sinus_driver.cli.console import columns
-from nfo_sinus_driver.cli.console import listed
-from nfo_sinus_driver.cli.console import progress
-from nfo_sinus_driver.cli.console import put
-from nfo_sinus_driver.cli.console import remark
-from nfo_sinus_driver.cli.console import say
+from nfo_sinus_driver.catalog import Family, Role, Value, load_family
+from nfo_sinus_driver.cli.console import (
+    CliError,
+    Interrupted,
+    UsageError,
+    columns,
+    listed,
+    progress,
+    put,
+    remark,
+    say,
+)
 from nfo_sinus_driver.cli.options import command_line
-from nfo_sinus_driver.cli.parameter_file import ParameterFile
-from nfo_sinus_driver.cli.parameter_file import format_file
-from nfo_sinus_driver.cli.parameter_file import is_barred
-from nfo_sinus_driver.cli.parameter_file import read_file
-from nfo_sinus_driver.cli.parameter_file import require_names
-from nfo_sinus_driver.cli.parameter_file import same
-from nfo_sinus_driver.cli.parameter_file import shown
-from nfo_sinus_driver.cli.parameter_file import write_file
-from nfo_sinus_driver.cli.session import Remote
-from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Identity
-from nfo_sinus_driver.drive.parameter_writer import Change
-from nfo_sinus_driver.drive.parameter_writer import ParameterError
-from nfo_sinus_driver.drive.parameter_writer import shown_raw
+from nfo_sinus_driver.cli.parameter_file import (
+    ParameterFile,
+    format_file,
+    is_barred,
+    read_file,
+    require_names,
+    same,
+    shown,
+    write_file,
+)
+from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.drive import DriveError, Identity
+from nfo_sinus_driver.drive.parameter_writer import Change, ParameterError, shown_raw
 
 _NOTHING = ', nothing was written'
 

@@ -9,21 +9,17 @@ import argparse
 import json
 import time
 
-from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.console import require_yes
-from nfo_sinus_driver.cli.console import say
-from nfo_sinus_driver.cli.control_session import NO_TIMEOUT
-from nfo_sinus_driver.cli.control_session import ControlSession
-from nfo_sinus_driver.cli.control_session import Ended
-from nfo_sinus_driver.cli.control_session import Stopping
-from nfo_sinus_driver.cli.control_session import control_session
-from nfo_sinus_driver.cli.control_session import spoken
+from nfo_sinus_driver.cli.console import CliError, require_yes, say
+from nfo_sinus_driver.cli.control_session import (
+    NO_TIMEOUT,
+    ControlSession,
+    Ended,
+    Stopping,
+    control_session,
+    spoken,
+)
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Procedure
-from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.drive import Tuned
+from nfo_sinus_driver.drive import Cause, DriveError, Procedure, Report, Tuned
 from nfo_sinus_driver.drive.procedure import require_known
 
 PROCEDURES = {

@@ -24,16 +24,10 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from nfo_sinus_driver.demo.bench import Bench
-from nfo_sinus_driver.demo.bench import own_domain
+from nfo_sinus_driver.demo.bench import Bench, own_domain
 from nfo_sinus_driver.demo.record import why_missing
-from nfo_sinus_driver.demo.recording import Recorder
-from nfo_sinus_driver.demo.recording import RecordingError
-from nfo_sinus_driver.demo.recording import replay_warning
-from nfo_sinus_driver.demo.sequence import HEADING
-from nfo_sinus_driver.demo.sequence import PATIENCE
-from nfo_sinus_driver.demo.sequence import DemoSequence
-from nfo_sinus_driver.demo.sequence import StepError
+from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
+from nfo_sinus_driver.demo.sequence import HEADING, PATIENCE, DemoSequence, StepError
 from nfo_sinus_driver.node.executor import spinning
 
 #: More often than by default, for a smooth curve.

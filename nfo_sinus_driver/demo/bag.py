@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 import dataclasses
-from dataclasses import dataclass
-from dataclasses import field
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any

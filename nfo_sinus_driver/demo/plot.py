@@ -15,15 +15,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.text import Text
-from matplotlib.ticker import MaxNLocator
-from matplotlib.ticker import MultipleLocator
-from matplotlib.transforms import Transform
-from matplotlib.transforms import blended_transform_factory
+from matplotlib.ticker import MaxNLocator, MultipleLocator
+from matplotlib.transforms import Transform, blended_transform_factory
 
-from nfo_sinus_driver.demo.bag import Curve
-from nfo_sinus_driver.demo.bag import Recording
-from nfo_sinus_driver.demo.bag import Span
-from nfo_sinus_driver.demo.bag import read
+from nfo_sinus_driver.demo.bag import Curve, Recording, Span, read
 
 #: The picture, inches and dots per inch: 1600 x 1000.
 _SIZE = (16.0, 10.0)

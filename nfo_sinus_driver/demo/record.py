@@ -10,8 +10,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 import contextlib
 import importlib
 import math
@@ -29,9 +28,7 @@ from rclpy.signals import SignalHandlerOptions
 import rclpy.utilities
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
-from nfo_sinus_driver.demo.recording import Recorder
-from nfo_sinus_driver.demo.recording import RecordingError
-from nfo_sinus_driver.demo.recording import replay_warning
+from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
 from nfo_sinus_driver.node.executor import spinning
 from nfo_sinus_driver.version import VERSION
 
@@ -103,8 +100,7 @@ def _draw(command: str, bag: Path, drive: str | None, picture: Path) -> int:
     # here and not above: a recorder has use for neither library before
     from rosbags.highlevel import AnyReaderError
 
-    from nfo_sinus_driver.demo import bag as bags
-    from nfo_sinus_driver.demo import plot as plots
+    from nfo_sinus_driver.demo import bag as bags, plot as plots
 
     try:
         plots.draw(bag, picture, drive or bags.only_drive(bag))

@@ -5,37 +5,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import json
 from pathlib import Path
 import re
 import time
-from typing import TYPE_CHECKING
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ament_index_python.packages import get_package_share_directory
 from diagnostic_msgs.msg import DiagnosticArray
-from nfo_sinus_msgs.msg import BusStatistics
-from nfo_sinus_msgs.msg import DriveStatus
-from nfo_sinus_msgs.msg import InvSt
-from nfo_sinus_msgs.msg import Telemetry
+from nfo_sinus_msgs.msg import BusStatistics, DriveStatus, InvSt, Telemetry
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy
-from rclpy.qos import QoSProfile
-from rclpy.qos import ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float32
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
-from nfo_sinus_driver.node.qos import LATCHED
-from nfo_sinus_driver.node.qos import NEWEST
-from nfo_sinus_driver.node.qos import RELIABLE
+from nfo_sinus_driver.node.qos import LATCHED, NEWEST, RELIABLE
 
 if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
-    from rosbags.interfaces import Qos
+    from rosbags.interfaces import Connection, Qos
 
 _EVENT = '_service_event'
 _ROSOUT = QoSProfile(
@@ -99,8 +88,7 @@ class Recorder(Node):
         heard: Callable[[], None] = lambda: None,
     ) -> None:
         # here and not above: the demo runs where there is only ROS
-        from rosbags.rosbag2 import StoragePlugin
-        from rosbags.rosbag2 import Writer
+        from rosbags.rosbag2 import StoragePlugin, Writer
 
         super().__init__('recorder', enable_rosout=False)
         self._heard: Callable[[], None] | None = heard
@@ -185,12 +173,14 @@ class Recorder(Node):
 
 def _as_recorded(qos: QoSProfile) -> Qos:
     """Return a profile as rosbag2 finds it when it asks for what a publisher offers."""
-    from rosbags.interfaces import Qos
-    from rosbags.interfaces import QosDurability
-    from rosbags.interfaces import QosHistory
-    from rosbags.interfaces import QosLiveliness
-    from rosbags.interfaces import QosReliability
-    from rosbags.interfaces import QosTime
+    from rosbags.interfaces import (
+        Qos,
+        QosDurability,
+        QosHistory,
+        QosLiveliness,
+        QosReliability,
+        QosTime,
+    )
 
     for_ever = QosTime(*_FOR_EVER)
     return Qos(

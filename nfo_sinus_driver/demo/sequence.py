@@ -12,19 +12,14 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from nfo_sinus_msgs.msg import DriveStatus
-from nfo_sinus_msgs.msg import InvSt
-from nfo_sinus_msgs.msg import Telemetry
+from nfo_sinus_msgs.msg import DriveStatus, InvSt, Telemetry
 from rclpy.node import Node
 from rclpy.service_introspection import ServiceIntrospectionState
 from std_msgs.msg import Float32
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from nfo_sinus_driver.demo.bench import Bench
-from nfo_sinus_driver.node.qos import LATCHED
-from nfo_sinus_driver.node.qos import NEWEST
-from nfo_sinus_driver.node.qos import RELIABLE
+from nfo_sinus_driver.node.qos import LATCHED, NEWEST, RELIABLE
 
 #: A shared machine may be very slow; a step that takes longer has failed, s.
 PATIENCE = 30.0

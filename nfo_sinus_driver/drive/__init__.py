@@ -3,22 +3,13 @@
 
 """One inverter in engineering units. No ROS."""
 
-from nfo_sinus_driver.catalog import InverterStatus
-from nfo_sinus_driver.catalog import Procedure
+from nfo_sinus_driver.catalog import InverterStatus, Procedure
 from nfo_sinus_driver.drive.drive import Drive
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Event
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.events import Cause, DriveError, Event, Report, Severity
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.parameter_writer import Change
-from nfo_sinus_driver.drive.settings import CONTROL_METHODS
-from nfo_sinus_driver.drive.settings import DriveSettings
-from nfo_sinus_driver.drive.snapshot import Listener
-from nfo_sinus_driver.drive.snapshot import LogEntry
-from nfo_sinus_driver.drive.snapshot import Snapshot
-from nfo_sinus_driver.drive.snapshot import Telemetry
+from nfo_sinus_driver.drive.settings import CONTROL_METHODS, DriveSettings
+from nfo_sinus_driver.drive.snapshot import Listener, LogEntry, Snapshot, Telemetry
 from nfo_sinus_driver.drive.tuning import Tuned
 
 __all__ = [

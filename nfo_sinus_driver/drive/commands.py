@@ -10,33 +10,27 @@ A control method says what to write, and nothing of when; `controller` decides t
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
 import math
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Holder
-from nfo_sinus_driver.catalog import InverterStatus
-from nfo_sinus_driver.catalog import NotPossible
-from nfo_sinus_driver.catalog import Procedure
-from nfo_sinus_driver.catalog import Refusal
-from nfo_sinus_driver.catalog import Removal
-from nfo_sinus_driver.catalog import Reset
-from nfo_sinus_driver.catalog import profile
+from nfo_sinus_driver.catalog import (
+    Access,
+    Holder,
+    InverterStatus,
+    NotPossible,
+    Procedure,
+    Refusal,
+    Removal,
+    Reset,
+    profile,
+)
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
 
 _T = TypeVar('_T')
 

@@ -5,14 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Collection
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import Family, Role, Value
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 
 

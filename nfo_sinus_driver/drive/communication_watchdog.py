@@ -5,18 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import Role, Value
 from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN

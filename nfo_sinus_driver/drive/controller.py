@@ -11,40 +11,28 @@ is ENABLED, to which a person's :meth:`Controller.enable` alone leads. All of th
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 import contextlib
 import math
 
-from nfo_sinus_driver.bus import Cancelled
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.catalog import InverterStatus
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Limits
-from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.bus import Cancelled, Priority, Task
+from nfo_sinus_driver.catalog import InverterStatus, Kind, Limits, State
 from nfo_sinus_driver.drive import control_state
 from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.control_state import COMMANDED
-from nfo_sinus_driver.drive.control_state import ControlEvent
-from nfo_sinus_driver.drive.control_state import ControlState
-from nfo_sinus_driver.drive.diagnosis import explain_fall
-from nfo_sinus_driver.drive.diagnosis import explain_fault
-from nfo_sinus_driver.drive.diagnosis import explain_stop
-from nfo_sinus_driver.drive.diagnosis import report_of
-from nfo_sinus_driver.drive.diagnosis import require_no_fault
+from nfo_sinus_driver.drive.control_state import COMMANDED, ControlEvent, ControlState
+from nfo_sinus_driver.drive.diagnosis import (
+    explain_fall,
+    explain_fault,
+    explain_stop,
+    report_of,
+    require_no_fault,
+)
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.following import Following
-from nfo_sinus_driver.drive.sequences import StartSequence
-from nfo_sinus_driver.drive.sequences import StopSequence
+from nfo_sinus_driver.drive.sequences import StartSequence, StopSequence
 from nfo_sinus_driver.drive.setpoint import Setpoint
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import LinkError, Refused
 
 
 class ExclusiveAccess:

@@ -5,19 +5,11 @@
 
 from __future__ import annotations
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Cancelled
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.bus import Bus, Cancelled, Priority
+from nfo_sinus_driver.catalog import Family, families, load_family
 from nfo_sinus_driver.drive.diagnosis import explain
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.drive.events import Cause, DriveError
+from nfo_sinus_driver.link import Address, Identification, LinkError, Refused
 
 
 async def detect_model(bus: Bus, unit: int) -> str:

@@ -8,26 +8,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 import math
 
-from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import InverterStatus
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.catalog import Fact, InverterStatus, Kind, Meaning, State
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.link import GatewayFault
-from nfo_sinus_driver.link import GatewayLate
-from nfo_sinus_driver.link import GatewaySilent
-from nfo_sinus_driver.link import Interrupted
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import NoData
-from nfo_sinus_driver.link import NoPath
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.link import (
+    GatewayFault,
+    GatewayLate,
+    GatewaySilent,
+    Interrupted,
+    LinkError,
+    NoAnswer,
+    NoData,
+    NoPath,
+    PortError,
+    Refused,
+)
 
 #: What is wrong is not the drive, nor the settings of its line.
 _SAYS_WHAT_TO_DO = (

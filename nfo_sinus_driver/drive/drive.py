@@ -5,55 +5,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Collection
-from collections.abc import Coroutine
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Coroutine, Sequence
 from concurrent.futures import Future
 import math
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Cancelled
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Statistics
-from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.catalog import InverterStatus
-from nfo_sinus_driver.catalog import Procedure
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.commands import carry_out
-from nfo_sinus_driver.drive.commands import read_scales
+from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Statistics, Task
+from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
+from nfo_sinus_driver.drive.commands import Commands, carry_out, read_scales
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.error_log import ErrorLog
-from nfo_sinus_driver.drive.error_log import ErrorLogMonitor
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.error_log import ErrorLog, ErrorLogMonitor
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.parameter_writer import Change
-from nfo_sinus_driver.drive.parameters import Parameters
-from nfo_sinus_driver.drive.parameters import on_bus
-from nfo_sinus_driver.drive.poller import Poller
-from nfo_sinus_driver.drive.poller import take_snapshot
+from nfo_sinus_driver.drive.parameters import Parameters, on_bus
+from nfo_sinus_driver.drive.poller import Poller, take_snapshot
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import DriveSettings
-from nfo_sinus_driver.drive.snapshot import Listener
-from nfo_sinus_driver.drive.snapshot import LogEntry
-from nfo_sinus_driver.drive.snapshot import Snapshot
+from nfo_sinus_driver.drive.snapshot import Listener, LogEntry, Snapshot
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
-from nfo_sinus_driver.drive.tuning import Tuned
-from nfo_sinus_driver.drive.tuning import Tuning
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.drive.tuning import Tuned, Tuning
+from nfo_sinus_driver.link import LinkError, Refused
 
 _T = TypeVar('_T')
 

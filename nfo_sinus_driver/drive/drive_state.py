@@ -6,40 +6,33 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 from dataclasses import replace
 from fractions import Fraction
 import logging
 import math
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import Holder
-from nfo_sinus_driver.catalog import InverterStatus
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import OlderDialect
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.bus import Bus, Priority
+from nfo_sinus_driver.catalog import (
+    Fact,
+    Holder,
+    InverterStatus,
+    Kind,
+    Meaning,
+    OlderDialect,
+    Role,
+    load_family,
+)
 from nfo_sinus_driver.catalog.inverter_status import NO_CODE
 from nfo_sinus_driver.drive.communication_timeout import CommunicationTimeout
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Event
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.events import Cause, DriveError, Event, Report, Severity
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.scales import Scales
 from nfo_sinus_driver.drive.settings import DriveSettings
-from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
-from nfo_sinus_driver.drive.snapshot import Listener
-from nfo_sinus_driver.drive.snapshot import Measured
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.drive.snapshot import NOT_MEASURED, Listener, Measured
+from nfo_sinus_driver.link import Refused, Reply
 
 _log = logging.getLogger(__name__)
 

@@ -10,23 +10,14 @@ from dataclasses import replace
 import logging
 import math
 
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.catalog import ErrorLogArea
-from nfo_sinus_driver.catalog import InverterStatus
-from nfo_sinus_driver.catalog import Reset
-from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.bus import Priority, Task
+from nfo_sinus_driver.catalog import ErrorLogArea, InverterStatus, Reset, Role
 from nfo_sinus_driver.catalog.error_log import TICK
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.snapshot import LogEntry
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Address, LinkError, Refused
 
 _log = logging.getLogger(__name__)
 

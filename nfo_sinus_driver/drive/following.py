@@ -9,9 +9,7 @@ import math
 
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.events import Cause, Report, Severity
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 

@@ -5,25 +5,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.bus import Bus, Priority
+from nfo_sinus_driver.catalog import Access, Family, Parameter, Role, Value
 from nfo_sinus_driver.catalog.profile import Write
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import (
+    Address,
+    DamagedAnswer,
+    Identification,
+    LinkError,
+    NoAnswer,
+    Refused,
+    Reply,
+)
 
 #: How often a drive that is busy is asked again, s, and how many times.
 _BUSY_PERIOD = 0.05

@@ -5,31 +5,18 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-from collections.abc import Awaitable
-from collections.abc import Callable
-from collections.abc import Iterable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 
-from nfo_sinus_driver.bus import Cancelled
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.bus import Cancelled, Priority
+from nfo_sinus_driver.catalog import Family, Role, Value
 from nfo_sinus_driver.drive.controller import ExclusiveAccess
-from nfo_sinus_driver.drive.diagnosis import explain_failure
-from nfo_sinus_driver.drive.diagnosis import report_of
+from nfo_sinus_driver.drive.diagnosis import explain_failure, report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import LinkError, Refused
 
 _SERVICE = Priority.SERVICE
 #: How often it is tried to put a value back that the drive refuses.

@@ -6,43 +6,38 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import AsyncIterator
-from collections.abc import Awaitable
-from collections.abc import Callable
-from collections.abc import Collection
-from collections.abc import Coroutine
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import (
+    AsyncIterator,
+    Awaitable,
+    Callable,
+    Collection,
+    Coroutine,
+    Mapping,
+    Sequence,
+)
 from concurrent.futures import Future
 import contextlib
 import functools
 import logging
-from typing import Any
-from typing import Concatenate
-from typing import ParamSpec
-from typing import Protocol
-from typing import TypeVar
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.bus import Bus, Priority, Task
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.drive.parameter_writer import Change
-from nfo_sinus_driver.drive.parameter_writer import ParameterError
-from nfo_sinus_driver.drive.parameter_writer import ParameterWriter
-from nfo_sinus_driver.drive.parameter_writer import Written
-from nfo_sinus_driver.drive.parameter_writer import after_change
-from nfo_sinus_driver.drive.parameter_writer import followers
-from nfo_sinus_driver.drive.parameter_writer import not_changed
-from nfo_sinus_driver.drive.parameter_writer import show
-from nfo_sinus_driver.drive.parameter_writer import why_not
+from nfo_sinus_driver.drive.events import Cause, Report, Severity
+from nfo_sinus_driver.drive.parameter_writer import (
+    Change,
+    ParameterError,
+    ParameterWriter,
+    Written,
+    after_change,
+    followers,
+    not_changed,
+    show,
+    why_not,
+)
 from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import LinkError, Refused
 
 _log = logging.getLogger(__name__)
 

@@ -5,38 +5,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
-from collections.abc import Callable
-from collections.abc import Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 import logging
 import math
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.catalog import InverterStatus
-from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.bus import Priority, Task
+from nfo_sinus_driver.catalog import InverterStatus, Role
 from nfo_sinus_driver.drive.controller import Controller
-from nfo_sinus_driver.drive.diagnosis import Conditions
-from nfo_sinus_driver.drive.diagnosis import explain_failure
-from nfo_sinus_driver.drive.diagnosis import explain_fault
+from nfo_sinus_driver.drive.diagnosis import Conditions, explain_failure, explain_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.setpoint import Setpoint
-from nfo_sinus_driver.drive.snapshot import NAN
-from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
-from nfo_sinus_driver.drive.snapshot import Measured
-from nfo_sinus_driver.drive.snapshot import Snapshot
-from nfo_sinus_driver.link import Interrupted
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoData
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.drive.snapshot import NAN, NOT_MEASURED, Measured, Snapshot
+from nfo_sinus_driver.link import Interrupted, LinkError, NoData, PortError, Refused, Reply
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')

@@ -6,27 +6,18 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 import contextlib
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Holder
-from nfo_sinus_driver.catalog import Procedure
-from nfo_sinus_driver.catalog import Reset
-from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import Family, Holder, Procedure, Reset, Role
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.control_state import ControlState
-from nfo_sinus_driver.drive.controller import Controller
-from nfo_sinus_driver.drive.controller import ExclusiveAccess
+from nfo_sinus_driver.drive.controller import Controller, ExclusiveAccess
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report
+from nfo_sinus_driver.link import LinkError, Refused
 
 #: How often a busy drive is told again, and for how long, s.
 _BUSY_PERIOD = 0.05

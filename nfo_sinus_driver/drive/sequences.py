@@ -5,38 +5,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 import contextlib
 import enum
 import math
 
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import InverterStatus
-from nfo_sinus_driver.catalog import Limits
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import Removal
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.bus import Priority, Task
+from nfo_sinus_driver.catalog import Fact, InverterStatus, Limits, Meaning, Removal, Role, State
 from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.commands import read_limits
-from nfo_sinus_driver.drive.commands import read_scales
+from nfo_sinus_driver.drive.commands import Commands, read_limits, read_scales
 from nfo_sinus_driver.drive.control_state import ControlEvent
-from nfo_sinus_driver.drive.diagnosis import report_of
-from nfo_sinus_driver.drive.diagnosis import require_no_fault
+from nfo_sinus_driver.drive.diagnosis import report_of, require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import DriveError
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
 
 #: How often a stop is written again that was heard and is not confirmed, s.
 _RETRY_PERIOD = 0.2

@@ -5,31 +5,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 import enum
 import functools
 import math
 from typing import NamedTuple
 
-from nfo_sinus_driver.bus import LatestValue
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.bus import Transfer
-from nfo_sinus_driver.catalog import Limits
-from nfo_sinus_driver.catalog import SetpointTarget
+from nfo_sinus_driver.bus import LatestValue, Priority, Task, Transfer
+from nfo_sinus_driver.catalog import Limits, SetpointTarget
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.events import Severity
+from nfo_sinus_driver.drive.events import Cause, Report, Severity
 from nfo_sinus_driver.drive.snapshot import NAN
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Interrupted
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Address, Interrupted, LinkError, NoAnswer, Refused, Reply
 
 #: An unchanged set-point is written again when the last write is this old, s: somebody else may
 #: have changed it meanwhile.

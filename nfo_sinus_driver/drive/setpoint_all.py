@@ -5,23 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterable
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 import dataclasses
 import math
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import LatestValue
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.bus import Bus, LatestValue, Priority, Transfer
 from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import Report
-from nfo_sinus_driver.drive.setpoint import Request
-from nfo_sinus_driver.drive.setpoint import Setpoint
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.drive.events import Cause, Report
+from nfo_sinus_driver.drive.setpoint import Request, Setpoint
+from nfo_sinus_driver.link import Address, LinkError
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,22 +5,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 import functools
 import math
 
-from nfo_sinus_driver.catalog import ControlMethod
-from nfo_sinus_driver.catalog import Profile
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_parameter
-from nfo_sinus_driver.catalog import load_profile
-from nfo_sinus_driver.catalog import usual_family
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import LineProtocol
+from nfo_sinus_driver.catalog import (
+    ControlMethod,
+    Profile,
+    Role,
+    families,
+    load_parameter,
+    load_profile,
+    usual_family,
+)
+from nfo_sinus_driver.link import PROTOCOLS, LineProtocol
 
 #: The model that is found out at the first configure.
 AUTO = 'auto'

@@ -6,16 +6,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
-from dataclasses import field
+from dataclasses import dataclass, field
 from datetime import datetime
 import math
-from typing import NamedTuple
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
-from nfo_sinus_driver.catalog import InverterStatus
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import InverterStatus, Kind, Role
 from nfo_sinus_driver.drive.events import Event
 from nfo_sinus_driver.link import Clock
 

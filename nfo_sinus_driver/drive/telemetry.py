@@ -11,10 +11,8 @@ from collections.abc import Callable
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.snapshot import NAN
-from nfo_sinus_driver.drive.snapshot import Telemetry
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.drive.snapshot import NAN, Telemetry
+from nfo_sinus_driver.link import LinkError, Refused
 
 #: Read every time.
 FAST = (

@@ -6,16 +6,17 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 import math
 
 from nfo_sinus_driver.link.interface import Remarks
-from nfo_sinus_driver.link.modbus_link import ENCAPSULATED_INTERFACE
-from nfo_sinus_driver.link.modbus_link import REPORT_SLAVE_ID
-from nfo_sinus_driver.link.modbus_link import ReadDevice
-from nfo_sinus_driver.link.modbus_link import ReportSlaveId
+from nfo_sinus_driver.link.modbus_link import (
+    ENCAPSULATED_INTERFACE,
+    REPORT_SLAVE_ID,
+    ReadDevice,
+    ReportSlaveId,
+)
 from nfo_sinus_driver.link.modbus_pdu import REFUSAL_LENGTH
 
 ANOTHER_MASTER = (

@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 #: The most bytes that a frame carries.
 MOST_DATA = 8

@@ -8,11 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NotReady
-from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import Address, Identification, LinkError, NotReady, Reply
 
 _SPACE = 'object'
 #: The longest text that is expected.

@@ -5,42 +5,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Iterator, Sequence, Set as AbstractSet
 import contextlib
 from dataclasses import replace
 import re
 import time
 
-from nfo_sinus_driver.link import nmt
-from nfo_sinus_driver.link import sdo
+from nfo_sinus_driver.link import nmt, sdo
 from nfo_sinus_driver.link.another_client import AnotherClient
-from nfo_sinus_driver.link.can import FUNCTION_CODE
-from nfo_sinus_driver.link.can import CanPort
-from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.can import FUNCTION_CODE, CanPort, Frame
 from nfo_sinus_driver.link.canopen_identify import CanopenInquiry
 from nfo_sinus_driver.link.canopen_supervision import CanopenSupervision
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Clock
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import PortError
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.interface import Remarks
-from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import (
+    Address,
+    Clock,
+    DamagedAnswer,
+    LineSettings,
+    LinkError,
+    NoAnswer,
+    PortError,
+    Refused,
+    Remarks,
+    Reply,
+)
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.lawicel_port import LawicelPort
 from nfo_sinus_driver.link.line_protocols import CANOPEN
-from nfo_sinus_driver.link.object_shapes import SECOND
-from nfo_sinus_driver.link.object_shapes import ObjectShapes
+from nfo_sinus_driver.link.object_shapes import SECOND, ObjectShapes
 from nfo_sinus_driver.link.port import port_of
-from nfo_sinus_driver.link.sdo import Download
-from nfo_sinus_driver.link.sdo import Kind
-from nfo_sinus_driver.link.sdo import Transfer
-from nfo_sinus_driver.link.sdo import Upload
+from nfo_sinus_driver.link.sdo import Download, Kind, Transfer, Upload
 from nfo_sinus_driver.link.socketcan import SocketCan
 
 #: Bit rate of the serial port of an adapter; those on USB do not care.

@@ -12,20 +12,13 @@ asks serves all of them, so they end with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Generator
-from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Callable, Generator, Sequence, Set as AbstractSet
 import math
 from typing import NamedTuple
 
 from nfo_sinus_driver.link import nmt
-from nfo_sinus_driver.link.can import CanPort
-from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Clock
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.can import CanPort, Frame
+from nfo_sinus_driver.link.interface import Address, Clock, Refused, Reply
 
 #: How often nodes hear the heartbeat, s, and how often at least in the time that one watches for.
 _HEARTBEAT = 0.1

@@ -12,14 +12,11 @@ in both [C86].
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from functools import reduce
+from functools import lru_cache, reduce
 from operator import xor
 
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.line_protocols import BROADCAST
-from nfo_sinus_driver.link.line_protocols import POINT_TO_POINT
+from nfo_sinus_driver.link.interface import LinkError, Refused
+from nfo_sinus_driver.link.line_protocols import BROADCAST, POINT_TO_POINT
 
 #: Of how many messages what is sent is kept; the ENQUIRIES of a poll are sent again and again.
 PREPARED = 1024

@@ -13,37 +13,38 @@ from typing import NamedTuple
 
 from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.link.another_master import DOUBTFUL
-from nfo_sinus_driver.link.classic import INV_ST
-from nfo_sinus_driver.link.classic import MODE
-from nfo_sinus_driver.link.classic import SIO_ERR
-from nfo_sinus_driver.link.classic import SIO_FAIL
-from nfo_sinus_driver.link.classic import Enquiry
-from nfo_sinus_driver.link.classic import Kind
-from nfo_sinus_driver.link.classic import Message
-from nfo_sinus_driver.link.classic import Nak
-from nfo_sinus_driver.link.classic import Reader
-from nfo_sinus_driver.link.classic import Request
-from nfo_sinus_driver.link.classic import Select
-from nfo_sinus_driver.link.classic import Value
-from nfo_sinus_driver.link.classic import nameless
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Clock
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import NothingToAsk
-from nfo_sinus_driver.link.interface import PortError
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.interface import Remarks
-from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.classic import (
+    INV_ST,
+    MODE,
+    SIO_ERR,
+    SIO_FAIL,
+    Enquiry,
+    Kind,
+    Message,
+    Nak,
+    Reader,
+    Request,
+    Select,
+    Value,
+    nameless,
+)
+from nfo_sinus_driver.link.interface import (
+    Address,
+    Clock,
+    DamagedAnswer,
+    LineSettings,
+    LinkError,
+    NoAnswer,
+    NothingToAsk,
+    PortError,
+    Refused,
+    Remarks,
+    Reply,
+)
 from nfo_sinus_driver.link.late_replies import LateReplies
-from nfo_sinus_driver.link.line_protocols import BROADCAST
-from nfo_sinus_driver.link.line_protocols import CLASSIC
-from nfo_sinus_driver.link.other_requests import TRIES
-from nfo_sinus_driver.link.other_requests import OtherRequests
-from nfo_sinus_driver.link.port import Port
-from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.line_protocols import BROADCAST, CLASSIC
+from nfo_sinus_driver.link.other_requests import TRIES, OtherRequests
+from nfo_sinus_driver.link.port import Port, port_of
 
 #: What a message carries.
 _WORD = struct.Struct('>H')

@@ -5,14 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Callable, Sequence, Set as AbstractSet
 from dataclasses import dataclass
 import functools
 import re
-from typing import NamedTuple
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 #: Of serial lines to drives, bit/s.
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600)

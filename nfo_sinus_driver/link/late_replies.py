@@ -9,13 +9,9 @@ Without I/O; time is in seconds of one steady clock.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterable
-from collections.abc import Set as AbstractSet
+from collections.abc import Callable, Iterable, Set as AbstractSet
 import enum
-from typing import Generic
-from typing import Protocol
-from typing import TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from nfo_sinus_driver.link.interface import NotReady
 

@@ -16,9 +16,7 @@ from collections.abc import Sequence
 import re
 from typing import NamedTuple
 
-from nfo_sinus_driver.link.can import IDENTIFIERS
-from nfo_sinus_driver.link.can import MOST_DATA
-from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.can import IDENTIFIERS, MOST_DATA, Frame
 
 #: The digit of the command that sets a bit rate, by the rate, bit/s.
 BIT_RATES = {

@@ -10,10 +10,8 @@ import contextlib
 import time
 
 from nfo_sinus_driver.link import lawicel
-from nfo_sinus_driver.link.can import CANNOT_SEND
-from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.interface import Clock
-from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.can import CANNOT_SEND, Frame
+from nfo_sinus_driver.link.interface import Clock, PortError
 from nfo_sinus_driver.link.port import Port
 
 #: How long an adapter may take to say that it has done something, s; some never say it.

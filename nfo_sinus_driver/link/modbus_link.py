@@ -5,24 +5,22 @@
 
 from __future__ import annotations
 
-from abc import ABC
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 import re
 from typing import TypeVar
 
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.interface import LineProtocol
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NotReady
-from nfo_sinus_driver.link.interface import Remarks
-from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.modbus_pdu import Request
-from nfo_sinus_driver.link.modbus_pdu import Write
-from nfo_sinus_driver.link.modbus_pdu import read_of
-from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
+from nfo_sinus_driver.link.interface import (
+    Address,
+    Identification,
+    LineProtocol,
+    LinkError,
+    NotReady,
+    Remarks,
+    Reply,
+)
+from nfo_sinus_driver.link.modbus_pdu import Request, Write, read_of, write_and_read_of
 
 _T = TypeVar('_T')
 

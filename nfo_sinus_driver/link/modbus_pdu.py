@@ -10,18 +10,14 @@ it into frames of its own.
 
 from __future__ import annotations
 
-from abc import ABC
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 import functools
 import struct
-from typing import Generic
-from typing import Protocol
-from typing import TypeVar
+from typing import Generic, Protocol, TypeVar
 
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Address, Refused
 
 READ_HOLDING_REGISTERS = 3
 WRITE_SINGLE_REGISTER = 6

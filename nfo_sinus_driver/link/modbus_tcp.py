@@ -13,40 +13,35 @@ somebody else is there.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import contextlib
 import struct
 import time
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
-from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link import telegram
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Clock
-from nfo_sinus_driver.link.interface import Connecting
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import GatewayFault
-from nfo_sinus_driver.link.interface import GatewayLate
-from nfo_sinus_driver.link.interface import GatewaySilent
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import NoPath
-from nfo_sinus_driver.link.interface import PortError
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.interface import Remarks
-from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link import modbus_pdu, telegram
+from nfo_sinus_driver.link.interface import (
+    Address,
+    Clock,
+    Connecting,
+    DamagedAnswer,
+    GatewayFault,
+    GatewayLate,
+    GatewaySilent,
+    LineSettings,
+    LinkError,
+    NoAnswer,
+    NoPath,
+    PortError,
+    Refused,
+    Remarks,
+    Reply,
+)
 from nfo_sinus_driver.link.line_protocols import MODBUS_TCP
 from nfo_sinus_driver.link.modbus_link import ModbusLink
-from nfo_sinus_driver.link.modbus_pdu import Request
-from nfo_sinus_driver.link.modbus_pdu import Write
-from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
-from nfo_sinus_driver.link.modbus_pdu import understand
-from nfo_sinus_driver.link.tcp_connection import Connection
-from nfo_sinus_driver.link.tcp_connection import TcpConnection
+from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, understand
+from nfo_sinus_driver.link.tcp_connection import Connection, TcpConnection
 
 _HEADER = struct.Struct('>HHH')
 #: Unit and function, and as much data as there can be.

@@ -5,43 +5,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 import contextlib
 import time
 
-from nfo_sinus_driver.link import movitrac
-from nfo_sinus_driver.link import movitrac_refusal
+from nfo_sinus_driver.link import movitrac, movitrac_refusal
 from nfo_sinus_driver.link.another_master import DOUBTFUL
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Clock
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NeverSilent
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import NothingToAsk
-from nfo_sinus_driver.link.interface import PortError
-from nfo_sinus_driver.link.interface import Remarks
-from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import (
+    Address,
+    Clock,
+    DamagedAnswer,
+    LineSettings,
+    LinkError,
+    NeverSilent,
+    NoAnswer,
+    NothingToAsk,
+    PortError,
+    Remarks,
+    Reply,
+)
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.line_protocols import MOVITRAC
-from nfo_sinus_driver.link.movitrac import Answer
-from nfo_sinus_driver.link.movitrac import Data
-from nfo_sinus_driver.link.movitrac import Enquiry
-from nfo_sinus_driver.link.movitrac import Kind
-from nfo_sinus_driver.link.movitrac import Nack
-from nfo_sinus_driver.link.movitrac import Overhearing
-from nfo_sinus_driver.link.movitrac import Reader
-from nfo_sinus_driver.link.movitrac import Request
-from nfo_sinus_driver.link.movitrac import Select
-from nfo_sinus_driver.link.other_requests import TRIES
-from nfo_sinus_driver.link.other_requests import OtherRequests
-from nfo_sinus_driver.link.port import Port
-from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.movitrac import (
+    Answer,
+    Data,
+    Enquiry,
+    Kind,
+    Nack,
+    Overhearing,
+    Reader,
+    Request,
+    Select,
+)
+from nfo_sinus_driver.link.other_requests import TRIES, OtherRequests
+from nfo_sinus_driver.link.port import Port, port_of
 from nfo_sinus_driver.link.serial_link import Echo
-from nfo_sinus_driver.link.silence import NEVER_SILENT
-from nfo_sinus_driver.link.silence import await_silence
+from nfo_sinus_driver.link.silence import NEVER_SILENT, await_silence
 
 #: How much later than at once a drive may be told to answer (P843), s.
 LONGEST_RESPONSE_TIME = 0.2

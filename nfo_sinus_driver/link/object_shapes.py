@@ -5,13 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from nfo_sinus_driver.link import sdo_abort
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Address, DamagedAnswer, Refused
 from nfo_sinus_driver.link.sdo_abort import Aborted
 
 #: How many bytes a number may have on CANopen.

@@ -5,11 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterable
-from typing import Any
-from typing import Generic
-from typing import TypeVar
+from collections.abc import Callable, Iterable
+from typing import Any, Generic, TypeVar
 
 from nfo_sinus_driver.link.another_master import Sightings
 from nfo_sinus_driver.link.interface import Remarks

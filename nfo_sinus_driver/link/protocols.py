@@ -6,12 +6,9 @@
 from __future__ import annotations
 
 import importlib
-from typing import Protocol
-from typing import cast
+from typing import Protocol, cast
 
-from nfo_sinus_driver.link.interface import LineProtocol
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import Link
+from nfo_sinus_driver.link.interface import LineProtocol, LineSettings, Link
 from nfo_sinus_driver.link.line_protocols import PROTOCOLS
 
 

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import logging
 
-from nfo_sinus_driver.link.interface import Connecting
-from nfo_sinus_driver.link.interface import Link
-from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import Connecting, Link, PortError
 
 _log = logging.getLogger(__name__)
 

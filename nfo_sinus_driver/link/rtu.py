@@ -12,14 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import functools
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link.another_master import message_lengths
 from nfo_sinus_driver.link.line_protocols import MODBUS_RTU
-from nfo_sinus_driver.link.modbus_pdu import AnswerReader
-from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.modbus_pdu import AnswerReader, Request
 from nfo_sinus_driver.link.serial_link import SerialLink
 
 #: How many bytes the check sum has.

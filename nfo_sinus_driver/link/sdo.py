@@ -12,10 +12,8 @@ to which object; only segments do not say to which.
 
 from __future__ import annotations
 
-from abc import ABC
-from abc import abstractmethod
-from collections.abc import Iterator
-from collections.abc import Set as AbstractSet
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Set as AbstractSet
 import struct
 from typing import NamedTuple
 

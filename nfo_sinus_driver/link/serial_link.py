@@ -6,43 +6,38 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 import contextlib
 import time
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from nfo_sinus_driver.link.another_master import DOUBTFUL
-from nfo_sinus_driver.link.another_master import AnotherMaster
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Clock
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NeverSilent
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import NotReady
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.interface import Remarks
-from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.late_replies import Doubt
-from nfo_sinus_driver.link.late_replies import LateReplies
-from nfo_sinus_driver.link.modbus_link import SPECIFIC
-from nfo_sinus_driver.link.modbus_link import ModbusLink
-from nfo_sinus_driver.link.modbus_link import ReadDevice
-from nfo_sinus_driver.link.modbus_link import ReportSlaveId
-from nfo_sinus_driver.link.modbus_pdu import AnswerReader
-from nfo_sinus_driver.link.modbus_pdu import Request
-from nfo_sinus_driver.link.modbus_pdu import Write
-from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
-from nfo_sinus_driver.link.modbus_pdu import read_of
-from nfo_sinus_driver.link.modbus_pdu import refusal_head
-from nfo_sinus_driver.link.modbus_pdu import write_and_read_of
-from nfo_sinus_driver.link.port import Port
-from nfo_sinus_driver.link.port import port_of
-from nfo_sinus_driver.link.silence import NEVER_SILENT
-from nfo_sinus_driver.link.silence import await_silence
+from nfo_sinus_driver.link.another_master import DOUBTFUL, AnotherMaster
+from nfo_sinus_driver.link.interface import (
+    Address,
+    Clock,
+    DamagedAnswer,
+    LineSettings,
+    LinkError,
+    NeverSilent,
+    NoAnswer,
+    NotReady,
+    Refused,
+    Remarks,
+    Reply,
+)
+from nfo_sinus_driver.link.late_replies import Doubt, LateReplies
+from nfo_sinus_driver.link.modbus_link import SPECIFIC, ModbusLink, ReadDevice, ReportSlaveId
+from nfo_sinus_driver.link.modbus_pdu import (
+    AnswerReader,
+    Request,
+    Write,
+    WriteAndRead,
+    read_of,
+    refusal_head,
+    write_and_read_of,
+)
+from nfo_sinus_driver.link.port import Port, port_of
+from nfo_sinus_driver.link.silence import NEVER_SILENT, await_silence
 
 _T = TypeVar('_T')
 

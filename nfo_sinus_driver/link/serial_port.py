@@ -15,8 +15,7 @@ import struct
 import termios
 import time
 
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import LineSettings, PortError
 
 # Linux ioctls that Python's termios module does not name
 _TIOCGSERIAL = 0x541E

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 import errno
 from pathlib import Path
 import select
@@ -14,10 +13,7 @@ import socket
 import struct
 import time
 
-from nfo_sinus_driver.link.can import CANNOT_SEND
-from nfo_sinus_driver.link.can import IDENTIFIERS
-from nfo_sinus_driver.link.can import MOST_DATA
-from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.can import CANNOT_SEND, IDENTIFIERS, MOST_DATA, Frame
 from nfo_sinus_driver.link.interface import PortError
 
 #: struct can_frame and struct can_filter (linux/can.h).

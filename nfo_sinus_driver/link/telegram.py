@@ -27,18 +27,17 @@ from collections.abc import Callable
 import struct
 from typing import TypeVar
 
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import Clock
-from nfo_sinus_driver.link.interface import Interrupted
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NoData
-from nfo_sinus_driver.link.interface import NoPath
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.interface import Reply
-from nfo_sinus_driver.link.modbus_pdu import Read
-from nfo_sinus_driver.link.modbus_pdu import Request
-from nfo_sinus_driver.link.modbus_pdu import Write
-from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+from nfo_sinus_driver.link.interface import (
+    Address,
+    Clock,
+    Interrupted,
+    LinkError,
+    NoData,
+    NoPath,
+    Refused,
+    Reply,
+)
+from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write, WriteAndRead
 
 _T = TypeVar('_T')
 

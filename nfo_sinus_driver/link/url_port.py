@@ -11,8 +11,7 @@ from urllib.parse import urlsplit
 
 import serial
 
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import LineSettings, PortError
 from nfo_sinus_driver.link.tcp_connection import watch_over
 
 _READ_SIZE = 512

@@ -14,8 +14,7 @@ import os
 import sys
 
 from nfo_sinus_driver.node.nonblocking_stdio import open_closed_streams
-from nfo_sinus_driver.signals import HeldSignals
-from nfo_sinus_driver.signals import ros2_parent
+from nfo_sinus_driver.signals import HeldSignals, ros2_parent
 
 
 def main(args: list[str] | None = None) -> int:

@@ -6,16 +6,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeoutError
+from concurrent.futures import Future, TimeoutError as FutureTimeoutError
 import time
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.drive import DriveError, Report
 from nfo_sinus_driver.drive.setpoint_all import broadcast_stop
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.callers import log_call

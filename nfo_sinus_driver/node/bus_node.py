@@ -14,16 +14,13 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.node import diagnostics
-from nfo_sinus_driver.node import messages
+from nfo_sinus_driver.link import line_settings, open_link
+from nfo_sinus_driver.node import diagnostics, messages
 from nfo_sinus_driver.node.all_drives import AllDrives
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.qos import RELIABLE
 from nfo_sinus_driver.node.setpoints import SetpointsForAll
-from nfo_sinus_driver.node.settings import BUS_SETTINGS
-from nfo_sinus_driver.node.settings import declare
+from nfo_sinus_driver.node.settings import BUS_SETTINGS, declare
 
 _PERIOD = 1.0
 #: How long it is waited for at the start that the port opens, and how often it is looked, s.

@@ -11,8 +11,7 @@ import time
 
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.node import Node
-from rclpy.node import NodeNameNonExistentError
+from rclpy.node import Node, NodeNameNonExistentError
 
 #: Within what time the middleware knows of a new client, s, and how often it is looked for.
 _KNOWN_WITHIN = 0.5

@@ -5,41 +5,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Sequence
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeoutError
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, TimeoutError as FutureTimeoutError
 import contextlib
 import functools
 import math
 import queue
 import threading
 import time
-from typing import Any
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.action import Tune
 from nfo_sinus_msgs.srv import GetErrorLog
-from rclpy.action import ActionServer
-from rclpy.action import CancelResponse
-from rclpy.action import GoalResponse
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
-from rclpy.callback_groups import CallbackGroup
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.callback_groups import (
+    CallbackGroup,
+    MutuallyExclusiveCallbackGroup,
+    ReentrantCallbackGroup,
+)
 from rclpy.node import Node
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import LogEntry
-from nfo_sinus_driver.drive import Procedure
-from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.drive import Tuned
+from nfo_sinus_driver.drive import (
+    Cause,
+    Drive,
+    DriveError,
+    LogEntry,
+    Procedure,
+    Report,
+    Snapshot,
+    Tuned,
+)
 from nfo_sinus_driver.node import messages
 from nfo_sinus_driver.node.callers import log_call
 from nfo_sinus_driver.node.executor import received_at

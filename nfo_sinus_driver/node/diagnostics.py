@@ -9,15 +9,12 @@ from collections.abc import Sequence
 import math
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray
-from diagnostic_msgs.msg import DiagnosticStatus
-from diagnostic_msgs.msg import KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.drive import LogEntry
-from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import LogEntry, Snapshot
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 

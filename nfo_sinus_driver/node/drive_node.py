@@ -5,46 +5,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeoutError
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, TimeoutError as FutureTimeoutError
 import dataclasses
 import functools
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.lifecycle import LifecycleNodeMixin
-from rclpy.lifecycle import LifecycleState
-from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from nfo_sinus_driver.drive import Change
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.drive import Change, DriveError, DriveSettings, Report
 from nfo_sinus_driver.node.bus_context import BusContext
-from nfo_sinus_driver.node.commands import Commands
-from nfo_sinus_driver.node.commands import ErrorLogServices
-from nfo_sinus_driver.node.commands import TuningServices
-from nfo_sinus_driver.node.drive_parameters import DriveParameters
-from nfo_sinus_driver.node.drive_parameters import wanted_state
+from nfo_sinus_driver.node.commands import Commands, ErrorLogServices, TuningServices
+from nfo_sinus_driver.node.drive_parameters import DriveParameters, wanted_state
 from nfo_sinus_driver.node.lifecycle import Lifecycle
-from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED
-from nfo_sinus_driver.node.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
 from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.reporter import Reporter
-from nfo_sinus_driver.node.scale import Scale
-from nfo_sinus_driver.node.scale import require_scale
+from nfo_sinus_driver.node.scale import Scale, require_scale
 from nfo_sinus_driver.node.setpoints import Setpoints
-from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
-from nfo_sinus_driver.node.settings import coerce
-from nfo_sinus_driver.node.settings import declare
-from nfo_sinus_driver.node.wording import NodeError
-from nfo_sinus_driver.node.wording import Wording
+from nfo_sinus_driver.node.settings import DRIVE_SETTINGS, coerce, declare
+from nfo_sinus_driver.node.wording import NodeError, Wording
 
 _NAMES = frozenset(setting.name for setting in DRIVE_SETTINGS)
 #: How long a stop may wait for the bus before it is said that it is not known, s.

@@ -5,28 +5,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from collections.abc import Iterable
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import contextlib
 import threading
 
-from rcl_interfaces.msg import FloatingPointRange
-from rcl_interfaces.msg import IntegerRange
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Parameter as CatalogParameter
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive import Change
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.node.overrides import declared_names
-from nfo_sinus_driver.node.overrides import did_you_mean
+from nfo_sinus_driver.catalog import Family, Parameter as CatalogParameter, Value
+from nfo_sinus_driver.drive import Change, Drive
+from nfo_sinus_driver.node.overrides import declared_names, did_you_mean
 from nfo_sinus_driver.node.wording import NodeError
 
 #: How long a change may wait for the bus before it is said that it is not known, s.

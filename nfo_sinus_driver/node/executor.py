@@ -13,10 +13,7 @@ So this sends it again.
 
 from __future__ import annotations
 
-from collections.abc import Awaitable
-from collections.abc import Callable
-from collections.abc import Iterable
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 import contextlib
 from contextvars import ContextVar
@@ -27,12 +24,14 @@ from typing import Any
 import warnings
 
 from rclpy.exceptions import InvalidHandle
-from rclpy.executors import ConditionReachedException
-from rclpy.executors import Executor
-from rclpy.executors import ExternalShutdownException
-from rclpy.executors import ShutdownException
-from rclpy.executors import TimeoutException
-from rclpy.executors import await_or_execute
+from rclpy.executors import (
+    ConditionReachedException,
+    Executor,
+    ExternalShutdownException,
+    ShutdownException,
+    TimeoutException,
+    await_or_execute,
+)
 from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.task import Task

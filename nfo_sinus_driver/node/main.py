@@ -10,9 +10,7 @@ It owns its signals, so that ROS is still there when the motors are being stoppe
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeoutError
-from concurrent.futures import as_completed
+from concurrent.futures import Future, TimeoutError as FutureTimeoutError, as_completed
 import contextlib
 import ctypes
 import gc
@@ -22,31 +20,27 @@ import traceback
 from typing import Any
 
 import rclpy
-from rclpy.exceptions import InvalidNodeNameException
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import InvalidNodeNameException, ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_node_name import validate_node_name
 
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME
-from nfo_sinus_driver.node.bus_node import BusNode
+from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME, BusNode
 from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
-from nfo_sinus_driver.node.executor import NodeExecutor
-from nfo_sinus_driver.node.executor import end_all
+from nfo_sinus_driver.node.executor import NodeExecutor, end_all
 from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
-from nfo_sinus_driver.node.overrides import bus_overrides
-from nfo_sinus_driver.node.overrides import overruled_parameters
-from nfo_sinus_driver.node.overrides import refuse_other_arguments
-from nfo_sinus_driver.node.overrides import take_out_end_with
-from nfo_sinus_driver.node.overrides import take_out_node_name
-from nfo_sinus_driver.node.overrides import unknown_nodes
-from nfo_sinus_driver.node.overrides import unknown_parameters
-from nfo_sinus_driver.signals import ENDING
-from nfo_sinus_driver.signals import HeldSignals
-from nfo_sinus_driver.signals import OtherProcess
-from nfo_sinus_driver.signals import signal_name
+from nfo_sinus_driver.node.overrides import (
+    bus_overrides,
+    overruled_parameters,
+    refuse_other_arguments,
+    take_out_end_with,
+    take_out_node_name,
+    unknown_nodes,
+    unknown_parameters,
+)
+from nfo_sinus_driver.signals import ENDING, HeldSignals, OtherProcess, signal_name
 
 #: Threads that callbacks of one drive may keep waiting: one for each of its callback groups, but
 #: more for ``~/enable``.

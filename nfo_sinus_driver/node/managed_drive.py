@@ -9,16 +9,12 @@ from concurrent.futures import Future
 import dataclasses
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Listener
-from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.drive import Drive, DriveSettings, Listener, Report
 from nfo_sinus_driver.drive.detect import detect_model
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.scale import Scale
-from nfo_sinus_driver.node.wording import NodeError
-from nfo_sinus_driver.node.wording import Wording
+from nfo_sinus_driver.node.wording import NodeError, Wording
 
 #: What identifies a drive or how it is commanded cannot change under way.
 ONLY_UNCONFIGURED = (

@@ -5,29 +5,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import math
 
 from builtin_interfaces.msg import Time
-from nfo_sinus_msgs.msg import BusStatistics
-from nfo_sinus_msgs.msg import DriveStatus
-from nfo_sinus_msgs.msg import ErrorLogEntry
-from nfo_sinus_msgs.msg import InvSt
-from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
+from nfo_sinus_msgs.msg import (
+    BusStatistics,
+    DriveStatus,
+    ErrorLogEntry,
+    InvSt,
+    Telemetry as TelemetryMessage,
+)
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from nfo_sinus_driver.bus import Statistics
-from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import InverterStatus
-from nfo_sinus_driver.drive import LogEntry
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.catalog import Fact, Kind, Role, State
+from nfo_sinus_driver.drive import Drive, InverterStatus, LogEntry, Snapshot, Telemetry
 from nfo_sinus_driver.node.scale import Scale
 
 _CONTROL_MODES = {

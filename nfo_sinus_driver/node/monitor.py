@@ -10,12 +10,9 @@ It listens to every drive on the graph and can stop them; nothing here starts a 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 import contextlib
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 import math
 import os
 import sys
@@ -23,39 +20,33 @@ import threading
 import time
 from typing import Any
 
-from nfo_sinus_msgs.msg import BusStatistics
-from nfo_sinus_msgs.msg import DriveStatus
-from nfo_sinus_msgs.msg import ErrorLogEntry
-from nfo_sinus_msgs.msg import InvSt
-from nfo_sinus_msgs.msg import Telemetry
+from nfo_sinus_msgs.msg import BusStatistics, DriveStatus, ErrorLogEntry, InvSt, Telemetry
 from rcl_interfaces.msg import Log
 import rclpy
 from rclpy.client import Client
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.utilities import get_default_context
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.node.qos import KEPT
-from nfo_sinus_driver.node.qos import LATCHED
-from nfo_sinus_driver.node.qos import RELIABLE
+from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE
 from nfo_sinus_driver.version import VERSION
 from nfo_sinus_driver.view import terminal
-from nfo_sinus_driver.view.picture import Condition
-from nfo_sinus_driver.view.picture import DriveView
-from nfo_sinus_driver.view.picture import Level
-from nfo_sinus_driver.view.picture import Measured
-from nfo_sinus_driver.view.picture import Note
-from nfo_sinus_driver.view.picture import Picture
-from nfo_sinus_driver.view.picture import line_view
+from nfo_sinus_driver.view.picture import (
+    Condition,
+    DriveView,
+    Level,
+    Measured,
+    Note,
+    Picture,
+    line_view,
+)
 
 #: How often it is looked who is on the graph, s.
 _DISCOVERY_PERIOD = 1.0

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 import itertools
 from pathlib import Path
 import re
@@ -14,9 +13,7 @@ from typing import Any
 
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rclpy.node import Node
-from rclpy.parameter import Parameter
-from rclpy.parameter import get_parameter_value
-from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
 from rclpy.utilities import remove_ros_args
 import yaml
 

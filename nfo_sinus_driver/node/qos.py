@@ -3,10 +3,7 @@
 
 """The qualities of service that the topics and services of the driver have."""
 
-from rclpy.qos import DurabilityPolicy
-from rclpy.qos import HistoryPolicy
-from rclpy.qos import QoSProfile
-from rclpy.qos import ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 #: For what flows: status, actual values, telemetry, statistics.
 RELIABLE = QoSProfile(

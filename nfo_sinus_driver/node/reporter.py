@@ -5,38 +5,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 import time
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from nfo_sinus_msgs.msg import BusStatistics
-from nfo_sinus_msgs.msg import DriveStatus
-from nfo_sinus_msgs.msg import ErrorLogEntry
-from nfo_sinus_msgs.msg import InvSt
-from nfo_sinus_msgs.msg import Telemetry as TelemetryMessage
+from nfo_sinus_msgs.msg import (
+    BusStatistics,
+    DriveStatus,
+    ErrorLogEntry,
+    InvSt,
+    Telemetry as TelemetryMessage,
+)
 from rclpy.lifecycle import LifecycleNodeMixin
 from rclpy.time import Time as NodeTime
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.drive import Event
-from nfo_sinus_driver.drive import LogEntry
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.drive import Telemetry
-from nfo_sinus_driver.node import diagnostics
-from nfo_sinus_driver.node import messages
+from nfo_sinus_driver.drive import Event, LogEntry, Severity, Snapshot, Telemetry
+from nfo_sinus_driver.node import diagnostics, messages
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.publish_queue import PublishQueue
-from nfo_sinus_driver.node.qos import KEPT
-from nfo_sinus_driver.node.qos import LATCHED
-from nfo_sinus_driver.node.qos import RELIABLE
-from nfo_sinus_driver.node.stamps import Sequence
-from nfo_sinus_driver.node.stamps import Stamps
+from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE
+from nfo_sinus_driver.node.stamps import Sequence, Stamps
 from nfo_sinus_driver.node.wording import Wording
 
 #: How often diagnostics go out and, while the drive is not connected, the status, s.

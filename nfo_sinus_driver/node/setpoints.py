@@ -18,12 +18,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive.setpoint_all import SetpointAll
-from nfo_sinus_driver.drive.setpoint_all import Told
+from nfo_sinus_driver.drive.setpoint_all import SetpointAll, Told
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
-from nfo_sinus_driver.node.messages import Joint
-from nfo_sinus_driver.node.messages import control_mode
+from nfo_sinus_driver.node.messages import Joint, control_mode
 
 _UNITS = {
     'Freque': Setpoint.HZ,

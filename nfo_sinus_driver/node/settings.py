@@ -8,23 +8,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from rcl_interfaces.msg import FloatingPointRange
-from rcl_interfaces.msg import IntegerRange
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import usual_family
+from nfo_sinus_driver.catalog import families, usual_family
 from nfo_sinus_driver.drive import CONTROL_METHODS
-from nfo_sinus_driver.drive.settings import AUTO
-from nfo_sinus_driver.drive.settings import CONTROL_MODES
-from nfo_sinus_driver.drive.settings import LAST_BLOCK
-from nfo_sinus_driver.drive.settings import LONGEST_DRIVE_TIMEOUT
-from nfo_sinus_driver.drive.settings import REFERENCES
-from nfo_sinus_driver.drive.settings import TELEGRAM_WORDS
-from nfo_sinus_driver.link import BIT_RATES
-from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.drive.settings import (
+    AUTO,
+    CONTROL_MODES,
+    LAST_BLOCK,
+    LONGEST_DRIVE_TIMEOUT,
+    REFERENCES,
+    TELEGRAM_WORDS,
+)
+from nfo_sinus_driver.link import BIT_RATES, PROTOCOLS
 
 #: What YAML makes of a character format without quotes.
 _FORMATS_THAT_ARE_NUMBERS = {float(text): text for text in ('7E1', '8E1', '7E2', '8E2')}

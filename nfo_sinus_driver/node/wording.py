@@ -7,10 +7,8 @@ from __future__ import annotations
 
 from rclpy.node import Node
 
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.wording import Calls
-from nfo_sinus_driver.wording import sentence
+from nfo_sinus_driver.drive import DriveError, Report
+from nfo_sinus_driver.wording import Calls, sentence
 
 
 class NodeError(Exception):

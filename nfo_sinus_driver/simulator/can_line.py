@@ -11,8 +11,7 @@ sent again later.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import enum
 import itertools
@@ -20,12 +19,10 @@ from typing import Protocol
 
 from nfo_sinus_driver.simulator import can_frames
 from nfo_sinus_driver.simulator.can_frames import Frame
-from nfo_sinus_driver.simulator.canopen import ANSWERS
-from nfo_sinus_driver.simulator.canopen import Server
+from nfo_sinus_driver.simulator.canopen import ANSWERS, Server
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line import Trace
-from nfo_sinus_driver.simulator.line_faults import LineFaults
-from nfo_sinus_driver.simulator.line_faults import Reply
+from nfo_sinus_driver.simulator.line_faults import LineFaults, Reply
 from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.wire import Wire

@@ -10,10 +10,7 @@ a lost bus means to the drive.
 from __future__ import annotations
 
 import abc
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 import enum
@@ -21,10 +18,8 @@ import enum
 from nfo_sinus_driver.simulator import sdo
 from nfo_sinus_driver.simulator.can_frames import Frame
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.sdo import Abort
-from nfo_sinus_driver.simulator.sdo import AbortCode
+from nfo_sinus_driver.simulator.memory import Reason, Refused
+from nfo_sinus_driver.simulator.sdo import Abort, AbortCode
 
 #: The node ids, and what is added to them for the identifiers of a node's frames.
 NODES = range(1, 128)

@@ -12,12 +12,8 @@ from __future__ import annotations
 import abc
 
 from nfo_sinus_driver.simulator import classic_frames
-from nfo_sinus_driver.simulator.classic_frames import BROADCAST
-from nfo_sinus_driver.simulator.classic_frames import POINT_TO_POINT
-from nfo_sinus_driver.simulator.classic_frames import LineError
-from nfo_sinus_driver.simulator.protocol import OnSerialLine
-from nfo_sinus_driver.simulator.protocol import Request
-from nfo_sinus_driver.simulator.protocol import Station
+from nfo_sinus_driver.simulator.classic_frames import BROADCAST, POINT_TO_POINT, LineError
+from nfo_sinus_driver.simulator.protocol import OnSerialLine, Request, Station
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: How long the rest of a message may take (s). No manual says [C86].

@@ -12,15 +12,12 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Sequence
-from typing import Any
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.memory import Memory
-from nfo_sinus_driver.simulator.motor import Counters
-from nfo_sinus_driver.simulator.motor import Motor
-from nfo_sinus_driver.simulator.motor import Nameplate
+from nfo_sinus_driver.simulator.motor import Counters, Motor, Nameplate
 from nfo_sinus_driver.simulator.timing import Timing
 
 

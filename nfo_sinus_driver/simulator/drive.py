@@ -11,19 +11,13 @@ and raw numbers, and time only as it is told of it; which protocol asks is not i
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import Access, Family, Value
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
-from nfo_sinus_driver.simulator.memory import Memory
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.memory import home
+from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
 from nfo_sinus_driver.simulator.motor import measure
 from nfo_sinus_driver.simulator.timing import Timing
 

@@ -9,9 +9,7 @@ A protocol is a file, and a row of :data:`PROTOCOLS`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from nfo_sinus_driver.simulator.can_line import CanLine
@@ -19,25 +17,15 @@ from nfo_sinus_driver.simulator.canopen import NODES
 from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.classic_frames import BROADCAST
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.lawicel import BIT_RATES
-from nfo_sinus_driver.simulator.lawicel import Adapter
-from nfo_sinus_driver.simulator.line import Line
-from nfo_sinus_driver.simulator.line import Trace
-from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
-from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
-from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
-from nfo_sinus_driver.simulator.modbus_frames import ThroughPlc
+from nfo_sinus_driver.simulator.lawicel import BIT_RATES, Adapter
+from nfo_sinus_driver.simulator.line import Line, Trace
+from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii, ModbusRtu, ModbusTcp, ThroughPlc
 from nfo_sinus_driver.simulator.movitrac import Movitrac
 from nfo_sinus_driver.simulator.movitrac_frames import ADDRESSES
 from nfo_sinus_driver.simulator.plc import TELEGRAM
-from nfo_sinus_driver.simulator.ports import Port
-from nfo_sinus_driver.simulator.ports import PtyPort
-from nfo_sinus_driver.simulator.ports import TcpPort
-from nfo_sinus_driver.simulator.protocol import Protocol
-from nfo_sinus_driver.simulator.protocol import Station
-from nfo_sinus_driver.simulator.socketcan import CanInterface
-from nfo_sinus_driver.simulator.socketcan import CanPort
-from nfo_sinus_driver.simulator.socketcan import is_interface
+from nfo_sinus_driver.simulator.ports import Port, PtyPort, TcpPort
+from nfo_sinus_driver.simulator.protocol import Protocol, Station
+from nfo_sinus_driver.simulator.socketcan import CanInterface, CanPort, is_interface
 from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.wire import Wire
 

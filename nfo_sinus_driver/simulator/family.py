@@ -10,25 +10,19 @@ does, as ``FAMILY``. Nobody imports such a folder: :func:`load` finds it by its 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from dataclasses import dataclass
-from dataclasses import field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 import functools
 import importlib
 import importlib.util
 from typing import Any
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Family, Value, families, load_family
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.injections import VERBS
-from nfo_sinus_driver.simulator.injections import Verb
+from nfo_sinus_driver.simulator.injections import VERBS, Verb
 from nfo_sinus_driver.simulator.memory import Memory
 
 

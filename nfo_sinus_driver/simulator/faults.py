@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Family, Kind
 
 
 @dataclass(frozen=True)

@@ -9,20 +9,15 @@ Here is what can happen to a drive of any family and to its line; a family may h
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 import difflib
 from typing import Any
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import Family, Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.line_faults import ANSWER_FAULTS
-from nfo_sinus_driver.simulator.plc import Channel
-from nfo_sinus_driver.simulator.plc import Plc
+from nfo_sinus_driver.simulator.plc import Channel, Plc
 from nfo_sinus_driver.simulator.wire import Wire
 
 #: Stands for an argument that must be given.

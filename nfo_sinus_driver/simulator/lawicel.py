@@ -13,9 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import re
 
-from nfo_sinus_driver.simulator.can_frames import EXTENDED
-from nfo_sinus_driver.simulator.can_frames import MOST_DATA
-from nfo_sinus_driver.simulator.can_frames import Frame
+from nfo_sinus_driver.simulator.can_frames import EXTENDED, MOST_DATA, Frame
 
 #: What S0 to S8 set, bit/s.
 BIT_RATES = (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)

@@ -9,21 +9,16 @@ Knows no clock of its own: it is told the time, so that tests can make it up.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 import heapq
 import itertools
 import json
 from typing import TextIO
 
-from nfo_sinus_driver.simulator.line_faults import LineFaults
-from nfo_sinus_driver.simulator.line_faults import Reply
+from nfo_sinus_driver.simulator.line_faults import LineFaults, Reply
 from nfo_sinus_driver.simulator.ports import Port
-from nfo_sinus_driver.simulator.protocol import Protocol
-from nfo_sinus_driver.simulator.protocol import Station
+from nfo_sinus_driver.simulator.protocol import Protocol, Station
 from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.wire import Wire
 

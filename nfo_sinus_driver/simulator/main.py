@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 import contextlib
 import dataclasses
 import json
@@ -16,17 +15,10 @@ import sys
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families import USUAL
-from nfo_sinus_driver.simulator.control import Client
-from nfo_sinus_driver.simulator.control import ControlError
-from nfo_sinus_driver.simulator.control import control_path
-from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT
-from nfo_sinus_driver.simulator.endpoints import PROTOCOLS
-from nfo_sinus_driver.simulator.family import every_option
-from nfo_sinus_driver.simulator.family import every_verb
-from nfo_sinus_driver.simulator.family import machine_of
-from nfo_sinus_driver.simulator.family import simulated
-from nfo_sinus_driver.simulator.injections import Argument
-from nfo_sinus_driver.simulator.injections import parse_setting
+from nfo_sinus_driver.simulator.control import Client, ControlError, control_path
+from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, PROTOCOLS
+from nfo_sinus_driver.simulator.family import every_option, every_verb, machine_of, simulated
+from nfo_sinus_driver.simulator.injections import Argument, parse_setting
 from nfo_sinus_driver.simulator.plc import PlcSetting
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.simulator import Simulator

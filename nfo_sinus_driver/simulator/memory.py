@@ -14,10 +14,7 @@ import enum
 from fractions import Fraction
 import math
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import Family, Parameter, Role, Value
 
 
 def home(parameter: Parameter) -> str:

@@ -6,21 +6,14 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import functools
 from typing import ClassVar
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import to_bytes
-from nfo_sinus_driver.catalog import to_words
+from nfo_sinus_driver.catalog import Family, Parameter, to_bytes, to_words
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.memory import carried
-from nfo_sinus_driver.simulator.memory import kept
+from nfo_sinus_driver.simulator.memory import Reason, Refused, carried, kept
 from nfo_sinus_driver.simulator.protocol import Station
 
 #: How a drive treats a function.

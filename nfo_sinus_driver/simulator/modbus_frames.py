@@ -12,11 +12,8 @@ import re
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.memory import GatewayReason
-from nfo_sinus_driver.simulator.modbus import is_write
-from nfo_sinus_driver.simulator.modbus import server
-from nfo_sinus_driver.simulator.protocol import OnSerialLine
-from nfo_sinus_driver.simulator.protocol import Request
-from nfo_sinus_driver.simulator.protocol import Station
+from nfo_sinus_driver.simulator.modbus import is_write, server
+from nfo_sinus_driver.simulator.protocol import OnSerialLine, Request, Station
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: Everybody obeys a write to this address and nobody answers.

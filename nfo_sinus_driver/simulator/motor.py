@@ -11,15 +11,13 @@ frequencies are electrical (Hz), signed, negative in reverse; torque is relative
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import enum
 import functools
 import math
 
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import Parameter, Role
 
 #: How long the rotor takes from standstill to f-Nom at nominal torque, without load (s).
 _INERTIA = 0.5

@@ -13,12 +13,9 @@ from __future__ import annotations
 import abc
 
 from nfo_sinus_driver.simulator import movitrac_frames
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.movitrac_frames import ReturnCode
-from nfo_sinus_driver.simulator.protocol import OnSerialLine
-from nfo_sinus_driver.simulator.protocol import Request
-from nfo_sinus_driver.simulator.protocol import Station
+from nfo_sinus_driver.simulator.protocol import OnSerialLine, Request, Station
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: The silence after which the rest of a frame is not waited for (s). No manual says; a busy

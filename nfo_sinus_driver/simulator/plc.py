@@ -11,22 +11,15 @@ whatever became of the drives. It is told the time, as everything here.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 import random
 from typing import Any
 
-from nfo_sinus_driver.simulator import modbus
-from nfo_sinus_driver.simulator import telegram1
+from nfo_sinus_driver.simulator import modbus, telegram1
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.plc_program import FIRST_WRITTEN
-from nfo_sinus_driver.simulator.plc_program import REGISTERS
-from nfo_sinus_driver.simulator.plc_program import Block
-from nfo_sinus_driver.simulator.plc_program import RosTelegram1
+from nfo_sinus_driver.simulator.memory import Reason, Refused
+from nfo_sinus_driver.simulator.plc_program import FIRST_WRITTEN, REGISTERS, Block, RosTelegram1
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: The name of the telegram in the tables of the families.

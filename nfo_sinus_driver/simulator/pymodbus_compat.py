@@ -20,9 +20,7 @@ What changed on the way:
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 import importlib
 import logging
 import struct

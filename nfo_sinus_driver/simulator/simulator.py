@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import contextlib
 import itertools
 import os
@@ -17,20 +16,13 @@ from typing import Any
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families import USUAL
-from nfo_sinus_driver.simulator.control import ControlServer
-from nfo_sinus_driver.simulator.control import control_path
-from nfo_sinus_driver.simulator.control import somebody_listens
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.drive import describe
-from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT
-from nfo_sinus_driver.simulator.endpoints import endpoint
-from nfo_sinus_driver.simulator.endpoints import parse_endpoint
-from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.family import verbs_of
+from nfo_sinus_driver.simulator.control import ControlServer, control_path, somebody_listens
+from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
+from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, endpoint, parse_endpoint
+from nfo_sinus_driver.simulator.family import simulated_drive, verbs_of
 from nfo_sinus_driver.simulator.injections import Target
 from nfo_sinus_driver.simulator.line import Trace
-from nfo_sinus_driver.simulator.plc import Plc
-from nfo_sinus_driver.simulator.plc import PlcSetting
+from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.timing import sharpen_timers
 

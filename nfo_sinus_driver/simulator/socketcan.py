@@ -10,8 +10,7 @@ import re
 import socket
 import struct
 
-from nfo_sinus_driver.simulator.can_frames import MOST_DATA
-from nfo_sinus_driver.simulator.can_frames import Frame
+from nfo_sinus_driver.simulator.can_frames import MOST_DATA, Frame
 from nfo_sinus_driver.simulator.ports import PortError
 
 #: Identifier with its flags, length, padding, data.

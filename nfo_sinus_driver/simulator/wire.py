@@ -7,8 +7,7 @@ from __future__ import annotations
 import abc
 
 from nfo_sinus_driver.simulator.line_faults import LineFaults
-from nfo_sinus_driver.simulator.ports import Port
-from nfo_sinus_driver.simulator.ports import PortError
+from nfo_sinus_driver.simulator.ports import Port, PortError
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: How long to wait before a port that could not come back is tried again (s).

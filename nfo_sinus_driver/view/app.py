@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable
-from collections.abc import Iterable
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 import contextlib
 from datetime import datetime
 import itertools
@@ -20,29 +18,24 @@ import textwrap
 from typing import ClassVar
 
 from rich.text import Text
-from textual.app import App
-from textual.app import ComposeResult
-from textual.binding import Binding
-from textual.binding import BindingType
-from textual.containers import Container
-from textual.containers import Vertical
+from textual.app import App, ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Container, Vertical
 from textual.css.query import NoMatches
 from textual.events import Resize
-from textual.widgets import DataTable
-from textual.widgets import Footer
-from textual.widgets import RichLog
-from textual.widgets import Static
+from textual.widgets import DataTable, Footer, RichLog, Static
 
-from nfo_sinus_driver.view.picture import Condition
-from nfo_sinus_driver.view.picture import DriveView
-from nfo_sinus_driver.view.picture import Level
-from nfo_sinus_driver.view.picture import LineView
-from nfo_sinus_driver.view.picture import Measured
-from nfo_sinus_driver.view.picture import Note
-from nfo_sinus_driver.view.picture import Picture
-from nfo_sinus_driver.view.picture import Source
-from nfo_sinus_driver.view.plot import plot
-from nfo_sinus_driver.view.plot import span
+from nfo_sinus_driver.view.picture import (
+    Condition,
+    DriveView,
+    Level,
+    LineView,
+    Measured,
+    Note,
+    Picture,
+    Source,
+)
+from nfo_sinus_driver.view.plot import plot, span
 
 #: How often it is looked, s.
 _PERIOD = 0.25

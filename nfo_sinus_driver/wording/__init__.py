@@ -3,7 +3,6 @@
 
 """The English sentences for what drives report, with what an operator types where it is read."""
 
-from nfo_sinus_driver.wording.templates import Calls
-from nfo_sinus_driver.wording.templates import sentence
+from nfo_sinus_driver.wording.templates import Calls, sentence
 
 __all__ = ['Calls', 'sentence']

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import string
 from typing import Any
 
-from nfo_sinus_driver.drive.events import Cause
-from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.events import Cause, Report
 
 _NO_TIMEOUT = (
     'the drive has no time-out of its own ({why}): if this {{call.program}} is killed or the cable '

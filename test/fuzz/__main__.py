@@ -15,9 +15,7 @@ import sys
 import time
 
 from fuzz import campaign
-from fuzz.campaign import CASE
-from fuzz.campaign import Finding
-from fuzz.campaign import Part
+from fuzz.campaign import CASE, Finding, Part
 
 #: Cases of one part; and how often progress is shown, in parts.
 _PART = 500

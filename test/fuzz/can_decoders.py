@@ -5,19 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from random import Random
 import re
 import struct
 
 from fuzz.decoders import Case
 from fuzz.mutations import Mutator
-from nfo_sinus_driver.link import lawicel
-from nfo_sinus_driver.link import sdo
+from nfo_sinus_driver.link import lawicel, sdo
 from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import DamagedAnswer, Refused
 
 _MOST_KEPT = 30
 _MANY = 25

@@ -11,9 +11,7 @@ whatever the decoder let out.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 import contextlib
 from random import Random
 import re
@@ -23,21 +21,18 @@ from typing import Any
 from support.addresses import packed
 
 from fuzz import judges
-from fuzz.judges import Asked
-from fuzz.judges import Meaning
-from fuzz.judges import Objects
-from fuzz.judges import Refusal
+from fuzz.judges import Asked, Meaning, Objects, Refusal
 from fuzz.mutations import Mutator
-from nfo_sinus_driver.link import classic
-from nfo_sinus_driver.link import modbus_ascii
-from nfo_sinus_driver.link import modbus_link
-from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link import modbus_tcp
-from nfo_sinus_driver.link import movitrac
-from nfo_sinus_driver.link import rtu
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link import (
+    classic,
+    modbus_ascii,
+    modbus_link,
+    modbus_pdu,
+    modbus_tcp,
+    movitrac,
+    rtu,
+)
+from nfo_sinus_driver.link.interface import LinkError, NoAnswer, Refused
 from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 
 #: Most bytes that a reader of a whole connection keeps, beside those just handed over.

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 import math
 from random import Random
@@ -15,12 +14,9 @@ import struct
 from support.addresses import packed
 
 from fuzz import judges
-from fuzz.decoders import Case
-from fuzz.decoders import classic_frame
+from fuzz.decoders import Case, classic_frame
 from fuzz.mutations import Mutator
-from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import State, families, load_family
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.families.sinus_g2 import words
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
@@ -28,9 +24,7 @@ from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.line import Receiver
-from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
-from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
-from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
+from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii, ModbusRtu, ModbusTcp
 from nfo_sinus_driver.simulator.movitrac import Movitrac
 from nfo_sinus_driver.simulator.protocol import Protocol
 

@@ -5,30 +5,32 @@
 
 from __future__ import annotations
 
-from mutant import ADVICE
-from mutant import ANY_ORDER
-from mutant import COMMANDS
-from mutant import CONTROL_TAKEN
-from mutant import CONTROLLER
-from mutant import DRIVE
-from mutant import G2
-from mutant import G2_CONTROL
-from mutant import G2_SCMD
-from mutant import LAW_2
-from mutant import MAIN
-from mutant import NO_STOP_FORGOTTEN
-from mutant import NO_TURN
-from mutant import OPTIMAL_SCMD
-from mutant import PROFILE
-from mutant import SEQUENCE
-from mutant import SETPOINT
-from mutant import STARTING
-from mutant import STOP_CONFIRMED
-from mutant import TABLE
-from mutant import TERMINALS_KEEP
-from mutant import TUNING_BEGINS
-from mutant import WATCH
-from mutant import Mutant
+from mutant import (
+    ADVICE,
+    ANY_ORDER,
+    COMMANDS,
+    CONTROL_TAKEN,
+    CONTROLLER,
+    DRIVE,
+    G2,
+    G2_CONTROL,
+    G2_SCMD,
+    LAW_2,
+    MAIN,
+    NO_STOP_FORGOTTEN,
+    NO_TURN,
+    OPTIMAL_SCMD,
+    PROFILE,
+    SEQUENCE,
+    SETPOINT,
+    STARTING,
+    STOP_CONFIRMED,
+    TABLE,
+    TERMINALS_KEEP,
+    TUNING_BEGINS,
+    WATCH,
+    Mutant,
+)
 
 HISTORIES = (
     # what the histories of any order have to notice

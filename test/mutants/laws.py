@@ -5,29 +5,31 @@
 
 from __future__ import annotations
 
-from mutant import ADVICE
-from mutant import COMMANDS
-from mutant import CONTROLLER
-from mutant import DRIVE
-from mutant import ECHO
-from mutant import EVERY_STEP
-from mutant import G2
-from mutant import INTERFACE
-from mutant import MAIN
-from mutant import NO_RESTART
-from mutant import NODE
-from mutant import PROFILE
-from mutant import RTU_LINK
-from mutant import SEQUENCE
-from mutant import SETPOINT
-from mutant import SIGNALS
-from mutant import TABLE
-from mutant import TRACE
-from mutant import TUNING
-from mutant import WATCH
-from mutant import WAYS_OUT
-from mutant import WRITER
-from mutant import Mutant
+from mutant import (
+    ADVICE,
+    COMMANDS,
+    CONTROLLER,
+    DRIVE,
+    ECHO,
+    EVERY_STEP,
+    G2,
+    INTERFACE,
+    MAIN,
+    NO_RESTART,
+    NODE,
+    PROFILE,
+    RTU_LINK,
+    SEQUENCE,
+    SETPOINT,
+    SIGNALS,
+    TABLE,
+    TRACE,
+    TUNING,
+    WATCH,
+    WAYS_OUT,
+    WRITER,
+    Mutant,
+)
 
 #: What the laws ask of a MOVITRAC alone.
 MOVITRAC_LAWS = 'test/unit/drive/test_movitrac_laws.py'

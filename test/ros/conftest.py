@@ -11,12 +11,7 @@ from pathlib import Path
 
 from bench import Bench
 import pytest
-from ways import DEFAULT
-from ways import EACH_KIND
-from ways import USUAL
-from ways import WAYS
-from ways import Way
-from ways import why_not
+from ways import DEFAULT, EACH_KIND, USUAL, WAYS, Way, why_not
 
 from nfo_sinus_driver.demo.bench import own_domain
 

@@ -6,8 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import contextlib
 import dataclasses
 from dataclasses import dataclass
@@ -15,25 +14,16 @@ import functools
 import itertools
 import json
 import re
-from typing import Any
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-from bench import Bench
-from bench import Client
-from bench import Process
-from bench import wait_until
-from rcl_interfaces.srv import GetParameters
-from rcl_interfaces.srv import SetParameters
-from rclpy.parameter import Parameter
-from rclpy.parameter import parameter_value_to_python
-from support.classic_ends import OTHER_ON_CLASSIC
-from support.classic_ends import on_classic
-from support.parameter_ends import ENDS
-from support.parameter_ends import Ends
+from bench import Bench, Client, Process, wait_until
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.parameter import Parameter, parameter_value_to_python
+from support.classic_ends import OTHER_ON_CLASSIC, on_classic
+from support.parameter_ends import ENDS, Ends
 from support.variants import hardest
 from support.wire import understand
-from ways import UNFRAMED
-from ways import Way
+from ways import UNFRAMED, Way
 
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.simulator import Simulator

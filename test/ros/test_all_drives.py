@@ -5,9 +5,7 @@
 
 from __future__ import annotations
 
-from bench import PATIENCE
-from bench import Bench
-from bench import wait_until
+from bench import PATIENCE, Bench, wait_until
 import pytest
 from ways import needs
 

@@ -14,10 +14,7 @@ import contextlib
 import random
 from typing import Any
 
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import wait_until
+from bench import PATIENCE, Bench, Client, wait_until
 import pytest
 from support.drives import Drives
 from ways import needs

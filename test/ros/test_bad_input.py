@@ -15,18 +15,9 @@ import subprocess
 import sys
 import time
 
-from bench import A_WHILE
-from bench import EXECUTED
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import Process
-from bench import holds_for
-from bench import wait_until
+from bench import A_WHILE, EXECUTED, PATIENCE, Bench, Client, Process, holds_for, wait_until
 import pytest
-from ways import SILENCE
-from ways import Way
-from ways import needs
+from ways import SILENCE, Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated

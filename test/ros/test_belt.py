@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bench import Bench
-from bench import wait_until
+from bench import Bench, wait_until
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 from std_msgs.msg import Float32

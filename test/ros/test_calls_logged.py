@@ -5,10 +5,8 @@
 
 from __future__ import annotations
 
-from bench import Bench
-from bench import wait_until
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from bench import Bench, wait_until
+from std_srvs.srv import SetBool, Trigger
 from ways import needs
 
 _TRIGGERS = ('stop', 'quick_stop', 'fault_ack', 'refresh_parameters', 'erase_error_log')

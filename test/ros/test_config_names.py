@@ -13,14 +13,11 @@ import re
 from typing import Any
 from xml.etree import ElementTree
 
-from bench import Bench
-from bench import Client
-from bench import wait_until
+from bench import Bench, Client, wait_until
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 from support.aggregator import Aggregator
-from support.sros2_policy import Policy
-from support.sros2_policy import allowed
+from support.sros2_policy import Policy, allowed
 from ways import Way
 import yaml
 

@@ -10,11 +10,7 @@ import signal
 import sys
 import time
 
-from bench import A_WHILE
-from bench import PATIENCE
-from bench import Bench
-from bench import holds_for
-from bench import wait_until
+from bench import A_WHILE, PATIENCE, Bench, holds_for, wait_until
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest

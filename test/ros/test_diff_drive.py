@@ -10,21 +10,15 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from bench import A_WHILE
-from bench import Bench
-from bench import holds_for
-from bench import wait_until
+from bench import A_WHILE, Bench, holds_for, wait_until
 import pytest
-from topic_hardware import Component
-from topic_hardware import Hardware
-from topic_hardware import components
+from topic_hardware import Component, Hardware, components
 from ways import needs
 import yaml
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.node.messages import Joint
-from nfo_sinus_driver.node.settings import BUS_SETTINGS
-from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
+from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
 
 _CONFIG = Path(__file__).parents[2] / 'config'
 _FOLDER = _CONFIG / 'diff_drive'

@@ -5,11 +5,7 @@
 
 from __future__ import annotations
 
-from bench import A_WHILE
-from bench import Bench
-from bench import Client
-from bench import holds_for
-from bench import wait_until
+from bench import A_WHILE, Bench, Client, holds_for, wait_until
 from ways import needs
 
 pytestmark = needs('direct')

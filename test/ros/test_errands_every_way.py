@@ -9,17 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from action_msgs.msg import GoalStatus
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import seconds
-from bench import wait_until
+from bench import PATIENCE, Bench, Client, seconds, wait_until
 from nfo_sinus_msgs.action import Tune
 from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.srv import GetErrorLog
 import pytest
-from rclpy.qos import DurabilityPolicy
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from tuner import Tuner
 from ways import Way
 

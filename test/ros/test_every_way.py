@@ -13,19 +13,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 import signal
 
-from bench import A_WHILE
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import wait_until
+from bench import A_WHILE, PATIENCE, Bench, Client, wait_until
 from lifecycle_msgs.msg import Transition
 from nfo_sinus_msgs.msg import DriveStatus
-from parameter_bench import refused
-from parameter_bench import set_one
+from parameter_bench import refused, set_one
 import pytest
 from unit.catalog import setting_names
-from ways import Way
-from ways import needs
+from ways import Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated

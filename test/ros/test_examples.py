@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 import dataclasses
 import functools
@@ -23,11 +22,7 @@ import sys
 from typing import Any
 from xml.etree import ElementTree
 
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import Process
-from bench import wait_until
+from bench import PATIENCE, Bench, Client, Process, wait_until
 from geometry_msgs.msg import Twist
 import pytest
 from ways import needs

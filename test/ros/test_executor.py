@@ -11,8 +11,7 @@ import threading
 from typing import Any
 import warnings
 
-from bench import Client
-from bench import wait_until
+from bench import Client, wait_until
 import pytest
 import rclpy
 from rclpy.node import Node

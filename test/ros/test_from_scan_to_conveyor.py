@@ -12,12 +12,7 @@ import subprocess
 import sys
 import threading
 
-from bench import A_WHILE
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import holds_for
-from bench import wait_until
+from bench import A_WHILE, PATIENCE, Bench, Client, holds_for, wait_until
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 import pytest

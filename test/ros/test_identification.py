@@ -8,9 +8,7 @@ from __future__ import annotations
 import re
 import signal
 
-from bench import Bench
-from bench import Client
-from bench import wait_until
+from bench import Bench, Client, wait_until
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 import pytest

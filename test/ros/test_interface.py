@@ -9,24 +9,14 @@ from collections.abc import Iterator
 import itertools
 import math
 
-from bench import FULL_RATE
-from bench import PATIENCE
-from bench import TOPICS
-from bench import Bench
-from bench import Client
-from bench import seconds
-from bench import wait_until
+from bench import FULL_RATE, PATIENCE, TOPICS, Bench, Client, seconds, wait_until
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
-from nfo_sinus_msgs.msg import BusStatistics
-from nfo_sinus_msgs.msg import DriveStatus
-from nfo_sinus_msgs.msg import InvSt
+from nfo_sinus_msgs.msg import BusStatistics, DriveStatus, InvSt
 from parameter_bench import Wire
 import pytest
-from rclpy.qos import DurabilityPolicy
-from rclpy.qos import ReliabilityPolicy
-from ways import Way
-from ways import needs
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from ways import Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 

@@ -9,9 +9,7 @@ import math
 import threading
 from types import SimpleNamespace
 
-from bench import Bench
-from bench import Client
-from bench import wait_until
+from bench import Bench, Client, wait_until
 from nfo_sinus_msgs.msg import Setpoint
 import pytest
 from sensor_msgs.msg import JointState

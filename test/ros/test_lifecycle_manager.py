@@ -9,13 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 import time
 
-from bench import A_WHILE
-from bench import Bench
-from bench import Client
-from bench import holds_for
-from bench import wait_until
-from lifecycle_msgs.msg import State
-from lifecycle_msgs.msg import Transition
+from bench import A_WHILE, Bench, Client, holds_for, wait_until
+from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import GetState
 import pytest
 from ways import needs

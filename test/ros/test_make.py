@@ -12,10 +12,7 @@ import signal
 import subprocess
 import sys
 
-from bench import Bench
-from bench import Process
-from bench import _executable
-from bench import wait_until
+from bench import Bench, Process, _executable, wait_until
 import pytest
 from ways import needs
 

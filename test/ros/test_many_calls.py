@@ -7,13 +7,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from bench import PATIENCE
-from bench import Bench
-from bench import wait_until
+from bench import PATIENCE, Bench, wait_until
 import pytest
 from rclpy.qos import QoSProfile
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 #: The answers must not be lost where they arrive, either.
 _QUALITY = QoSProfile(depth=1000)

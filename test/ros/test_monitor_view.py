@@ -9,9 +9,7 @@ import signal
 import subprocess
 import sys
 
-from bench import PATIENCE
-from bench import Bench
-from bench import wait_until
+from bench import PATIENCE, Bench, wait_until
 import pytest
 from ways import needs
 

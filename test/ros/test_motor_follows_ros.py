@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bench import Bench
-from bench import wait_until
+from bench import Bench, wait_until
 from parameter_bench import set_one
 from ways import WAYS
 

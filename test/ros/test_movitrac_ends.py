@@ -11,17 +11,11 @@ from pathlib import Path
 import subprocess
 import sys
 
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from parameter_bench import COUNTED
-from parameter_bench import refused
-from parameter_bench import set_one
-from parameter_bench import values
+from bench import PATIENCE, Bench, Client
+from parameter_bench import COUNTED, refused, set_one, values
 import pytest
 from rcl_interfaces.srv import DescribeParameters
-from support.movitrac_ends import ENDS
-from support.movitrac_ends import Value
+from support.movitrac_ends import ENDS, Value
 from ways import WAYS
 
 from nfo_sinus_driver.demo.bench import own_domain

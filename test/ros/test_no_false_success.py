@@ -12,15 +12,10 @@ import subprocess
 import sys
 import time
 
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import Process
-from bench import wait_until
+from bench import PATIENCE, Bench, Client, Process, wait_until
 from lifecycle_msgs.msg import Transition
 import pytest
-from std_srvs.srv import SetBool
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 from support.wire import understand
 from told import stop_sequence
 from ways import needs

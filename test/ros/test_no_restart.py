@@ -8,16 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 import signal
 
-from bench import A_WHILE
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import Process
-from bench import wait_until
+from bench import A_WHILE, PATIENCE, Bench, Client, Process, wait_until
 import pytest
 from support.variants import hardest
-from ways import Way
-from ways import needs
+from ways import Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated

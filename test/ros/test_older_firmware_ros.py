@@ -8,12 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import wait_until
-from parameter_bench import refused
-from parameter_bench import set_one
+from bench import PATIENCE, Bench, Client, wait_until
+from parameter_bench import refused, set_one
 import pytest
 from ways import WAYS
 

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import pytest
 
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import families, load_family
 from nfo_sinus_driver.node.overrides import did_you_mean
-from nfo_sinus_driver.node.settings import BUS_SETTINGS
-from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
-from nfo_sinus_driver.node.settings import Setting
+from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS, Setting
 
 #: What rclpy declares for each node.
 _OF_ROS = ('use_sim_time', 'start_type_description_service')

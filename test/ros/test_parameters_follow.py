@@ -8,19 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from bench import A_WHILE
-from bench import Bench
-from bench import Client
-from bench import holds_for
-from bench import wait_until
-from parameter_bench import COUNTED
-from parameter_bench import Stubborn
-from parameter_bench import Wire
-from parameter_bench import refused
-from parameter_bench import says_once
-from parameter_bench import set_one
-from parameter_bench import settings
-from parameter_bench import values
+from bench import A_WHILE, Bench, Client, holds_for, wait_until
+from parameter_bench import COUNTED, Stubborn, Wire, refused, says_once, set_one, settings, values
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
 from ways import needs

@@ -6,18 +6,9 @@
 
 from __future__ import annotations
 
-from bench import Bench
-from bench import Client
-from bench import wait_until
+from bench import Bench, Client, wait_until
 from lifecycle_msgs.msg import Transition
-from parameter_bench import QUIET
-from parameter_bench import Wire
-from parameter_bench import refused
-from parameter_bench import set_each
-from parameter_bench import set_one
-from parameter_bench import settings
-from parameter_bench import values
-from parameter_bench import written
+from parameter_bench import QUIET, Wire, refused, set_each, set_one, settings, values, written
 from ways import needs
 
 pytestmark = needs('parameters')

@@ -9,13 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from bench import Bench
-from bench import Client
-from parameter_bench import QUIET
-from parameter_bench import Wire
-from parameter_bench import says_once
-from parameter_bench import settings
-from parameter_bench import values
+from bench import Bench, Client
+from parameter_bench import QUIET, Wire, says_once, settings, values
 import pytest
 from rcl_interfaces.srv import DescribeParameters
 from support.parameter_ends import Ends

@@ -6,14 +6,8 @@
 
 from __future__ import annotations
 
-from bench import Bench
-from bench import wait_until
-from parameter_bench import QUIET
-from parameter_bench import Wire
-from parameter_bench import refused
-from parameter_bench import set_each
-from parameter_bench import set_one
-from parameter_bench import values
+from bench import Bench, wait_until
+from parameter_bench import QUIET, Wire, refused, set_each, set_one, values
 from support.parameter_ends import ENDS
 from ways import needs
 

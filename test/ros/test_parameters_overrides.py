@@ -8,21 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from bench import A_WHILE
-from bench import Bench
-from bench import Client
-from bench import Process
-from bench import holds_for
-from bench import wait_until
+from bench import A_WHILE, Bench, Client, Process, holds_for, wait_until
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
-from parameter_bench import COUNTED
-from parameter_bench import Wire
-from parameter_bench import register
-from parameter_bench import says_once
-from parameter_bench import set_one
-from parameter_bench import values
-from parameter_bench import written
+from parameter_bench import COUNTED, Wire, register, says_once, set_one, values, written
 import pytest
 from ways import needs
 

@@ -9,22 +9,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from bench import Bench
-from bench import Client
-from parameter_bench import ANY_BUS
-from parameter_bench import COUNTED
-from parameter_bench import Value
-from parameter_bench import Wire
-from parameter_bench import refused
-from parameter_bench import says_once
-from parameter_bench import set_each
-from parameter_bench import set_one
-from parameter_bench import settings
-from parameter_bench import values
-from parameter_bench import written
+from bench import Bench, Client
+from parameter_bench import (
+    ANY_BUS,
+    COUNTED,
+    Value,
+    Wire,
+    refused,
+    says_once,
+    set_each,
+    set_one,
+    settings,
+    values,
+    written,
+)
 import pytest
-from ways import Way
-from ways import needs
+from ways import Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 

@@ -10,26 +10,24 @@ from collections.abc import Callable
 import itertools
 import time
 
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import wait_until
-from parameter_bench import QUIET
-from parameter_bench import Stubborn
-from parameter_bench import Wire
-from parameter_bench import Write
-from parameter_bench import refused
-from parameter_bench import register
-from parameter_bench import set_each_async
-from parameter_bench import set_one
-from parameter_bench import values
-from parameter_bench import written
+from bench import PATIENCE, Bench, Client, wait_until
+from parameter_bench import (
+    QUIET,
+    Stubborn,
+    Wire,
+    Write,
+    refused,
+    register,
+    set_each_async,
+    set_one,
+    values,
+    written,
+)
 import pytest
 from std_srvs.srv import Trigger
 from ways import needs
 
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 
 pytestmark = needs('parameters')
 

@@ -14,9 +14,7 @@ import subprocess
 import sys
 from types import SimpleNamespace
 
-from bench import Bench
-from bench import Process
-from bench import wait_until
+from bench import Bench, Process, wait_until
 from ways import needs
 
 from nfo_sinus_driver.demo import bag as bags

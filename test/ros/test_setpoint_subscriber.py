@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from bench import FULL_RATE
-from bench import Bench
-from bench import wait_until
+from bench import FULL_RATE, Bench, wait_until
 import pytest
 import rclpy
 from rclpy.node import Node

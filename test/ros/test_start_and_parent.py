@@ -11,9 +11,7 @@ import signal
 import subprocess
 import sys
 
-from bench import PATIENCE
-from bench import Bench
-from bench import wait_until
+from bench import PATIENCE, Bench, wait_until
 import pytest
 
 #: As ``ros2 run`` is: it waits for its child, passes nothing on, and SIGTERM ends it at once.

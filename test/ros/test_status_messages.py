@@ -12,10 +12,8 @@ from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_profile
-from nfo_sinus_driver.node.messages import drive_status
-from nfo_sinus_driver.node.messages import error_log_entry
+from nfo_sinus_driver.catalog import families, load_profile
+from nfo_sinus_driver.node.messages import drive_status, error_log_entry
 
 
 def status_of(method: str) -> DriveStatus:

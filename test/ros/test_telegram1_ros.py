@@ -15,15 +15,10 @@ from pathlib import Path
 import signal
 from typing import Any
 
-from bench import A_WHILE
-from bench import PATIENCE
-from bench import Bench
-from bench import Client
-from bench import wait_until
+from bench import A_WHILE, PATIENCE, Bench, Client, wait_until
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
-from ways import TELEGRAM1
-from ways import Way
+from ways import TELEGRAM1, Way
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated

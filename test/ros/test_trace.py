@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import signal
 
-from bench import FULL_RATE
-from bench import Bench
+from bench import FULL_RATE, Bench
 from lifecycle_msgs.msg import Transition
 from support.trace_laws import violations
-from support.wire import Request
-from support.wire import understand
+from support.wire import Request, understand
 from told import run_commands
 from ways import needs
 

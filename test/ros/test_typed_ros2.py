@@ -21,15 +21,10 @@ import signal
 import subprocess
 from typing import Any
 
-from bench import PATIENCE
-from bench import Bench
-from bench import wait_until
+from bench import PATIENCE, Bench, wait_until
 import pytest
-from rosidl_parser.definition import AbstractNestedType
-from rosidl_parser.definition import NamespacedType
-from support.typed import ROOT
-from support.typed import Typed
-from support.typed import typed
+from rosidl_parser.definition import AbstractNestedType, NamespacedType
+from support.typed import ROOT, Typed, typed
 from ways import needs
 import yaml
 

@@ -7,15 +7,11 @@ from __future__ import annotations
 
 import time
 
-from bench import FULL_RATE
-from bench import Bench
-from bench import wait_until
+from bench import FULL_RATE, Bench, wait_until
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from support.wire import Request
-from support.wire import understand
-from told import run_command
-from told import stop_sequence
+from support.wire import Request, understand
+from told import run_command, stop_sequence
 from ways import needs
 
 pytestmark = needs('states')

@@ -11,11 +11,7 @@ import re
 import signal
 import subprocess
 
-from bench import A_WHILE
-from bench import EXECUTED
-from bench import PATIENCE
-from bench import Bench
-from bench import wait_until
+from bench import A_WHILE, EXECUTED, PATIENCE, Bench, wait_until
 from lifecycle_msgs.msg import Transition
 import pytest
 from std_srvs.srv import SetBool

@@ -6,8 +6,7 @@
 
 from __future__ import annotations
 
-from bench import Client
-from bench import wait_until
+from bench import Client, wait_until
 from nfo_sinus_msgs.action import Tune
 from rclpy.action import ActionClient
 

@@ -6,13 +6,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import pytest
-from support.drives import DRIVES
-from support.drives import Drives
+from support.drives import DRIVES, Drives
 
 #: What only some of the ways have, and why the others go without; see :func:`needs`.
 WITHOUT = {

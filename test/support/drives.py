@@ -6,11 +6,9 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from nfo_sinus_driver.simulator.control import Client as Simulated
 

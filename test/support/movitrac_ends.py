@@ -15,9 +15,7 @@ simulated drive can have.
 
 from __future__ import annotations
 
-from typing import Any
-from typing import NamedTuple
-from typing import TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 Value: TypeAlias = float | int | str | bool
 

@@ -9,8 +9,7 @@ from collections.abc import Iterator
 import functools
 
 from nfo_sinus_driver.catalog import load_family
-from support.wire import Request
-from support.wire import understand
+from support.wire import Request, understand
 
 #: Remote set-point, function bits and P841 [M4 §4].
 _SIZE, _BITS, _CONTROL_MODE = 223, 281, 205

@@ -12,39 +12,30 @@ the laws are judged by every frame that was on the line.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Collection
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass
-from dataclasses import field
+from dataclasses import dataclass, field
 import math
-from typing import Any
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Event
-from nfo_sinus_driver.drive import LogEntry
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.drive import (
+    Cause,
+    Drive,
+    DriveSettings,
+    Event,
+    LogEntry,
+    Severity,
+    Snapshot,
+    Telemetry,
+)
 from nfo_sinus_driver.drive.control_state import ControlState
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Address, Refused, Reply
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from support import telegram_laws
-from support import trace_laws
-from support.rig_line import Clock
-from support.rig_line import Line
-from support.said import Said
-from support.said import said
-from support.said import says
-from support.variants import hardest
-from support.variants import ramps
+from support import telegram_laws, trace_laws
+from support.rig_line import Clock, Line
+from support.said import Said, said, says
+from support.variants import hardest, ramps
 
 #: How far the clock goes at a time while nothing is due, s.
 SLICE = 0.02

@@ -5,28 +5,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterable
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 import heapq
 import itertools
 from random import Random
 from typing import Any
 
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import line_settings
+from nfo_sinus_driver.link import PortError, line_settings
 from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.lawicel_port import LawicelPort
 from nfo_sinus_driver.link.modbus_tcp import TcpLink
-from nfo_sinus_driver.link.protocols import link_class
-from nfo_sinus_driver.link.protocols import protocol_of
+from nfo_sinus_driver.link.protocols import link_class, protocol_of
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.endpoints import endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.line import Trace
-from nfo_sinus_driver.simulator.plc import Plc
-from nfo_sinus_driver.simulator.plc import PlcSetting
+from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
 
 _NEVER = float('inf')
 #: How much later an answer comes that is late, in response time-outs.

@@ -11,13 +11,8 @@ from typing import Any
 
 import pytest
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Event
-from nfo_sinus_driver.drive import Report
-from nfo_sinus_driver.drive import Tuned
-from nfo_sinus_driver.wording import Calls
-from nfo_sinus_driver.wording import sentence
+from nfo_sinus_driver.drive import Cause, DriveError, Event, Report, Tuned
+from nfo_sinus_driver.wording import Calls, sentence
 
 CALLS = Calls(
     acknowledge='call ~/fault_ack',

@@ -6,16 +6,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from nfo_sinus_driver.catalog.profile import Refusal
-from nfo_sinus_driver.catalog.profile import Step
-from nfo_sinus_driver.catalog.profile import Until
+from nfo_sinus_driver.catalog.profile import Refusal, Step, Until
 from nfo_sinus_driver.catalog.status import State
 
 #: What a drive answers that refuses a step.

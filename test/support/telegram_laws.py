@@ -12,9 +12,7 @@ and [M0 tables 14 to 16] print it, with [C107], [C109] and [C111].
 from __future__ import annotations
 
 import abc
-from collections.abc import Iterable
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 import dataclasses
 from itertools import groupby
 import struct

@@ -5,22 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 import functools
 import itertools
 from typing import Any
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.catalog import Access, load_family
+from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd
 from support.movitrac_laws import MovitracJudge
-from support.wire import WITH_GAP
-from support.wire import Request
-from support.wire import understand
+from support.wire import WITH_GAP, Request, understand
 
 #: The Classic address that every drive obeys [M0 §6.1].
 _EVERYBODY = 95

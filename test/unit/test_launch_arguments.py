@@ -9,9 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from nfo_sinus_driver.launch_arguments import number
-from nfo_sinus_driver.launch_arguments import parameter_file
-from nfo_sinus_driver.launch_arguments import require_packages
+from nfo_sinus_driver.launch_arguments import number, parameter_file, require_packages
 
 
 @pytest.fixture

@@ -16,8 +16,7 @@ import sys
 
 import pytest
 
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import families, load_family
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = 'nfo_sinus_driver'

@@ -11,10 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from support.aggregator import ERROR
-from support.aggregator import OK
-from support.aggregator import WARN
-from support.aggregator import Aggregator
+from support.aggregator import ERROR, OK, WARN, Aggregator
 import yaml
 
 CONFIG = Path(__file__).resolve().parents[2] / 'config'

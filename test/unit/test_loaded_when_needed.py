@@ -11,11 +11,8 @@ import sys
 
 import pytest
 
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.catalog import families, load_family
+from nfo_sinus_driver.link import PROTOCOLS, line_settings, open_link
 
 ROOT = Path(__file__).resolve().parents[2]
 PORTS = {'modbus_tcp': 'gateway:502'}

@@ -13,9 +13,7 @@ each value.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 import itertools

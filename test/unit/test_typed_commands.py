@@ -18,8 +18,7 @@ import subprocess
 import sys
 
 import pytest
-from support.typed import Typed
-from support.typed import typed
+from support.typed import Typed, typed
 
 from nfo_sinus_driver.cli.options import parse
 

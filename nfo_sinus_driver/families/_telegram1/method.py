@@ -17,22 +17,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from nfo_sinus_driver.catalog.profile import ControlMethod
-from nfo_sinus_driver.catalog.profile import Hold
-from nfo_sinus_driver.catalog.profile import Holder
-from nfo_sinus_driver.catalog.profile import NotPossible
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Refusal
-from nfo_sinus_driver.catalog.profile import Removal
-from nfo_sinus_driver.catalog.profile import SetpointTarget
-from nfo_sinus_driver.catalog.profile import Status
-from nfo_sinus_driver.catalog.profile import Steps
-from nfo_sinus_driver.catalog.profile import Write
-from nfo_sinus_driver.catalog.profile import taken
-from nfo_sinus_driver.catalog.status import Fact
-from nfo_sinus_driver.catalog.status import State
-from nfo_sinus_driver.catalog.status import StatusCode
-from nfo_sinus_driver.catalog.status import StatusWord
+from nfo_sinus_driver.catalog.profile import (
+    ControlMethod,
+    Hold,
+    Holder,
+    NotPossible,
+    Read,
+    Refusal,
+    Removal,
+    SetpointTarget,
+    Status,
+    Steps,
+    Write,
+    taken,
+)
+from nfo_sinus_driver.catalog.status import Fact, State, StatusCode, StatusWord
 
 STATUS = 'telegram.status'
 ACTUAL = 'telegram.actual'

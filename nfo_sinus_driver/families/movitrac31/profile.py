@@ -12,28 +12,27 @@ is written.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 import contextlib
 import math
 
 from nfo_sinus_driver.catalog.parameter import Value
-from nfo_sinus_driver.catalog.profile import ControlMethod
-from nfo_sinus_driver.catalog.profile import Holder
-from nfo_sinus_driver.catalog.profile import NotPossible
-from nfo_sinus_driver.catalog.profile import Profile
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Refusal
-from nfo_sinus_driver.catalog.profile import Removal
-from nfo_sinus_driver.catalog.profile import SetpointTarget
-from nfo_sinus_driver.catalog.profile import Status
-from nfo_sinus_driver.catalog.profile import Steps
-from nfo_sinus_driver.catalog.profile import Write
-from nfo_sinus_driver.catalog.profile import one
-from nfo_sinus_driver.catalog.profile import taken
-from nfo_sinus_driver.catalog.status import Role
-from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.catalog.profile import (
+    ControlMethod,
+    Holder,
+    NotPossible,
+    Profile,
+    Read,
+    Refusal,
+    Removal,
+    SetpointTarget,
+    Status,
+    Steps,
+    Write,
+    one,
+    taken,
+)
+from nfo_sinus_driver.catalog.status import Role, StatusCode
 from nfo_sinus_driver.families.movitrac31 import words
 from nfo_sinus_driver.families.movitrac31.words import Bits
 

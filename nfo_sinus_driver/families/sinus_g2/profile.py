@@ -9,42 +9,37 @@ the generic state machine [M0 §7.1 tables 14 to 16].
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 import contextlib
 from fractions import Fraction
 from typing import ClassVar
 
 from nfo_sinus_driver.catalog.parameter import Value
-from nfo_sinus_driver.catalog.profile import Acknowledge
-from nfo_sinus_driver.catalog.profile import AcknowledgeThenWrite
-from nfo_sinus_driver.catalog.profile import ControlMethod
-from nfo_sinus_driver.catalog.profile import Holder
-from nfo_sinus_driver.catalog.profile import NotPossible
-from nfo_sinus_driver.catalog.profile import OlderDialect
-from nfo_sinus_driver.catalog.profile import Procedure
-from nfo_sinus_driver.catalog.profile import Profile
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Refusal
-from nfo_sinus_driver.catalog.profile import Removal
-from nfo_sinus_driver.catalog.profile import Reset
-from nfo_sinus_driver.catalog.profile import SetpointTarget
-from nfo_sinus_driver.catalog.profile import Status
-from nfo_sinus_driver.catalog.profile import Steps
-from nfo_sinus_driver.catalog.profile import Until
-from nfo_sinus_driver.catalog.profile import Write
-from nfo_sinus_driver.catalog.profile import one
-from nfo_sinus_driver.catalog.profile import taken
-from nfo_sinus_driver.catalog.status import Meaning
-from nfo_sinus_driver.catalog.status import Role
-from nfo_sinus_driver.catalog.status import State
-from nfo_sinus_driver.catalog.status import StatusCode
+from nfo_sinus_driver.catalog.profile import (
+    Acknowledge,
+    AcknowledgeThenWrite,
+    ControlMethod,
+    Holder,
+    NotPossible,
+    OlderDialect,
+    Procedure,
+    Profile,
+    Read,
+    Refusal,
+    Removal,
+    Reset,
+    SetpointTarget,
+    Status,
+    Steps,
+    Until,
+    Write,
+    one,
+    taken,
+)
+from nfo_sinus_driver.catalog.status import Meaning, Role, State, StatusCode
 from nfo_sinus_driver.families.sinus_g2 import words
 from nfo_sinus_driver.families.sinus_g2.telegram1.profile import G2Telegram1
-from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd
 
 MODE = 'fieldbus.mode'
 CONTROL_WORD = 'fieldbus.drive_control'

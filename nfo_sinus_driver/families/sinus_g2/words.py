@@ -8,9 +8,7 @@ from __future__ import annotations
 import enum
 import functools
 
-from nfo_sinus_driver.catalog.status import Fact
-from nfo_sinus_driver.catalog.status import State
-from nfo_sinus_driver.catalog.status import StatusWord
+from nfo_sinus_driver.catalog.status import Fact, State, StatusWord
 
 
 class Mode(enum.IntEnum):

@@ -11,19 +11,11 @@ ADV-8 says; out of S4 there is no other way than that, QuickStop and CoastStop [
 
 from __future__ import annotations
 
-from nfo_sinus_driver.catalog.profile import Profile
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Steps
-from nfo_sinus_driver.catalog.profile import Until
-from nfo_sinus_driver.catalog.status import Role
-from nfo_sinus_driver.catalog.status import State
+from nfo_sinus_driver.catalog.profile import Profile, Read, Steps, Until
+from nfo_sinus_driver.catalog.status import Role, State
 from nfo_sinus_driver.families._telegram1 import method
 from nfo_sinus_driver.families._telegram1.method import Telegram1
-from nfo_sinus_driver.families._telegram1.profidrive import OFF
-from nfo_sinus_driver.families._telegram1.profidrive import ON
-from nfo_sinus_driver.families._telegram1.profidrive import RUN
-from nfo_sinus_driver.families._telegram1.profidrive import Control
-from nfo_sinus_driver.families._telegram1.profidrive import state_of
+from nfo_sinus_driver.families._telegram1.profidrive import OFF, ON, RUN, Control, state_of
 from nfo_sinus_driver.families.sinus_h.words import STATUS_WORD
 
 

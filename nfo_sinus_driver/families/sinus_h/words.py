@@ -11,12 +11,10 @@ drive has heard, and nothing of the motor, for which the actual value speaks.
 
 from __future__ import annotations
 
-from nfo_sinus_driver.catalog.status import Fact
-from nfo_sinus_driver.catalog.status import State
+from nfo_sinus_driver.catalog.status import Fact, State
 from nfo_sinus_driver.families._telegram1 import method
 from nfo_sinus_driver.families._telegram1.method import Words
-from nfo_sinus_driver.families._telegram1.profidrive import Status
-from nfo_sinus_driver.families._telegram1.profidrive import state_of
+from nfo_sinus_driver.families._telegram1.profidrive import Status, state_of
 
 STATUS_WORD = Words(
     state=state_of,

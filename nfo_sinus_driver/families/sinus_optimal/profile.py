@@ -11,37 +11,38 @@ what one has started the other does not stop.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from nfo_sinus_driver.catalog.parameter import Value
-from nfo_sinus_driver.catalog.profile import ControlMethod
-from nfo_sinus_driver.catalog.profile import Holder
-from nfo_sinus_driver.catalog.profile import Procedure
-from nfo_sinus_driver.catalog.profile import Profile
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Refusal
-from nfo_sinus_driver.catalog.profile import Removal
-from nfo_sinus_driver.catalog.profile import Reset
-from nfo_sinus_driver.catalog.profile import SetpointTarget
-from nfo_sinus_driver.catalog.profile import Status
-from nfo_sinus_driver.catalog.profile import Steps
-from nfo_sinus_driver.catalog.profile import Until
-from nfo_sinus_driver.catalog.profile import Write
-from nfo_sinus_driver.catalog.profile import one
-from nfo_sinus_driver.catalog.profile import taken
+from nfo_sinus_driver.catalog.profile import (
+    ControlMethod,
+    Holder,
+    Procedure,
+    Profile,
+    Read,
+    Refusal,
+    Removal,
+    Reset,
+    SetpointTarget,
+    Status,
+    Steps,
+    Until,
+    Write,
+    one,
+    taken,
+)
 from nfo_sinus_driver.catalog.status import StatusCode
-from nfo_sinus_driver.families.sinus_g2.profile import CONTROL_WORD
-from nfo_sinus_driver.families.sinus_g2.profile import MODE
-from nfo_sinus_driver.families.sinus_g2.profile import MOST
-from nfo_sinus_driver.families.sinus_g2.profile import STATUS_WORD
-from nfo_sinus_driver.families.sinus_g2.profile import ModeScmd
+from nfo_sinus_driver.families.sinus_g2.profile import (
+    CONTROL_WORD,
+    MODE,
+    MOST,
+    STATUS_WORD,
+    ModeScmd,
+)
 from nfo_sinus_driver.families.sinus_optimal import words
 from nfo_sinus_driver.families.sinus_optimal.telegram1.profile import OptimalTelegram1
-from nfo_sinus_driver.families.sinus_optimal.words import Control
-from nfo_sinus_driver.families.sinus_optimal.words import Mode
-from nfo_sinus_driver.families.sinus_optimal.words import Smode
+from nfo_sinus_driver.families.sinus_optimal.words import Control, Mode, Smode
 
 _HOLDERS: Mapping[Value, Holder] = {
     Mode.MANUAL: Holder.LOCAL,

@@ -9,11 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from nfo_sinus_driver.simulator.memory import Memory
-from nfo_sinus_driver.simulator.movitrac31.codes import Bit
-from nfo_sinus_driver.simulator.movitrac31.codes import Input
-from nfo_sinus_driver.simulator.movitrac31.codes import Mode
-from nfo_sinus_driver.simulator.movitrac31.parameter_set import ParameterSet
-from nfo_sinus_driver.simulator.movitrac31.parameter_set import parameter_set
+from nfo_sinus_driver.simulator.movitrac31.codes import Bit, Input, Mode
+from nfo_sinus_driver.simulator.movitrac31.parameter_set import ParameterSet, parameter_set
 from nfo_sinus_driver.simulator.movitrac31.terminals import Terminals
 
 FUNCTION_BITS = 'fieldbus.function_bits'

@@ -9,9 +9,7 @@ Where the manual leaves it open, its :class:`Variant` says.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence as Several
+from collections.abc import Iterator, Mapping, Sequence as Several
 from dataclasses import replace
 from typing import Any
 
@@ -19,31 +17,30 @@ from nfo_sinus_driver.simulator.control_unit import ControlUnit
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.motor import Nameplate
 from nfo_sinus_driver.simulator.movitrac import Nack
-from nfo_sinus_driver.simulator.movitrac31.codes import EXTERNAL_FAULT
-from nfo_sinus_driver.simulator.movitrac31.codes import FAULTS
-from nfo_sinus_driver.simulator.movitrac31.codes import PC_TIMEOUT
-from nfo_sinus_driver.simulator.movitrac31.codes import Bit
-from nfo_sinus_driver.simulator.movitrac31.codes import Flag
-from nfo_sinus_driver.simulator.movitrac31.codes import Input
-from nfo_sinus_driver.simulator.movitrac31.codes import Mode
-from nfo_sinus_driver.simulator.movitrac31.codes import Number
-from nfo_sinus_driver.simulator.movitrac31.codes import Output
-from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS
-from nfo_sinus_driver.simulator.movitrac31.commands import KEYS
-from nfo_sinus_driver.simulator.movitrac31.commands import MANUAL
-from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
-from nfo_sinus_driver.simulator.movitrac31.commands import Commands
-from nfo_sinus_driver.simulator.movitrac31.displays import AMBIENT
-from nfo_sinus_driver.simulator.movitrac31.displays import DISPLAYS
-from nfo_sinus_driver.simulator.movitrac31.displays import heat_sink
-from nfo_sinus_driver.simulator.movitrac31.displays import readings
+from nfo_sinus_driver.simulator.movitrac31.codes import (
+    EXTERNAL_FAULT,
+    FAULTS,
+    PC_TIMEOUT,
+    Bit,
+    Flag,
+    Input,
+    Mode,
+    Number,
+    Output,
+)
+from nfo_sinus_driver.simulator.movitrac31.commands import (
+    FUNCTION_BITS,
+    KEYS,
+    MANUAL,
+    SETPOINT,
+    Commands,
+)
+from nfo_sinus_driver.simulator.movitrac31.displays import AMBIENT, DISPLAYS, heat_sink, readings
 from nfo_sinus_driver.simulator.movitrac31.eeprom import Eeprom
-from nfo_sinus_driver.simulator.movitrac31.fault_memory import FaultMemory
-from nfo_sinus_driver.simulator.movitrac31.fault_memory import MovitracFaults
+from nfo_sinus_driver.simulator.movitrac31.fault_memory import FaultMemory, MovitracFaults
 from nfo_sinus_driver.simulator.movitrac31.option_cards import places
 from nfo_sinus_driver.simulator.movitrac31.sequence import Sequence
-from nfo_sinus_driver.simulator.movitrac31.terminals import ENABLE
-from nfo_sinus_driver.simulator.movitrac31.terminals import Terminals
+from nfo_sinus_driver.simulator.movitrac31.terminals import ENABLE, Terminals
 from nfo_sinus_driver.simulator.movitrac31.variant import Variant
 from nfo_sinus_driver.simulator.movitrac_frames import ReturnCode
 from nfo_sinus_driver.simulator.timing import Timing

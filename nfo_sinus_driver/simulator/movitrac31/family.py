@@ -9,16 +9,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog.codec import Bcd
-from nfo_sinus_driver.catalog.codec import codec_of
+from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
+from nfo_sinus_driver.catalog.codec import Bcd, codec_of
 from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Argument
-from nfo_sinus_driver.simulator.injections import Target
-from nfo_sinus_driver.simulator.injections import Verb
+from nfo_sinus_driver.simulator.injections import Argument, Target, Verb
 from nfo_sinus_driver.simulator.movitrac31.commands import KEYS
 from nfo_sinus_driver.simulator.movitrac31.control_unit import MovitracControlUnit
 from nfo_sinus_driver.simulator.movitrac31.server import Server

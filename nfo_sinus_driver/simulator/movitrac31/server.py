@@ -9,14 +9,12 @@ Of what is wrong with a request it tells the first thing that it comes to.
 
 from __future__ import annotations
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Parameter
+from nfo_sinus_driver.catalog import Access, Parameter
 from nfo_sinus_driver.catalog.codec import Bcd
 from nfo_sinus_driver.simulator import movitrac
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.movitrac import Nack
-from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS
-from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
+from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS, SETPOINT
 from nfo_sinus_driver.simulator.movitrac31.control_unit import MovitracControlUnit
 from nfo_sinus_driver.simulator.movitrac31.option_cards import suffices
 from nfo_sinus_driver.simulator.movitrac31.rules import broken

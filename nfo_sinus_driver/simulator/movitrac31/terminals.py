@@ -5,12 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from nfo_sinus_driver.simulator.memory import Memory
-from nfo_sinus_driver.simulator.movitrac31.codes import Input
-from nfo_sinus_driver.simulator.movitrac31.codes import Output
+from nfo_sinus_driver.simulator.movitrac31.codes import Input, Output
 
 #: The terminal that is always CW/Stop, and the one that is the enable from the factory.
 CW, ENABLE = 41, 43

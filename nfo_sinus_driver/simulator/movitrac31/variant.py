@@ -5,9 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 
 from nfo_sinus_driver.simulator.family import Option
 from nfo_sinus_driver.simulator.movitrac31.option_cards import CARDS

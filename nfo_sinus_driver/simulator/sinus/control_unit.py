@@ -13,31 +13,25 @@ cycle, and MODE = Ext or Auto starts the motor; or what its variant says.
 from __future__ import annotations
 
 import abc
-from collections.abc import Collection
-from collections.abc import Iterator
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 import contextlib
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import enum
-from typing import Any
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
-from nfo_sinus_driver.simulator.memory import Memory
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.modbus import KNOWN
-from nfo_sinus_driver.simulator.modbus import TREATMENTS
+from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused
+from nfo_sinus_driver.simulator.modbus import KNOWN, TREATMENTS
 from nfo_sinus_driver.simulator.motor import Nameplate
-from nfo_sinus_driver.simulator.sinus.serial_side import LINE_SETTINGS
-from nfo_sinus_driver.simulator.sinus.serial_side import REFUSALS
-from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
-from nfo_sinus_driver.simulator.sinus.serial_side import SerialSide
-from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
+from nfo_sinus_driver.simulator.sinus.serial_side import (
+    LINE_SETTINGS,
+    REFUSALS,
+    LineRules,
+    SerialSide,
+    SinusFaults,
+)
 from nfo_sinus_driver.simulator.telegram1 import FieldbusWatch
 from nfo_sinus_driver.simulator.timing import Timing
 

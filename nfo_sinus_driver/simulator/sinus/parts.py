@@ -12,14 +12,9 @@ from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import Option
-from nfo_sinus_driver.simulator.injections import Argument
-from nfo_sinus_driver.simulator.injections import Target
-from nfo_sinus_driver.simulator.injections import Verb
-from nfo_sinus_driver.simulator.modbus import KNOWN
-from nfo_sinus_driver.simulator.modbus import TREATMENTS
-from nfo_sinus_driver.simulator.sinus.control_unit import CHOICES
-from nfo_sinus_driver.simulator.sinus.control_unit import KEYS
-from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
+from nfo_sinus_driver.simulator.injections import Argument, Target, Verb
+from nfo_sinus_driver.simulator.modbus import KNOWN, TREATMENTS
+from nfo_sinus_driver.simulator.sinus.control_unit import CHOICES, KEYS, SinusControlUnit
 
 OPTIONS = (
     Option('lenient', 'a Classic message that is refused while the bus has control is no serial '

@@ -5,14 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from collections.abc import Sequence
-from dataclasses import dataclass
-from dataclasses import field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog import Family, Meaning
 from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.memory import Memory

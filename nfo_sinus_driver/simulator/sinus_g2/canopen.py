@@ -12,23 +12,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 import zlib
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Parameter
+from nfo_sinus_driver.catalog import Access, Parameter
 from nfo_sinus_driver.simulator import canopen
-from nfo_sinus_driver.simulator.canopen import Entries
-from nfo_sinus_driver.simulator.canopen import Entry
-from nfo_sinus_driver.simulator.canopen import Identity
+from nfo_sinus_driver.simulator.canopen import Entries, Entry, Identity
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.memory import carried
-from nfo_sinus_driver.simulator.memory import kept
-from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import FROM_ONE
-from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import HELD
-from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import NARROW
-from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import NONE
-from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import SECOND
-from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import WIDE
+from nfo_sinus_driver.simulator.memory import Reason, Refused, carried, kept
+from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import (
+    FROM_ONE,
+    HELD,
+    NARROW,
+    NONE,
+    SECOND,
+    WIDE,
+)
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
 _PROTOCOL = 'canopen'

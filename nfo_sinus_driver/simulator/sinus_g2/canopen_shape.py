@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from dataclasses import field
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 
 from nfo_sinus_driver.simulator.canopen import Profile301
 from nfo_sinus_driver.simulator.family import Option

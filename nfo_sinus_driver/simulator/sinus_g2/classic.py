@@ -13,21 +13,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 import functools
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import to_bytes
-from nfo_sinus_driver.catalog import to_words
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.catalog import Access, Family, Parameter, to_bytes, to_words
+from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 from nfo_sinus_driver.simulator import classic
 from nfo_sinus_driver.simulator.classic import Wrong
 from nfo_sinus_driver.simulator.classic_frames import LineError
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.memory import carried
-from nfo_sinus_driver.simulator.memory import kept
+from nfo_sinus_driver.simulator.memory import Reason, Refused, carried, kept
 from nfo_sinus_driver.simulator.motor import measure
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 

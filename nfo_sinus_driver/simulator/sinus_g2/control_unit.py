@@ -11,46 +11,36 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Any
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.families.sinus_g2.words import Status
-from nfo_sinus_driver.simulator.memory import Memory
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.memory import home
-from nfo_sinus_driver.simulator.motor import Regulation
-from nfo_sinus_driver.simulator.motor import nearest
+from nfo_sinus_driver.catalog import Meaning, Parameter, Value
+from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd, Status
+from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
+from nfo_sinus_driver.simulator.motor import Regulation, nearest
 from nfo_sinus_driver.simulator.sinus import control_unit
-from nfo_sinus_driver.simulator.sinus.control_unit import CODE
-from nfo_sinus_driver.simulator.sinus.control_unit import REFUSED
-from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
-from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
-from nfo_sinus_driver.simulator.sinus.control_unit import Source
-from nfo_sinus_driver.simulator.sinus.control_unit import Variant
-from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
-from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
-from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import NAMES as CANOPEN_OPTIONS
-from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import CanopenShape
+from nfo_sinus_driver.simulator.sinus.control_unit import (
+    CODE,
+    REFUSED,
+    TERMINAL_SHARE,
+    SinusControlUnit,
+    Source,
+    Variant,
+)
+from nfo_sinus_driver.simulator.sinus.serial_side import LineRules, SinusFaults
+from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import NAMES as CANOPEN_OPTIONS, CanopenShape
 from nfo_sinus_driver.simulator.sinus_g2.firmware import firmware_of
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import SelfRestart
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import RELEASED
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import RUN_COMMANDS
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import RUNNING
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import STANDBY
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import StateMachine
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import local_share
-from nfo_sinus_driver.simulator.sinus_g2.tuning import FAILURES
-from nfo_sinus_driver.simulator.sinus_g2.tuning import PROCEDURES
-from nfo_sinus_driver.simulator.sinus_g2.tuning import Tuning
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import (
+    RELEASED,
+    RUN_COMMANDS,
+    RUNNING,
+    STANDBY,
+    Conditions,
+    Phase,
+    StateMachine,
+    local_share,
+)
+from nfo_sinus_driver.simulator.sinus_g2.tuning import FAILURES, PROCEDURES, Tuning
 
 #: What leaves the factory beside what all have.
 FACTORY: Mapping[str, Value] = {

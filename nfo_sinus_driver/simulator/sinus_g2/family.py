@@ -9,20 +9,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.family import Option
-from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Argument
-from nfo_sinus_driver.simulator.injections import Target
-from nfo_sinus_driver.simulator.injections import Verb
+from nfo_sinus_driver.simulator.family import Option, SimulatedFamily
+from nfo_sinus_driver.simulator.injections import Argument, Target, Verb
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus import parts
-from nfo_sinus_driver.simulator.sinus_g2 import canopen
-from nfo_sinus_driver.simulator.sinus_g2 import canopen_shape
-from nfo_sinus_driver.simulator.sinus_g2 import classic
-from nfo_sinus_driver.simulator.sinus_g2 import telegram1
-from nfo_sinus_driver.simulator.sinus_g2.control_unit import FACTORY
-from nfo_sinus_driver.simulator.sinus_g2.control_unit import TELEGRAM_CHOICES
-from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
+from nfo_sinus_driver.simulator.sinus_g2 import canopen, canopen_shape, classic, telegram1
+from nfo_sinus_driver.simulator.sinus_g2.control_unit import (
+    FACTORY,
+    TELEGRAM_CHOICES,
+    G2ControlUnit,
+)
 from nfo_sinus_driver.simulator.sinus_g2.firmware import DIALECTS
 
 _REVISION_LENGTH = 17

@@ -14,9 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import enum
 
-from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.families.sinus_g2.words import Status
+from nfo_sinus_driver.families.sinus_g2.words import Control, Scmd, Status
 from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
 
 #: Without both of these the power is off, or a quick stop is wanted [M0 table 14].

@@ -15,9 +15,7 @@ import enum
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.simulator import telegram1
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.sinus_g2.control_unit import DRIVECONTROL
-from nfo_sinus_driver.simulator.sinus_g2.control_unit import LEVELS
-from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
+from nfo_sinus_driver.simulator.sinus_g2.control_unit import DRIVECONTROL, LEVELS, G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
 
 #: What each bit of STW1 of PROFIdrive is in DriveControl.

@@ -17,15 +17,17 @@ from typing import Any
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus_h import keypad
-from nfo_sinus_driver.simulator.sinus_h.state_machine import LEVELS
-from nfo_sinus_driver.simulator.sinus_h.state_machine import NONE
-from nfo_sinus_driver.simulator.sinus_h.state_machine import PATTERNS
-from nfo_sinus_driver.simulator.sinus_h.state_machine import PROFIDRIVE
-from nfo_sinus_driver.simulator.sinus_h.state_machine import Control
-from nfo_sinus_driver.simulator.sinus_h.state_machine import State
-from nfo_sinus_driver.simulator.sinus_h.state_machine import StateMachine
-from nfo_sinus_driver.simulator.sinus_h.state_machine import Status
-from nfo_sinus_driver.simulator.sinus_h.state_machine import Stop
+from nfo_sinus_driver.simulator.sinus_h.state_machine import (
+    LEVELS,
+    NONE,
+    PATTERNS,
+    PROFIDRIVE,
+    Control,
+    State,
+    StateMachine,
+    Status,
+    Stop,
+)
 from nfo_sinus_driver.simulator.sinus_h.trips import LOST_COMMAND
 from nfo_sinus_driver.simulator.telegram1 import FieldbusWatch
 

@@ -7,15 +7,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from nfo_sinus_driver.simulator.family import Option
-from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Argument
-from nfo_sinus_driver.simulator.injections import Target
-from nfo_sinus_driver.simulator.injections import Verb
+from nfo_sinus_driver.simulator.family import Option, SimulatedFamily
+from nfo_sinus_driver.simulator.injections import Argument, Target, Verb
 from nfo_sinus_driver.simulator.sinus_h import keypad
-from nfo_sinus_driver.simulator.sinus_h.control_unit import CHOICES
-from nfo_sinus_driver.simulator.sinus_h.control_unit import KEYS
-from nfo_sinus_driver.simulator.sinus_h.control_unit import SinusHControlUnit
+from nfo_sinus_driver.simulator.sinus_h.control_unit import CHOICES, KEYS, SinusHControlUnit
 from nfo_sinus_driver.simulator.sinus_h.telegram1 import Server
 
 

@@ -10,15 +10,11 @@ it, but its defaults are not known here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
 from nfo_sinus_driver.catalog.codec import codec_of
 from nfo_sinus_driver.catalog.parameter import Address
 from nfo_sinus_driver.simulator.sinus_h.trips import TRIPS

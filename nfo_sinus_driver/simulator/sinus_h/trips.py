@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import StatusCode
+from nfo_sinus_driver.catalog import Kind, StatusCode
 
 LOST_COMMAND = 35
 

@@ -16,25 +16,18 @@ does not expect it:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from nfo_sinus_driver.families.sinus_optimal.words import Control
-from nfo_sinus_driver.families.sinus_optimal.words import Mode
-from nfo_sinus_driver.families.sinus_optimal.words import Smode
-from nfo_sinus_driver.families.sinus_optimal.words import Status
-from nfo_sinus_driver.families.sinus_optimal.words import state_of
-from nfo_sinus_driver.simulator.memory import Memory
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.memory import home
-from nfo_sinus_driver.simulator.motor import Regulation
-from nfo_sinus_driver.simulator.motor import nearest
-from nfo_sinus_driver.simulator.sinus.control_unit import KEEPS
-from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
-from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
-from nfo_sinus_driver.simulator.sinus.control_unit import Source
-from nfo_sinus_driver.simulator.sinus.control_unit import Variant
+from nfo_sinus_driver.families.sinus_optimal.words import Control, Mode, Smode, Status, state_of
+from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
+from nfo_sinus_driver.simulator.motor import Regulation, nearest
+from nfo_sinus_driver.simulator.sinus.control_unit import (
+    KEEPS,
+    TERMINAL_SHARE,
+    SinusControlUnit,
+    Source,
+    Variant,
+)
 from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
 
 #: Codes of the setting control.mode.

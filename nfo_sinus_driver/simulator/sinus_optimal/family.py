@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Family, load_family
 from nfo_sinus_driver.simulator.family import SimulatedFamily
 from nfo_sinus_driver.simulator.modbus import READ_INPUT
 from nfo_sinus_driver.simulator.sinus import parts

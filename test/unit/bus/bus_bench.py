@@ -9,20 +9,11 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
-from fake_link import PATIENCE
-from fake_link import Done
-from fake_link import FakeLink
-from fake_link import wait_until
+from fake_link import PATIENCE, Done, FakeLink, wait_until
 import pytest
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import packed, register
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Cancelled
-from nfo_sinus_driver.bus import LatestValue
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.bus import Bus, Cancelled, LatestValue, Priority, Task, Transfer
 from nfo_sinus_driver.link import LinkError
 
 UNIT = 1

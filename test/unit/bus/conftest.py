@@ -10,8 +10,7 @@ from collections.abc import Iterator
 from fake_link import FakeLink
 import pytest
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import worker as bus_module
+from nfo_sinus_driver.bus import Bus, worker as bus_module
 
 
 @pytest.fixture

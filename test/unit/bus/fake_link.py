@@ -6,23 +6,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
 import threading
 import time
 from typing import NamedTuple
 
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import packed, register
 
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Remarks
-from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import Supervision
+from nfo_sinus_driver.link import PROTOCOLS, Address, NoAnswer, Remarks, Reply, Supervision
 
 #: No honest wait takes this long, on any machine, s.
 PATIENCE = 30.0

@@ -8,28 +8,14 @@ from __future__ import annotations
 from collections import Counter
 import threading
 
-from bus_bench import UNIT
-from bus_bench import Writer
-from bus_bench import ask
-from bus_bench import failure
-from bus_bench import hold
-from bus_bench import result
-from bus_bench import take_time
-from fake_link import Done
-from fake_link import FakeLink
-from fake_link import wait_until
+from bus_bench import UNIT, Writer, ask, failure, hold, result, take_time
+from fake_link import Done, FakeLink, wait_until
 import pytest
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import packed, register
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.bus.scheduler import BACKGROUND_SHARE
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import Address, DamagedAnswer, LinkError, NoAnswer, Refused
 
 
 def test_read_and_write(bus: Bus, link: FakeLink) -> None:

@@ -8,31 +8,13 @@ from __future__ import annotations
 import threading
 import time
 
-from bus_bench import OTHER
-from bus_bench import RAISED
-from bus_bench import UNIT
-from bus_bench import Writer
-from bus_bench import ask
-from bus_bench import failure
-from bus_bench import hold
-from bus_bench import raiser
-from bus_bench import result
-from bus_bench import spawned
-from fake_link import PATIENCE
-from fake_link import Done
-from fake_link import FakeLink
-from fake_link import wait_until
+from bus_bench import OTHER, RAISED, UNIT, Writer, ask, failure, hold, raiser, result, spawned
+from fake_link import PATIENCE, Done, FakeLink, wait_until
 import pytest
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import packed, register
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Cancelled
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import worker as bus_module
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NotReady
-from nfo_sinus_driver.link import PortError
+from nfo_sinus_driver.bus import Bus, Cancelled, Priority, worker as bus_module
+from nfo_sinus_driver.link import LinkError, NotReady, PortError
 
 
 @RAISED

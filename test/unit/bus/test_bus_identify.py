@@ -5,26 +5,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
-from fake_link import PATIENCE
-from fake_link import Done
-from fake_link import FakeLink
+from fake_link import PATIENCE, Done, FakeLink
 import pytest
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import packed, register
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import NotReady
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.bus import Bus, Priority
+from nfo_sinus_driver.link import (
+    DamagedAnswer,
+    Identification,
+    LinkError,
+    NoAnswer,
+    NotReady,
+    PortError,
+    Refused,
+    Reply,
+)
 
 _UNIT = 1
 _FIRST, _SECOND, _STOP = 43, 17, 99

@@ -8,34 +8,13 @@ from __future__ import annotations
 import math
 import threading
 
-from bus_bench import UNIT
-from bus_bench import Writer
-from bus_bench import ask
-from bus_bench import failure
-from bus_bench import hold
-from bus_bench import raiser
-from bus_bench import result
-from bus_bench import take_time
-from fake_link import PATIENCE
-from fake_link import Done
-from fake_link import FakeLink
-from fake_link import wait_until
+from bus_bench import UNIT, Writer, ask, failure, hold, raiser, result, take_time
+from fake_link import PATIENCE, Done, FakeLink, wait_until
 import pytest
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import packed, register
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Cancelled
-from nfo_sinus_driver.bus import LatestValue
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Task
-from nfo_sinus_driver.bus import worker as bus_module
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import NotReady
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.bus import Bus, Cancelled, LatestValue, Priority, Task, worker as bus_module
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, NotReady, PortError, Refused
 
 
 def test_port_that_is_lost_and_comes_back(bus: Bus, link: FakeLink) -> None:

@@ -8,21 +8,11 @@ from __future__ import annotations
 import threading
 import time
 
-from bus_bench import UNIT
-from bus_bench import ask
-from bus_bench import hold
-from bus_bench import result
-from bus_bench import spawned
-from fake_link import Done
-from fake_link import FakeLink
-from fake_link import wait_until
-from support.addresses import packed
-from support.addresses import register
+from bus_bench import UNIT, ask, hold, result, spawned
+from fake_link import Done, FakeLink, wait_until
+from support.addresses import packed, register
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Cancelled
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Task
+from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Task
 from nfo_sinus_driver.link import NotReady
 
 

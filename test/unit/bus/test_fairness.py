@@ -7,18 +7,11 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 
-from bus_bench import ask
-from bus_bench import result
-from fake_link import Done
-from fake_link import FakeLink
-from fake_link import wait_until
-from support.addresses import packed
-from support.addresses import register
+from bus_bench import ask, result
+from fake_link import Done, FakeLink, wait_until
+from support.addresses import packed, register
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import LatestValue
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.bus import Transfer
+from nfo_sinus_driver.bus import Bus, LatestValue, Priority, Transfer
 
 _SETPOINT = 50
 _POLL = 7

@@ -7,20 +7,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from typing import Any
-from typing import cast
+from typing import Any, cast
 
 import pytest
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import packed, register
 
-from nfo_sinus_driver.bus.scheduler import BACKGROUND_SHARE
-from nfo_sinus_driver.bus.scheduler import Scheduler
-from nfo_sinus_driver.bus.scheduler import Waiting
-from nfo_sinus_driver.bus.tasks import LatestValue
-from nfo_sinus_driver.bus.tasks import Priority
-from nfo_sinus_driver.bus.tasks import Task
-from nfo_sinus_driver.bus.tasks import Transfer
+from nfo_sinus_driver.bus.scheduler import BACKGROUND_SHARE, Scheduler, Waiting
+from nfo_sinus_driver.bus.tasks import LatestValue, Priority, Task, Transfer
 
 _SLOT = 'slot'
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)

@@ -10,11 +10,7 @@ import math
 import pytest
 
 from nfo_sinus_driver.bus.scheduler import Silences
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, PortError, Refused
 
 
 def test_who_is_not_asked_is_not_silent() -> None:

@@ -13,10 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from nfo_sinus_driver.bus.statistics import Recorder
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
 
 
 @pytest.fixture

@@ -13,8 +13,7 @@ import re
 
 import pytest
 
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Parameter, load_family
 
 SHARED = Path(__file__).resolve().parents[4] / 'shared'
 G2 = load_family('sinus_g2')

@@ -10,8 +10,7 @@ from collections import Counter
 
 import pytest
 
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Parameter, load_family
 
 G2 = load_family('sinus_g2')
 MODBUS = [parameter for parameter in G2.values() if 'modbus' in parameter.addresses]

@@ -15,11 +15,7 @@ import time
 
 import pytest
 
-from nfo_sinus_driver.catalog import CatalogError
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import family
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import CatalogError, Role, families, family, load_family
 
 NAME = 'sinus_g2'
 PARAMETERS = 'parameters.csv'

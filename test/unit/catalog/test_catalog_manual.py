@@ -9,16 +9,10 @@ from __future__ import annotations
 from fractions import Fraction
 import re
 
-from manual_text import G2
-from manual_text import between
-from manual_text import labels_in
-from manual_text import lines_of
-from manual_text import manual
-from manual_text import settings_of_m2
+from manual_text import G2, between, labels_in, lines_of, manual, settings_of_m2
 import pytest
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Address
+from nfo_sinus_driver.catalog import Access, Address
 
 #: What is misprinted, by key and table, with the reading that is followed.
 MISPRINTS = {

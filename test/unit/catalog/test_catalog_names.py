@@ -12,11 +12,7 @@ from pathlib import Path
 import pytest
 from setting_names import SETTINGS
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import example_setting
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog import usual_family
+from nfo_sinus_driver.catalog import Access, Parameter, example_setting, load_family, usual_family
 
 G2 = load_family('sinus_g2')
 NAMES = Path(__file__).resolve().parents[4] / 'shared' / 'design' / 'parameter_names.csv'

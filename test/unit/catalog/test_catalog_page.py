@@ -12,9 +12,7 @@ import sys
 
 import pytest
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Access, families, load_family
 from nfo_sinus_driver.catalog.page import page
 from nfo_sinus_driver.cli.parameter_file import readable
 

@@ -11,11 +11,7 @@ from fractions import Fraction
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Access, Family, Parameter, Value, load_family
 
 G2 = load_family('sinus_g2')
 ROWS = pytest.mark.parametrize('parameter', list(G2.values()), ids=list(G2))

@@ -9,14 +9,11 @@ from __future__ import annotations
 from fractions import Fraction
 import struct
 
-from hypothesis import example
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Parameter, load_family
 from nfo_sinus_driver.catalog.codec import BitField
 
 G2 = load_family('sinus_g2')

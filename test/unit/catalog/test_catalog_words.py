@@ -8,20 +8,12 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.families.sinus_g2.words import Status
-from nfo_sinus_driver.families.sinus_g2.words import state_of
+from nfo_sinus_driver.catalog import Kind, Meaning, State, load_family
+from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd, Status, state_of
 
 G2 = load_family('sinus_g2')
 

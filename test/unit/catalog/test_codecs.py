@@ -10,16 +10,10 @@ from dataclasses import replace
 from fractions import Fraction
 import struct
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import Number
-from nfo_sinus_driver.catalog import Text
-from nfo_sinus_driver.catalog import codec_of
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog import to_bytes
-from nfo_sinus_driver.catalog import to_words
+from nfo_sinus_driver.catalog import Number, Text, codec_of, load_family, to_bytes, to_words
 
 #: A codec, a raw number, and its bytes as they go over the bus, written down by hand.
 GOLDEN = [

@@ -9,12 +9,9 @@ import re
 
 import pytest
 from support.addresses import packed
-from support.parameter_ends import ENDS
-from support.parameter_ends import Ends
+from support.parameter_ends import ENDS, Ends
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Access, Parameter, load_family
 
 G2 = load_family('sinus_g2')
 SETTINGS = pytest.mark.parametrize('ends', ENDS, ids=[ends.name for ends in ENDS])

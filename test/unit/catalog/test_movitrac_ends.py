@@ -8,10 +8,7 @@ from __future__ import annotations
 from collections import Counter
 import re
 
-from support.movitrac_ends import COUNTS
-from support.movitrac_ends import ENDS
-from support.movitrac_ends import Ends
-from support.movitrac_ends import Value
+from support.movitrac_ends import COUNTS, ENDS, Ends, Value
 
 from nfo_sinus_driver.catalog import load_family
 

@@ -18,9 +18,7 @@ import re
 
 from manual_text import manual
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Access, Parameter, load_family
 
 FAMILY = load_family('movitrac31')
 BY_INDEX = {row.at('movitrac').index: row for row in FAMILY.values()}

@@ -10,15 +10,10 @@ from collections import Counter
 from fractions import Fraction
 import math
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Access, Kind, Meaning, Parameter, load_family
 
 MOVITRAC = load_family('movitrac31')
 BUS = 'movitrac'

@@ -6,14 +6,10 @@
 
 from __future__ import annotations
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Fact, Kind, State, load_family
 from nfo_sinus_driver.families.movitrac31 import words
 
 MOVITRAC = load_family('movitrac31')

@@ -13,12 +13,8 @@ import re
 
 import pytest
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.families.sinus_optimal.words import Control
-from nfo_sinus_driver.families.sinus_optimal.words import Mode
-from nfo_sinus_driver.families.sinus_optimal.words import Smode
-from nfo_sinus_driver.families.sinus_optimal.words import Status
+from nfo_sinus_driver.catalog import Access, load_family
+from nfo_sinus_driver.families.sinus_optimal.words import Control, Mode, Smode, Status
 
 MANUALS = Path(__file__).resolve().parents[4] / 'shared' / 'manuals'
 OPTIMAL = load_family('sinus_optimal')

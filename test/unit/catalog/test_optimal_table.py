@@ -9,16 +9,11 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from hypothesis import example
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import family
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Access, families, family, load_family
 from nfo_sinus_driver.drive.settings import DriveSettings
 
 G2 = load_family('sinus_g2')

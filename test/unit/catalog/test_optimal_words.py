@@ -9,22 +9,12 @@ from __future__ import annotations
 from pathlib import Path
 import re
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Fact, Kind, Meaning, State, families, load_family
 from nfo_sinus_driver.families.sinus_g2 import words
-from nfo_sinus_driver.families.sinus_optimal.words import Control
-from nfo_sinus_driver.families.sinus_optimal.words import Mode
-from nfo_sinus_driver.families.sinus_optimal.words import Smode
-from nfo_sinus_driver.families.sinus_optimal.words import Status
-from nfo_sinus_driver.families.sinus_optimal.words import state_of
+from nfo_sinus_driver.families.sinus_optimal.words import Control, Mode, Smode, Status, state_of
 
 G2 = load_family('sinus_g2')
 OPTIMAL = load_family('sinus_optimal')

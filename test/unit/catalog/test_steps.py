@@ -10,14 +10,10 @@ from dataclasses import replace
 from fractions import Fraction
 import re
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import Address
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import codec_of
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Address, Parameter, codec_of, load_family
 
 BUS = 'modbus'
 HUNDREDTH = Fraction(1, 100)

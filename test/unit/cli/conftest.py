@@ -5,17 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 from pathlib import Path
 import signal
 from typing import Any
 
-from cli_bench import ROOT
-from cli_bench import Bench
-from cli_bench import Done
-from cli_bench import MakeBench
+from cli_bench import ROOT, Bench, Done, MakeBench
 import pytest
 
 from nfo_sinus_driver.cli.main import main

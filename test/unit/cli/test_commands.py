@@ -11,12 +11,7 @@ import re
 import signal
 from typing import Any
 
-from cli_bench import PATIENCE
-from cli_bench import QUICK
-from cli_bench import Bench
-from cli_bench import Done
-from cli_bench import MakeBench
-from cli_bench import wait_until
+from cli_bench import PATIENCE, QUICK, Bench, Done, MakeBench, wait_until
 import pytest
 
 from nfo_sinus_driver.families.sinus_g2.words import Control

@@ -13,8 +13,7 @@ import subprocess
 import pytest
 
 from nfo_sinus_driver.cli.completion import script
-from nfo_sinus_driver.cli.main import VERBS
-from nfo_sinus_driver.cli.main import main
+from nfo_sinus_driver.cli.main import VERBS, main
 from nfo_sinus_driver.simulator.main import main as simulator
 from nfo_sinus_driver.version import VERSION
 

@@ -9,8 +9,7 @@ import signal
 import subprocess
 import sys
 
-from cli_bench import COMMAND
-from cli_bench import Bench
+from cli_bench import COMMAND, Bench
 import pytest
 from support.terminal import Terminal
 

@@ -8,10 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from cli_bench import Bench
-from cli_bench import Done
-from cli_bench import MakeBench
-from cli_bench import wait_until
+from cli_bench import Bench, Done, MakeBench, wait_until
 import pytest
 
 Nfo = Callable[..., Done]

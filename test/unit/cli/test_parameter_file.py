@@ -5,19 +5,13 @@
 
 from __future__ import annotations
 
-from hypothesis import given
-from hypothesis import settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 import pytest
 import yaml
 
-from nfo_sinus_driver.catalog import Parameter
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Parameter, Value, load_family
 from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.parameter_file import HEADER
-from nfo_sinus_driver.cli.parameter_file import format_file
-from nfo_sinus_driver.cli.parameter_file import parse_file
+from nfo_sinus_driver.cli.parameter_file import HEADER, format_file, parse_file
 
 G2 = load_family('sinus_g2')
 

@@ -18,14 +18,7 @@ import subprocess
 import time
 from typing import Any
 
-from cli_bench import COMMAND
-from cli_bench import PATIENCE
-from cli_bench import QUICK
-from cli_bench import ROOT
-from cli_bench import Bench
-from cli_bench import Done
-from cli_bench import MakeBench
-from cli_bench import wait_until
+from cli_bench import COMMAND, PATIENCE, QUICK, ROOT, Bench, Done, MakeBench, wait_until
 import pytest
 
 Nfo = Callable[..., Done]

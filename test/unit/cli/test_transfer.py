@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 import json
 import os
@@ -14,16 +13,13 @@ from pathlib import Path
 import shlex
 import signal
 
-from cli_bench import Bench
-from cli_bench import Done
-from cli_bench import wait_until
+from cli_bench import Bench, Done, wait_until
 import pytest
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import transfer
 from nfo_sinus_driver.cli.parameter_file import parse_file
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 
 Nfo = Callable[..., Done]
 REACHED = [p for p in load_family('sinus_g2').settings if {*p.addresses} >= {'modbus', 'classic'}]

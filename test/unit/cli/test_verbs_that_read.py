@@ -14,9 +14,7 @@ from pathlib import Path
 import signal
 import sys
 
-from cli_bench import BACKGROUND
-from cli_bench import Bench
-from cli_bench import Done
+from cli_bench import BACKGROUND, Bench, Done
 import pytest
 import yaml
 

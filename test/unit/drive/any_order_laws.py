@@ -14,15 +14,10 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from any_order_history import SETPOINT_TIMEOUT
-from any_order_history import STOPS
-from any_order_history import Command
-from any_order_history import History
+from any_order_history import SETPOINT_TIMEOUT, STOPS, Command, History
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import Snapshot
+from nfo_sinus_driver.drive import Cause, Severity, Snapshot
 
 #: Within this it is said that a motor cannot be stopped, s.
 SAID = 5.0

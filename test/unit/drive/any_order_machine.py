@@ -5,23 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import math
-from typing import Any
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from any_order_history import POLL_RATE
-from any_order_history import SETPOINT_TIMEOUT
-from any_order_history import SHUTDOWN_TIMEOUT
+from any_order_history import POLL_RATE, SETPOINT_TIMEOUT, SHUTDOWN_TIMEOUT
 from any_order_laws import Laws
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine
-from hypothesis.stateful import precondition
-from hypothesis.stateful import rule
+from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 import pytest
-from support.rig import Rig
-from support.rig import Way
+from support.rig import Rig, Way
 
 from nfo_sinus_driver.simulator.memory import Refused as Refusal
 

@@ -6,36 +6,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from any_order_machine import BOOT_TIMES
-from any_order_machine import DRIVEN
-from any_order_machine import WAITS
-from any_order_machine import WHOLE
-from any_order_machine import AnyOrder
-from any_order_shown import MODE_BUS
-from any_order_shown import MODE_STOP
-from any_order_shown import RUN_FIELDBUS
+from any_order_machine import BOOT_TIMES, DRIVEN, WAITS, WHOLE, AnyOrder
+from any_order_shown import MODE_BUS, MODE_STOP, RUN_FIELDBUS
 from hypothesis import strategies as st
-from hypothesis.stateful import initialize
-from hypothesis.stateful import precondition
-from hypothesis.stateful import rule
+from hypothesis.stateful import initialize, precondition, rule
 
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.simulator.family import load
-from nfo_sinus_driver.simulator.movitrac31.codes import Bit
-from nfo_sinus_driver.simulator.movitrac31.codes import Mode
-from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
-from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS
-from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
-from nfo_sinus_driver.simulator.sinus.control_unit import ALL
-from nfo_sinus_driver.simulator.sinus.control_unit import DROPS
-from nfo_sinus_driver.simulator.sinus.control_unit import KEEPS
-from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
-from nfo_sinus_driver.simulator.sinus.control_unit import REFUSED
-from nfo_sinus_driver.simulator.sinus.control_unit import SCMD
-from nfo_sinus_driver.simulator.sinus.control_unit import TAKEN
+from nfo_sinus_driver.simulator.movitrac31.codes import Bit, Mode
+from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE, FUNCTION_BITS, SETPOINT
+from nfo_sinus_driver.simulator.sinus.control_unit import (
+    ALL,
+    DROPS,
+    KEEPS,
+    NOTHING,
+    REFUSED,
+    SCMD,
+    TAKEN,
+)
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 
 _CONTROL = 'fieldbus.drive_control'

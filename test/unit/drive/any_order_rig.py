@@ -11,9 +11,7 @@ second, and the same history always goes the same way.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Collection
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future
 import contextlib
 import functools
@@ -21,32 +19,33 @@ from random import Random
 import struct
 from typing import Any
 
-from support.addresses import Words
-from support.addresses import packed
-from support.addresses import words_of
-from support.said import Said
-from support.said import said
+from support.addresses import Words, packed, words_of
+from support.said import Said, said
 from support.wire import crc
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Event
-from nfo_sinus_driver.drive import LogEntry
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.drive import (
+    Drive,
+    DriveSettings,
+    Event,
+    LogEntry,
+    Severity,
+    Snapshot,
+    Telemetry,
+)
 from nfo_sinus_driver.drive.control_state import ControlState
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import NotReady
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Remarks
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import (
+    PROTOCOLS,
+    Address,
+    DamagedAnswer,
+    Identification,
+    NoAnswer,
+    NotReady,
+    PortError,
+    Refused,
+    Remarks,
+    Reply,
+)
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.memory import Refused as FarRefusal
 from nfo_sinus_driver.simulator.modbus import server

@@ -10,23 +10,20 @@ Written from the manuals; nothing of the driver is asked.
 from __future__ import annotations
 
 import abc
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from support.rig import Rig
 
-from nfo_sinus_driver.simulator.movitrac31.codes import Bit
-from nfo_sinus_driver.simulator.movitrac31.codes import Mode
-from nfo_sinus_driver.simulator.movitrac31.codes import Number
-from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
-from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS
-from nfo_sinus_driver.simulator.movitrac31.commands import MANUAL
-from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
-from nfo_sinus_driver.simulator.sinus.control_unit import ALL
-from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
-from nfo_sinus_driver.simulator.sinus.control_unit import Source
+from nfo_sinus_driver.simulator.movitrac31.codes import Bit, Mode, Number
+from nfo_sinus_driver.simulator.movitrac31.commands import (
+    CONTROL_MODE,
+    FUNCTION_BITS,
+    MANUAL,
+    SETPOINT,
+)
+from nfo_sinus_driver.simulator.sinus.control_unit import ALL, NOTHING, Source
 
 #: What commands a drive of NFO [M0 §7], [M1]; of the mask and its word, the latter comes last.
 MODE, CONTROL, MASK = 'fieldbus.mode', 'fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'

@@ -6,25 +6,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 import contextlib
 from pathlib import Path
 from typing import Any
 
-from drive_rig import MODEST
-from drive_rig import MakeRig
-from drive_rig import Rig
-from drive_rig import patient
+from drive_rig import MODEST, MakeRig, Rig, patient
 import pytest
-from virtual_rig import MakeVirtual
-from virtual_rig import VirtualRig
+from virtual_rig import MakeVirtual, VirtualRig
 
 from nfo_sinus_driver.bus import worker as bus_module
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.drive import poller as watch_module
-from nfo_sinus_driver.drive import sequences
+from nfo_sinus_driver.drive import DriveSettings, drive_state, poller as watch_module, sequences
 
 
 @pytest.fixture

@@ -6,8 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 import dataclasses
 import json
 import math
@@ -18,35 +17,27 @@ from typing import Any
 
 import pytest
 from support import trace_laws
-from support.addresses import Words
-from support.addresses import words_of
-from support.said import Said
-from support.said import said
-from support.said import says
+from support.addresses import Words, words_of
+from support.said import Said, said, says
 from support.variants import hardest
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Event
-from nfo_sinus_driver.drive import LogEntry
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.drive import Telemetry
+from nfo_sinus_driver.catalog import Fact, Meaning
+from nfo_sinus_driver.drive import (
+    Cause,
+    Drive,
+    DriveError,
+    DriveSettings,
+    Event,
+    LogEntry,
+    Severity,
+    Snapshot,
+    Telemetry,
+)
 from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import LineSettings
-from nfo_sinus_driver.link import Link
-from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.link import PROTOCOLS, Address, LineSettings, Link, Reply, open_link
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 #: No honest wait takes this long, on any machine, s.

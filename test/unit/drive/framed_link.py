@@ -15,9 +15,7 @@ import heapq
 import itertools
 from typing import Any
 
-from any_order_rig import DirectLink
-from any_order_rig import FaultyLine
-from any_order_rig import Rig
+from any_order_rig import DirectLink, FaultyLine, Rig
 from support.wire import understand
 
 from nfo_sinus_driver.link.interface import LineSettings

@@ -13,13 +13,15 @@ from typing import Any
 from support.rig import Rig
 
 from nfo_sinus_driver.drive.detect import detect_model
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Remarks
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import (
+    PROTOCOLS,
+    Address,
+    Identification,
+    LinkError,
+    Refused,
+    Remarks,
+    Reply,
+)
 
 #: How long an access takes, s.
 _ACCESS = 0.002

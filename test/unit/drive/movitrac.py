@@ -5,19 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any
 
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Drive, DriveError
 from nfo_sinus_driver.simulator.family import load
 from nfo_sinus_driver.simulator.movitrac31.codes import Bit
-from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
-from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS
+from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE, FUNCTION_BITS
 
 OVERCURRENT = 101
 DIRECTIONS = Bit.CW | Bit.CCW

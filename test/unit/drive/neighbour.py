@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import contextlib
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.bus import Bus, Priority
+from nfo_sinus_driver.link import Address, LinkError
 
 
 async def neighbour(bus: Bus, address: Address) -> None:

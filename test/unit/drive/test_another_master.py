@@ -13,14 +13,9 @@ from typing import Any
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.link import classic
-from nfo_sinus_driver.link import modbus_ascii
-from nfo_sinus_driver.link import movitrac
-from nfo_sinus_driver.link import rtu
-from nfo_sinus_driver.link.modbus_link import ReadDevice
-from nfo_sinus_driver.link.modbus_link import ReportSlaveId
+from nfo_sinus_driver.drive import Cause, Snapshot
+from nfo_sinus_driver.link import classic, modbus_ascii, movitrac, rtu
+from nfo_sinus_driver.link.modbus_link import ReadDevice, ReportSlaveId
 from nfo_sinus_driver.link.modbus_pdu import read_of
 
 SECONDS = 40.0

@@ -13,14 +13,8 @@ from __future__ import annotations
 import os
 
 from any_order_machine import AnyOrder
-from any_order_machines import MACHINES
-from any_order_machines import G2DriveControl
-from any_order_machines import G2ModeScmd
-from any_order_machines import OptimalModeScmd
-from hypothesis import HealthCheck
-from hypothesis import Phase
-from hypothesis import seed
-from hypothesis import settings
+from any_order_machines import MACHINES, G2DriveControl, G2ModeScmd, OptimalModeScmd
+from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis.stateful import run_state_machine_as_test
 import pytest
 from support.examples import examples

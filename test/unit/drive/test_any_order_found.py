@@ -10,19 +10,13 @@ import dataclasses
 import itertools
 
 from any_order_machine import AnyOrder
-from any_order_machines import G2DriveControl
-from any_order_machines import G2ModeScmd
-from any_order_machines import Movitrac
-from drive_rig import MODE
-from drive_rig import RUN
-from drive_rig import SCMD
+from any_order_machines import G2DriveControl, G2ModeScmd, Movitrac
+from drive_rig import MODE, RUN, SCMD
 import pytest
 from support.addresses import Words
-from virtual_rig import MakeVirtual
-from virtual_rig import VirtualRig
+from virtual_rig import MakeVirtual, VirtualRig
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import Refused
 

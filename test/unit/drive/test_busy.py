@@ -8,8 +8,7 @@ from __future__ import annotations
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Cause, Severity
 
 MODE, SCMD, STATUS = 'fieldbus.mode', 'fieldbus.scmd', 'fieldbus.inv_st'
 FREQUENCY = 'status.frq_set'

@@ -10,27 +10,25 @@ import asyncio
 from collections.abc import Callable
 import math
 from types import SimpleNamespace
-from typing import Any
-from typing import cast
+from typing import Any, cast
 
 import pytest
 from support.said import raises
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import NotPossible
-from nfo_sinus_driver.catalog import Refusal
-from nfo_sinus_driver.catalog.profile import Acknowledge
-from nfo_sinus_driver.catalog.profile import AcknowledgeThenWrite
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Steps
-from nfo_sinus_driver.catalog.profile import Until
-from nfo_sinus_driver.catalog.profile import Write
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.catalog import NotPossible, Refusal
+from nfo_sinus_driver.catalog.profile import (
+    Acknowledge,
+    AcknowledgeThenWrite,
+    Read,
+    Steps,
+    Until,
+    Write,
+)
+from nfo_sinus_driver.drive import Cause, DriveError
 from nfo_sinus_driver.drive.commands import carry_out
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import NoAnswer, Refused
 
 NO = Refused(Refused.ILLEGAL_VALUE, 'no')
 

@@ -5,16 +5,13 @@
 
 from __future__ import annotations
 
-from drive_rig import MODE
-from drive_rig import RUN
+from drive_rig import MODE, RUN
 import pytest
 from support.addresses import Words
-from virtual_rig import MakeVirtual
-from virtual_rig import VirtualRig
+from virtual_rig import MakeVirtual, VirtualRig
 
 from nfo_sinus_driver.drive import Procedure
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.simulator.sinus.control_unit import Source
 

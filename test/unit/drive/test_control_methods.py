@@ -7,19 +7,12 @@ from __future__ import annotations
 
 import dataclasses
 
-from drive_rig import PATIENCE
-from drive_rig import STOPPING_OR_STOPPED
-from drive_rig import MakeRig
-from drive_rig import Rig
-from drive_rig import wait_until
+from drive_rig import PATIENCE, STOPPING_OR_STOPPED, MakeRig, Rig, wait_until
 import pytest
-from support.said import raises
-from support.said import said
+from support.said import raises, said
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import drive_state
+from nfo_sinus_driver.drive import Cause, DriveSettings, drive_state
 from nfo_sinus_driver.simulator.sinus_optimal import control_unit
 
 OVERLOAD = 5

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 import contextlib
 
 from any_order_machine import AnyOrder
@@ -14,10 +13,8 @@ from any_order_machines import G2ModeScmd
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Procedure
-from nfo_sinus_driver.drive import control_state
-from nfo_sinus_driver.drive.control_state import ControlEvent
-from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive import Procedure, control_state
+from nfo_sinus_driver.drive.control_state import ControlEvent, ControlState
 
 Row = tuple[ControlState, ControlEvent]
 

@@ -10,10 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from nfo_sinus_driver.drive.control_state import COMMANDED
-from nfo_sinus_driver.drive.control_state import TRANSITIONS
-from nfo_sinus_driver.drive.control_state import ControlEvent
-from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive.control_state import COMMANDED, TRANSITIONS, ControlEvent, ControlState
 
 PAGE = Path(__file__).parents[3] / 'docs' / 'control.md'
 

@@ -10,8 +10,7 @@ from types import FrameType
 from typing import Any
 
 from support.addresses import register
-from support.rig import SLICE
-from support.rig import Rig
+from support.rig import SLICE, Rig
 
 from nfo_sinus_driver.link import rtu
 from nfo_sinus_driver.link.modbus_pdu import read_of

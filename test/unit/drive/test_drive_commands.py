@@ -6,16 +6,13 @@
 from __future__ import annotations
 
 import pytest
-from support.rig import WAYS
-from support.rig import Rig
+from support.rig import WAYS, Rig
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 from nfo_sinus_driver.simulator.classic_frames import LineError
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
 OVERLOAD = 5

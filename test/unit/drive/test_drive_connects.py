@@ -12,16 +12,12 @@ import pytest
 from support.rig import Rig
 from support.said import said
 
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.catalog import Kind, Role
+from nfo_sinus_driver.drive import Cause, DriveSettings, Severity
 from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import NoAnswer
+from nfo_sinus_driver.link import PROTOCOLS, NoAnswer
 
 OVERLOAD = 5
 MODE, SCMD = 'fieldbus.mode', 'fieldbus.scmd'

@@ -8,10 +8,8 @@ from __future__ import annotations
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 
 OVERLOAD = 5
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import pytest
 from support.addresses import packed
-from support.classic_ends import OTHER_ON_CLASSIC
-from support.classic_ends import on_classic
+from support.classic_ends import OTHER_ON_CLASSIC, on_classic
 from support.parameter_ends import ENDS
 from support.rig import Rig
 

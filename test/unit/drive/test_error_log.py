@@ -5,23 +5,18 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from datetime import timedelta
+from datetime import datetime, timedelta
 import math
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 from support.addresses import packed
-from support.rig import WAYS
-from support.rig import Rig
+from support.rig import WAYS, Rig
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.drive.error_log import OperatingClock
 from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.link import Address, Reply
 from nfo_sinus_driver.simulator.faults import LogEntry
 
 #: What a request for an entry of the log is called: it is no parameter.

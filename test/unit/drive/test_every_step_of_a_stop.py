@@ -11,12 +11,10 @@ import contextlib
 from typing import Any
 
 import pytest
-from ways_rig import WAYS
-from ways_rig import WayRig
+from ways_rig import WAYS, WayRig
 
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
+from nfo_sinus_driver.drive import Cause, Drive
 
 STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
     'stop': lambda drive: drive.stop(),

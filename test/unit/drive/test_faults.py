@@ -7,19 +7,12 @@ from __future__ import annotations
 
 import itertools
 
-from drive_rig import PATIENCE
-from drive_rig import MakeRig
-from drive_rig import Rig
-from drive_rig import wait_until
+from drive_rig import PATIENCE, MakeRig, Rig, wait_until
 import pytest
 from support.said import said
 
-from nfo_sinus_driver.catalog import Family
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Meaning
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.catalog import Family, Kind, Meaning, load_family
+from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 

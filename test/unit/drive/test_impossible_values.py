@@ -8,15 +8,11 @@ from __future__ import annotations
 import math
 
 import pytest
-from support.rig import WAYS
-from support.rig import Rig
+from support.rig import WAYS, Rig
 
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.drive import Severity, Snapshot
+from nfo_sinus_driver.link import Address, Refused, Reply
 
 #: What no drive can have, as each byte of it: no status, code or label; 2621.4 Hz, 26214 rpm.
 IMPOSSIBLE = {

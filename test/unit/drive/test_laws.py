@@ -19,14 +19,11 @@ from typing import Any
 
 import pytest
 from support.drives import DRIVES
-from support.rig import WAYS
-from support.rig import Rig
+from support.rig import WAYS, Rig
 from support.variants import ramps
 
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Cause, Drive, Severity
 
 #: How soon a loss has to be noticed and the motor has to be stopped, beyond lost_after, s.
 _SOON = 1.5

@@ -17,16 +17,13 @@ from pathlib import Path
 import shutil
 from typing import Any
 
-from made_up_rig import FarEnd
-from made_up_rig import MadeUpRig
+from made_up_rig import FarEnd, MadeUpRig
 import pytest
 from support.said import raises
 
 from nfo_sinus_driver import families
-from nfo_sinus_driver.catalog import CatalogError
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.catalog import CatalogError, load_family
+from nfo_sinus_driver.drive import Cause, DriveSettings
 from nfo_sinus_driver.drive.settings import AUTO
 
 MADE_UP = Path(__file__).parent / 'made_up'

@@ -19,18 +19,14 @@ import shutil
 import struct
 from typing import Any
 
-from made_up_rig import FarEnd
-from made_up_rig import MadeUpRig
+from made_up_rig import FarEnd, MadeUpRig
 import pytest
-from support.said import raises
-from support.said import said
+from support.said import raises, said
 
 from nfo_sinus_driver import families
-from nfo_sinus_driver.catalog import CatalogError
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import CatalogError, load_family
 from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import NoAnswer, Refused
 
 RAMP, WORD, TURN, SIZE, TOLD, CODE, HERTZ, KIND = 10, 100, 101, 102, 200, 201, 202, 300
 RESET, RUN, REMOTE = 1 << 3, 1 << 12, 1 << 15

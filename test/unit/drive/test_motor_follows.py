@@ -11,8 +11,7 @@ from typing import Any
 
 import pytest
 from support.variants import ramps
-from ways_rig import WAYS
-from ways_rig import WayRig
+from ways_rig import WAYS, WayRig
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.families.movitrac31.words import Bits

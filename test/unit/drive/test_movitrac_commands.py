@@ -10,17 +10,12 @@ from concurrent.futures import Future
 import dataclasses
 from typing import Any
 
-from movitrac import DIRECTIONS
-from movitrac import REMOTE
-from movitrac import bits
-from movitrac import make
-from movitrac import succeeded
+from movitrac import DIRECTIONS, REMOTE, bits, make, succeeded
 import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive import Drive, Procedure
 from nfo_sinus_driver.simulator.movitrac31.codes import Mode
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
 

@@ -9,31 +9,18 @@ With all of them as hard as can be it is one of the ways of test_laws.py.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 import itertools
 from typing import Any
 
-from movitrac import DIRECTIONS
-from movitrac import OVERCURRENT
-from movitrac import STOPS
-from movitrac import SWITCHES
-from movitrac import bits
-from movitrac import make
-from movitrac import succeeded
-from movitrac import switched
+from movitrac import DIRECTIONS, OVERCURRENT, STOPS, SWITCHES, bits, make, succeeded, switched
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.simulator.movitrac31.codes import PC_TIMEOUT
-from nfo_sinus_driver.simulator.movitrac31.codes import Bit
-from nfo_sinus_driver.simulator.movitrac31.codes import Mode
-from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
-from nfo_sinus_driver.simulator.movitrac31.commands import SETPOINT
+from nfo_sinus_driver.drive import Cause, Drive, Severity
+from nfo_sinus_driver.simulator.movitrac31.codes import PC_TIMEOUT, Bit, Mode
+from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE, SETPOINT
 
 BITS = 'fieldbus.function_bits'
 each_switch = pytest.mark.parametrize('switch', SWITCHES)

@@ -5,15 +5,11 @@
 
 from __future__ import annotations
 
-from movitrac import STOPS
-from movitrac import make
-from movitrac import succeeded
-from movitrac import switched
+from movitrac import STOPS, make, succeeded, switched
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.simulator.movitrac31.codes import PC_TIMEOUT
 
 KEY = 'serial.pc_timeout'

@@ -10,8 +10,7 @@ from concurrent.futures import Future
 from typing import Any
 
 import pytest
-from support.rig import SLICE
-from support.rig import Rig
+from support.rig import SLICE, Rig
 
 #: What the neighbours keep of the rate that they would have alone on the line.
 _KEPT = 0.9

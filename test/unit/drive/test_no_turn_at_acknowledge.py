@@ -17,11 +17,13 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.simulator.sinus.control_unit import ALL
-from nfo_sinus_driver.simulator.sinus.control_unit import DROPS
-from nfo_sinus_driver.simulator.sinus.control_unit import KEEPS
-from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
-from nfo_sinus_driver.simulator.sinus.control_unit import SCMD as SCMD_ONLY
+from nfo_sinus_driver.simulator.sinus.control_unit import (
+    ALL,
+    DROPS,
+    KEEPS,
+    NOTHING,
+    SCMD as SCMD_ONLY,
+)
 
 #: How many acknowledgements each kind of drive goes through; a campaign has a thousand.
 ACKNOWLEDGEMENTS = int(os.environ.get('ACKNOWLEDGEMENTS', '6'))

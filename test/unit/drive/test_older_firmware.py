@@ -9,9 +9,7 @@ import pytest
 from support.rig import Rig
 from support.said import raises
 
-from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import Fact, Kind, Role
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.simulator.sinus_g2.classic import Server
 

@@ -14,20 +14,14 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from support.rig import Rig
-from support.rig import Way
-from support.said import raises
-from support.said import said
+from support.rig import Rig, Way
+from support.said import raises, said
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Cause, DriveError, DriveSettings, Severity
 from nfo_sinus_driver.drive.tuning import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.classic_frames import LineError
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 
 STOP, EXT, BUS = 1, 2, 3
 SIO_FAIL, OFF, STANDBY = 14, 24, 37

@@ -11,16 +11,12 @@ import struct
 from typing import Any
 
 import pytest
-from support.rig import WAYS
-from support.rig import Rig
-from support.said import Said
-from support.said import raises
-from support.said import said
+from support.rig import WAYS, Rig
+from support.said import Said, raises, said
 from support.variants import ramps
 
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.link import Refused

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import itertools
 
-from hypothesis import given
-from hypothesis import settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 import pytest
 from support.examples import examples
 from support.rig import Rig

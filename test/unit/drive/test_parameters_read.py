@@ -9,16 +9,12 @@ from collections import Counter
 from typing import Any
 
 import pytest
-from support.rig import WAYS
-from support.rig import Rig
-from support.rig import Way
+from support.rig import WAYS, Rig, Way
 from support.said import raises
 from support.variants import ramps
 
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Cause, DriveError, Severity
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.link import Refused
 

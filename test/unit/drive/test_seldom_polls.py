@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 import pytest
-from support.rig import WAYS
-from support.rig import Rig
+from support.rig import WAYS, Rig
 
 
 @pytest.mark.parametrize('way', [way for way in WAYS if way.startswith('telegram1')])

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 import dataclasses
 from typing import Any
@@ -14,12 +13,10 @@ from unittest import mock
 
 import pytest
 from support.rig import Rig
-from support.said import Said
-from support.said import said
+from support.said import Said, said
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.drive.setpoint_all import SetpointAll
-from nfo_sinus_driver.drive.setpoint_all import Told
+from nfo_sinus_driver.drive.setpoint_all import SetpointAll, Told
 
 _TO_ALL = b'\x04\x7f\x02E001E='
 _LINE = {'baud': 57600}

@@ -5,17 +5,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import math
 
 import pytest
-from support.rig import WAYS
-from support.rig import Rig
+from support.rig import WAYS, Rig
 
 from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Severity
+from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 
 

@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 import pytest
-from support.rig import WAYS
-from support.rig import Rig
+from support.rig import WAYS, Rig
 
 from nfo_sinus_driver.drive import Cause
 

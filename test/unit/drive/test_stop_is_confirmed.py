@@ -17,13 +17,8 @@ from support.rig import Rig
 from support.said import said
 from test_laws import STOPS
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import Procedure
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.families.sinus_g2.words import Status
+from nfo_sinus_driver.drive import Cause, DriveError, Procedure, Severity
+from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd, Status
 from nfo_sinus_driver.simulator.sinus_g2 import control_unit
 
 MODE, SCMD = 'fieldbus.mode', 'fieldbus.scmd'

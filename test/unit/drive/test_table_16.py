@@ -10,10 +10,8 @@ driver makes of what the drive does, whoever brought it there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Sequence
-from typing import Any
-from typing import cast
+from collections.abc import Callable, Sequence
+from typing import Any, cast
 
 import pytest
 from support.rig import Rig
@@ -22,9 +20,7 @@ from nfo_sinus_driver.catalog import State
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import StateMachine
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions, Phase, StateMachine
 
 OVERLOAD = 5
 WAY = 'rtu, control word'

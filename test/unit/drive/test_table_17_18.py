@@ -14,11 +14,9 @@ import pytest
 from support.rig import Rig
 from support.said import raises
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive import Cause, DriveSettings
 from nfo_sinus_driver.drive.settings import REFERENCES
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 from nfo_sinus_driver.families.sinus_optimal.words import Smode
 
 MODE, SCMD = 'fieldbus.mode', 'fieldbus.scmd'

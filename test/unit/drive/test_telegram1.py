@@ -14,12 +14,9 @@ from support.rig import Rig
 from support.telegram_laws import words
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.catalog.status import Fact
-from nfo_sinus_driver.catalog.status import State
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.link import LineSettings
-from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.catalog.status import Fact, State
+from nfo_sinus_driver.drive import Drive, DriveSettings
+from nfo_sinus_driver.link import LineSettings, open_link
 
 OPTIMAL, SINUS_H, G2 = 'telegram1 optimal', 'telegram1 sinus_h', 'telegram1 g2'
 BY_DRIVECONTROL = 'telegram1 g2, drivecontrol'

@@ -15,15 +15,13 @@ import itertools
 
 import pytest
 from support.examples import FULL
-from support.rig import WAYS
-from support.rig import Rig
+from support.rig import WAYS, Rig
 from support.telegram_laws import words
 from support.variants import ramps
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.link.telegram import PLC_TIME
-from nfo_sinus_driver.simulator.plc import Channel
-from nfo_sinus_driver.simulator.plc import Plc
+from nfo_sinus_driver.simulator.plc import Channel, Plc
 
 #: Of each family: the option by which a drive goes on by what stands in a telegram.
 LEVELS = {

@@ -9,8 +9,7 @@ A real port and a real clock, so nothing here says how fast something has to be.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 import contextlib
 import itertools
@@ -25,13 +24,9 @@ from support.rig_line import Clock
 from support.said import said
 from support.variants import ramps
 
-from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.bus import Cancelled
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.bus import Bus, Cancelled
+from nfo_sinus_driver.drive import Drive, DriveError, DriveSettings
+from nfo_sinus_driver.link import line_settings, open_link
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.simulator import Simulator
 

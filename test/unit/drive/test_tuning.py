@@ -11,17 +11,11 @@ import itertools
 from typing import Any
 
 import pytest
-from support.rig import WAYS
-from support.rig import Rig
+from support.rig import WAYS, Rig
 from support.said import said
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Drive
-from nfo_sinus_driver.drive import Procedure
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.drive import Tuned
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.drive import Cause, Drive, Procedure, Snapshot, Tuned
+from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 
 MODE, SCMD = 'fieldbus.mode', 'fieldbus.scmd'
 TUNING = 28

@@ -13,19 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drive_rig import PATIENCE
-from drive_rig import MakeRig
-from drive_rig import Rig
-from drive_rig import wait_until
+from drive_rig import PATIENCE, MakeRig, Rig, wait_until
 import pytest
 from support.said import said
 
-from nfo_sinus_driver.catalog import Fact
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.catalog import Fact, Kind
+from nfo_sinus_driver.drive import Severity, Snapshot
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 
 OVERLOAD = 5
 DC_LOW = 7

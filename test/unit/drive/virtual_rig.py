@@ -5,27 +5,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import any_order_rig
 from framed_link import link_of
-from support.addresses import Words
-from support.addresses import packed
-from support.addresses import words_of
+from support.addresses import Words, packed, words_of
 from support.said import says
-from support.variants import hardest
-from support.variants import ramps
+from support.variants import hardest, ramps
 from support.wire import understand
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive import Severity
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Reply
+from nfo_sinus_driver.drive import Cause, DriveSettings, Severity
+from nfo_sinus_driver.link import Address, Refused, Reply
 from nfo_sinus_driver.simulator.family import simulated_drive
 
 #: What a drive takes to say that it is busy, s.

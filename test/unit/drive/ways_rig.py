@@ -9,36 +9,24 @@ The frames of Classic and CANopen matter to nobody here: what is asked is done a
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Mapping
-from dataclasses import dataclass
-from dataclasses import field
-from typing import Any
-from typing import TypeVar
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
-from any_order_rig import RESPONSE_TIMEOUT
-from any_order_rig import DirectLink
-from any_order_rig import Rig
+from any_order_rig import RESPONSE_TIMEOUT, DirectLink, Rig
 from framed_link import FramedLink
 from support.said import says
 from support.variants import ramps
 
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import Reply
-from nfo_sinus_driver.link import modbus_pdu
+from nfo_sinus_driver.drive import Cause, DriveSettings
+from nfo_sinus_driver.link import PROTOCOLS, Address, NoAnswer, Refused, Reply, modbus_pdu
 from nfo_sinus_driver.link.telegram import Blocks
 from nfo_sinus_driver.simulator.classic import Wrong
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.memory import Refused as FarRefusal
 from nfo_sinus_driver.simulator.modbus import server
-from nfo_sinus_driver.simulator.plc import Plc
-from nfo_sinus_driver.simulator.plc import PlcSetting
+from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
 from nfo_sinus_driver.simulator.sdo import Abort
 
 _T = TypeVar('_T')

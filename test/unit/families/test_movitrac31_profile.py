@@ -12,19 +12,12 @@ from dataclasses import replace
 import math
 from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
-from support.steps import REFUSED
-from support.steps import play
+from support.steps import REFUSED, play
 
-from nfo_sinus_driver.catalog import Holder
-from nfo_sinus_driver.catalog import NotPossible
-from nfo_sinus_driver.catalog import Refusal
-from nfo_sinus_driver.catalog import Removal
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog import Holder, NotPossible, Refusal, Removal, load_family
+from nfo_sinus_driver.catalog.profile import Read, Write
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.families.movitrac31 import words
 

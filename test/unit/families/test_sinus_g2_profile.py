@@ -9,24 +9,25 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from support.steps import REFUSED
-from support.steps import Wait
-from support.steps import play
-from support.steps import status
+from support.steps import REFUSED, Wait, play, status
 
-from nfo_sinus_driver.catalog import Holder
-from nfo_sinus_driver.catalog import NotPossible
-from nfo_sinus_driver.catalog import Procedure
-from nfo_sinus_driver.catalog import Refusal
-from nfo_sinus_driver.catalog import Removal
-from nfo_sinus_driver.catalog import Reset
-from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog.profile import Acknowledge
-from nfo_sinus_driver.catalog.profile import AcknowledgeThenWrite
-from nfo_sinus_driver.catalog.profile import ControlMethod
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog import (
+    Holder,
+    NotPossible,
+    Procedure,
+    Refusal,
+    Removal,
+    Reset,
+    State,
+    load_family,
+)
+from nfo_sinus_driver.catalog.profile import (
+    Acknowledge,
+    AcknowledgeThenWrite,
+    ControlMethod,
+    Read,
+    Write,
+)
 
 G2 = load_family('sinus_g2')
 MODE, SCMD, WORD = 'fieldbus.mode', 'fieldbus.scmd', 'fieldbus.drive_control'

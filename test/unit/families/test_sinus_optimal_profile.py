@@ -9,20 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from support.steps import REFUSED
-from support.steps import Wait
-from support.steps import play
-from support.steps import status
+from support.steps import REFUSED, Wait, play, status
 
-from nfo_sinus_driver.catalog import Holder
-from nfo_sinus_driver.catalog import NotPossible
-from nfo_sinus_driver.catalog import Refusal
-from nfo_sinus_driver.catalog import Removal
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.catalog.profile import Acknowledge
-from nfo_sinus_driver.catalog.profile import AcknowledgeThenWrite
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog import Holder, NotPossible, Refusal, Removal, load_family
+from nfo_sinus_driver.catalog.profile import Acknowledge, AcknowledgeThenWrite, Read, Write
 
 OPTIMAL = load_family('sinus_optimal')
 MODE, SMODE, WORD = 'fieldbus.mode', 'fieldbus.smode', 'fieldbus.drive_control'

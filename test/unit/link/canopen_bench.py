@@ -15,9 +15,7 @@ from canopen_far_end import Server
 
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import Address, LineSettings, Reply
 
 TIMEOUT = 0.2
 SETTINGS = LineSettings(baud_rate=125_000, char_format='8N1', response_timeout=TIMEOUT)

@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from dataclasses import field
+from dataclasses import dataclass, field
 
 NO_OBJECT, NO_SUB_INDEX, WRONG_LENGTH = 0x06020000, 0x06090011, 0x06070010
 BAD_COMMAND, BAD_TOGGLE = 0x05040001, 0x05030000

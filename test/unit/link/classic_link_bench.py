@@ -7,18 +7,13 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from classic_far_end import FarEnd
-from classic_far_end import Fate
+from classic_far_end import FarEnd, Fate
 import pytest
-from support.addresses import classic_id
-from support.addresses import packed
+from support.addresses import classic_id, packed
 from virtual_wire import Wire
 
 from nfo_sinus_driver.link.classic_link import ClassicLink
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import Address, LineSettings, Refused, Reply
 
 TIMEOUT = 0.1
 SETTINGS = LineSettings(baud_rate=9600, char_format='7E1', response_timeout=TIMEOUT)

@@ -9,29 +9,28 @@ from collections.abc import Callable
 import contextlib
 
 import pymodbus_opinion as opinion
-from support.addresses import register
-from support.addresses import words_of
+from support.addresses import register, words_of
 from virtual_wire import Wire
 
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import (
+    Address,
+    DamagedAnswer,
+    Identification,
+    LineSettings,
+    NoAnswer,
+    Refused,
+)
 from nfo_sinus_driver.link.modbus_link import ModbusInquiry
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.rtu import RtuLink
 
 if opinion.OLD:
-    from pymodbus import mei_message
-    from pymodbus import other_message
+    from pymodbus import mei_message, other_message
 
     SlaveRequest = other_message.ReportSlaveIdRequest
     SlaveResponse = other_message.ReportSlaveIdResponse
 else:
-    from pymodbus.pdu import mei_message
-    from pymodbus.pdu import other_message
+    from pymodbus.pdu import mei_message, other_message
 
     SlaveRequest = other_message.ReportDeviceIdRequest
     SlaveResponse = other_message.ReportDeviceIdResponse

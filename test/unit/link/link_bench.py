@@ -8,16 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from support.addresses import packed
-from support.addresses import register
-from virtual_wire import Fate
-from virtual_wire import Slave
-from virtual_wire import Wire
+from support.addresses import packed, register
+from virtual_wire import Fate, Slave, Wire
 
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import Address, LineSettings, LinkError, Reply
 from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.link.serial_link import SerialLink
 

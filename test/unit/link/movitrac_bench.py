@@ -7,13 +7,10 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from movitrac_far_end import FarEnd
-from movitrac_far_end import Fate
+from movitrac_far_end import FarEnd, Fate
 from virtual_wire import Wire
 
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import Reply
+from nfo_sinus_driver.link.interface import Address, LineSettings, Reply
 from nfo_sinus_driver.link.movitrac_link import MovitracLink
 
 TIMEOUT = 0.2

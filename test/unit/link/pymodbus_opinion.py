@@ -11,18 +11,16 @@ import logging
 from typing import Any
 
 try:
-    from pymodbus.framer import FramerAscii
-    from pymodbus.framer import FramerRTU
-    from pymodbus.framer import FramerSocket
-    from pymodbus.pdu import DecodePDU
-    from pymodbus.pdu import ExceptionResponse
-    from pymodbus.pdu import register_message as read_message
+    from pymodbus.framer import FramerAscii, FramerRTU, FramerSocket
+    from pymodbus.pdu import DecodePDU, ExceptionResponse, register_message as read_message
 
     write_message = read_message
     OLD = False
 except ImportError:
-    from pymodbus import register_read_message as read_message
-    from pymodbus import register_write_message as write_message
+    from pymodbus import (
+        register_read_message as read_message,
+        register_write_message as write_message,
+    )
     from pymodbus.factory import ServerDecoder
     from pymodbus.framer.rtu_framer import ModbusRtuFramer
     from pymodbus.message.ascii import MessageAscii as FramerAscii

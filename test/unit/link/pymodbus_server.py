@@ -16,17 +16,14 @@ import threading
 import tty
 from typing import Any
 
-from pymodbus.server import ModbusSerialServer
-from pymodbus.server import ModbusTcpServer
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 
 try:
     from pymodbus.device import ModbusDeviceIdentification
 except ImportError:
     from pymodbus.pdu.device import ModbusDeviceIdentification
-from pymodbus import datastore
-from pymodbus import framer as framers
-from pymodbus.datastore import ModbusSequentialDataBlock
-from pymodbus.datastore import ModbusServerContext
+from pymodbus import datastore, framer as framers
+from pymodbus.datastore import ModbusSequentialDataBlock, ModbusServerContext
 
 OLD = hasattr(datastore, 'ModbusSlaveContext')
 PATIENCE = 20

@@ -12,9 +12,7 @@ import movitrac_bench
 import movitrac_far_end
 import pytest
 
-from nfo_sinus_driver.link import classic
-from nfo_sinus_driver.link import movitrac
-from nfo_sinus_driver.link import rtu
+from nfo_sinus_driver.link import classic, movitrac, rtu
 from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.modbus_link import ReportSlaveId
 

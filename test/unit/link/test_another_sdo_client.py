@@ -5,17 +5,11 @@
 
 from __future__ import annotations
 
-from canopen_bench import TEXT
-from canopen_bench import UNIT
-from canopen_bench import A
-from canopen_bench import B
-from canopen_bench import Bench
-from canopen_bench import Frame
+from canopen_bench import TEXT, UNIT, A, B, Bench, Frame
 from canopen_far_end import WRONG_LENGTH
 import pytest
 
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import DamagedAnswer, Refused
 
 REQUESTS = 0x600 + UNIT
 CANNOT = 0x08000022

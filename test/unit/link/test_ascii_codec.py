@@ -8,26 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
 
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.modbus_ascii import INTER_BYTE_TIMEOUT
-from nfo_sinus_driver.link.modbus_ascii import AsciiReader
-from nfo_sinus_driver.link.modbus_ascii import encode
-from nfo_sinus_driver.link.modbus_ascii import length
-from nfo_sinus_driver.link.modbus_ascii import lrc
-from nfo_sinus_driver.link.modbus_link import REGULAR
-from nfo_sinus_driver.link.modbus_link import ReadDevice
-from nfo_sinus_driver.link.modbus_link import ReportSlaveId
-from nfo_sinus_driver.link.modbus_pdu import Read
-from nfo_sinus_driver.link.modbus_pdu import Request
-from nfo_sinus_driver.link.modbus_pdu import Write
-from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+from nfo_sinus_driver.link.modbus_ascii import INTER_BYTE_TIMEOUT, AsciiReader, encode, length, lrc
+from nfo_sinus_driver.link.modbus_link import REGULAR, ReadDevice, ReportSlaveId
+from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write, WriteAndRead
 
 # few units and registers, so that answers resemble each other
 UNIT = st.sampled_from([1, 2, 247])

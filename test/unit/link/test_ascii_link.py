@@ -7,41 +7,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from link_bench import TIMEOUT
-from link_bench import UNIT
-from link_bench import A
-from link_bench import B
-from link_bench import Bench
-from link_bench import C
+from link_bench import TIMEOUT, UNIT, A, B, Bench, C
 import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
 
 # what holds for RTU holds for ASCII, unless it is about the silence between frames
-from test_rtu_link import test_babbling_line_is_no_reason_to_hang  # noqa: F401
-from test_rtu_link import test_closing_ends_every_quarantine  # noqa: F401
-from test_rtu_link import test_damaged_answer  # noqa: F401
-from test_rtu_link import test_doubled_answer_is_noticed  # noqa: F401
-from test_rtu_link import test_every_answer_belongs_to_its_request  # noqa: F401
-from test_rtu_link import test_late_answer_before_a_write_is_passed_over  # noqa: F401
-from test_rtu_link import test_late_answer_is_not_taken_for_the_next_one  # noqa: F401
-from test_rtu_link import test_late_answer_to_a_write_does_not_end_the_quarantine  # noqa: F401
-from test_rtu_link import test_line_that_begins_to_babble_is_no_reason_to_hang  # noqa: F401
-from test_rtu_link import test_lost_port_is_passed_on  # noqa: F401
-from test_rtu_link import test_quarantine_of_one_unit_is_not_that_of_another  # noqa: F401
-from test_rtu_link import test_read_and_write  # noqa: F401
-from test_rtu_link import test_refusal  # noqa: F401
-from test_rtu_link import test_refusal_is_not_taken_for_that_of_another_request  # noqa: F401
-from test_rtu_link import test_refusal_of_another_function_is_believed_in_quarantine  # noqa: F401
-from test_rtu_link import test_refused_resync_read_is_an_answer  # noqa: F401
-from test_rtu_link import test_reply_says_when_its_last_byte_came  # noqa: F401
-from test_rtu_link import test_resync_read_has_another_shape  # noqa: F401
-from test_rtu_link import test_write_goes_out_at_once_even_in_quarantine  # noqa: F401
-from virtual_wire import AsciiWire
-from virtual_wire import Fate
+from test_rtu_link import (
+    test_babbling_line_is_no_reason_to_hang,  # noqa: F401
+    test_closing_ends_every_quarantine,  # noqa: F401
+    test_damaged_answer,  # noqa: F401
+    test_doubled_answer_is_noticed,  # noqa: F401
+    test_every_answer_belongs_to_its_request,  # noqa: F401
+    test_late_answer_before_a_write_is_passed_over,  # noqa: F401
+    test_late_answer_is_not_taken_for_the_next_one,  # noqa: F401
+    test_late_answer_to_a_write_does_not_end_the_quarantine,  # noqa: F401
+    test_line_that_begins_to_babble_is_no_reason_to_hang,  # noqa: F401
+    test_lost_port_is_passed_on,  # noqa: F401
+    test_quarantine_of_one_unit_is_not_that_of_another,  # noqa: F401
+    test_read_and_write,  # noqa: F401
+    test_refusal,  # noqa: F401
+    test_refusal_is_not_taken_for_that_of_another_request,  # noqa: F401
+    test_refusal_of_another_function_is_believed_in_quarantine,  # noqa: F401
+    test_refused_resync_read_is_an_answer,  # noqa: F401
+    test_reply_says_when_its_last_byte_came,  # noqa: F401
+    test_resync_read_has_another_shape,  # noqa: F401
+    test_write_goes_out_at_once_even_in_quarantine,  # noqa: F401
+)
+from virtual_wire import AsciiWire, Fate
 
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import DamagedAnswer, LineSettings
 from nfo_sinus_driver.link.modbus_ascii import AsciiLink
 
 

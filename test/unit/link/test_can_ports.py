@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import errno
 import os
 from pathlib import Path
@@ -23,11 +22,7 @@ import pytest
 from nfo_sinus_driver.link import socketcan
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import PortError
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Address, LineSettings, NoAnswer, PortError, Refused
 from nfo_sinus_driver.link.lawicel_port import LawicelPort
 from nfo_sinus_driver.link.socketcan import SocketCan
 

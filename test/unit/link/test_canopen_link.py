@@ -7,32 +7,33 @@ from __future__ import annotations
 
 import itertools
 
-from canopen_bench import DROP
-from canopen_bench import FRAME_TIME
-from canopen_bench import GOOD
-from canopen_bench import MANDATORY
-from canopen_bench import TEXT
-from canopen_bench import TIMEOUT
-from canopen_bench import UNIT
-from canopen_bench import A
-from canopen_bench import B
-from canopen_bench import Bench
-from canopen_bench import Fate
-from canopen_bench import at
-from hypothesis import example
-from hypothesis import given
-from hypothesis import settings as hypothesis_settings
-from hypothesis import strategies as st
+from canopen_bench import (
+    DROP,
+    FRAME_TIME,
+    GOOD,
+    MANDATORY,
+    TEXT,
+    TIMEOUT,
+    UNIT,
+    A,
+    B,
+    Bench,
+    Fate,
+    at,
+)
+from hypothesis import example, given, settings as hypothesis_settings, strategies as st
 import pytest
 
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import NotReady
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import (
+    DamagedAnswer,
+    Identification,
+    LineSettings,
+    NoAnswer,
+    NotReady,
+    Refused,
+)
 
 # --- plain transfers ------------------------------------------------------------------------------
 

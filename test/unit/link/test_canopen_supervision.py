@@ -8,21 +8,13 @@ from __future__ import annotations
 import itertools
 import math
 
-from canopen_bench import DROP
-from canopen_bench import TIMEOUT
-from canopen_bench import UNIT
-from canopen_bench import A
-from canopen_bench import Bench
-from canopen_bench import Fate
+from canopen_bench import DROP, TIMEOUT, UNIT, A, Bench, Fate
 from canopen_far_end import Server
 import pytest
 
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Watch
+from nfo_sinus_driver.link import DamagedAnswer, NoAnswer, Watch
 from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.canopen_supervision import GUARDING_MEANS
-from nfo_sinus_driver.link.canopen_supervision import HEARTBEAT_MEANS
+from nfo_sinus_driver.link.canopen_supervision import GUARDING_MEANS, HEARTBEAT_MEANS
 
 BEAT = Frame(0x77F, b'\x05')
 GUARD = Frame(0x705, b'\0', remote=True)

@@ -5,28 +5,21 @@
 
 from __future__ import annotations
 
-from classic_far_end import INV_ST
-from classic_far_end import Fate
-from classic_link_bench import MODE
-from classic_link_bench import TIMEOUT
-from classic_link_bench import UNIT
-from classic_link_bench import A
-from classic_link_bench import B
-from classic_link_bench import Bench
-from hypothesis import example
-from hypothesis import given
-from hypothesis import settings as hypothesis_settings
-from hypothesis import strategies as st
+from classic_far_end import INV_ST, Fate
+from classic_link_bench import MODE, TIMEOUT, UNIT, A, B, Bench
+from hypothesis import example, given, settings as hypothesis_settings, strategies as st
 import pytest
 from support.addresses import classic_id
 
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import NotReady
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import (
+    Address,
+    DamagedAnswer,
+    LineSettings,
+    LinkError,
+    NoAnswer,
+    NotReady,
+    Refused,
+)
 
 # --- quarantine -----------------------------------------------------------------------------------
 

@@ -11,28 +11,21 @@ from typing import Any
 
 import classic_far_end as far
 from classic_far_end import Fate
-from classic_link_bench import LONG
-from classic_link_bench import MODE
-from classic_link_bench import SETTINGS
-from classic_link_bench import TIMEOUT
-from classic_link_bench import UNIT
-from classic_link_bench import A
-from classic_link_bench import B
-from classic_link_bench import Bench
-from hypothesis import given
-from hypothesis import strategies as st
+from classic_link_bench import LONG, MODE, SETTINGS, TIMEOUT, UNIT, A, B, Bench
+from hypothesis import given, strategies as st
 import pytest
-from support.addresses import classic_id
-from support.addresses import packed
+from support.addresses import classic_id, packed
 
 from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.link.classic_link import ClassicLink
-from nfo_sinus_driver.link.interface import BAUD_RATES
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.interface import (
+    BAUD_RATES,
+    DamagedAnswer,
+    Identification,
+    LineSettings,
+    NoAnswer,
+    PortError,
+)
 
 # --- plain transactions ---------------------------------------------------------------------------
 

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import os
 import select
 import threading
@@ -15,17 +14,11 @@ import tty
 
 import classic_far_end as far
 import pytest
-from support.addresses import classic_id
-from support.addresses import packed
+from support.addresses import classic_id, packed
 
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.link import line_settings, open_link
 from nfo_sinus_driver.link.classic_link import ClassicLink
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import PortError
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import DamagedAnswer, LinkError, NoAnswer, PortError, Refused
 
 #: Longer than any drive here takes to answer, on any machine, s.
 PATIENT = 10.0

@@ -6,11 +6,8 @@
 from __future__ import annotations
 
 import classic_far_end as far
-from classic_far_end import INV_ST
-from classic_far_end import SIO_ERR
-from classic_far_end import Fate
-from classic_link_bench import A
-from classic_link_bench import Bench
+from classic_far_end import INV_ST, SIO_ERR, Fate
+from classic_link_bench import A, Bench
 import pytest
 from support.addresses import classic_id
 

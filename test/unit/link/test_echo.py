@@ -13,36 +13,17 @@ import select
 import threading
 from typing import Any
 
-from hypothesis import example
-from hypothesis import given
-from hypothesis import settings as hypothesis_settings
-from hypothesis import strategies as st
-from link_bench import TIMEOUT
-from link_bench import UNIT
-from link_bench import A
-from link_bench import B
-from link_bench import Bench
-from link_bench import C
-from link_bench import D
+from hypothesis import example, given, settings as hypothesis_settings, strategies as st
+from link_bench import TIMEOUT, UNIT, A, B, Bench, C, D
 import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
-from test_link_ports import PATIENCE
-from test_link_ports import Pty
-from test_rtu_link import NAMES
-from test_rtu_link import STEPS
-from virtual_wire import AsciiWire
-from virtual_wire import Fate
-from virtual_wire import Slave
-from virtual_wire import Wire
+from test_link_ports import PATIENCE, Pty
+from test_rtu_link import NAMES, STEPS
+from virtual_wire import AsciiWire, Fate, Slave, Wire
 
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link import line_settings, open_link
+from nfo_sinus_driver.link.interface import Address, DamagedAnswer, LinkError, NoAnswer, Refused
 from nfo_sinus_driver.link.modbus_ascii import AsciiLink
 from nfo_sinus_driver.link.rtu import RtuLink
 from nfo_sinus_driver.link.serial_link import Echo

@@ -9,15 +9,12 @@ from types import SimpleNamespace
 
 import canopen
 from canopen import objectdictionary
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import Address, LineSettings, Refused
 
 UNIT = 5
 NUMBERS = {

@@ -5,21 +5,11 @@
 
 from __future__ import annotations
 
-from fuzz import campaign
-from fuzz import decoders
-from fuzz import judges
-from fuzz.campaign import CASE
-from fuzz.campaign import CASES
-from fuzz.campaign import Part
+from fuzz import campaign, decoders, judges
+from fuzz.campaign import CASE, CASES, Part
 import pytest
 
-from nfo_sinus_driver.link import classic
-from nfo_sinus_driver.link import lawicel
-from nfo_sinus_driver.link import modbus_ascii
-from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link import movitrac
-from nfo_sinus_driver.link import rtu
-from nfo_sinus_driver.link import sdo
+from nfo_sinus_driver.link import classic, lawicel, modbus_ascii, modbus_pdu, movitrac, rtu, sdo
 
 #: Fixed, so that every run goes through the same.
 SEED = 11

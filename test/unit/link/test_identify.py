@@ -7,39 +7,44 @@ from __future__ import annotations
 
 from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
-from identify_bench import G2
-from identify_bench import KNOWN
-from identify_bench import ONE
-from identify_bench import SERIAL
-from identify_bench import TIMEOUT
-from identify_bench import TWO
-from identify_bench import Unit
-from identify_bench import asked_all
-from identify_bench import device_answer
-from identify_bench import g2_answer
-from identify_bench import refuses
-from identify_bench import silent
-from identify_bench import spoil
+from hypothesis import given, strategies as st
+from identify_bench import (
+    G2,
+    KNOWN,
+    ONE,
+    SERIAL,
+    TIMEOUT,
+    TWO,
+    Unit,
+    asked_all,
+    device_answer,
+    g2_answer,
+    refuses,
+    silent,
+    spoil,
+)
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import NotReady
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.modbus_link import REGULAR
-from nfo_sinus_driver.link.modbus_link import DeviceObjects
-from nfo_sinus_driver.link.modbus_link import ModbusInquiry
-from nfo_sinus_driver.link.modbus_link import ReadDevice
-from nfo_sinus_driver.link.modbus_link import ReportSlaveId
-from nfo_sinus_driver.link.modbus_link import revision
-from nfo_sinus_driver.link.modbus_link import serial_number
-from nfo_sinus_driver.link.modbus_link import text
+from nfo_sinus_driver.link.interface import (
+    DamagedAnswer,
+    Identification,
+    LineSettings,
+    LinkError,
+    NoAnswer,
+    NotReady,
+    Refused,
+)
+from nfo_sinus_driver.link.modbus_link import (
+    REGULAR,
+    DeviceObjects,
+    ModbusInquiry,
+    ReadDevice,
+    ReportSlaveId,
+    revision,
+    serial_number,
+    text,
+)
 from nfo_sinus_driver.link.modbus_pdu import Request
 
 # --- what the bytes say ---------------------------------------------------------------------------

@@ -7,34 +7,32 @@ from __future__ import annotations
 
 from typing import Any
 
-from hypothesis import assume
-from hypothesis import example
-from hypothesis import given
-from hypothesis import strategies as st
-from identify_bench import device_answer
-from identify_bench import device_request
-from identify_bench import g2_answer
-from identify_bench import slave_answer
-from identify_bench import slave_request
-from identify_bench import spoil
-from identify_bench import write_and_read_answer
-from identify_bench import write_and_read_request
+from hypothesis import assume, example, given, strategies as st
+from identify_bench import (
+    device_answer,
+    device_request,
+    g2_answer,
+    slave_answer,
+    slave_request,
+    spoil,
+    write_and_read_answer,
+    write_and_read_request,
+)
 import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
 
 from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.modbus_link import BASIC
-from nfo_sinus_driver.link.modbus_link import REGULAR
-from nfo_sinus_driver.link.modbus_link import SPECIFIC
-from nfo_sinus_driver.link.modbus_link import DeviceObjects
-from nfo_sinus_driver.link.modbus_link import ReadDevice
-from nfo_sinus_driver.link.modbus_link import ReportSlaveId
-from nfo_sinus_driver.link.modbus_pdu import Request
-from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
-from nfo_sinus_driver.link.rtu import CRC_LENGTH
-from nfo_sinus_driver.link.rtu import RtuReader
-from nfo_sinus_driver.link.rtu import encode
+from nfo_sinus_driver.link.modbus_link import (
+    BASIC,
+    REGULAR,
+    SPECIFIC,
+    DeviceObjects,
+    ReadDevice,
+    ReportSlaveId,
+)
+from nfo_sinus_driver.link.modbus_pdu import Request, WriteAndRead
+from nfo_sinus_driver.link.rtu import CRC_LENGTH, RtuReader, encode
 
 # --- what may be asked and answered ---------------------------------------------------------------
 

@@ -7,19 +7,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.link import NotReady
-from nfo_sinus_driver.link import classic_link
-from nfo_sinus_driver.link import movitrac_link
-from nfo_sinus_driver.link.late_replies import LATEST_REPLY
-from nfo_sinus_driver.link.late_replies import SUSPECT_FOR
-from nfo_sinus_driver.link.late_replies import Doubt
-from nfo_sinus_driver.link.late_replies import LateReplies
+from nfo_sinus_driver.catalog import Access, load_family
+from nfo_sinus_driver.link import NotReady, classic_link, movitrac_link
+from nfo_sinus_driver.link.late_replies import LATEST_REPLY, SUSPECT_FOR, Doubt, LateReplies
 
 TIMEOUT = 0.2
 UNIT = 1

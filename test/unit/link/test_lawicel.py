@@ -5,16 +5,11 @@
 
 from __future__ import annotations
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
 from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.lawicel import BIT_RATES
-from nfo_sinus_driver.link.lawicel import Heard
-from nfo_sinus_driver.link.lawicel import Reader
-from nfo_sinus_driver.link.lawicel import bit_rate
-from nfo_sinus_driver.link.lawicel import encode
+from nfo_sinus_driver.link.lawicel import BIT_RATES, Heard, Reader, bit_rate, encode
 from nfo_sinus_driver.link.line_protocols import CANOPEN
 
 FRAMES = st.builds(Frame, st.integers(0, 0x7FF), st.binary(max_size=8), st.just(False))

@@ -22,17 +22,12 @@ import tty
 from types import SimpleNamespace
 
 import pytest
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import packed, register
 
-from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link import serial_port
-from nfo_sinus_driver.link.interface import BAUD_RATES
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link import open_link, serial_port
+from nfo_sinus_driver.link.interface import BAUD_RATES, LineSettings, PortError
 from nfo_sinus_driver.link.modbus_pdu import Read
-from nfo_sinus_driver.link.rtu import crc
-from nfo_sinus_driver.link.rtu import encode
+from nfo_sinus_driver.link.rtu import crc, encode
 from nfo_sinus_driver.link.serial_port import SerialPort
 from nfo_sinus_driver.link.url_port import UrlPort
 

@@ -5,22 +5,23 @@
 
 from __future__ import annotations
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import movitrac_far_end as far
 import pytest
 
-from nfo_sinus_driver.link.movitrac import Ack
-from nfo_sinus_driver.link.movitrac import Answer
-from nfo_sinus_driver.link.movitrac import Data
-from nfo_sinus_driver.link.movitrac import Enquiry
-from nfo_sinus_driver.link.movitrac import Message
-from nfo_sinus_driver.link.movitrac import Nack
-from nfo_sinus_driver.link.movitrac import Reader
-from nfo_sinus_driver.link.movitrac import Request
-from nfo_sinus_driver.link.movitrac import Select
-from nfo_sinus_driver.link.movitrac import decode
-from nfo_sinus_driver.link.movitrac import encode
+from nfo_sinus_driver.link.movitrac import (
+    Ack,
+    Answer,
+    Data,
+    Enquiry,
+    Message,
+    Nack,
+    Reader,
+    Request,
+    Select,
+    decode,
+    encode,
+)
 
 #: 100 000 in half-bytes [M4 §3.3], [C106].
 GEAR_RATIO = bytes.fromhex('000000010806 0a00')

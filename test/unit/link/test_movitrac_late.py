@@ -5,26 +5,12 @@
 
 from __future__ import annotations
 
-from hypothesis import example
-from hypothesis import given
-from hypothesis import settings as hypothesis_settings
-from hypothesis import strategies as st
-from movitrac_bench import CHAR
-from movitrac_bench import LONG
-from movitrac_bench import RESYNC
-from movitrac_bench import TIMEOUT
-from movitrac_bench import VALUE
-from movitrac_bench import A
-from movitrac_bench import B
-from movitrac_bench import Bench
+from hypothesis import example, given, settings as hypothesis_settings, strategies as st
+from movitrac_bench import CHAR, LONG, RESYNC, TIMEOUT, VALUE, A, B, Bench
 from movitrac_far_end import Fate
 import pytest
 
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import NotReady
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import DamagedAnswer, LinkError, NoAnswer, NotReady, Refused
 
 #: A drive that nobody knows yet is waited for two time-outs.
 LATE = [2.2, 3.0, 4.0]

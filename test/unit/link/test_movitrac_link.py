@@ -8,28 +8,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from movitrac_bench import CHAR
-from movitrac_bench import LONG
-from movitrac_bench import RESYNC
-from movitrac_bench import SETTINGS
-from movitrac_bench import TIMEOUT
-from movitrac_bench import UNIT
-from movitrac_bench import VALUE
-from movitrac_bench import A
-from movitrac_bench import B
-from movitrac_bench import Bench
-from movitrac_bench import at
+from movitrac_bench import CHAR, LONG, RESYNC, SETTINGS, TIMEOUT, UNIT, VALUE, A, B, Bench, at
 from movitrac_far_end import Fate
 import pytest
 
-from nfo_sinus_driver.link import Identification
-from nfo_sinus_driver.link import movitrac
-from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import NeverSilent
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link import Identification, movitrac, open_link
+from nfo_sinus_driver.link.interface import (
+    DamagedAnswer,
+    LineSettings,
+    NeverSilent,
+    NoAnswer,
+    PortError,
+)
 
 #: Two characters of silence between any two frames.
 GAP = 2 * CHAR

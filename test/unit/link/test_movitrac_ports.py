@@ -15,11 +15,7 @@ import tty
 import movitrac_far_end as far
 import pytest
 
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.link import Address, NoAnswer, Refused, line_settings, open_link
 
 #: Longer than any drive here takes to answer, on any machine, s.
 PATIENT = 10.0

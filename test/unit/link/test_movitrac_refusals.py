@@ -5,16 +5,12 @@
 
 from __future__ import annotations
 
-from movitrac_bench import RESYNC
-from movitrac_bench import A
-from movitrac_bench import Bench
+from movitrac_bench import RESYNC, A, Bench
 from movitrac_far_end import Fate
 import pytest
 
 from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.movitrac_refusal import DONE
-from nfo_sinus_driver.link.movitrac_refusal import REFUSALS
-from nfo_sinus_driver.link.movitrac_refusal import refusal
+from nfo_sinus_driver.link.movitrac_refusal import DONE, REFUSALS, refusal
 
 #: Words of the manual's table [M4 §2.1.2], and what a program makes of each code.
 MANUAL = {

@@ -5,48 +5,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 import functools
 import heapq
 
-from classic_far_end import FarEnd
-from classic_far_end import Fate as ClassicFate
+from classic_far_end import FarEnd, Fate as ClassicFate
 from classic_link_bench import Bench as ClassicBench
-from hypothesis import example
-from hypothesis import given
-from hypothesis import settings as hypothesis_settings
-from hypothesis import strategies as st
-from link_bench import SETTINGS
-from link_bench import TIMEOUT
-from link_bench import TWO
-from link_bench import UNIT
-from link_bench import A
-from link_bench import B
-from link_bench import Bench
-from link_bench import C
-from link_bench import D
+from hypothesis import example, given, settings as hypothesis_settings, strategies as st
+from link_bench import SETTINGS, TIMEOUT, TWO, UNIT, A, B, Bench, C, D
 import pymodbus_opinion as opinion
 import pytest
-from support.addresses import classic_id
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import classic_id, packed, register
 from test_read_then_write import AsciiBench
-from test_rtu_link import FATES
-from test_rtu_link import STEPS
-from test_rtu_link import lumps_or_doubles
-from virtual_wire import Fate
-from virtual_wire import Slave
-from virtual_wire import Wire
+from test_rtu_link import FATES, STEPS, lumps_or_doubles
+from virtual_wire import Fate, Slave, Wire
 
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import NotReady
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, NotReady, Refused
+from nfo_sinus_driver.link.interface import Address, LineSettings
 
 LOST = Fate(what='drop')
 NAMES = {'A': A, 'B': B, 'C': C, 'D': D}

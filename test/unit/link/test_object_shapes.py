@@ -5,19 +5,12 @@
 
 from __future__ import annotations
 
-from canopen_bench import UNIT
-from canopen_bench import Bench
-from canopen_far_end import NO_OBJECT
-from canopen_far_end import WRONG_LENGTH
-from canopen_far_end import Server
-from hypothesis import given
-from hypothesis import strategies as st
+from canopen_bench import UNIT, Bench
+from canopen_far_end import NO_OBJECT, WRONG_LENGTH, Server
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import sdo_abort
+from nfo_sinus_driver.link import Address, DamagedAnswer, Refused, sdo_abort
 
 MODE = 0x2022
 INV_ST = 0x2026

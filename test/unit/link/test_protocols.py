@@ -6,19 +6,12 @@
 
 from __future__ import annotations
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import LineProtocol
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link.interface import BAUD_RATES
-from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.catalog import families, load_family
+from nfo_sinus_driver.link import PROTOCOLS, Address, LineProtocol, line_settings, open_link
+from nfo_sinus_driver.link.interface import BAUD_RATES, LineSettings
 
 EVERY = pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=list(PROTOCOLS))
 PORTS = {'modbus_tcp': 'gateway:502'}

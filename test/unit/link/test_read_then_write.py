@@ -9,25 +9,13 @@ from collections.abc import Callable
 
 from classic_far_end import Fate as ClassicFate
 from classic_link_bench import Bench as ClassicBench
-from link_bench import ONE
-from link_bench import TIMEOUT
-from link_bench import TWO
-from link_bench import UNIT
-from link_bench import A
-from link_bench import B
-from link_bench import Bench
+from link_bench import ONE, TIMEOUT, TWO, UNIT, A, B, Bench
 import pytest
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import packed, register
 from test_echo import SameWords
-from virtual_wire import AsciiWire
-from virtual_wire import Fate
+from virtual_wire import AsciiWire, Fate
 
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, PortError, Refused
 from nfo_sinus_driver.link.interface import Reply
 from nfo_sinus_driver.link.modbus_ascii import AsciiLink
 

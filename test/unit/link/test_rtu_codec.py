@@ -8,23 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hypothesis import assume
-from hypothesis import example
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import assume, example, given, strategies as st
 import pymodbus_opinion as opinion
 import pytest
-from support.addresses import packed
-from support.addresses import words_of
+from support.addresses import packed, words_of
 
 from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.modbus_pdu import Read
-from nfo_sinus_driver.link.modbus_pdu import Request
-from nfo_sinus_driver.link.modbus_pdu import Write
-from nfo_sinus_driver.link.rtu import CRC_LENGTH
-from nfo_sinus_driver.link.rtu import RtuReader
-from nfo_sinus_driver.link.rtu import crc
-from nfo_sinus_driver.link.rtu import encode
+from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write
+from nfo_sinus_driver.link.rtu import CRC_LENGTH, RtuReader, crc, encode
 
 
 def contents(least: int, most: int) -> st.SearchStrategy[bytes]:

@@ -9,35 +9,25 @@ from __future__ import annotations
 from collections.abc import Iterator
 import contextlib
 
-from hypothesis import example
-from hypothesis import given
-from hypothesis import settings as hypothesis_settings
-from hypothesis import strategies as st
-from link_bench import ONE
-from link_bench import SETTINGS
-from link_bench import TIMEOUT
-from link_bench import TWO
-from link_bench import UNIT
-from link_bench import A
-from link_bench import B
-from link_bench import Bench
-from link_bench import C
-from link_bench import D
+from hypothesis import example, given, settings as hypothesis_settings, strategies as st
+from link_bench import ONE, SETTINGS, TIMEOUT, TWO, UNIT, A, B, Bench, C, D
 import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
 from virtual_wire import Fate
 
-from nfo_sinus_driver.link.interface import BAUD_RATES
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import LinkError
-from nfo_sinus_driver.link.interface import NeverSilent
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import NotReady
-from nfo_sinus_driver.link.interface import PortError
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import (
+    BAUD_RATES,
+    Address,
+    DamagedAnswer,
+    LineSettings,
+    LinkError,
+    NeverSilent,
+    NoAnswer,
+    NotReady,
+    PortError,
+    Refused,
+)
 
 # --- plain transactions ---------------------------------------------------------------------------
 

@@ -5,21 +5,13 @@
 
 from __future__ import annotations
 
-from canopen_far_end import Server
-from canopen_far_end import messages
-from hypothesis import given
-from hypothesis import strategies as st
+from canopen_far_end import Server, messages
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.link.interface import DamagedAnswer
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.sdo import LONGEST_VALUE
-from nfo_sinus_driver.link.sdo import Download
-from nfo_sinus_driver.link.sdo import Transfer
-from nfo_sinus_driver.link.sdo import Upload
-from nfo_sinus_driver.link.sdo import kind
-from nfo_sinus_driver.link.sdo_abort import ABORT_CODES
-from nfo_sinus_driver.link.sdo_abort import TIMED_OUT
+from nfo_sinus_driver.link.interface import DamagedAnswer, Refused
+from nfo_sinus_driver.link.sdo import LONGEST_VALUE, Download, Transfer, Upload, kind
+from nfo_sinus_driver.link.sdo_abort import ABORT_CODES, TIMED_OUT
 
 UNIT = 5
 INDICES = st.integers(0, 0xFFFF)

@@ -8,17 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 import contextlib
 
-from pymodbus_server import REGISTERS
-from pymodbus_server import serial_server
+from pymodbus_server import REGISTERS, serial_server
 import pytest
-from support.addresses import packed
-from support.addresses import register
+from support.addresses import packed, register
 
-from nfo_sinus_driver.link import Link
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import line_settings
-from nfo_sinus_driver.link import open_link
+from nfo_sinus_driver.link import Link, LinkError, Refused, line_settings, open_link
 
 ONE = register(0x2A5)
 TWO = register(0x258, 2)

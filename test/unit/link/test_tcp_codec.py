@@ -5,18 +5,14 @@
 
 from __future__ import annotations
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
 
 from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link.modbus_pdu import Read
-from nfo_sinus_driver.link.modbus_pdu import Request
-from nfo_sinus_driver.link.modbus_pdu import Write
-from nfo_sinus_driver.link.modbus_tcp import FrameReader
-from nfo_sinus_driver.link.modbus_tcp import encode
+from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write
+from nfo_sinus_driver.link.modbus_tcp import FrameReader, encode
 
 NUMBER = st.integers(0, 0xFFFF)
 MESSAGE = st.binary(min_size=2, max_size=254)

@@ -5,32 +5,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 import socket
 import threading
 import time
 
-from pymodbus_server import PATIENCE
-from pymodbus_server import REGISTERS
-from pymodbus_server import tcp_server
+from pymodbus_server import PATIENCE, REGISTERS, tcp_server
 import pytest
-from support.addresses import packed
-from support.addresses import register
-from support.addresses import words_of
+from support.addresses import packed, register, words_of
 
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import DamagedAnswer
-from nfo_sinus_driver.link import GatewaySilent
-from nfo_sinus_driver.link import LineSettings
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import NoPath
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import open_link
-from nfo_sinus_driver.link import telegram
+from nfo_sinus_driver.link import (
+    Address,
+    DamagedAnswer,
+    GatewaySilent,
+    LineSettings,
+    LinkError,
+    NoAnswer,
+    NoPath,
+    PortError,
+    Refused,
+    open_link,
+    telegram,
+)
 from nfo_sinus_driver.link.modbus_tcp import TcpLink
 from nfo_sinus_driver.link.tcp_connection import TcpConnection
 

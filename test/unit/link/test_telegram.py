@@ -6,27 +6,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from dataclasses import field
+from dataclasses import dataclass, field
 import itertools
 import struct
 from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.link import Address
-from nfo_sinus_driver.link import Interrupted
-from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link import NoAnswer
-from nfo_sinus_driver.link import NoData
-from nfo_sinus_driver.link import NoPath
-from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.link import telegram
-from nfo_sinus_driver.link.modbus_pdu import Read
-from nfo_sinus_driver.link.modbus_pdu import Write
-from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+from nfo_sinus_driver.link import (
+    Address,
+    Interrupted,
+    LinkError,
+    NoAnswer,
+    NoData,
+    NoPath,
+    Refused,
+    telegram,
+)
+from nfo_sinus_driver.link.modbus_pdu import Read, Write, WriteAndRead
 
 START = 100
 STATUS = Address('telegram1', START, telegram.STATUS, 4)

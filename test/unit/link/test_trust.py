@@ -5,11 +5,7 @@
 
 from __future__ import annotations
 
-from link_bench import UNIT
-from link_bench import A
-from link_bench import B
-from link_bench import Bench
-from link_bench import D
+from link_bench import UNIT, A, B, Bench, D
 import pytest
 from test_echo import SameWords
 from virtual_wire import Fate

@@ -5,16 +5,11 @@
 
 from __future__ import annotations
 
-from identify_bench import ONE
-from identify_bench import TWO
-from identify_bench import Unit
-from identify_bench import refuses
-from identify_bench import write_and_read_request
+from identify_bench import ONE, TWO, Unit, refuses, write_and_read_request
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.link.interface import NoAnswer
-from nfo_sinus_driver.link.interface import Refused
+from nfo_sinus_driver.link.interface import NoAnswer, Refused
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 
 

@@ -12,9 +12,7 @@ import time
 
 import pytest
 
-from nfo_sinus_driver.node.publish_queue import Failures
-from nfo_sinus_driver.node.publish_queue import PublishQueue
-from nfo_sinus_driver.node.publish_queue import Schedule
+from nfo_sinus_driver.node.publish_queue import Failures, PublishQueue, Schedule
 
 #: Far longer than anything here takes, s.
 PATIENCE = 20.0

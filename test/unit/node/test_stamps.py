@@ -8,11 +8,9 @@ from __future__ import annotations
 import itertools
 import math
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from nfo_sinus_driver.node.stamps import Sequence
-from nfo_sinus_driver.node.stamps import Stamps
+from nfo_sinus_driver.node.stamps import Sequence, Stamps
 
 #: What the node's clock shows when the steady one shows 0, ns.
 _EPOCH = 1_800_000_000_000_000_000

@@ -11,8 +11,7 @@ import time
 import tty
 
 import pytest
-from support.addresses import packed
-from support.addresses import words_of
+from support.addresses import packed, words_of
 
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.family import simulated_drive

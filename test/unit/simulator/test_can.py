@@ -11,28 +11,19 @@ import select
 import socket
 import struct
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
 from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.sdo import Download
-from nfo_sinus_driver.link.sdo import Upload
+from nfo_sinus_driver.link.interface import Address, LineSettings, Refused
+from nfo_sinus_driver.link.sdo import Download, Upload
 from nfo_sinus_driver.simulator import socketcan
-from nfo_sinus_driver.simulator.can_frames import Frame
-from nfo_sinus_driver.simulator.can_frames import bits
+from nfo_sinus_driver.simulator.can_frames import Frame, bits
 from nfo_sinus_driver.simulator.lawicel import Adapter
 from nfo_sinus_driver.simulator.ports import PortError
-from nfo_sinus_driver.simulator.sdo import Abort
-from nfo_sinus_driver.simulator.sdo import AbortCode
-from nfo_sinus_driver.simulator.sdo import Server
+from nfo_sinus_driver.simulator.sdo import Abort, AbortCode, Server
 from nfo_sinus_driver.simulator.simulator import Simulator
-from nfo_sinus_driver.simulator.socketcan import CanInterface
-from nfo_sinus_driver.simulator.socketcan import CanPort
-from nfo_sinus_driver.simulator.socketcan import is_interface
+from nfo_sinus_driver.simulator.socketcan import CanInterface, CanPort, is_interface
 
 # ---- frames (ISO 11898-1) ----
 

@@ -4,21 +4,16 @@
 """Simulated drives on a CAN bus: services, faults of the bus, and what the manual leaves open."""
 
 from can_bus_bench import Bus
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
-from support.addresses import packed
-from support.addresses import words_of
+from support.addresses import packed, words_of
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.simulator.can_frames import Frame
-from nfo_sinus_driver.simulator.can_frames import bits
+from nfo_sinus_driver.catalog import Access, load_family
+from nfo_sinus_driver.simulator.can_frames import Frame, bits
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.modbus import server as modbus_server
-from nfo_sinus_driver.simulator.sdo import Abort
-from nfo_sinus_driver.simulator.sdo import AbortCode
+from nfo_sinus_driver.simulator.sdo import Abort, AbortCode
 from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import OPTIONS
 
 READ_VENDOR, READ_DATA = '4018100100000000', bytes.fromhex('4018100100000000')

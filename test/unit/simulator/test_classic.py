@@ -3,26 +3,15 @@
 
 """A simulated drive on Classic: messages byte by byte, values, refusals, and older firmware."""
 
-from classic_bench import ACK
-from classic_bench import NAK
-from classic_bench import RUN
-from classic_bench import SIO_FAIL
-from classic_bench import ClassicBench
-from classic_bench import bcc
-from classic_bench import enquiry
-from classic_bench import reply
-from classic_bench import select
-from hypothesis import given
-from hypothesis import settings
-from hypothesis import strategies as st
+from classic_bench import ACK, NAK, RUN, SIO_FAIL, ClassicBench, bcc, enquiry, reply, select
+from hypothesis import given, settings, strategies as st
 import pytest
 from support.addresses import packed
 from support.examples import examples
 
 from nfo_sinus_driver.simulator import classic_frames
 from nfo_sinus_driver.simulator.classic import Classic
-from nfo_sinus_driver.simulator.classic_frames import LineError
-from nfo_sinus_driver.simulator.classic_frames import Message
+from nfo_sinus_driver.simulator.classic_frames import LineError, Message
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.line import Receiver
 from nfo_sinus_driver.simulator.modbus import server

@@ -12,13 +12,11 @@ import signal
 import subprocess
 import sys
 
-from classic_bench import enquiry
-from classic_bench import reply
+from classic_bench import enquiry, reply
 import pytest
 
 from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import Address, LineSettings
 from nfo_sinus_driver.simulator.main import main
 from nfo_sinus_driver.simulator.simulator import Simulator
 

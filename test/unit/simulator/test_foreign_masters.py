@@ -19,16 +19,13 @@ import can
 import canopen
 from canopen import objectdictionary
 from canopen.sdo import SdoClient
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import minimalmodbus
-from pymodbus.client import ModbusSerialClient
-from pymodbus.client import ModbusTcpClient
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 import pytest
 import serial
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Access, load_family
 from nfo_sinus_driver.simulator.can_frames import Frame
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.sdo import Server as SdoServer

@@ -5,8 +5,7 @@
 
 import pytest
 
-from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import RUN_COMMANDS

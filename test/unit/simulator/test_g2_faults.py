@@ -5,12 +5,10 @@
 
 import pytest
 
-from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Kind, load_family
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.sinus.control_unit import CHOICES
-from nfo_sinus_driver.simulator.sinus.control_unit import Variant
+from nfo_sinus_driver.simulator.sinus.control_unit import CHOICES, Variant
 from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
 from nfo_sinus_driver.simulator.sinus_g2.tuning import PROCEDURES
 

@@ -3,16 +3,11 @@
 
 """Every state and exit of [M0 table 16]."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.families.sinus_g2.words import Control
-from nfo_sinus_driver.families.sinus_g2.words import Status
-from nfo_sinus_driver.families.sinus_g2.words import state_of
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
-from nfo_sinus_driver.simulator.sinus_g2.state_machine import StateMachine
+from nfo_sinus_driver.families.sinus_g2.words import Control, Status, state_of
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions, Phase, StateMachine
 
 VOLTAGE, QUICK = Control.ENABLE_VOLTAGE, Control.DISABLE_QUICK_STOP
 POWER = VOLTAGE | QUICK

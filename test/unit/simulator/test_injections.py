@@ -14,8 +14,7 @@ import time
 
 import pytest
 
-from nfo_sinus_driver.simulator.control import Client
-from nfo_sinus_driver.simulator.control import ControlError
+from nfo_sinus_driver.simulator.control import Client, ControlError
 from nfo_sinus_driver.simulator.injections import VERBS
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.simulator import Simulator

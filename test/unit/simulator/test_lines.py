@@ -7,20 +7,15 @@ from dataclasses import dataclass
 import io
 import json
 
-from classic_bench import enquiry
-from classic_bench import reply
+from classic_bench import enquiry, reply
 import movitrac_drive_bench as movitrac
 import pytest
 
 from nfo_sinus_driver.simulator.endpoints import endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.line import Line
-from nfo_sinus_driver.simulator.line import Trace
-from nfo_sinus_driver.simulator.line_faults import LineFaults
-from nfo_sinus_driver.simulator.line_faults import Reply
-from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
-from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
-from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
+from nfo_sinus_driver.simulator.line import Line, Trace
+from nfo_sinus_driver.simulator.line_faults import LineFaults, Reply
+from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii, ModbusRtu, ModbusTcp
 
 READ = bytes.fromhex('0302940001')
 STOP = bytes.fromhex('03020001')

@@ -5,24 +5,18 @@
 
 import itertools
 
-from hypothesis import given
-from hypothesis import settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 import pytest
 from support.examples import examples
 
-from nfo_sinus_driver.catalog import Access
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Access, load_family
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import describe
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.line import Receiver
-from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.memory import Refused
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.modbus import server
-from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii
-from nfo_sinus_driver.simulator.modbus_frames import ModbusRtu
-from nfo_sinus_driver.simulator.modbus_frames import ModbusTcp
+from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii, ModbusRtu, ModbusTcp
 from nfo_sinus_driver.simulator.protocol import Request
 
 ON_MODBUS = [one for one in load_family('sinus_g2').values() if 'modbus' in one.addresses]

@@ -5,13 +5,10 @@
 
 import math
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.simulator.motor import Motor
-from nfo_sinus_driver.simulator.motor import Nameplate
-from nfo_sinus_driver.simulator.motor import Regulation
+from nfo_sinus_driver.simulator.motor import Motor, Nameplate, Regulation
 
 STEP = 0.005
 

@@ -3,18 +3,9 @@
 
 """A MOVITRAC 31.. that is commanded: by line, terminals and keypad; its faults, its variants."""
 
-from hypothesis import given
-from hypothesis import settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 import movitrac_drive_bench as m
-from movitrac_drive_bench import ACK
-from movitrac_drive_bench import CCW
-from movitrac_drive_bench import CW
-from movitrac_drive_bench import ENABLE
-from movitrac_drive_bench import FREQUENCY
-from movitrac_drive_bench import RESET
-from movitrac_drive_bench import SETPOINT
-from movitrac_drive_bench import MovitracBench
+from movitrac_drive_bench import ACK, CCW, CW, ENABLE, FREQUENCY, RESET, SETPOINT, MovitracBench
 import pytest
 from support.examples import examples
 

@@ -3,27 +3,26 @@
 
 """The MOVITRAC's protocol [M4 §2]: frames, what a drive does not carry out, and why."""
 
-from hypothesis import given
-from hypothesis import settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 import movitrac_drive_bench as m
-from movitrac_drive_bench import ACK
-from movitrac_drive_bench import MovitracBench
-from movitrac_drive_bench import bcd
-from movitrac_drive_bench import data
-from movitrac_drive_bench import enquiry
-from movitrac_drive_bench import long_data
-from movitrac_drive_bench import long_select
-from movitrac_drive_bench import nack
-from movitrac_drive_bench import select
-from movitrac_drive_bench import summed
+from movitrac_drive_bench import (
+    ACK,
+    MovitracBench,
+    bcd,
+    data,
+    enquiry,
+    long_data,
+    long_select,
+    nack,
+    select,
+    summed,
+)
 import pytest
 from support.examples import examples
 
 from nfo_sinus_driver.simulator import movitrac_frames
 from nfo_sinus_driver.simulator.movitrac import Movitrac
-from nfo_sinus_driver.simulator.movitrac_frames import Message
-from nfo_sinus_driver.simulator.movitrac_frames import ReturnCode
+from nfo_sinus_driver.simulator.movitrac_frames import Message, ReturnCode
 
 #: [M4 §2.4.3] and [M4 §2.4.4].
 HEAT_SINK_TEMPERATURE = bytes.fromhex('B5 00 00 04 B9')

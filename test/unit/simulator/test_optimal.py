@@ -5,38 +5,40 @@
 
 import struct
 
-from optimal_bench import ALARM
-from optimal_bench import AUTO
-from optimal_bench import BRAKE
-from optimal_bench import BUS
-from optimal_bench import CONTROL_FREQUENCY
-from optimal_bench import CONTROL_SPEED
-from optimal_bench import DISABLED
-from optimal_bench import DRIVE_CONTROL
-from optimal_bench import DRIVE_STATUS
-from optimal_bench import ENABLED
-from optimal_bench import FAULT
-from optimal_bench import FROM_BUS
-from optimal_bench import INPUT_FREQUENCY
-from optimal_bench import INPUT_SPEED
-from optimal_bench import LIMIT
-from optimal_bench import MANUAL
-from optimal_bench import MODE
-from optimal_bench import REACHED
-from optimal_bench import READY
-from optimal_bench import REVERSE
-from optimal_bench import ROTOR_SPEED
-from optimal_bench import RUN_INPUT
-from optimal_bench import RUN_TERMINAL
-from optimal_bench import SLEEP
-from optimal_bench import SMODE
-from optimal_bench import STATOR_FREQUENCY
-from optimal_bench import STATUS
-from optimal_bench import STATUS_WITH_ACK
-from optimal_bench import STOP
-from optimal_bench import STOPPING
-from optimal_bench import SWITCHED_ON
-from optimal_bench import OptimalBench
+from optimal_bench import (
+    ALARM,
+    AUTO,
+    BRAKE,
+    BUS,
+    CONTROL_FREQUENCY,
+    CONTROL_SPEED,
+    DISABLED,
+    DRIVE_CONTROL,
+    DRIVE_STATUS,
+    ENABLED,
+    FAULT,
+    FROM_BUS,
+    INPUT_FREQUENCY,
+    INPUT_SPEED,
+    LIMIT,
+    MANUAL,
+    MODE,
+    REACHED,
+    READY,
+    REVERSE,
+    ROTOR_SPEED,
+    RUN_INPUT,
+    RUN_TERMINAL,
+    SLEEP,
+    SMODE,
+    STATOR_FREQUENCY,
+    STATUS,
+    STATUS_WITH_ACK,
+    STOP,
+    STOPPING,
+    SWITCHED_ON,
+    OptimalBench,
+)
 import pytest
 
 from nfo_sinus_driver.families.sinus_optimal import words

@@ -10,17 +10,14 @@ import subprocess
 import sys
 import time
 
-from hypothesis import given
-from hypothesis import settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pymodbus.client import ModbusTcpClient
 import pytest
 from support.examples import examples
 
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.modbus import server
-from nfo_sinus_driver.simulator.plc import Plc
-from nfo_sinus_driver.simulator.plc import PlcSetting
+from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
 from nfo_sinus_driver.simulator.simulator import Simulator
 from nfo_sinus_driver.simulator.timing import Timing
 

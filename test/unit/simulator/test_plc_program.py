@@ -3,15 +3,11 @@
 
 """The PLC's program: Structured Text as it is shipped, and the Python that the simulator runs."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import pytest
-from structured_text import StRosTelegram1
-from structured_text import declared
+from structured_text import StRosTelegram1, declared
 
-from nfo_sinus_driver.simulator.plc_program import Block
-from nfo_sinus_driver.simulator.plc_program import RosTelegram1
-from nfo_sinus_driver.simulator.plc_program import Ton
+from nfo_sinus_driver.simulator.plc_program import Block, RosTelegram1, Ton
 
 #: The layout of the public interface: registers from the beginning of the block.
 LAYOUT = {

@@ -8,12 +8,9 @@ import struct
 
 import pytest
 
-from nfo_sinus_driver import families
-from nfo_sinus_driver import simulator as room
-from nfo_sinus_driver.simulator.family import every_verb
-from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.main import inject
-from nfo_sinus_driver.simulator.main import main
+from nfo_sinus_driver import families, simulator as room
+from nfo_sinus_driver.simulator.family import every_verb, simulated_drive
+from nfo_sinus_driver.simulator.main import inject, main
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.simulator import Simulator
 

@@ -14,17 +14,12 @@ import select
 import socket
 import time
 
-from classic_bench import ACK
-from classic_bench import NAK
-from classic_bench import enquiry
-from classic_bench import reply
-from classic_bench import select as select_
+from classic_bench import ACK, NAK, enquiry, reply, select as select_
 import movitrac_drive_bench as movitrac
 import pytest
 
 from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.interface import Address
-from nfo_sinus_driver.link.interface import LineSettings
+from nfo_sinus_driver.link.interface import Address, LineSettings
 from nfo_sinus_driver.simulator.control import Client
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.ports import PortError

@@ -3,9 +3,7 @@
 
 """The simulated Sinus H by the tables of its manual, typed in here by hand [M3]."""
 
-from hypothesis import given
-from hypothesis import settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 import pytest
 from support.examples import examples
 from telegram_bench import TelegramBench

@@ -3,9 +3,7 @@
 
 """The simulated Optimal and G2 on a fieldbus: telegram 1 by their manuals ([M1], [M0 §7])."""
 
-from hypothesis import given
-from hypothesis import settings as examples_of
-from hypothesis import strategies as st
+from hypothesis import given, settings as examples_of, strategies as st
 import pytest
 from support.examples import examples
 from telegram_bench import TelegramBench as Bench

@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 import pytest
-from support.wire import Request
-from support.wire import understand
+from support.wire import Request, understand
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
 import math
 import time
@@ -15,16 +14,16 @@ import time
 import pytest
 from textual.pilot import Pilot
 
-from nfo_sinus_driver.view.app import MonitorApp
-from nfo_sinus_driver.view.app import natural
-from nfo_sinus_driver.view.app import short_names
-from nfo_sinus_driver.view.picture import Condition
-from nfo_sinus_driver.view.picture import DriveView
-from nfo_sinus_driver.view.picture import Level
-from nfo_sinus_driver.view.picture import LineView
-from nfo_sinus_driver.view.picture import Measured
-from nfo_sinus_driver.view.picture import Note
-from nfo_sinus_driver.view.picture import Picture
+from nfo_sinus_driver.view.app import MonitorApp, natural, short_names
+from nfo_sinus_driver.view.picture import (
+    Condition,
+    DriveView,
+    Level,
+    LineView,
+    Measured,
+    Note,
+    Picture,
+)
 
 #: Machines are shared and slow, s.
 _PATIENCE = 60.0

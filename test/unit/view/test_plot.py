@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import math
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from nfo_sinus_driver.view.plot import plot
-from nfo_sinus_driver.view.plot import span
+from nfo_sinus_driver.view.plot import plot, span
 
 _VALUES = st.lists(st.floats(-1e6, 1e6) | st.just(math.nan), max_size=100)
 

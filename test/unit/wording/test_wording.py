@@ -16,11 +16,9 @@ import string
 import pytest
 from support.said import CALLS
 
-from nfo_sinus_driver.catalog import families
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import families, load_family
 from nfo_sinus_driver.cli import console as cli
-from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.drive import Cause, Report
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.wording import sentence

@@ -13,16 +13,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from nfo_sinus_driver.catalog.profile import Profile
-from nfo_sinus_driver.catalog.profile import Steps
-from nfo_sinus_driver.catalog.profile import Until
-from nfo_sinus_driver.catalog.status import Fact
-from nfo_sinus_driver.catalog.status import Role
-from nfo_sinus_driver.catalog.status import State
-from nfo_sinus_driver.families._telegram1 import method
-from nfo_sinus_driver.families._telegram1 import profidrive
-from nfo_sinus_driver.families._telegram1.method import Telegram1
-from nfo_sinus_driver.families._telegram1.method import Words
+from nfo_sinus_driver.catalog.profile import Profile, Steps, Until
+from nfo_sinus_driver.catalog.status import Fact, Role, State
+from nfo_sinus_driver.families._telegram1 import method, profidrive
+from nfo_sinus_driver.families._telegram1.method import Telegram1, Words
 from nfo_sinus_driver.families.sinus_g2 import words as drivecontrol
 
 _STARTABLE = (State.READY_TO_SWITCH_ON, State.STOPPING)

@@ -11,20 +11,19 @@ Switch on away, and the motor ramps; Enable taken away would release it [C109].
 
 from __future__ import annotations
 
-from nfo_sinus_driver.catalog.profile import Profile
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Status as InverterStatus
-from nfo_sinus_driver.catalog.profile import Steps
-from nfo_sinus_driver.catalog.profile import Until
-from nfo_sinus_driver.catalog.profile import one
-from nfo_sinus_driver.catalog.profile import taken
+from nfo_sinus_driver.catalog.profile import (
+    Profile,
+    Read,
+    Status as InverterStatus,
+    Steps,
+    Until,
+    one,
+    taken,
+)
 from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.families._telegram1 import method
-from nfo_sinus_driver.families._telegram1.method import Telegram1
-from nfo_sinus_driver.families._telegram1.method import Words
-from nfo_sinus_driver.families.sinus_optimal.words import STATUS_WORD
-from nfo_sinus_driver.families.sinus_optimal.words import Status
-from nfo_sinus_driver.families.sinus_optimal.words import state_of
+from nfo_sinus_driver.families._telegram1.method import Telegram1, Words
+from nfo_sinus_driver.families.sinus_optimal.words import STATUS_WORD, Status, state_of
 
 _PLC_CONTROL = 1 << 10
 _ENABLE = 1 << 3

@@ -6,26 +6,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import enum
 import math
 
-from nfo_sinus_driver.catalog.profile import ControlMethod
-from nfo_sinus_driver.catalog.profile import Holder
-from nfo_sinus_driver.catalog.profile import Profile
-from nfo_sinus_driver.catalog.profile import Read
-from nfo_sinus_driver.catalog.profile import Removal
-from nfo_sinus_driver.catalog.profile import SetpointTarget
-from nfo_sinus_driver.catalog.profile import Status
-from nfo_sinus_driver.catalog.profile import Steps
-from nfo_sinus_driver.catalog.profile import Write
-from nfo_sinus_driver.catalog.profile import one
-from nfo_sinus_driver.catalog.profile import taken
-from nfo_sinus_driver.catalog.status import Fact
-from nfo_sinus_driver.catalog.status import State
-from nfo_sinus_driver.catalog.status import StatusCode
-from nfo_sinus_driver.catalog.status import StatusWord
+from nfo_sinus_driver.catalog.profile import (
+    ControlMethod,
+    Holder,
+    Profile,
+    Read,
+    Removal,
+    SetpointTarget,
+    Status,
+    Steps,
+    Write,
+    one,
+    taken,
+)
+from nfo_sinus_driver.catalog.status import Fact, State, StatusCode, StatusWord
 
 _WORD, _TURN, _SIZE, _TOLD = 'bus.word', 'bus.turn', 'bus.size', 'bus.told'
 

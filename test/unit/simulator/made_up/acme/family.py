@@ -9,10 +9,8 @@ import enum
 from typing import Any
 
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
-from nfo_sinus_driver.simulator.family import Option
-from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Argument
-from nfo_sinus_driver.simulator.injections import Verb
+from nfo_sinus_driver.simulator.family import Option, SimulatedFamily
+from nfo_sinus_driver.simulator.injections import Argument, Verb
 from nfo_sinus_driver.simulator.memory import Memory
 
 
