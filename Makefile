@@ -97,9 +97,10 @@ docs: .venv/docs/installed ## the documentation as a site, in site/; every link 
 	@.venv/docs/bin/sphinx-build -q -W --keep-going -b html -c docs . site
 	@echo 'site/index.html'
 
-parameters: setup ## write docs/parameters.md from the tables of the drives
-	@.venv/bin/python -m nfo_sinus_driver.catalog.page > docs/parameters.md.new
+parameters: setup ## write the tables of parameters in docs/ from those of the drives and nodes
+	@PYTHONPATH=. .venv/bin/python tools/parameters_page.py > docs/parameters.md.new
 	@mv docs/parameters.md.new docs/parameters.md
+	@PYTHONPATH=. .venv/bin/python tools/settings_page.py
 
 build: ## build both packages again
 	@rm -rf build install

@@ -42,7 +42,7 @@ def drive(port: str, control: str, seconds: float, turns: int, stops: int) -> li
     """Run the motor and measure; in a process of its own."""
     from nfo_sinus_driver.bus import Bus
     from nfo_sinus_driver.drive import Drive, DriveSettings
-    from nfo_sinus_driver.link import line_settings, open_link
+    from nfo_sinus_driver.link import BusSettings, open_link
     from nfo_sinus_driver.simulator.control import Client
 
     class Counting:
@@ -57,7 +57,7 @@ def drive(port: str, control: str, seconds: float, turns: int, stops: int) -> li
             return lambda *_: None
 
     listener = Counting()
-    line = line_settings('canopen', baud_rate=_BIT_RATE, response_timeout=1.0)
+    line = BusSettings(protocol='canopen', baud_rate=_BIT_RATE, response_timeout=1.0).line
     bus = Bus(open_link('canopen', port, line))
     bus.start()
     settings = DriveSettings(setpoint_timeout=0.0, poll_rate=_POLL_RATE)

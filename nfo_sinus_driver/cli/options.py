@@ -9,28 +9,25 @@ import argparse
 from collections.abc import Sequence
 import math
 import shlex
+from typing import Any
 
-from nfo_sinus_driver.catalog import example_setting, families, usual_family
+from nfo_sinus_driver.catalog import example_setting
 from nfo_sinus_driver.cli.tune import PROCEDURES
-from nfo_sinus_driver.drive import CONTROL_METHODS
-from nfo_sinus_driver.drive.settings import CONTROL_MODES, MONITOR, REFERENCES
-from nfo_sinus_driver.link import BIT_RATES, PROTOCOLS
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive.settings import AUTO, MONITOR
+from nfo_sinus_driver.link import BIT_RATES, PROTOCOLS, BusSettings
+from nfo_sinus_driver.setting import settings_of
 from nfo_sinus_driver.version import VERSION
 
-#: Where the line and the drive are, unless it is said: as the parameters of the nodes.
-DEFAULTS = {
-    'port': '/dev/ttyUSB0',
-    'protocol': 'modbus_rtu',
-    'address': 1,
-    'model': usual_family(),
-    'baud_rate': 0,
-    'char_format': '',
-    'response_timeout': 0.2,
-    'retries': 2,
-}
-#: Nobody waits long for each of 247 addresses.
-SCAN_TIMEOUT = 0.1
-SCAN_RETRIES = 0
+#: Where the line and the drive are: settings as the nodes have them.
+_SETTINGS = {**settings_of(BusSettings), **settings_of(DriveSettings)}
+_LINE_AND_DRIVE = (
+    'port', 'protocol', 'address', 'model', 'baud_rate', 'char_format', 'response_timeout',
+    'retries',
+)
+DEFAULTS = {name: _SETTINGS[name].default for name in _LINE_AND_DRIVE}
+#: What is as short as it can be for each of 247 addresses.
+_OF_SCAN = {'response_timeout': 0.1, 'retries': 0}
 
 _ALLOW = '--allow-communication-changes'
 _EPILOG = """
@@ -45,8 +42,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     defaults = dict(DEFAULTS)
     if options.verb == 'scan':
-        defaults['response_timeout'] = SCAN_TIMEOUT
-        options.silence_retries = getattr(options, 'retries', SCAN_RETRIES)
+        defaults['response_timeout'] = _OF_SCAN['response_timeout']
+        options.silence_retries = getattr(options, 'retries', _OF_SCAN['retries'])
     for name, default in defaults.items():
         if not hasattr(options, name):
             setattr(options, name, default)
@@ -110,54 +107,34 @@ def _common() -> argparse.ArgumentParser:
     # without a default the one behind the verb does not overrule the one in front of it
     parser = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
     group = parser.add_argument_group('line and drive, as the parameters of the driver')
-    add = group.add_argument
-    # the line of a gateway is set in the gateway
-    lines = [protocol for protocol in PROTOCOLS.values() if protocol.char_formats]
-    buses = [protocol for protocol in PROTOCOLS.values() if protocol.rates_disturb]
-    rates = [f'{protocol.name} {protocol.baud_rate}' for protocol in (*lines, *buses)]
-    formats = [f'{protocol.name} {protocol.char_format}' for protocol in lines]
-    add(
-        '--port',
-        help='a device path, or a URL such as socket://host:port; for modbus_tcp host:port of the '
-        'gateway; for canopen a CAN interface such as can0, too (default: /dev/ttyUSB0)',
-    )
-    add('--protocol', choices=PROTOCOLS, help='default: modbus_rtu')
-    add(
-        '--address',
-        type=_address,
-        metavar='N',
-        help='of the drive, 1 to 247; classic: 1 to 94, 0 for one alone; movitrac: 0 to 63; '
-        'canopen: node id, 1 to 127 (default: 1)',
-    )
-    add('--model', choices=families(), help=f'default: {usual_family()}')
-    add(
-        '--baud-rate',
-        type=int,
-        choices=(0, *BIT_RATES),
-        metavar='RATE',
-        help=f'0 or one of {", ".join(str(rate) for rate in BIT_RATES)}, as the protocol has it '
-        f'(default: 0, the one of the factory: {", ".join(rates)})',
-    )
-    add(
-        '--char-format',
-        metavar='FORMAT',
-        help=f'such as 8E1, 8O1, 8N2 (default: the one of the factory: {", ".join(formats)})',
-    )
-    add(
-        '--response-timeout',
-        type=_seconds,
-        metavar='SECONDS',
-        help=f'how long a drive may take to begin its answer (default: 0.2; scan: {SCAN_TIMEOUT})',
-    )
-    add(
-        '--retries',
-        type=int,
-        choices=range(11),
-        metavar='TIMES',
-        help='how often a request without a response is repeated (default: 2; scan: '
-        f'{SCAN_RETRIES} where nobody has answered yet)',
-    )
+    for name in _LINE_AND_DRIVE:
+        _add_setting(group, name, f'--{name.replace("_", "-")}')
     return parser
+
+
+def _add_setting(group: argparse._ActionsContainer, name: str, option: str, **more: Any) -> None:
+    """Add a setting as an option; what more is given replaces what the setting says."""
+    setting = _SETTINGS[name]
+
+    def value(text: str) -> object:
+        given = type(setting.default)(text)
+        try:
+            setting.check(given)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+        return given
+
+    # what argparse calls it in its own words
+    value.__name__ = 'number'
+    also = f'; scan: {_OF_SCAN[name]}' if name in _OF_SCAN else ''
+    default = f'default: {setting.default}{also}' if setting.default != '' else ''
+    text = '; '.join(filter(None, (setting.description, setting.also, default)))
+    given: dict[str, Any] = {'type': value, 'metavar': option.rpartition('-')[2].upper()}
+    if setting.choices:
+        given = {'choices': [one for one in setting.choices if one not in (MONITOR, AUTO)]}
+    elif name == 'baud_rate':
+        given['choices'] = (0, *BIT_RATES)
+    group.add_argument(option, help=text.replace('%', '%%'), **{**given, **more})
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -312,43 +289,14 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         metavar='SECONDS',
         help='stop after so long (default: run until Ctrl-C)',
     )
-    add(
-        '--method',
-        choices=[name for name in CONTROL_METHODS if name != MONITOR],
-        default='',
-        help='how the drive is commanded (default: the usual way of its family)',
-    )
-    add(
-        '--reference',
-        choices=REFERENCES,
-        metavar='REFERENCE',
-        default='fieldbus',
-        help=f'what the motor follows: {", ".join(REFERENCES)} (default: fieldbus, which is '
-        'SETPOINT)',
-    )
-    add(
-        '--control-mode',
-        choices=CONTROL_MODES,
-        default='',
-        help='refuse to run in another one; an Optimal, which does not tell it, is taken to be in '
-        'this one (default: any; an Optimal: Freque)',
-    )
-    add(
-        '--setpoint-max',
-        type=_limit,
-        default=0.0,
-        metavar='VALUE',
-        help='the greatest SETPOINT that is meant to be one (default: what is nominal for the '
-        'motor, where the drive tells it)',
-    )
-    add(
-        '--drive-timeout',
-        type=float,
-        default=0.0,
-        metavar='SECONDS',
-        help="set the drive's own time-out, so that it stops by itself when the line is cut "
-        '(default: leave it as it is)',
-    )
+    for name, option in (
+        ('control_method', '--method'),
+        ('reference', '--reference'),
+        ('expected_control_mode', '--control-mode'),
+        ('setpoint_max', '--setpoint-max'),
+        ('drive_timeout', '--drive-timeout'),
+    ):
+        _add_setting(run, name, option, default=_SETTINGS[name].default)
     add(
         '--period',
         type=_seconds,
@@ -404,13 +352,6 @@ def _setpoint(text: str) -> float:
     if not math.isfinite(setpoint):
         raise argparse.ArgumentTypeError(f'{text} is no set-point')
     return setpoint
-
-
-def _limit(text: str) -> float:
-    limit = float(text)
-    if not 0 < limit <= 32767:
-        raise argparse.ArgumentTypeError(f'{text} is not possible: more than 0')
-    return limit
 
 
 def _ride_seconds(text: str) -> float:

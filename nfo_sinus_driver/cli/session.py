@@ -30,7 +30,7 @@ from nfo_sinus_driver.drive import (
 )
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.snapshot import LogEntry
-from nfo_sinus_driver.link import Refused, line_settings, open_link
+from nfo_sinus_driver.link import BusSettings, Refused
 
 _T = TypeVar('_T')
 
@@ -126,13 +126,13 @@ class Session:
         #: When the last round of reading each drive was over, s.
         self._polled_at: dict[int, float] = {}
         try:
-            line = line_settings(
+            link = BusSettings(
+                options.port,
                 options.protocol,
-                baud_rate=options.baud_rate,
-                char_format=options.char_format,
-                response_timeout=options.response_timeout,
-            )
-            link = open_link(options.protocol, options.port, line)
+                options.baud_rate,
+                options.char_format,
+                options.response_timeout,
+            ).open()
             self._bus = Bus(link, link.protocol.most_requests)
             self._settings(options.address)
         except ValueError as error:

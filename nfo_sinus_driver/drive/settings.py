@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 import functools
 import math
@@ -20,11 +20,12 @@ from nfo_sinus_driver.catalog import (
     load_profile,
     usual_family,
 )
-from nfo_sinus_driver.link import PROTOCOLS, LineProtocol
+from nfo_sinus_driver.link import ADDRESSES, PROTOCOLS, LineProtocol
+from nfo_sinus_driver.setting import UNCONFIGURED, setting, settings_of
 
 #: The model that is found out at the first configure.
 AUTO = 'auto'
-CLASSIC_DIALECTS = ('', 'v2.03', 'v5.0')
+CLASSIC_DIALECTS = ('v2.03', 'v5.0')
 MONITOR = 'monitor'
 
 
@@ -96,56 +97,117 @@ DRIVE_TIMEOUT_MARGIN = 0.5
 @dataclass(frozen=True)
 class DriveSettings:
     """
-    How one drive is to be treated; the fields are the parameters of its node.
+    How one drive is to be treated; the fields are parameters of its node.
 
-    :ivar address: one that the protocol of the line has.
-    :ivar block_address: the first register of the block that a PLC shows, with ``telegram1``.
-    :ivar telegram_words: which words a PLC maps for a drive that may have several, by name; '': the
-        usual ones of the model.
-    :ivar model: one of the catalog's, or ``auto``; only a node can do with that.
-    :ivar control_method: as it was chosen; ``''`` stands for the usual one of the model.
-    :ivar reference: where a running drive takes its reference from; set-points are only followed
-        with ``fieldbus``.
-    :ivar poll_rate: Hz; 0 is as fast as the bus allows.
-    :ivar idle_poll_rate: Hz, while the motor stands and nobody has enabled it; 0 is as
-        ``poll_rate``.
-    :ivar telemetry_rate: Hz; 0 turns telemetry off.
-    :ivar lost_after: s; after so long without a valid frame a drive that is asked is lost.
-    :ivar setpoint_timeout: s; 0 turns it off.
-    :ivar setpoint_max: in the unit of the control mode; 0 is the nominal value of what it is
-        about, where the drive tells it, else the drive's own limit.
-    :ivar drive_timeout: s; the drive's own time-out, within its limits and on a step of it; 0
-        leaves it as it is. At least :data:`DRIVE_TIMEOUT_MARGIN` more than ``lost_after``.
-    :ivar frequency_scale: Hz for one count of the bus, as FrqScl in the drive says, which no bus
-        tells [C16]; only where the family has such a scale, like the following.
-    :ivar torque_scale: % of the nominal torque for one count, as TrqScl says.
-    :ivar process_scale: of the process unit for one count, as RegScl says.
-    :ivar classic_dialect: which manual of the Classic protocol the drive follows, ``v2.03`` or the
-        older ``v5.0``; '' asks it for its firmware, while the bus has no control.
-    :ivar allow_communication_changes: the parameters ``serial.…`` may be changed.
     :raises ValueError: a field that makes no sense; the message says what would.
     """
 
-    address: int = 1
-    block_address: int = 0
-    telegram_words: str = ''
-    model: str = usual_family()
-    control_method: str = ''
-    reference: str = 'fieldbus'
-    poll_rate: float = 50.0
-    idle_poll_rate: float = 0.0
-    telemetry_rate: float = 2.0
-    lost_after: float = 1.0
-    setpoint_timeout: float = 2.5
-    setpoint_max: float = 0.0
-    expected_control_mode: str = ''
-    drive_timeout: float = 0.0
-    shutdown_timeout: float = 4.0
-    frequency_scale: float = 0.1
-    torque_scale: float = 1.0
-    process_scale: float = 0.1
-    allow_communication_changes: bool = False
-    classic_dialect: str = ''
+    address: int = setting(
+        1,
+        'the address of the drive on its line; no two drives on a line share one',
+        0, 247, also=ADDRESSES, change=UNCONFIGURED,
+    )
+    block_address: int = setting(
+        0,
+        'with control_method telegram1: the first of the registers that the PLC shows for this '
+        'drive; the blocks of two drives do not overlap',
+        0, LAST_BLOCK, change=UNCONFIGURED,
+    )
+    telegram_words: str = setting(
+        '',
+        'with control_method telegram1: the words that the PLC maps, where the model has several',
+        choices=TELEGRAM_WORDS, zero=TELEGRAM_WORDS[0], change=UNCONFIGURED,
+    )
+    model: str = setting(
+        usual_family(),
+        'the drive family; a drive that contradicts it is reported',
+        choices=(*families(), AUTO), also='auto: ask the drive at configure',
+        change=UNCONFIGURED,
+    )
+    control_method: str = setting(
+        '',
+        'how the drive is commanded; monitor: not one write to it',
+        choices=CONTROL_METHODS, zero='the usual method of the model',
+        change=UNCONFIGURED,
+    )
+    reference: str = setting(
+        'fieldbus',
+        'where a running drive takes its reference from; with any but fieldbus it follows no '
+        'set-points',
+        choices=REFERENCES, also='as far as model and control_method have it',
+        change=UNCONFIGURED,
+    )
+    poll_rate: float = setting(
+        50.0,
+        'status and actual values; while the drive is enabled or a stop is not confirmed, the '
+        'status is read at least five times a second in any case',
+        0, 1000, unit='Hz', zero='as fast as the bus allows',
+    )
+    idle_poll_rate: float = setting(
+        0.0,
+        'as poll_rate, but while the motor stands and is not enabled',
+        0, 1000, unit='Hz', zero='as poll_rate',
+    )
+    telemetry_rate: float = setting(2.0, 'measured values', 0, 100, unit='Hz', zero='off')
+    lost_after: float = setting(
+        1.0,
+        'a drive that is asked and sends no valid frame for this long is lost and stopped; any '
+        'valid answer, a refusal too, begins it anew',
+        0.2, 60, unit='s',
+    )
+    setpoint_timeout: float = setting(
+        2.5,
+        'no fresh set-point for this long: ramp to a stop and warn',
+        0, 3600, unit='s', zero='off',
+    )
+    setpoint_max: float = setting(
+        0.0,
+        'set-points beyond it are clamped, in both directions, in the unit of the control mode',
+        0, 32767,
+        zero="what is nominal for the motor, or the drive's own limit where it does not tell that",
+    )
+    expected_control_mode: str = setting(
+        '',
+        'enable is refused when the drive is in another control mode',
+        choices=CONTROL_MODES, zero='any',
+    )
+    drive_timeout: float = setting(
+        0.0, "the drive's own time-out: it stops the motor when this driver dies", 0,
+        LONGEST_DRIVE_TIMEOUT, unit='s', zero='leave it as it is',
+        also='0 or at least lost_after + 0.5; the most and the step are those of the drive',
+    )
+    shutdown_timeout: float = setting(
+        4.0,
+        'how long an exit or a cleanup waits for the drive to confirm that it stops',
+        0, 600, unit='s',
+    )
+    frequency_scale: float = setting(
+        0.1,
+        'what one count of a frequency is, where the drive has a scale that no bus tells (FrqScl '
+        'of a G2) [C16]; one that is not that of the drive makes every frequency wrong',
+        1e-6, 1e6, unit='Hz', change=UNCONFIGURED,
+    )
+    torque_scale: float = setting(
+        1.0,
+        'the same of a torque (TrqScl), % of the nominal one',
+        1e-6, 1e6, unit='%', change=UNCONFIGURED,
+    )
+    process_scale: float = setting(
+        0.1,
+        'the same of a process value (RegScl), in its unit',
+        1e-6, 1e6, change=UNCONFIGURED,
+    )
+    allow_communication_changes: bool = setting(
+        False, 'allow changes of the parameters serial.*: the driver may lose the drive by that'
+    )
+    classic_dialect: str = setting(
+        '',
+        'which manual of the Classic protocol the drive follows: v2.03, or v5.0 for firmware '
+        'before 4.28',
+        choices=CLASSIC_DIALECTS, zero='ask the drive, while the bus does not control it',
+        change=UNCONFIGURED,
+    )
+    #: How often a request without a response is repeated; a setting of the line.
     retries: int = 2
 
     @property
@@ -197,42 +259,34 @@ class DriveSettings:
             )
 
     def __post_init__(self) -> None:
-        _one_of('model', self.model, (*families(), AUTO))
+        settings = settings_of(DriveSettings)
+        settings['model'].check(self.model)
         if self.control_method:
             _one_of('control_method', self.control_method, _control_methods(self.model))
-        _one_of('reference', self.reference, REFERENCES)
+        settings['reference'].check(self.reference)
         kind = f'{self.method} on {self.model}'
         allowed = _references(self.model, self.method)
         if self.reference not in allowed:
             raise ValueError(
                 f'reference {self.reference!r}: with {kind} it must be {" or ".join(allowed)}'
             )
-        _one_of('classic_dialect', self.classic_dialect, CLASSIC_DIALECTS)
+        settings['classic_dialect'].check(self.classic_dialect)
         self._require_known_method()
         if self.telegram_words:
             _one_of('telegram_words', self.telegram_words, _telegram_words(self.model, self.method))
         modes = _control_modes(self.model, self.method)
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
-        if not any(self.address in protocol.units for protocol in PROTOCOLS.values()):
-            raise ValueError(f'address {self.address}: allowed are 0 to 247')
-        _between('block_address', self.block_address, 0, LAST_BLOCK, '(a register)')
-        _between('poll_rate', self.poll_rate, 0, 1000, 'Hz (0: as fast as the bus allows)')
-        _between('idle_poll_rate', self.idle_poll_rate, 0, 1000, 'Hz (0: as poll_rate)')
-        _between('telemetry_rate', self.telemetry_rate, 0, 100, 'Hz (0: off)')
-        _between('lost_after', self.lost_after, 0.2, 60, 's')
-        _between('setpoint_timeout', self.setpoint_timeout, 0, 3600, 's (0: off)')
-        _between('setpoint_max', self.setpoint_max, 0, 32767, '(0: what the motor is made for)')
-        for name in ('frequency_scale', 'torque_scale', 'process_scale'):
-            _between(name, getattr(self, name), 1e-6, 1e6, '(the value of one count)')
-        _between('shutdown_timeout', self.shutdown_timeout, 0, 600, 's')
         self._check_drive_timeout()
+        for name, one in settings.items():
+            one.check(getattr(self, name))
 
     def _check_drive_timeout(self) -> None:
         # a drive that has none refuses any, with the reason
         own = _own_timeouts(self.model) or _own_timeouts(AUTO)
         longest, step = max(most for most, _ in own), min(least for _, least in own)
         whose = f' with {self.model}' if len(own) == 1 else ''
-        _between('drive_timeout', self.drive_timeout, 0, float(longest), f's{whose} (0: as it is)')
+        own_span = replace(settings_of(DriveSettings)['drive_timeout'], high=float(longest))
+        replace(own_span, unit=f's{whose}').check(self.drive_timeout)
         least = self.lost_after + DRIVE_TIMEOUT_MARGIN
         if 0 < self.drive_timeout < least - 1e-9:
             raise ValueError(
@@ -262,8 +316,3 @@ def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:
     if value not in allowed:
         shown = ', '.join(repr(choice) for choice in allowed)
         raise ValueError(f'{name} {value!r}: choose one of {shown}')
-
-
-def _between(name: str, value: float, low: float, high: float, unit: str) -> None:
-    if not low <= value <= high:
-        raise ValueError(f'{name} {value:g}: allowed are {low:g} to {high:g} {unit}')

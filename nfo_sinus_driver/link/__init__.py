@@ -29,14 +29,16 @@ from nfo_sinus_driver.link.interface import (
     Supervision,
     Watch,
 )
-from nfo_sinus_driver.link.line_protocols import BIT_RATES, PROTOCOLS
-from nfo_sinus_driver.link.protocols import line_settings, open_link
+from nfo_sinus_driver.link.line_protocols import ADDRESSES, BIT_RATES, PROTOCOLS
+from nfo_sinus_driver.link.protocols import BusSettings, open_link
 from nfo_sinus_driver.link.reconnect import Reconnect
 
 __all__ = [
+    'ADDRESSES',
     'BIT_RATES',
     'PROTOCOLS',
     'Address',
+    'BusSettings',
     'Clock',
     'Connecting',
     'DamagedAnswer',
@@ -61,6 +63,5 @@ __all__ = [
     'Reply',
     'Supervision',
     'Watch',
-    'line_settings',
     'open_link',
 ]

@@ -97,3 +97,11 @@ PROTOCOLS: Mapping[str, LineProtocol] = {
 }
 #: The bit rates of all of them.
 BIT_RATES = tuple(sorted({rate for each in PROTOCOLS.values() for rate in each.baud_rates}))
+#: Which addresses a drive may have, for the reader.
+ADDRESSES = '; '.join(
+    dict.fromkeys(
+        f'{one.addressing} {one.units[0]} to {one.units[-1]}'
+        + f' ({one.point_to_point}: alone on its line)' * (one.point_to_point is not None)
+        for one in PROTOCOLS.values()
+    )
+)

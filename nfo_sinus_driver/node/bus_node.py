@@ -14,13 +14,14 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.link import line_settings, open_link
+from nfo_sinus_driver.link import BusSettings
 from nfo_sinus_driver.node import diagnostics, messages
 from nfo_sinus_driver.node.all_drives import AllDrives
 from nfo_sinus_driver.node.bus_context import BusContext
+from nfo_sinus_driver.node.declaring import declare
 from nfo_sinus_driver.node.qos import RELIABLE
 from nfo_sinus_driver.node.setpoints import SetpointsForAll
-from nfo_sinus_driver.node.settings import BUS_SETTINGS, declare
+from nfo_sinus_driver.node.settings import BUS_SETTINGS
 
 _PERIOD = 1.0
 #: How long it is waited for at the start that the port opens, and how often it is looked, s.
@@ -36,18 +37,12 @@ class BusNode(Node):
     def __init__(self, overrides: Sequence[Parameter] = ()) -> None:
         super().__init__(NAME, parameter_overrides=list(overrides))
         values = declare(self, BUS_SETTINGS)
-        settings = line_settings(
-            values['protocol'],
-            baud_rate=values['baud_rate'],
-            char_format=values['char_format'],
-            response_timeout=values['response_timeout'],
-            rs485=values['rs485'],
-        )
-        self.drive_names: list[str] = list(values['drives'])
-        self._port: str = values['port']
-        link = open_link(values['protocol'], self._port, settings)
-        limit = values['max_requests'] if link.protocol.most_requests else 0.0
-        self.bus_context = BusContext(Bus(link, limit), values['retries'])
+        self.drive_names: list[str] = list(values.pop('drives'))
+        settings = BusSettings(**values)
+        self._port = settings.port
+        link = settings.open()
+        limit = settings.max_requests if link.protocol.most_requests else 0.0
+        self.bus_context = BusContext(Bus(link, limit), settings.retries)
         AllDrives(self, self.bus_context)
         SetpointsForAll(self, self.bus_context)
         self._logged_port: str | None = ''

@@ -20,6 +20,7 @@ from rclpy.parameter import Parameter
 from nfo_sinus_driver.drive import Change, DriveError, DriveSettings, Report
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.commands import Commands, ErrorLogServices, TuningServices
+from nfo_sinus_driver.node.declaring import coerce, declare
 from nfo_sinus_driver.node.drive_parameters import DriveParameters, wanted_state
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
@@ -27,10 +28,9 @@ from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.scale import Scale, require_scale
 from nfo_sinus_driver.node.setpoints import Setpoints
-from nfo_sinus_driver.node.settings import DRIVE_SETTINGS, coerce, declare
+from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.wording import NodeError, Wording
 
-_NAMES = frozenset(setting.name for setting in DRIVE_SETTINGS)
 #: How long a stop may wait for the bus before it is said that it is not known, s.
 _LONGEST_STOP = 10.0
 
@@ -254,7 +254,7 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _settings_with(self, parameters: list[Parameter]) -> DriveSettings:
         """Return the settings as they would be; a ValueError if they make no sense."""
-        changed = {one.name: one.value for one in parameters if one.name in _NAMES}
+        changed = {one.name: one.value for one in parameters if one.name in DRIVE_SETTINGS}
         if not changed:
             # a drive has many of its own, and they come one by one
             return self.managed.settings

@@ -15,19 +15,11 @@ from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.scale import Scale
 from nfo_sinus_driver.node.wording import NodeError, Wording
+from nfo_sinus_driver.setting import UNCONFIGURED, settings_of
 
 #: What identifies a drive or how it is commanded cannot change under way.
-ONLY_UNCONFIGURED = (
-    'address',
-    'block_address',
-    'telegram_words',
-    'model',
-    'control_method',
-    'reference',
-    'classic_dialect',
-    'frequency_scale',
-    'torque_scale',
-    'process_scale',
+ONLY_UNCONFIGURED = tuple(
+    name for name, one in settings_of(DriveSettings).items() if one.change == UNCONFIGURED
 )
 
 

@@ -38,7 +38,7 @@ def bus_overrides(name: str) -> list[Parameter]:
     given = _given_to(name)
     return [
         given[key]
-        for key in (setting.name for setting in BUS_SETTINGS)
+        for key in BUS_SETTINGS
         if key in given and (key not in for_all or given[key].value != for_all[key].value)
     ]
 

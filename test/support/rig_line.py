@@ -11,7 +11,7 @@ import itertools
 from random import Random
 from typing import Any
 
-from nfo_sinus_driver.link import PortError, line_settings
+from nfo_sinus_driver.link import BusSettings, PortError
 from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.lawicel_port import LawicelPort
@@ -120,9 +120,11 @@ class Line:
         )
         self._stations = list(getattr(self.wire, 'stations', ()))
         self._protocol = protocol_of('modbus_tcp' if end.through_plc else protocol)
-        self.settings = line_settings(
-            self._protocol.name, baud_rate=end.timing.baud, response_timeout=response_timeout
-        )
+        self.settings = BusSettings(
+            protocol=self._protocol.name,
+            baud_rate=end.timing.baud,
+            response_timeout=response_timeout,
+        ).line
         # a damaged frame of CAN is no frame
         self._damage = 'drop' if protocol == 'canopen' else 'damage'
         self._seldom_at = 0.0

@@ -9,11 +9,12 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 import re
+import runpy
 from xml.etree import ElementTree
 
 import pytest
 
-from nfo_sinus_driver.catalog import usual_family
+from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'nfo_sinus_driver'
@@ -27,6 +28,7 @@ PICTURES = sorted((ROOT / 'docs').glob('*.svg'))
 OF_OTHERS = {'diagnostic_aggregator.yaml'}
 CONFIGS = sorted(path for path in (ROOT / 'config').glob('*.yaml') if path.name not in OF_OTHERS)
 LAUNCH_FILES = sorted((ROOT / 'launch').glob('*.launch.py'))
+SETTINGS = {*BUS_SETTINGS, *DRIVE_SETTINGS}
 #: Arguments of remapping, and the example of a message, that look like parameters.
 NO_PARAMETERS = {'__node', '__ns', 'name'}
 
@@ -66,16 +68,6 @@ def topics_and_services(source: str) -> set[str]:
     """The names that a node gives its topics and services."""
     pattern = re.compile(r'~/[a-z_]+|/diagnostics')
     return {text for text in texts(ast.parse(source)) if pattern.fullmatch(text)}
-
-
-def settings(source: str) -> dict[str, object]:
-    """The parameters that a module declares as a ``Setting``, and their defaults."""
-    found = {}
-    for call in calls(source, 'Setting'):
-        name, default = call.args[:2]
-        usual = ast.unparse(default) == 'usual_family()'
-        found[ast.literal_eval(name)] = usual_family() if usual else ast.literal_eval(default)
-    return found
 
 
 def launch_arguments(source: str) -> set[str]:
@@ -195,32 +187,11 @@ def named_files(text: str) -> set[str]:
     return {span for span in code_spans(text) if pattern.fullmatch(span)}
 
 
-def as_written(default: object) -> str:
-    """A default as the tables show it."""
-    if isinstance(default, bool):
-        return str(default).lower()
-    if isinstance(default, list):
-        return f'`[{", ".join(default)}]`'
-    if isinstance(default, str):
-        return f'`{default}`' if default else "`''`"
-    return str(default)
-
-
-def wrong_default(text: str, name: str, default: object) -> bool:
-    """Tell whether no table row says that this is the parameter's default."""
-    row = f'| `{name}` | {as_written(default)} |'
-    return not any(line.startswith(row) for line in text.splitlines())
-
-
 # --- the tests ------------------------------------------------------------------------------------
 
 
 def read(path: Path) -> str:
     return path.read_text(encoding='utf-8')
-
-
-def all_settings() -> dict[str, object]:
-    return settings(read(PACKAGE / 'node' / 'settings.py'))
 
 
 def all_launch_arguments() -> set[str]:
@@ -235,14 +206,9 @@ def test_topics_and_services_are_documented() -> None:
     assert names - documented(read(INTERFACE)) == set()
 
 
-def test_parameters_are_documented() -> None:
-    assert {'port', 'drives', 'address', 'drive_timeout'} <= set(all_settings())
-    assert set(all_settings()) - documented(read(INTERFACE)) == set()
-
-
-@pytest.mark.parametrize(('name', 'default'), all_settings().items())
-def test_default_is_documented(name: str, default: object) -> None:
-    assert not wrong_default(read(INTERFACE), name, default), f'{name}: {as_written(default)}'
+def test_tables_of_parameters_are_current() -> None:
+    made = runpy.run_path(str(ROOT / 'tools' / 'settings_page.py'))['page'](read(INTERFACE))
+    assert read(INTERFACE) == made, 'make parameters'
 
 
 def test_executables_are_documented() -> None:
@@ -292,7 +258,7 @@ def test_what_a_page_names_exists(page: Path) -> None:
     text = read(page)
     assert broken_links(page, text) == []
     assert named_targets(text) - make_targets(read(ROOT / 'Makefile')) == set()
-    assert named_parameters(text) - set(all_settings()) - all_launch_arguments() == set()
+    assert named_parameters(text) - SETTINGS - all_launch_arguments() == set()
     for name in named_files(text):
         assert any((folder / name).exists() for folder in (ROOT, PACKAGE)), name
 
@@ -335,7 +301,7 @@ def test_the_picture_of_control_names_the_time_outs_of_its_page() -> None:
 def test_parameter_file_names_parameters_that_exist(path: Path) -> None:
     names = set(re.findall(r'^    (\w+):', read(path), re.MULTILINE))
     assert 'port' in names
-    assert names - set(all_settings()) == set()
+    assert names - SETTINGS == set()
 
 
 # --- the checker itself ---------------------------------------------------------------------------
@@ -344,7 +310,6 @@ def test_parameter_file_names_parameters_that_exist(path: Path) -> None:
 def test_checker_finds_what_is_public() -> None:
     node = "self.create_service(Trigger, '~/tune', f)\nlog('call ~/enable')\npub(A, '/diagnostics')"
     assert topics_and_services(node) == {'~/tune', '/diagnostics'}
-    assert settings("A = (Setting('gear_ratio', 1.0, 'turns'),)") == {'gear_ratio': 1.0}
     launch = "OVERRIDES = {'port': 1}\ndeclare('link')\nDeclareLaunchArgument('x')\ndeclare(name)"
     assert launch_arguments(launch) == {'port', 'link', 'x'}
     assert options("add('--link', '-l')\nparser.add_argument('--tcp', help='--x y')") == {
@@ -374,11 +339,6 @@ def test_checker_sees_what_is_missing() -> None:
         'run',
         'on',
     }
-    row = '| `autostart` | true | | by itself |\n| `drives` | `[a]` | |\n'
-    assert not wrong_default(row, 'autostart', True)
-    assert not wrong_default(row, 'drives', ['a'])
-    assert wrong_default(row, 'autostart', False)
-    assert wrong_default(row, 'frame_id', '')
 
 
 def test_checker_sees_what_does_not_exist(tmp_path: Path) -> None:

@@ -12,13 +12,13 @@ import sys
 import pytest
 
 from nfo_sinus_driver.catalog import families, load_family
-from nfo_sinus_driver.link import PROTOCOLS, line_settings, open_link
+from nfo_sinus_driver.link import PROTOCOLS, BusSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 PORTS = {'modbus_tcp': 'gateway:502'}
 #: The module of the link that speaks each protocol.
 LINKS = {
-    name: type(open_link(name, PORTS.get(name, '/dev/x'), line_settings(name))).__module__
+    name: type(BusSettings(PORTS.get(name, '/dev/x'), name).open()).__module__
     for name in PROTOCOLS
 }
 
@@ -33,8 +33,8 @@ def said_by(program: str, *arguments: str) -> str:
 def test_only_the_link_that_is_opened_is_loaded(protocol: str) -> None:
     said = said_by(
         'import sys\n'
-        'from nfo_sinus_driver.link import line_settings, open_link\n'
-        'open_link(sys.argv[1], sys.argv[2], line_settings(sys.argv[1]))\n'
+        'from nfo_sinus_driver.link import BusSettings\n'
+        'BusSettings(sys.argv[2], sys.argv[1]).open()\n'
         'print(*sys.modules)',
         protocol,
         PORTS.get(protocol, '/dev/x'),

@@ -202,7 +202,7 @@ NO_SENSE: list[tuple[dict[str, Any], str]] = [
     ({'drive_timeout': 1.2, 'lost_after': 0.75}, 'at least 1.3 s, half a second more'),
     ({'drive_timeout': 25.1}, 'allowed are 0 to 25 s with sinus_g2'),
     ({'drive_timeout': 10.1, 'model': 'movitrac31'}, 'allowed are 0 to 10 s with movitrac31'),
-    ({'drive_timeout': 25.1, 'model': 'auto'}, 'allowed are 0 to 25 s (0: as it is)'),
+    ({'drive_timeout': 25.1, 'model': 'auto'}, 'allowed are 0 to 25 s (0: leave it as it is)'),
     ({'drive_timeout': 25.1, 'model': 'sinus_optimal'}, 'allowed are 0 to 25 s'),
     ({'drive_timeout': 2.55}, 'between two steps of the drive, 2.5 and 2.6'),
 ]

@@ -26,7 +26,7 @@ from support.variants import ramps
 
 from nfo_sinus_driver.bus import Bus, Cancelled
 from nfo_sinus_driver.drive import Drive, DriveError, DriveSettings
-from nfo_sinus_driver.link import line_settings, open_link
+from nfo_sinus_driver.link import BusSettings, open_link
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.simulator import Simulator
 
@@ -55,7 +55,7 @@ class Real:
 
     def __init__(self, simulator: Simulator) -> None:
         self.simulator = simulator
-        line = line_settings('modbus_rtu', baud_rate=57600, response_timeout=1.0)
+        line = BusSettings(protocol='modbus_rtu', baud_rate=57600, response_timeout=1.0).line
         self.bus = Bus(open_link('modbus_rtu', simulator.port, line))
         self.notes = Listener()
         settings = DriveSettings(poll_rate=50.0, lost_after=10.0, setpoint_timeout=0.0)

@@ -16,7 +16,7 @@ import classic_far_end as far
 import pytest
 from support.addresses import classic_id, packed
 
-from nfo_sinus_driver.link import line_settings, open_link
+from nfo_sinus_driver.link import BusSettings
 from nfo_sinus_driver.link.classic_link import ClassicLink
 from nfo_sinus_driver.link.interface import DamagedAnswer, LinkError, NoAnswer, PortError, Refused
 
@@ -116,8 +116,9 @@ def drive() -> Iterator[PtyDrive]:
 
 
 def connect(drive: PtyDrive, timeout: float = PATIENT, char_format: str = '') -> ClassicLink:
-    settings = line_settings('classic', response_timeout=timeout, char_format=char_format)
-    link = open_link('classic', drive.path, settings)
+    link = BusSettings(
+        drive.path, 'classic', char_format=char_format, response_timeout=timeout
+    ).open()
     assert isinstance(link, ClassicLink)
     link.open()
     return link
@@ -138,7 +139,7 @@ def hasty(drive: PtyDrive) -> Iterator[ClassicLink]:
 
 
 def test_the_factory_setting_is_that_of_the_drive() -> None:
-    settings = line_settings('classic')
+    settings = BusSettings(protocol='classic').line
     assert (settings.baud_rate, settings.char_format) == (9600, '7E1')
 
 

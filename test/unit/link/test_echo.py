@@ -22,7 +22,7 @@ from test_link_ports import PATIENCE, Pty
 from test_rtu_link import NAMES, STEPS
 from virtual_wire import AsciiWire, Fate, Slave, Wire
 
-from nfo_sinus_driver.link import line_settings, open_link
+from nfo_sinus_driver.link import BusSettings
 from nfo_sinus_driver.link.interface import Address, DamagedAnswer, LinkError, NoAnswer, Refused
 from nfo_sinus_driver.link.modbus_ascii import AsciiLink
 from nfo_sinus_driver.link.rtu import RtuLink
@@ -410,7 +410,7 @@ def pty() -> Iterator[Pty]:
 
 def test_echo_on_a_real_port(pty: Pty, kind: str) -> None:
     protocol = f'modbus_{kind}'
-    link = open_link(protocol, pty.path, line_settings(protocol, response_timeout=1.0))
+    link = BusSettings(pty.path, protocol, response_timeout=1.0).open()
     line = EchoingLine(pty, kind)
     link.open()
     try:

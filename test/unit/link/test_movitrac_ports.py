@@ -15,7 +15,7 @@ import tty
 import movitrac_far_end as far
 import pytest
 
-from nfo_sinus_driver.link import Address, NoAnswer, Refused, line_settings, open_link
+from nfo_sinus_driver.link import Address, BusSettings, NoAnswer, Refused
 
 #: Longer than any drive here takes to answer, on any machine, s.
 PATIENT = 10.0
@@ -103,7 +103,7 @@ def server() -> Iterator[str]:
 @pytest.mark.parametrize('kind', ['serial', 'server'])
 def test_a_drive_is_read_and_written(kind: str, request: pytest.FixtureRequest) -> None:
     port: str = request.getfixturevalue(kind)
-    link = open_link('movitrac', port, line_settings('movitrac', response_timeout=PATIENT))
+    link = BusSettings(port, 'movitrac', response_timeout=PATIENT).open()
     link.open()
     try:
         assert link.read(1, RAMP).data == bytes.fromhex('00000370')
@@ -118,7 +118,7 @@ def test_a_drive_is_read_and_written(kind: str, request: pytest.FixtureRequest) 
 
 
 def test_nobody_answers(serial: str) -> None:
-    link = open_link('movitrac', serial, line_settings('movitrac', response_timeout=0.05))
+    link = BusSettings(serial, 'movitrac', response_timeout=0.05).open()
     link.open()
     try:
         with pytest.raises(NoAnswer, match='unit 5 did not answer'):

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 import pytest
 
 from nfo_sinus_driver.catalog import families, load_family
-from nfo_sinus_driver.link import PROTOCOLS, Address, LineProtocol, line_settings, open_link
+from nfo_sinus_driver.link import PROTOCOLS, Address, BusSettings, LineProtocol, open_link
 from nfo_sinus_driver.link.interface import BAUD_RATES, LineSettings
 
 EVERY = pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=list(PROTOCOLS))
@@ -29,7 +29,7 @@ ROWS = {
 
 def open_with(protocol: str, char_format: str) -> None:
     """Make the link that speaks a protocol on a line that is set so."""
-    line = line_settings(protocol, char_format=char_format)
+    line = BusSettings(protocol=protocol, char_format=char_format).line
     open_link(protocol, PORTS.get(protocol, '/dev/x'), line)
 
 
@@ -37,7 +37,7 @@ def open_with(protocol: str, char_format: str) -> None:
 def test_a_link_says_what_it_speaks(protocol: LineProtocol) -> None:
     port = PORTS.get(protocol.name, '/dev/x')
     assert PROTOCOLS[protocol.name] is protocol
-    assert open_link(protocol.name, port, line_settings(protocol.name)).protocol is protocol
+    assert BusSettings(port, protocol.name).open().protocol is protocol
 
 
 @EVERY
@@ -50,7 +50,7 @@ def test_it_reaches_parameters_and_no_drive_by_its_broadcast(protocol: LineProto
 @EVERY
 def test_the_parts_of_every_parameter_are_the_whole_of_it(protocol: LineProtocol) -> None:
     port = PORTS.get(protocol.name, '/dev/x')
-    link = open_link(protocol.name, port, line_settings(protocol.name))
+    link = BusSettings(port, protocol.name).open()
     for row in ROWS[protocol.name]:
         place = row.at(protocol.addressing)
         address = Address(*place.place)
@@ -98,7 +98,7 @@ def test_classic_has_the_formats_of_its_firmwares(format_: str) -> None:
 
 @given(st.sampled_from(list(PROTOCOLS)), st.sampled_from((*BAUD_RATES, 125_000)))
 def test_baud_rates(protocol: str, baud_rate: int) -> None:
-    line = line_settings(protocol, baud_rate=baud_rate)
+    line = BusSettings(protocol=protocol, baud_rate=baud_rate).line
     if baud_rate in PROTOCOLS[protocol].baud_rates:
         open_link(protocol, PORTS.get(protocol, '/dev/x'), line)
     else:
@@ -110,8 +110,8 @@ def test_baud_rates(protocol: str, baud_rate: int) -> None:
 @pytest.mark.parametrize('port', ['/dev/ttyACM0', 'can0', 'socket://adapter:4001'])
 def test_canopen_has_the_bit_rates_of_its_adapters(port: str) -> None:
     for bit_rate in (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 1_000_000):
-        open_link('canopen', port, line_settings('canopen', baud_rate=bit_rate))
-    assert line_settings('canopen').baud_rate == 125_000
+        BusSettings(port, 'canopen', baud_rate=bit_rate).open()
+    assert BusSettings(protocol='canopen').line.baud_rate == 125_000
 
 
 @given(FORMATS)
@@ -130,13 +130,13 @@ def test_the_line_of_a_gateway_is_the_gateways(format_: str) -> None:
 )
 def test_factory_settings(protocol: str, baud_rate: int, char_format: str) -> None:
     # [M0 §6.2.2], [M0 §6.1.2], [C6], [M4 §2.3.3]
-    line = line_settings(protocol)
+    line = BusSettings(protocol=protocol).line
     assert (line.baud_rate, line.char_format) == (baud_rate, char_format)
     open_link(protocol, '/dev/x', line)
-    asked = line_settings(protocol, baud_rate=9600, char_format=f'{char_format[0]}N2')
+    asked = BusSettings(protocol=protocol, baud_rate=9600, char_format=f'{char_format[0]}N2').line
     assert (asked.baud_rate, asked.char_format) == (9600, f'{char_format[0]}N2')
     with pytest.raises(ValueError, match='unknown protocol'):
-        line_settings('profibus')
+        BusSettings(protocol='profibus').open()
 
 
 def test_unknown_protocol() -> None:

@@ -12,7 +12,7 @@ from pymodbus_server import REGISTERS, serial_server
 import pytest
 from support.addresses import packed, register
 
-from nfo_sinus_driver.link import Link, LinkError, Refused, line_settings, open_link
+from nfo_sinus_driver.link import BusSettings, Link, LinkError, Refused
 
 ONE = register(0x2A5)
 TWO = register(0x258, 2)
@@ -22,7 +22,7 @@ TWO = register(0x258, 2)
 def link(request: pytest.FixtureRequest) -> Iterator[Link]:
     protocol = f'modbus_{request.param}'
     with serial_server(request.param) as path:
-        link = open_link(protocol, path, line_settings(protocol, response_timeout=5.0))
+        link = BusSettings(path, protocol, response_timeout=5.0).open()
         link.use_resync_reads(1, (ONE, TWO))
         link.open()
         yield link

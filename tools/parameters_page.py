@@ -1,12 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
-"""
-The page of all parameters for people, made from the tables.
-
-``python -m nfo_sinus_driver.catalog.page`` prints it; ``make parameters`` writes it to ``docs/``.
-"""
+"""docs/parameters.md: all parameters for people, made from the tables; ``make parameters``."""
 
 from __future__ import annotations
 

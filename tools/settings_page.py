@@ -1,0 +1,63 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The tables of settings in docs/interface.md, made from the settings; ``make parameters``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+import re
+
+from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
+from nfo_sinus_driver.setting import FIXED, Setting
+
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'interface.md'
+#: Names, topics and values in a text, which the page shows as code.
+_NAMES = '|'.join(name for name in (*BUS_SETTINGS, *DRIVE_SETTINGS) if '_' in name)
+_CODE = re.compile(
+    rf"(?<![`\w./])(~/\w+|serial\.\*|''|{_NAMES}|joint_states|joint_command|telegram1)(?!\w)"
+)
+
+
+def page(text: str) -> str:
+    """Return the page with its tables of settings made anew."""
+    for title, settings in ('meaning |', BUS_SETTINGS), ('meaning | change |', DRIVE_SETTINGS):
+        begin = f'| parameter | default | range | {title}\n'
+        before, found, after = text.partition(begin)
+        assert found, f'{PAGE} has no table that begins with {begin}'
+        rest = re.sub(r'\A(\|.*\n)+', '', after)
+        text = before + begin + ''.join(_rows(settings)) + rest
+    return text
+
+
+def _rows(settings: Mapping[str, Setting]) -> list[str]:
+    fixed = all(one.change == FIXED for one in settings.values())
+    rows = ['|---|---|---|---|\n' if fixed else '|---|---|---|---|---|\n']
+    for name, one in settings.items():
+        cells = [f'`{name}`', _default(one.default), _range(one), _code(one.description)]
+        cells += [] if fixed else [one.change]
+        rows.append('|' + '|'.join(f' {cell} ' if cell else ' ' for cell in cells) + '|\n')
+    return rows
+
+
+def _default(default: object) -> str:
+    if isinstance(default, bool):
+        return str(default).lower()
+    if isinstance(default, list):
+        return f'`[{", ".join(default)}]`'
+    return f"`{default or repr('')}`" if isinstance(default, str) else str(default)
+
+
+def _range(one: Setting) -> str:
+    span = f'{one.low:g} to {one.high:g} {one.unit}'.strip() if one.low is not None else ''
+    choices = ', '.join(f'`{choice}`' for choice in one.choices)
+    return '; '.join(filter(None, (span, choices, _code(one.also))))
+
+
+def _code(text: str) -> str:
+    return _CODE.sub(r'`\1`', text)
+
+
+if __name__ == '__main__':
+    PAGE.write_text(page(PAGE.read_text(encoding='utf-8')), encoding='utf-8')
