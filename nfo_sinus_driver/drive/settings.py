@@ -183,18 +183,18 @@ class DriveSettings:
     )
     frequency_scale: float = setting(
         0.1,
-        'what one count of a frequency is, where the drive has a scale that no bus tells (FrqScl '
-        'of a G2) [C16]; one that is not that of the drive makes every frequency wrong',
+        'what one count of a frequency is, where the drive has a scale that no bus tells [C16]; '
+        'one that is not that of the drive makes every frequency wrong',
         1e-6, 1e6, unit='Hz', change=UNCONFIGURED,
     )
     torque_scale: float = setting(
         1.0,
-        'the same of a torque (TrqScl), % of the nominal one',
+        'the same of a torque, % of the nominal one',
         1e-6, 1e6, unit='%', change=UNCONFIGURED,
     )
     process_scale: float = setting(
         0.1,
-        'the same of a process value (RegScl), in its unit',
+        'the same of a process value, in its unit',
         1e-6, 1e6, change=UNCONFIGURED,
     )
     allow_communication_changes: bool = setting(
