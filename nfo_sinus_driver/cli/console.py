@@ -19,7 +19,7 @@ import unicodedata
 from tqdm import tqdm
 
 from nfo_sinus_driver.drive import DriveError, Report
-from nfo_sinus_driver.wording import Calls, sentence
+from nfo_sinus_driver.drive.events import Calls, sentence
 
 #: What takes less needs no bar, s.
 _DELAY = 0.3

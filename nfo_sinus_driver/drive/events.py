@@ -1,13 +1,15 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What there is to say of a drive, as values; the sentences are made where they are shown."""
+"""What there is to say of a drive: a report is values, and its cause the sentence for them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 import enum
+import string
+from typing import Any
 
 
 class Severity(enum.Enum):
@@ -18,63 +20,394 @@ class Severity(enum.Enum):
     ERROR = 'error'
 
 
-#: What happened, what was done, or what went wrong; the wording has a sentence for each.
-Cause = enum.Enum(
-    'Cause',
-    # the line and who answers
-    'CONNECTED DRIVER_ERROR LINE_FAILED NOT_REACHED NO_RESPONSE NO_VALID_ANSWER TOO_LATE LOST '
-    'LOST_IN_USE OLD_DATA RESTARTED HELD_BY_LINE NOT_THE_MODEL OTHER_MODEL UNEXPECTED_IDENTITY '
-    'SEVERAL_MODELS FIRMWARE_NOT_ASKED '
-    # why a command is not carried out
-    'MONITOR_ONLY NOT_CONNECTED NOT_ACTIVE ENDING NOT_POSSIBLE ENABLING_ALREADY STOP_PENDING '
-    'STOPPED_SINCE_ASKED PROCEDURE_GOES_ON FAULT_FORBIDS OTHER_METHOD_RUNS WRONG_CONTROL_MODE '
-    'NO_RUN_INPUT START_FAULTED NOT_STARTED STOPPED_WHILE_ENABLING NOT_CONFIRMED '
-    # enable, stop, acknowledge, release
-    'ENABLED ENABLED_BY_OWN_REFERENCE ENABLED_ALREADY STOPPED STOPPED_BY_FAULT STOP_BLOCKED '
-    'STOPPING COASTING RAMPING QUICK_STOPPED NO_QUICK_STOP QUICK_STOP_UNCONFIRMED NO_CONTROL '
-    'RUN_BY_OTHERS STOP_UNCONFIRMED STOP_UNCONFIRMED_AT_END CANNOT_STOP STOP_CONFIRMED_LATE '
-    'CANNOT_STOP_BUT_STANDS STOP_FORCED '
-    'NOTHING_TO_ACKNOWLEDGE ACKNOWLEDGED ACKNOWLEDGED_DETAILED STILL_FAULTED NEXT_FAULT '
-    'NOT_IN_CONTROL CONTROL_RELEASED COASTED_FOR_TIMEOUT CONTROL_KEPT LEFT_TO_RAMP RELEASE_BLOCKED '
-    'ONLY_WATCHED '
-    # what a stop that is not confirmed waits for
-    'NO_ANSWER_YET TUNING_ENERGISES TUNING_REFUSES DRIVE_SAYS '
-    # the motor is stopped without a command, and why
-    'STOPPED_BECAUSE STOPPED_BECAUSE_OF_FAULT STOPPING_BECAUSE FAULT FAULT_APPEARED '
-    'CONTROL_MODE_CHANGED DRIVE_STARTING RUN_INPUT_LOST STOPPED_BY_ITSELF TERMINALS_IN_CONTROL '
-    'KEYPAD_IN_CONTROL OTHERS_IN_CONTROL POWER_CYCLED SLOWER_AFTER_SILENCE CONTROL_LOST '
-    'CONTROL_LOST_WHILE_AWAY CONTROL_WITHHELD TURNS_BACKWARDS NOT_SLOWER_AFTER_TIME_OUT '
-    'RUNS_UNASKED FOUND_RUNNING STARTED_AFTER_FAULT '
-    # set-points
-    'SETPOINT_REFUSED OWN_REFERENCE SETPOINT_LIMITED SETPOINT_BEYOND_NOMINAL '
-    'SPEED_SCALE SETPOINT_TIMED_OUT SETPOINTS_AGAIN FASTER_THAN_TOLD '
-    'BROADCAST_MISSED NO_BROADCAST MEMBER_MONITORED MEMBER_BY_OWN_REFERENCE MEMBER_NOT_ENABLED '
-    'MEMBER_TAKES_SEVERAL_WRITES MEMBERS_DIFFER MEMBERS_WRITTEN_DIFFERENTLY '
-    'SHARED_SETPOINT_LIMITED '
-    # what the drive says of itself
-    'CURRENT_LIMITED ALARM ALARM_UNNAMED ASLEEP IMPOSSIBLE_VALUE '
-    # the time-out of the drive itself
-    'NO_OWN_TIMEOUT OWN_TIMEOUT_OFF OWN_TIMEOUT_STOPS_NOTHING OWN_TIMEOUT_SHORT OWN_TIMEOUT_LATER '
-    'OWN_TIMEOUT_IMPOSSIBLE OWN_TIMEOUT_NOT_TAKEN OWN_TIMEOUT_LEFT OWN_TIMEOUT_NOT_OURS WATCH_LEFT '
-    'OWN_TIMEOUT_UNKNOWN OWN_TIMEOUT_OF_PLC '
-    # procedures
-    'UNKNOWN_PROCEDURE OTHER_METHOD_NEEDED OTHER_PROCEDURE_GOES_ON MOTOR_ENABLED '
-    'STOP_NOT_CONFIRMED_YET MOTOR_RUNS CONTROL_INHIBITED CONTROLLED_LOCALLY NO_STANDBY '
-    'PROCEDURE_STOPPED PROCEDURE_NOT_BEGUN INTERRUPTED TUNING_BEGINS TUNING_NEEDS TUNED '
-    'TUNING_FAILED TUNING_STOPPED TUNING_WITHOUT_RESULT TUNING_CUT_SHORT '
-    'TUNING_DOES_NOT_BEGIN TUNING_ENDLESS '
-    'TUNING_CHANGED LOG_ERASED LOG_NOT_ERASED ENERGY_RESET ENERGY_NOT_RESET ENERGY_RESET_UNKNOWN '
-    # the error log
-    'LOG_ENTRY LOG_ENTRY_UNSEEN LOG_UNDOCUMENTED LOG_NOT_WATCHED LOG_CHANGES '
-    # the settings of the drive
-    'SETTINGS_READ SETTINGS_BEING_READ SETTINGS_REFRESHED SETTING_UNREADABLE OPTIONS_MISSING '
-    'BAD_VALUE CHANGED CHANGED_FOR_TIMEOUT STORED CHANGED_AS_WANTED CHANGED_AT_DRIVE NOT_AS_WANTED '
-    'WANTED_BUT_MISSING WANTED_BUT_REFUSED NO_SETTING NOT_CHANGED CHANGE_WHILE_TUNING '
-    'COMMUNICATION_PROTECTED CODES_UNCERTAIN FOLLOW_THE_LINE STANDSTILL_NEEDED VALUE_NOT_ACCEPTED '
-    'NOT_WHILE_ENABLED '
-    'REFUSED_WHILE_RUNNING REFUSED_WHILE_FAULTED DRIVE_KEEPS DRIVE_KEEPS_OTHER AS_BEFORE '
-    'PERHAPS_CHANGED PUT_BACK NOT_PUT_BACK NOT_TRIED_ANY_MORE ENDED_HALF_WAY SEVERAL',
+_NO_TIMEOUT = (
+    'the drive has no time-out of its own ({why}): if this {{call.program}} is killed or the cable '
+    'is cut, the motor runs on; {remedy}'
 )
+_REMEDY = '{fault.description}. {fault.remedy}'
+_GO_ON = 'then {call.enable} to go on'
+_EMERGENCY = 'Use the {enable_input} or the emergency stop if it turns'
+
+
+@enum.unique
+class Cause(enum.Enum):
+    """
+    What happened, what was done, or what went wrong: the sentence for it.
+
+    A field is a value of the report, ``call`` is :class:`Calls`. Short and active, the important
+    word first: what happened, why, and what to do.
+    """
+
+    # --- the line and who answers
+    CONNECTED = 'connected: {drive}'
+    DRIVER_ERROR = 'error in the driver: {error}'
+    LINE_FAILED = '{error}'
+    NOT_REACHED = '{error}: check the cable and that the drive has power'
+    NO_RESPONSE = 'no response from address {address}{behind}: check in this order: {check}'
+    NO_VALID_ANSWER = (
+        'what comes from address {address} is no answer ({error}): check baud rate and parity, '
+        'that no other master is on the line, and the wiring'
+    )
+    TOO_LATE = 'no answer within {timeout:g} s'
+    LOST = 'lost: {why}; retrying'
+    LOST_IN_USE = f'lost: {{why}}; retrying, and stopped as soon as it answers; {_GO_ON}'
+    OLD_DATA = (
+        'the data from the drive stand still in the PLC for {seconds:g} s or more (its life '
+        'counter does not change): check the fieldbus between them and that the program of the '
+        'PLC runs'
+    )
+    RESTARTED = 'the drive has started anew, as its boot-up message says: check its mains'
+    HELD_BY_LINE = 'only watched, and yet {why}: a motor that the terminals ran has stopped'
+    OTHER_MODEL = '{error}: every {model} has it; is this another model? {call.set_model}'
+    NOT_THE_MODEL = '{drive} answers, but not as a {model} does ({why}): is --model right?'
+    UNEXPECTED_IDENTITY = (
+        'this drive says that it is a {model}; no {title} says anything: {call.set_model}'
+    )
+    SEVERAL_MODELS = (
+        'the drive at address {address} does not tell what it is: set model to {models}'
+    )
+    FIRMWARE_NOT_ASKED = (
+        'its firmware is not asked for while the bus has control, which firmware before '
+        '{before:g} takes for a fault: it is treated like that one until it is connected to while '
+        'the bus has no control; set classic_dialect to v2.03 or {dialect} to know it at once'
+    )
+    # --- why a command is not carried out
+    MONITOR_ONLY = (
+        'control_method is monitor: this driver only reads; set control_method to another one'
+    )
+    NOT_CONNECTED = 'the drive at address {address} is not connected'
+    NOT_ACTIVE = 'the drive is not active'
+    ENDING = 'this {call.program} is ending'
+    NOT_POSSIBLE = '{why}'
+    ENABLING_ALREADY = 'it is being enabled already'
+    STOP_PENDING = 'a stop is on its way and not confirmed yet: wait for it, then enable'
+    STOPPED_SINCE_ASKED = (
+        'a stop was confirmed after this was asked for: ask again if the motor shall run'
+    )
+    PROCEDURE_GOES_ON = '{what} is going on: wait for its end, or stop it'
+    FAULT_FORBIDS = f'fault {{status}} is active: {_REMEDY}; then {{call.acknowledge}}'
+    OTHER_METHOD_RUNS = (
+        'the motor still runs by control_method {method} ({status}): another one has to wait '
+        'until it stands'
+    )
+    WRONG_CONTROL_MODE = (
+        'the drive is in control mode {mode}, expected is {expected}: set {key} in the drive or '
+        '{call.set_control_mode}'
+    )
+    NO_RUN_INPUT = (
+        'the drive stays in standby: its {enable_input} is not active: close it, or its safety '
+        'contact'
+    )
+    START_FAULTED = 'the drive did not start: {status}'
+    NOT_STARTED = 'the drive does not start: {status}'
+    STOPPED_WHILE_ENABLING = 'it was stopped while it was being enabled'
+    NOT_CONFIRMED = 'the drive does not do it; it says {status}'
+    # --- enable, stop, acknowledge, release
+    ENABLED = 'enabled; it follows set-points that arrive from now on'
+    ENABLED_BY_OWN_REFERENCE = 'enabled; it follows its own reference ({reference})'
+    ENABLED_ALREADY = 'is enabled already'
+    STOPPED = 'stopped ({status})'
+    STOPPED_BY_FAULT = 'stopped by fault {status}'
+    STOP_BLOCKED = 'stopped by fault {status}; what the drive refuses now is done when it is over'
+    STOPPING = 'stopping ({status})'
+    COASTING = 'stopping: it coasts'
+    RAMPING = 'stopping: it ramps down'
+    QUICK_STOPPED = 'released: the motor coasts'
+    NO_QUICK_STOP = '{stop} (this drive has no quick stop)'
+    QUICK_STOP_UNCONFIRMED = 'the quick stop is NOT confirmed: {why} ({status}); trying a stop'
+    NO_CONTROL = 'the bus has no control of this drive ({status}), and it does not run'
+    RUN_BY_OTHERS = (
+        'the bus has no control of this drive ({status}): stop it where it is controlled, by '
+        'keypad or {enable_input}'
+    )
+    STOP_UNCONFIRMED = 'the stop is NOT confirmed: {why}; retrying'
+    STOP_UNCONFIRMED_AT_END = 'the stop is NOT confirmed: this {call.program} is ending'
+    CANNOT_STOP = f'CANNOT STOP THE MOTOR: {{why}}; retrying. {_EMERGENCY}'
+    CANNOT_STOP_BUT_STANDS = (
+        'the stop is NOT confirmed: {why}; retrying. The drive shows that the motor stands '
+        '({status}); the {enable_input} or the emergency stop keeps it so'
+    )
+    STOP_CONFIRMED_LATE = 'the stop is confirmed now: {status}'
+    STOP_FORCED = (
+        'an ordinary stop did not do ({why}): control was taken from the drive, or its motor was '
+        'released ({status}). Find out why it did not stop, and whether another master commands '
+        'it'
+    )
+    NOTHING_TO_ACKNOWLEDGE = 'nothing to acknowledge ({status})'
+    ACKNOWLEDGED = 'acknowledged {status}'
+    ACKNOWLEDGED_DETAILED = 'acknowledged {status} ({details})'
+    STILL_FAULTED = f'{{status}} is still active: {_REMEDY}'
+    NEXT_FAULT = 'acknowledged {acknowledged}, but {still}'
+    NOT_IN_CONTROL = 'not under bus control'
+    CONTROL_RELEASED = '{stop}; control released'
+    COASTED_FOR_TIMEOUT = 'released to coast, for the time-out of the drive would end the ramp'
+    CONTROL_KEPT = '{stop}; the bus keeps control: {why}'
+    LEFT_TO_RAMP = '{stop}; it was left to its ramp, under bus control'
+    RELEASE_BLOCKED = (
+        'fault {status} is active and the drive takes no command: a run command may still stand '
+        'in it when the fault is acknowledged'
+    )
+    ONLY_WATCHED = 'only watched'
+    # --- what a stop that is not confirmed waits for
+    NO_ANSWER_YET = 'no answer yet'
+    TUNING_ENERGISES = 'the motor is energised by a tuning ({status})'
+    TUNING_REFUSES = 'the motor is energised by a tuning ({status}): {error}'
+    DRIVE_SAYS = 'the drive says {status}'
+    # --- the motor is stopped without a command, and why
+    STOPPED_BECAUSE = f'stopped: {{why}}; {_GO_ON}'
+    STOPPED_BECAUSE_OF_FAULT = f'stopped: {{why}}; then {{call.acknowledge}}, {_GO_ON}'
+    STOPPING_BECAUSE = 'stopping: {why}'
+    FAULT = f'fault {{status}}: {_REMEDY}'
+    FAULT_APPEARED = '{fault}; then {call.acknowledge}'
+    CONTROL_MODE_CHANGED = (
+        'the control mode was changed to {mode} at the drive, and set-points are in {unit} now: '
+        'check what sends them'
+    )
+    DRIVE_STARTING = 'the drive is starting ({status}): it was switched off and on; check its mains'
+    RUN_INPUT_LOST = 'the {enable_input} of the drive was lost ({status}): close it'
+    STOPPED_BY_ITSELF = (
+        'the drive stopped by itself ({status}). Either its {enable_input} was lost or another '
+        'master stopped it: close the input'
+    )
+    TERMINALS_IN_CONTROL = 'the terminals have control now ({status}): press STOP at the drive'
+    KEYPAD_IN_CONTROL = 'the keypad has control now and runs the motor ({status}): press STOP there'
+    OTHERS_IN_CONTROL = (
+        'keypad or terminals have control now and run the motor ({status}): press STOP there'
+    )
+    POWER_CYCLED = (
+        'the drive did not answer for a moment, and the bus has lost control ({status}). It was '
+        'switched off and on: check its mains'
+    )
+    SLOWER_AFTER_SILENCE = (
+        'the drive did not answer for a moment, and the motor turns slower than it was told to '
+        '({now:g} Hz, before {before:g} Hz; {status}). It may have been switched off and on: '
+        'check its mains and the line'
+    )
+    TURNS_BACKWARDS = (
+        'the motor turns in the other direction than its set-points say ({now:.4g} Hz, {status}). '
+        'Another master may command the drive: find out which'
+    )
+    NOT_SLOWER_AFTER_TIME_OUT = (
+        'no set-points arrive, and the motor does not slow down at set-point 0 ({now:.4g} Hz, '
+        '{status}). Check the least frequency that the drive is set to, and whether another '
+        'master commands it'
+    )
+    CONTROL_LOST = (
+        'the bus has lost control ({status}). STOP was pressed at the keypad, or another '
+        'master took it away: find out who'
+    )
+    CONTROL_LOST_WHILE_AWAY = (
+        'the bus has lost control meanwhile ({status}). The drive was '
+        f'switched off and on, or its keypad was used: check its mains; {_GO_ON}'
+    )
+    CONTROL_WITHHELD = 'the PLC has taken the release to ROS back ({status}): give it in the PLC'
+    RUNS_UNASKED = (
+        'it runs under bus control although it was not enabled: find out whether another master '
+        'commands it'
+    )
+    FOUND_RUNNING = (
+        'the motor runs under bus control, started by an earlier session '
+        f'({{status}}): stopping it; {_GO_ON}'
+    )
+    STARTED_AFTER_FAULT = (
+        'the fault ended by itself or at the drive, and the motor started '
+        f'by the run command that stood there ({{status}}): stopping it; {_GO_ON}'
+    )
+    # --- set-points
+    SETPOINT_REFUSED = 'it refused set-point {value:g}: {error}'
+    OWN_REFERENCE = (
+        'set-point refused: reference is {reference}, so the drive follows none; set reference to '
+        'fieldbus, where its control method has that'
+    )
+    SETPOINT_LIMITED = (
+        'set-point {value:g} is limited to {limited:g} (setpoint_max, or the limit of the drive)'
+    )
+    SETPOINT_BEYOND_NOMINAL = (
+        'set-point {value:g} is limited to {limited:g} {unit}, which is nominal for this motor: '
+        'check in which unit it was meant; if the motor may go beyond, {call.set_setpoint_max}'
+    )
+    SETPOINT_TIMED_OUT = (
+        'no set-point for {timeout:g} s: the motor ramps to a stop until the next one arrives; '
+        'check what publishes them'
+    )
+    SETPOINTS_AGAIN = 'set-points arrive again'
+    FASTER_THAN_SETPOINT = (
+        'the motor turns at {now:.4g} {unit}, and its set-point is {setpoint:g} ({status}): the '
+        'set-point is written again. Check whether the load drives the motor, and whether another '
+        'master commands the drive'
+    )
+    BROADCAST_MISSED = (
+        'it did not take the set-point for all drives: it keeps {value:g}; it is given its own'
+    )
+    NO_BROADCAST = (
+        'only the Classic protocol has set-points for all drives at once: publish one to each '
+        'drive'
+    )
+    MEMBER_MONITORED = '{name} is only monitored'
+    MEMBER_BY_OWN_REFERENCE = '{name} follows a reference of its own ({reference})'
+    MEMBER_NOT_ENABLED = '{name} is not enabled'
+    MEMBER_TAKES_SEVERAL_WRITES = '{name} takes a set-point in several writes'
+    MEMBERS_DIFFER = 'it would not mean the same to all drives ({meanings})'
+    MEMBERS_WRITTEN_DIFFERENTLY = 'it would not be written alike to all drives ({names})'
+    SHARED_SETPOINT_LIMITED = (
+        '{value:g} is limited to {limited:g}, the least that a drive allows ({name})'
+    )
+    # --- what the drive says of itself
+    CURRENT_LIMITED = 'the current limit holds the motor back ({status}). {limit.remedy}'
+    ALARM = 'alarm {status}: {alarm.description}. {alarm.remedy}'
+    ALARM_UNNAMED = 'alarm, the status does not say which ({status}): see its display'
+    ASLEEP = (
+        'the drive sleeps ({status}), for its set-point is below its sleep frequency: a greater '
+        'one wakes it'
+    )
+    IMPOSSIBLE_VALUE = (
+        'it says that {key} is {value}, which cannot be: that is not published; check motor and '
+        'scaling in the drive, and that no other master is on the line'
+    )
+    # --- the time-out of the drive itself
+    NO_OWN_TIMEOUT = _NO_TIMEOUT.format(
+        why='none is known of this model', remedy='use the {enable_input}'
+    )
+    OWN_TIMEOUT_OFF = _NO_TIMEOUT.format(why='{name} is 0', remedy='{call.set_drive_timeout}')
+    OWN_TIMEOUT_STOPS_NOTHING = _NO_TIMEOUT.format(
+        why='{name} is OFF', remedy='{call.set_drive_timeout}'
+    )
+    OWN_TIMEOUT_UNKNOWN = (
+        'the PLC stops the motor if this {call.program} dies; what the drive does if the PLC '
+        'does, cannot be read here: {what}'
+    )
+    OWN_TIMEOUT_SHORT = (
+        'the time-out of the drive itself ({name} {timeout:g} s) is less than lost_after + '
+        '{margin:g} s: noise that this {call.program} waits out may stop the motor; '
+        '{call.set_drive_timeout}, at least {least:g} s'
+    )
+    OWN_TIMEOUT_LATER = (
+        '{call.drive_timeout} cannot be set yet, and will be when it is enabled: {why}'
+    )
+    OWN_TIMEOUT_IMPOSSIBLE = (
+        '{call.drive_timeout}: this model has no time-out of its own that can be set, so it must '
+        'be 0'
+    )
+    OWN_TIMEOUT_OF_PLC = (
+        '{call.drive_timeout}: through a PLC nothing is set at the drive; the PLC watches this '
+        '{call.program}, and stops the motor {seconds:g} s after its last word, so it must be 0'
+    )
+    OWN_TIMEOUT_NOT_TAKEN = _NO_TIMEOUT.format(why='{why}', remedy='use the {enable_input}')
+    OWN_TIMEOUT_LEFT = (
+        'control stays with the bus, and the time-out of the drive itself ({name} {timeout:g} s) '
+        'goes on: {why}. So it will have a fault when nothing is said to it for so long; set '
+        '{key} to 0 if it shall not'
+    )
+    OWN_TIMEOUT_NOT_OURS = 'this {call.program} has not set it, and leaves it as it is'
+    WATCH_LEFT = (
+        'the drive may go on watching over this {call.program} ({by}): {why}. So it may have a '
+        'fault {seconds:g} s after this end, which is acknowledged as any other'
+    )
+    # --- procedures
+    UNKNOWN_PROCEDURE = (
+        '{what} is not known of this model ({model}): its manual lists no command for it; do it '
+        'at the keypad'
+    )
+    OTHER_METHOD_NEEDED = (
+        '{what} needs {means}, and one session does not mix control methods: clean up, set '
+        'control_method to {method} and configure again'
+    )
+    OTHER_PROCEDURE_GOES_ON = '{what}: {other} is going on already'
+    MOTOR_ENABLED = '{what}: the motor is enabled: stop it first'
+    STOP_NOT_CONFIRMED_YET = '{what}: a stop is not confirmed yet'
+    MOTOR_RUNS = '{what}: the motor runs ({status}): stop it first'
+    CONTROL_INHIBITED = (
+        '{what}: the drive lets no one take control now ({status}; {name} is Inhibit)'
+    )
+    CONTROLLED_LOCALLY = (
+        '{what}: keypad or terminals have control ({status}), and giving it back to them could '
+        'start the motor: press STOP at the drive first'
+    )
+    NO_STANDBY = '{what}: the drive does not stand by: {status}'
+    PROCEDURE_STOPPED = '{what} was stopped'
+    PROCEDURE_NOT_BEGUN = '{what} was stopped before it began'
+    INTERRUPTED = '{signal}: not begun'
+    SPEED_SCALE = (
+        'the drive multiplies the speeds of the bus by {scale}: the driver takes that into '
+        'account, and set-points and values are in rpm'
+    )
+    TUNING_BEGINS = '{what} begins: the motor is energised'
+    TUNING_NEEDS = '{what} needs {key}: set it as the motor plate says'
+    TUNED = '{what} finished ({status})'
+    TUNING_WITHOUT_RESULT = (
+        '{what} ended in standby ({status}) and has changed no parameter: the {enable_input} may '
+        'have been lost meanwhile; repeat it if it was'
+    )
+    TUNING_FAILED = f'{{what}} failed, {{status}}: {_REMEDY}; {{call.acknowledge}} first'
+    TUNING_STOPPED = '{what} was stopped before it was finished ({status})'
+    TUNING_CUT_SHORT = (
+        '{what} ended, and the drive does not say that it has finished ({status}): was the '
+        '{enable_input} lost, or STOP pressed?'
+    )
+    TUNING_DOES_NOT_BEGIN = '{what} does not begin ({status}): is its {enable_input} active?'
+    TUNING_ENDLESS = '{what} has no end ({status}): stopping it'
+    TUNING_CHANGED = '{how}; changed: {changes}'
+    LOG_ERASED = 'the error log is erased'
+    LOG_NOT_ERASED = 'the drive took the command, but its error log is not empty'
+    ENERGY_RESET = '{key}: {before:.3f} -> {after:.3f} kWh'
+    ENERGY_NOT_RESET = 'the drive took the command, but {key} is {energy:g} kWh'
+    ENERGY_RESET_UNKNOWN = '{what} came with firmware {since:.2f}; this drive has {firmware}'
+    # --- the error log
+    LOG_ENTRY = 'error log: {entry}'
+    LOG_ENTRY_UNSEEN = 'error log: {entry}; no poll saw it'
+    LOG_UNDOCUMENTED = 'the error log of this model ({model}) is not documented [M1]'
+    LOG_NOT_WATCHED = 'its error log is not watched: {error}'
+    LOG_CHANGES = 'the drive writes into its error log all the time: try again'
+    # --- the settings of the drive
+    SETTINGS_READ = 'parameters: {progress} in {seconds:.1f} s'
+    SETTINGS_BEING_READ = 'parameters: {progress}'
+    SETTINGS_REFRESHED = '{count} parameters read, changed: {changed}'
+    SETTING_UNREADABLE = '{key} cannot be read: {error}'
+    OPTIONS_MISSING = (
+        'parameters: {count} are left out, for the drive has none of the option cards that they '
+        'need ({options})'
+    )
+    CHANGED = '{change}'
+    CHANGED_FOR_TIMEOUT = '{change} ({call.drive_timeout})'
+    STORED = (
+        '{key} ({name}) was changed to take control, and is stored in the drive: {old} -> {new}'
+    )
+    CHANGED_AS_WANTED = '{change}, as the parameter file says'
+    CHANGED_AT_DRIVE = 'changed at the drive: {change}'
+    NOT_AS_WANTED = '{key} is {has} in the drive, but {wanted} was asked for: it is left so'
+    WANTED_BUT_MISSING = 'this drive has no {keys}: not applied'
+    WANTED_BUT_REFUSED = 'not applied from the parameter file: {why}'
+    NO_SETTING = '{key} is no parameter that can be changed here'
+    NOT_CHANGED = '{key}: {why}'
+    CHANGE_WHILE_TUNING = 'the drive is tuning: wait for its end, or stop it'
+    COMMUNICATION_PROTECTED = (
+        'communication settings are not changed unless allow_communication_changes is true, for '
+        'the driver may lose the drive'
+    )
+    CODES_UNCERTAIN = (
+        'what its codes mean in firmware {firmware:.2f} is not known for sure: change it at the '
+        'keypad'
+    )
+    FOLLOW_THE_LINE = (
+        'the drive uses the new settings of the line from its next power-up on, or at once: then '
+        'start this driver with the {settings} that it has'
+    )
+    STANDSTILL_NEEDED = 'only while the motor is stopped, but it is not ({status})'
+    NOT_WHILE_ENABLED = (
+        'the motor is enabled, and might not do what it is told after that: stop it first'
+    )
+    VALUE_NOT_ACCEPTED = 'the drive does not accept {value}{behind}'
+    REFUSED_WHILE_RUNNING = '{why}: the motor must be stopped for this, and it runs'
+    REFUSED_WHILE_FAULTED = '{why}; fault {status} is active: {call.acknowledge} first'
+    DRIVE_KEEPS = 'the drive keeps {value}'
+    DRIVE_KEEPS_OTHER = 'the drive keeps {value} where {written} was written'
+    AS_BEFORE = 'it is {value} as before'
+    PERHAPS_CHANGED = 'whether the drive took {value} is not known'
+    PUT_BACK = 'put back: {keys}'
+    NOT_PUT_BACK = '{key} is NOT put back to {value}: {why}'
+    NOT_TRIED_ANY_MORE = 'not tried any more'
+    ENDED_HALF_WAY = 'ended half-way, NOT put back: {changes}'
+    SEVERAL = '{reports}'
 
 
 @dataclass(frozen=True, init=False)
@@ -122,3 +455,62 @@ class DriveError(Exception):
     def cause(self) -> Cause:
         """Why not."""
         return self.report.cause
+
+
+#: What stands for a value that is empty, by its name.
+_IF_EMPTY = {
+    'status': 'its status is not known',
+    'mode': '?',
+    'unit': 'another unit',
+    'firmware': 'an older one',
+    'changed': 'none',
+    'changes': 'no parameter',
+}
+
+
+@dataclass(frozen=True)
+class Calls:
+    """
+    What an operator calls, types or sets, as parts of sentences; by full names, to be pasted.
+
+    :ivar acknowledge: such as ``call /infeed/fault_ack``.
+    :ivar enable: likewise.
+    :ivar program: what this is that speaks.
+    :ivar drive_timeout: the name of that setting.
+    :ivar set_drive_timeout: such as ``set drive_timeout``.
+    :ivar set_setpoint_max: how to let set-points go beyond what is nominal.
+    :ivar set_control_mode: how to expect another control mode.
+    :ivar set_model: how to correct the model.
+    """
+
+    acknowledge: str
+    enable: str
+    program: str
+    drive_timeout: str
+    set_drive_timeout: str
+    set_setpoint_max: str
+    set_control_mode: str
+    set_model: str
+
+
+class _Formatter(string.Formatter):
+    def __init__(self, calls: Calls) -> None:
+        self._calls = calls
+
+    def get_field(self, field_name: str, args: Any, kwargs: Any) -> Any:
+        value, name = super().get_field(field_name, args, kwargs)
+        return (_IF_EMPTY.get(field_name, value) if value in ('', ()) else value), name
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        if isinstance(value, Report):
+            return sentence(value, self._calls)
+        if isinstance(value, tuple):
+            between = '; ' if isinstance(value[0], Report) else ', '
+            return between.join(self.format_field(one, format_spec) for one in value)
+        return str(super().format_field(value, format_spec))
+
+
+def sentence(report: Report, calls: Calls) -> str:
+    """Return what an operator reads of a report."""
+    values = {**report.values, 'call': calls}
+    return _Formatter(calls).vformat(report.cause.value, (), values)

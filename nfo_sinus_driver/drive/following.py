@@ -120,6 +120,8 @@ class Following:
             return
         self._told = True
         told, name = self._setpoint.commanded, self._inverter.unit
-        report = self._inverter.report(Cause.FASTER_THAN_TOLD, now=value, told=told, unit=name)
+        report = self._inverter.report(
+            Cause.FASTER_THAN_SETPOINT, now=value, setpoint=told, unit=name
+        )
         self._inverter.tell(Severity.WARNING, report)
         self._setpoint.write_again()

@@ -156,7 +156,7 @@ class Parameters:
         try:
             return self._registers.value(key, self._registers.encode(key, value))
         except ValueError as error:
-            raise ParameterError(key, Report(Cause.BAD_VALUE, error=str(error))) from None
+            raise ParameterError(key, Report(Cause.NOT_POSSIBLE, why=str(error))) from None
 
     def limits(self, key: str) -> tuple[float, float, float]:
         """Return the least value of a number, the greatest, and the step of the drive."""
@@ -421,7 +421,7 @@ class Parameters:
             values[key] = self._registers.value(key, data)
         except ValueError as error:
             # and nobody may rely on what it was before
-            self._inverter.tell(Severity.WARNING, Cause.BAD_VALUE, error=str(error))
+            self._inverter.tell(Severity.WARNING, Cause.NOT_POSSIBLE, why=str(error))
         self._values = values
         if not quiet and before is not None and key in values:
             self._tell_news(Change(key, before, values[key], self._inverter.model[key].unit))

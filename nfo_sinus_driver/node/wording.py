@@ -8,7 +8,7 @@ from __future__ import annotations
 from rclpy.node import Node
 
 from nfo_sinus_driver.drive import DriveError, Report
-from nfo_sinus_driver.wording import Calls, sentence
+from nfo_sinus_driver.drive.events import Calls, sentence
 
 
 class NodeError(Exception):

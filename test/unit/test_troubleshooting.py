@@ -25,7 +25,6 @@ import pytest
 
 from nfo_sinus_driver.drive.events import Cause
 from nfo_sinus_driver.link import Refused
-from nfo_sinus_driver.wording.templates import TEMPLATES
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'nfo_sinus_driver'
@@ -52,6 +51,7 @@ SUCCESSES = {
     Cause.CHANGED_AS_WANTED,
     Cause.CHANGED_FOR_TIMEOUT,
 }
+SENTENCES = {cause: cause.value for cause in Cause}
 #: The simulator and the command line have pages of their own, and no log.
 OTHER_PROGRAMS = ('simulator', 'cli')
 #: Modules whose ``ValueError`` no operator reads, and why.
@@ -338,10 +338,7 @@ def only_informing(code: Code) -> set[Cause]:
     """Return the causes that are told as information wherever they are mentioned."""
     informing, other = set[ast.AST](), set[str]()
     mentions = list[ast.Attribute]()
-    for path, node in code.nodes():
-        if path.startswith('wording'):
-            # it has all of them
-            continue
+    for _, node in code.nodes():
         if informs(node):
             informing.update(causes_in(node))
         if isinstance(node, ast.Attribute) and name_of(node.value) == 'Cause':
@@ -395,7 +392,7 @@ def templates() -> dict[Cause, Sentence]:
     silent = SUCCESSES | only_informing(CODE)
     return {
         cause: of_template(cause.name, template)
-        for cause, template in TEMPLATES.items()
+        for cause, template in SENTENCES.items()
         if cause not in silent
     }
 
@@ -423,7 +420,7 @@ def test_every_text_of_an_exception_has_an_entry() -> None:
     said = {'…'.join(one.parts) for one in found}
     assert {'… does not exist: … Ports there are: …', 'port is empty: name a device, such as '
             '/dev/ttyUSB0'} <= said
-    assert 'the drive lets nobody take control now (MODE is Inhibit: tuning?)' in said, 'a constant'
+    assert 'the drive lets no one take control now (MODE is Inhibit: tuning?)' in said, 'a constant'
     assert missing(found, PAGE_TEXT) == []
 
 
@@ -444,7 +441,7 @@ def test_every_message_of_an_answer_has_an_entry() -> None:
 def test_every_entry_is_still_said() -> None:
     refusals = [Sentence('', (str(Refused(code)),)) for code in range(1, 12)]
     said = [one for one in CODE.texts() if one.has_words]
-    said += [of_template(cause.name, text) for cause, text in TEMPLATES.items()]
+    said += [of_template(cause.name, text) for cause, text in SENTENCES.items()]
     said += [*refusals, Sentence('', ('the drive refused (exception ', ')'))]
     # a few words with values around them would stand for anything
     telling = [one for one in said if one.has_words and len(''.join(one.parts)) > 4]

@@ -117,7 +117,7 @@ _LINE_FAULTS = {
     10: 'the value is out of range',
     14: 'receive buffer overrun',
 }
-_NOT_NOW = 'the drive lets nobody take control now (MODE is Inhibit: tuning?)'
+_NOT_NOW = 'the drive lets no one take control now (MODE is Inhibit: tuning?)'
 #: Why a serial fault is left that MODE = Stop would end.
 _CONTROLLED_ELSEWHERE = (
     'the serial fault is still active: keypad or terminals have control, which MODE = Stop, the '

@@ -129,7 +129,7 @@ def test_a_motor_that_another_master_speeds_up_is_told_and_given_its_set_point(w
         rig.far.memory.set(key, 45.0)
         rig.far.write_raw(key, rig.far.memory.raw(key))
         rig.pass_time(2.0)
-        assert rig.said(Cause.FASTER_THAN_TOLD)
+        assert rig.said(Cause.FASTER_THAN_SETPOINT)
         assert rig.far.motor.frequency == pytest.approx(20.0, abs=0.5)
         assert rig.drive.armed
 
@@ -143,7 +143,7 @@ def test_no_change_of_a_set_point_is_taken_for_another_master(way: str) -> None:
                 rig.send(abs(value) if forward_only else value)
                 rig.pass_time(pause)
         assert rig.drive.armed
-        assert not rig.said(Cause.FASTER_THAN_TOLD)
+        assert not rig.said(Cause.FASTER_THAN_SETPOINT)
 
 
 def test_a_motor_that_ramps_through_an_earlier_set_point_is_not_stopped() -> None:

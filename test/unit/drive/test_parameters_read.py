@@ -166,7 +166,7 @@ def test_a_switch_that_is_neither_on_nor_off_has_no_value(rig: Rig) -> None:
     rig.pass_time(ROUND)
     assert 'serial.auto_stop' not in values.values
     assert not timeout.timeout.stops_motor
-    reported = texts(rig, Cause.BAD_VALUE)
+    reported = texts(rig, Cause.NOT_POSSIBLE)
     assert len(reported) == 2
     assert all('serial.auto_stop: the drive has code 2' in text for text in reported)
 

@@ -275,7 +275,7 @@ def test_table_16_disable_leaves_at_zero_rpm(exits: Exits) -> None:
         assert 'SR' in exits
 
 
-UNASKED = 'although nobody enabled it'
+UNASKED = 'although it was not enabled'
 #: From a motor that stands under our control: the last exits, the words, and what the driver says.
 IDLE: list[tuple[str, list[Control], str]] = [
     ('DR RS', [Control(0), ON | Control.AUTO_INIT], ''),

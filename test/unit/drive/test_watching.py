@@ -92,7 +92,7 @@ EVENTS = {
     ),
     'stop_at_the_keypad': Event(
         inject('keypad', 'stop'),
-        'the bus has lost control (24 Stop). Somebody pressed STOP at the keypad, or another',
+        'the bus has lost control (24 Stop). STOP was pressed at the keypad, or another',
         'find out who',
         tells=lambda told: Fact.NETWORK_CONTROL not in facts(told) and told.text == 'Stop',
     ),

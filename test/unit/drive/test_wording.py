@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What is told is a value where it is noticed, and has a sentence where it is shown."""
 
 from __future__ import annotations
@@ -19,17 +18,16 @@ from support.said import CALLS
 from nfo_sinus_driver.catalog import families, load_family
 from nfo_sinus_driver.cli import console as cli
 from nfo_sinus_driver.drive import Cause, Report
+from nfo_sinus_driver.drive.events import sentence
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.wording import sentence
-from nfo_sinus_driver.wording.templates import TEMPLATES
 
 PACKAGE = Path(__file__).resolve().parents[3] / 'nfo_sinus_driver'
 DRIVE = sorted((PACKAGE / 'drive').glob('*.py'))
 REPORTING = [*DRIVE, *(path for room in ('cli', 'node') for path in (PACKAGE / room).glob('*.py'))]
 #: What the table of control means, drawn in the docs; and how to write a setting that is wrong.
-WITH_SENTENCES = {'control_state.py', 'settings.py'}
-#: Mistakes in the program, and wrong values: they are reported as BAD_VALUE.
+WITH_SENTENCES = {'control_state.py', 'events.py', 'settings.py'}
+#: Mistakes in the program, and wrong values: they are reported as NOT_POSSIBLE.
 SPEAKING = {'AssertionError', 'ValueError', 'debug', 'exception'}
 WORD = re.compile(r"(?:^| )\(?[a-z][a-z'-]*[:,.;)]?(?= |$)")
 
@@ -77,7 +75,7 @@ def causes_in(node: ast.AST) -> set[Cause]:
 
 
 def fields_of(cause: Cause) -> set[str]:
-    parts = string.Formatter().parse(TEMPLATES[cause])
+    parts = string.Formatter().parse(cause.value)
     return {re.split(r'[.\[]', name)[0] for _, name, _, _ in parts if name} - {'call'}
 
 
@@ -98,7 +96,6 @@ def test_a_sentence_would_be_found() -> None:
 
 
 def test_every_cause_has_a_sentence_and_is_reported() -> None:
-    assert set(TEMPLATES) == set(Cause)
     reported = {cause for _, tree in trees(REPORTING) for cause in causes_in(tree)}
     assert reported == set(Cause)
 
@@ -151,7 +148,7 @@ OF_PROTOCOL = {
 }
 SAYING = [
     path
-    for room in ('bus', 'cli', 'drive', 'link', 'node', 'view', 'wording')
+    for room in ('bus', 'cli', 'drive', 'link', 'node', 'view')
     for path in sorted((PACKAGE / room).glob('*.py'))
 ]
 
@@ -187,7 +184,7 @@ def test_no_sentence_for_one_family_names_what_another_has(family: str) -> None:
         assert not foreign_names(f'{code.description} {code.remedy}', family), code
     named = load_family(family).profile.enable_input
     for cause in Cause:
-        said = TEMPLATES[cause].replace('{enable_input}', named)
+        said = cause.value.replace('{enable_input}', named)
         assert not foreign_names(said, family), cause
 
 
@@ -195,7 +192,7 @@ def test_no_sentence_for_one_family_names_what_another_has(family: str) -> None:
 def test_every_sentence_can_be_made(cause: Cause) -> None:
     code = load_family('sinus_g2').status_code(5)
     special = {'fault': code, 'alarm': code, 'limit': code}
-    parts = string.Formatter().parse(TEMPLATES[cause])
+    parts = string.Formatter().parse(cause.value)
     numbers = {name: 1.0 for _, name, spec, _ in parts if name and spec}
     values = {name: name for name in fields_of(cause)} | special | numbers
     text = sentence(Report(cause, **values), CALLS)
@@ -234,4 +231,4 @@ def test_reports_are_compared_by_what_they_say() -> None:
 
 
 def test_what_is_called_is_named_by_who_is_called() -> None:
-    assert [cause for cause, template in TEMPLATES.items() if '~/' in template] == []
+    assert [cause for cause in Cause if '~/' in cause.value] == []
