@@ -341,7 +341,7 @@ def test_a_fault(bench: Bench) -> None:
     ('what', 'value', 'said'),
     [
         ('run', 'off', 'RUN input'),
-        ('keypad', 'stop', 'pressed STOP at the keypad'),
+        ('keypad', 'stop', 'STOP was pressed at the keypad'),
         ('power-cycle', 1, ''),
     ],
 )
