@@ -94,9 +94,10 @@ class Following:
 
         One that has begun to, through standstill, has been told by another master.
         """
-        if least > 0:
+        # a motor that only ramps down from before comes nearer to standstill
+        if least >= 0 and most > 0:
             back = -frequency
-        elif most < 0 and self._signed:
+        elif most <= 0 and least < 0 and self._signed:
             back = frequency
         else:
             back = math.nan

@@ -260,7 +260,7 @@ class DriveSettings:
 
     def __post_init__(self) -> None:
         settings = settings_of(DriveSettings)
-        settings['model'].check(self.model)
+        _one_of('model', self.model, (*families(), AUTO))
         if self.control_method:
             _one_of('control_method', self.control_method, _control_methods(self.model))
         settings['reference'].check(self.reference)
@@ -278,7 +278,9 @@ class DriveSettings:
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
         self._check_drive_timeout()
         for name, one in settings.items():
-            one.check(getattr(self, name))
+            # what a family decides was checked above
+            if one.low is not None:
+                one.check(getattr(self, name))
 
     def _check_drive_timeout(self) -> None:
         # a drive that has none refuses any, with the reason

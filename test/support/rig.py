@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Future
+import dataclasses
 from dataclasses import dataclass, field
 import math
 from typing import Any, NamedTuple
@@ -217,6 +218,10 @@ class Rig:
             ('read', False), ('write', True), ('write_and_read', True), ('read_then_write', False),
         ):
             setattr(self.link, name, self._met(getattr(self.link, name), is_write))
+
+    def reset(self, **settings: Any) -> None:
+        """Have the next driver begin with other settings of the first drive."""
+        self._settings[1] = dataclasses.replace(self._settings[1], **settings)
 
     def kill(self) -> None:
         """End the driver without a word to the drive, as a power cut of the computer does."""

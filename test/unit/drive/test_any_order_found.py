@@ -6,21 +6,17 @@
 from __future__ import annotations
 
 from concurrent.futures import Future
-import dataclasses
 import itertools
 
 from any_order_machine import AnyOrder
 from any_order_machines import G2DriveControl, G2ModeScmd, Movitrac
-from drive_rig import MODE, RUN, SCMD
 import pytest
-from support.addresses import Words
-from virtual_rig import MakeVirtual, VirtualRig
+from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.link import Refused
 
-BUS_FAIL = 15
+BUS_FAIL, RUN = 15, 0x101
 
 
 def test_a_fault_that_holds_the_stop_does_not_keep_the_line_busy_while_it_connects() -> None:
@@ -51,134 +47,114 @@ def test_a_start_that_the_run_input_ends_does_not_wait_for_it() -> None:
         state.teardown()
 
 
-def test_nothing_is_enabled_while_it_is_awaited_that_the_motor_stands(
-    make_virtual: MakeVirtual,
-) -> None:
-    rig = make_virtual({'control.retard': 3.0})
-    rig.ride()
-    gone = rig.drive.disconnect(1.0)
-    rig.pass_time(0.3)
-    assert not gone.done()
-    assert 'not active' in rig.answer(rig.drive.enable())
-    assert 'left to its ramp' in rig.answer(gone)
-    rig.pass_time(5.0)
-    assert not rig.drive.armed
-    assert not rig.far.motor.driven
-
-
-def timed_out(rig: VirtualRig) -> None:
-    """Kill a driver in the middle of a ride, and start one that wants another drive_timeout."""
-    rig.ride()
-    rig.kill()
-    rig.elapse(3.0)
-    assert rig.far.control_unit.status_text == 'Sio Fail'
-    rig.settings = dataclasses.replace(rig.settings, drive_timeout=1.5)
-    rig.begin()
-    rig.send(None)
-
-
-def test_a_serial_fault_that_stands_keeps_nobody_from_acknowledging_it(
-    make_virtual: MakeVirtual,
-) -> None:
-    rig = make_virtual(drive_timeout=2.0)
-    timed_out(rig)
-    assert 'firmware' in rig.connect()
-    assert rig.said(Cause.OWN_TIMEOUT_LATER, Severity.WARNING)
-    assert 'Sio Fail is active' in rig.answer(rig.drive.enable())
-    assert rig.answer(rig.drive.acknowledge()).startswith('acknowledged 14 Sio Fail')
-    writes: list[tuple[int, Words]] = []
-    rig.wrote = lambda register, words: writes.append((register, words))
-    assert 'enabled' in rig.answer(rig.drive.enable())
-    # the bus has control by then, for older firmware takes it only so [C100]; nothing runs yet
-    registers = [register for register, _ in writes]
-    before = writes[: registers.index(rig.register('serial.sio_tot'))]
-    assert (MODE, (Mode.BUS,)) in before
-    assert (SCMD, (RUN,)) not in before
-    assert rig.far.peek('serial.sio_tot') == 1.5
-    # and once is enough
-    rig.answer(rig.drive.stop())
-    asked: list[int] = []
-    rig.before = lambda register, words: asked.append(register)
-    assert 'enabled' in rig.answer(rig.drive.enable())
-    assert rig.register('serial.sio_tot') not in asked
-
-
-def test_nothing_runs_without_the_time_out_that_could_not_be_set(
-    make_virtual: MakeVirtual,
-) -> None:
-    rig = make_virtual(drive_timeout=2.0)
-    timed_out(rig)
-    rig.connect()
-    rig.answer(rig.drive.acknowledge())
-    timeout, runs = rig.register('serial.sio_tot'), rig.written(SCMD).count(RUN)
-
-    def refuse(register: int, words: Words | None) -> None:
-        if register == timeout and words is not None:
-            raise Refused(4)
-
-    rig.before = refuse
-    for _ in range(2):
-        assert 'serial.sio_tot' in rig.answer(rig.drive.enable())
-        assert not rig.drive.armed
-    assert rig.written(SCMD).count(RUN) == runs
-    rig.before = lambda register, words: None
-    assert 'enabled' in rig.answer(rig.drive.enable())
-
-
-@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control'])
-def test_a_poll_that_a_quick_stop_overtakes_complains_of_nobody(
-    make_virtual: MakeVirtual, method: str
-) -> None:
-    rig = make_virtual(control_method=method, poll_rate=1000.0)
-    rig.connect()
-    for moment in range(12):
-        rig.answer(rig.drive.enable())
-        rig.send(20.0)
+def test_nothing_is_enabled_while_it_is_awaited_that_the_motor_stands() -> None:
+    with Rig(parameters={'control.retard': 3.0}) as rig:
+        rig.turn()
+        gone = rig.drive.disconnect(1.0)
         rig.pass_time(0.3)
-        quick_stopped(rig, moment)
-        rig.pass_time(0.1)
-        assert not rig.said('nobody enabled it'), moment
+        assert not gone.done()
+        assert 'not active' in rig.answer(rig.drive.enable())
+        assert 'left to its ramp' in rig.answer(gone)
+        rig.pass_time(5.0)
+        assert not rig.drive.armed
+        assert not rig.far.motor.driven
 
 
-def quick_stopped(rig: VirtualRig, moment: int) -> None:
+def timed_out() -> Rig:
+    """Return a drive whose time-out is over, and a new driver that wants another drive_timeout."""
+    rig = Rig(drive_timeout=2.0)
+    rig.turn()
+    rig.kill()
+    rig.line.go_to(rig.clock.now + 3.0)
+    assert rig.far.control_unit.status_text == 'Sio Fail'
+    rig.acknowledged = 1
+    rig.reset(drive_timeout=1.5)
+    rig.begin()
+    rig.connect()
+    return rig
+
+
+def test_a_serial_fault_that_stands_keeps_no_driver_from_acknowledging_it() -> None:
+    with timed_out() as rig:
+        assert rig.notes.said(Cause.OWN_TIMEOUT_LATER, Severity.WARNING)
+        assert 'Sio Fail is active' in rig.answer(rig.drive.enable())
+        assert rig.answer(rig.drive.acknowledge()).startswith('acknowledged 14 Sio Fail')
+        rig.asked.clear()
+        rig.enable()
+        # the bus has control by then, for older firmware takes it only so [C100]; nothing runs yet
+        writes = [(key, rig.number(data)) for _, key, data in rig.asked if data is not None]
+        before = writes[: [key for key, _ in writes].index('serial.sio_tot')]
+        assert ('fieldbus.mode', Mode.BUS) in before
+        assert ('fieldbus.scmd', RUN) not in before
+        assert rig.far.peek('serial.sio_tot') == 1.5
+        # and once is enough
+        rig.answer(rig.drive.stop())
+        rig.asked.clear()
+        rig.enable()
+        assert 'serial.sio_tot' not in [key for _, key, _ in rig.asked]
+
+
+def test_nothing_runs_without_the_time_out_that_could_not_be_set() -> None:
+    with timed_out() as rig:
+        rig.answer(rig.drive.acknowledge())
+        rig.asked.clear()
+        rig.spoil('refused', 'serial.sio_tot', 100)
+        for _ in range(2):
+            assert 'serial.sio_tot' in rig.answer(rig.drive.enable())
+            assert not rig.drive.armed
+        assert RUN not in rig.written('fieldbus.scmd')
+        rig.spoil('refused', 'serial.sio_tot', 0)
+        rig.enable()
+
+
+@pytest.mark.parametrize('way', ['rtu', 'rtu, control word'])
+def test_a_poll_that_a_quick_stop_overtakes_complains_of_no_other_master(way: str) -> None:
+    with Rig(way, poll_rate=1000.0) as rig:
+        rig.connect()
+        for moment in range(12):
+            rig.enable()
+            rig.send(20.0)
+            rig.pass_time(0.3)
+            quick_stopped(rig, moment)
+            rig.pass_time(0.1)
+            assert not rig.notes.said(Cause.RUNS_UNASKED), moment
+
+
+def quick_stopped(rig: Rig, moment: int) -> None:
     """Stop a drive quickly at so many requests."""
     requests = itertools.count()
     stops: list[Future[str]] = []
 
-    def stop(register: int, words: Words | None) -> None:
+    def stop(key: str, data: bytes | None) -> None:
         if next(requests) == moment:
             stops.append(rig.drive.quick_stop())
 
-    rig.before = stop
-    while not stops:
-        rig.pass_time(0.001)
+    rig.meet = stop
+    rig.wait_until(lambda: stops)
     assert rig.answer(stops[0]) == 'released: the motor coasts'
 
 
-def test_why_it_stops_is_told_although_the_line_is_lost_at_once(
-    make_virtual: MakeVirtual,
-) -> None:
-    rig = make_virtual()
-    rig.ride()
-    setpoint = rig.register('status.frq_set')
+def test_why_it_stops_is_said_although_the_line_is_lost_at_once() -> None:
+    with Rig() as rig:
+        rig.turn()
 
-    def refuse(register: int, words: Words | None) -> None:
-        if register == setpoint and words is not None and any(words):
-            rig.link.state = 'silent'
-            raise Refused(4)
+        def refuse(key: str, data: bytes | None) -> str | None:
+            if key != 'status.frq_set' or data is None or not any(data):
+                return None
+            rig.line.state = 'silent'
+            return 'refused'
 
-    rig.before = refuse
-    rig.send(10.0)
-    rig.pass_time(2.0)
-    assert rig.said('stopping: it refused set-point 10', Severity.WARNING)
-    assert rig.said('retrying, and stopped as soon as it answers', Severity.ERROR)
-    rig.before = lambda register, words: None
-    rig.link.mend()
-    rig.pass_time(5.0)
-    assert rig.drive.snapshot.connected
-    assert not rig.far.motor.driven
-    # it is told once
-    assert sum('refused' in text for _, _, text in rig.notes.events) == 1
+        rig.meet = refuse
+        rig.send(10.0)
+        rig.pass_time(2.0)
+        assert rig.notes.said('stopping: it refused set-point 10', Severity.WARNING)
+        assert rig.notes.said('retrying, and stopped as soon as it answers', Severity.ERROR)
+        rig.meet = lambda key, data: None
+        rig.line.mend()
+        rig.pass_time(5.0)
+        assert rig.drive.snapshot.connected
+        assert not rig.far.motor.driven
+        assert sum('refused' in one.text for one in rig.notes.events) == 1
 
 
 @pytest.mark.parametrize('machine', [G2ModeScmd, G2DriveControl])

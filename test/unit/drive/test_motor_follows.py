@@ -5,15 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-import contextlib
 from typing import Any
 
 import pytest
+from support.rig import WAYS, Rig
 from support.variants import ramps
-from ways_rig import WAYS, WayRig
 
-from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.movitrac31.words import Bits
 
 FOLLOWING = [name for name, way in WAYS.items() if way.reference == 'fieldbus']
@@ -21,15 +19,7 @@ BITS, SIZE = 'fieldbus.function_bits', 'fieldbus.remote_setpoint'
 FORWARD, REVERSE = (int(Bits.ENABLE | way) for way in (Bits.CLOCKWISE, Bits.COUNTER_CLOCKWISE))
 
 
-@contextlib.contextmanager
-def riding(way: str, frequency: float = 20.0, **settings: Any) -> Iterator[WayRig]:
-    """Have a motor follow set-points."""
-    with contextlib.closing(WayRig(WAYS[way], **settings)) as rig:
-        rig.ride(frequency)
-        yield rig
-
-
-def is_setpoint(rig: WayRig, key: str) -> bool:
+def is_setpoint(rig: Rig, key: str) -> bool:
     return key.endswith('setpoint') or any(
         key in (target.key, target.at) for target in rig.drive.model.profile.setpoints.values()
     )
@@ -40,13 +30,14 @@ def is_setpoint(rig: WayRig, key: str) -> bool:
 
 @pytest.mark.parametrize('way', FOLLOWING)
 def test_a_motor_that_does_not_slow_down_after_a_time_out_is_stopped(way: str) -> None:
-    with riding(way) as rig:
+    with Rig(way, setpoint_timeout=2.5) as rig:
+        rig.turn()
         # the drive takes set-point 0, and does not follow it
-        rig.meet = lambda key, written: 'ignored' if is_setpoint(rig, key) and written else None
+        rig.meet = lambda key, data: 'ignored' if is_setpoint(rig, key) and data else None
         rig.send(None)
         rig.pass_time(10.0)
-        assert rig.said(Cause.SETPOINT_TIMED_OUT)
-        assert rig.said('does not slow down at set-point 0 (20 Hz')
+        assert rig.notes.said(Cause.SETPOINT_TIMED_OUT)
+        assert rig.notes.said('does not slow down at set-point 0 (20 Hz')
         assert not rig.drive.armed
         assert not rig.drive.stop_unconfirmed
         assert not rig.turns
@@ -54,7 +45,8 @@ def test_a_motor_that_does_not_slow_down_after_a_time_out_is_stopped(way: str) -
 
 @pytest.mark.parametrize('way', FOLLOWING)
 def test_a_motor_that_slows_down_after_a_time_out_is_not_stopped(way: str) -> None:
-    with riding(way) as rig:
+    with Rig(way, setpoint_timeout=2.5) as rig:
+        rig.turn()
         rig.send(None)
         rig.pass_time(15.0)
         assert rig.far.motor.frequency == pytest.approx(0.0, abs=0.5)
@@ -62,7 +54,8 @@ def test_a_motor_that_slows_down_after_a_time_out_is_not_stopped(way: str) -> No
 
 
 def test_the_slowest_ramp_is_not_taken_for_none() -> None:
-    with riding('MOVITRAC') as rig:
+    with Rig('movitrac') as rig:
+        rig.turn()
         _, down = ramps('movitrac31', 0.5, 0.5)
         rig.far.set_from_keypad(down, 2000.0)
         rig.send(None)
@@ -72,7 +65,8 @@ def test_the_slowest_ramp_is_not_taken_for_none() -> None:
 
 
 def test_a_least_frequency_that_the_keypad_sets_keeps_no_motor_turning() -> None:
-    with riding('MOVITRAC', 35.0) as rig:
+    with Rig('movitrac') as rig:
+        rig.turn(35.0)
         rig.far.set_from_keypad('frequency.f_min_1', 30.0)
         rig.send(None)
         rig.pass_time(12.0)
@@ -81,7 +75,8 @@ def test_a_least_frequency_that_the_keypad_sets_keeps_no_motor_turning() -> None
 
 
 def test_what_a_start_depends_on_does_not_change_while_the_motor_is_enabled() -> None:
-    with riding('MOVITRAC', allow_communication_changes=True) as rig:
+    with Rig('movitrac', allow_communication_changes=True) as rig:
+        rig.turn()
         rig.answer(rig.drive.parameters.read())
         profile = rig.drive.model.profile
         before = {key: rig.far.memory.raw(key) for key in profile.start_settings}
@@ -98,7 +93,7 @@ def test_what_a_start_depends_on_does_not_change_while_the_motor_is_enabled() ->
         assert rig.far.memory.number('frequency.f_min_1') == 30
 
 
-def other(rig: WayRig, key: str) -> Any:
+def other(rig: Rig, key: str) -> Any:
     """Return another value of a setting than it has."""
     labels = rig.drive.model[key].labels
     now = rig.drive.parameters.values[key]
@@ -111,25 +106,27 @@ def other(rig: WayRig, key: str) -> Any:
 
 
 def test_a_motor_that_another_master_reverses_is_stopped_and_its_direction_shown() -> None:
-    with riding('MOVITRAC') as rig:
+    with Rig('movitrac') as rig:
+        rig.turn()
         shown = []
         rig.looked = lambda: shown.append(rig.notes.snapshot.frequency)
         rig.far.write_raw(BITS, REVERSE)
         rig.pass_time(3.0)
-        assert rig.said(Cause.TURNS_BACKWARDS)
+        assert rig.notes.said(Cause.TURNS_BACKWARDS)
         assert min(shown) < -2.0
         assert not rig.drive.armed
         assert not rig.turns
 
 
-@pytest.mark.parametrize('way', ['G2, Modbus, MODE', 'Optimal, MODE', 'MOVITRAC'])
+@pytest.mark.parametrize('way', ['rtu', 'optimal', 'movitrac'])
 def test_a_motor_that_another_master_speeds_up_is_told_and_given_its_set_point(way: str) -> None:
-    with riding(way) as rig:
+    with Rig(way) as rig:
+        rig.turn()
         key = rig.drive.model.profile.setpoints['Freque'].key
         rig.far.memory.set(key, 45.0)
         rig.far.write_raw(key, rig.far.memory.raw(key))
         rig.pass_time(2.0)
-        assert rig.said(Cause.FASTER_THAN_SETPOINT)
+        assert rig.notes.said(Cause.FASTER_THAN_SETPOINT)
         assert rig.far.motor.frequency == pytest.approx(20.0, abs=0.5)
         assert rig.drive.armed
 
@@ -137,24 +134,24 @@ def test_a_motor_that_another_master_speeds_up_is_told_and_given_its_set_point(w
 @pytest.mark.parametrize('way', FOLLOWING)
 def test_no_change_of_a_set_point_is_taken_for_another_master(way: str) -> None:
     forward_only = WAYS[way].model == 'sinus_h'
-    with riding(way) as rig:
+    with Rig(way) as rig:
+        rig.turn()
         for value in (40.0, -40.0, 10.0, 0.0, -5.0, 5.0, -30.0, 50.0, 1.0, -1.0, 20.0):
             for pause in (0.3, 2.5):
                 rig.send(abs(value) if forward_only else value)
                 rig.pass_time(pause)
         assert rig.drive.armed
-        assert not rig.said(Cause.FASTER_THAN_SETPOINT)
+        assert not rig.notes.said(Cause.FASTER_THAN_SETPOINT)
 
 
 def test_a_motor_that_ramps_through_an_earlier_set_point_is_not_stopped() -> None:
-    with contextlib.closing(WayRig(WAYS['MOVITRAC'])) as rig:
+    with Rig('movitrac') as rig:
         for key in ramps('movitrac31', 0.5, 0.5):
             rig.far.set_from_keypad(key, 60.0)
-        rig.answer(rig.drive.connect())
-        rig.drive.activate()
-        rig.answer(rig.drive.enable())
+        rig.connect()
+        rig.enable()
         for value in (30.0, -30.0):
             rig.send(value)
             rig.pass_time(25.0)
             assert rig.drive.armed
-        assert rig.notes.events[-1][1].name != 'WARNING'
+        assert rig.notes.events[-1].severity is not Severity.WARNING
