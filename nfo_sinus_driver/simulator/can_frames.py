@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import functools
 from typing import NamedTuple
 
 #: The identifiers of standard frames, and of extended ones.
@@ -38,6 +39,7 @@ class Frame(NamedTuple):
     extended: bool = False
 
 
+@functools.lru_cache(maxsize=4096)
 def bits(frame: Frame) -> int:
     """Return how many bits a frame has on the wire, with stuffed ones and the pause behind it."""
     sent = list(_head(frame))

@@ -51,15 +51,17 @@ def steps_of(way: str, stop: str) -> set[tuple[str, bool]]:
 
 def goes_wrong(way: str, stop: str, step: tuple[str, bool], how: str) -> str:
     """Return what is wrong with a stop of which one step always goes wrong; ``''``: nothing."""
-    rig = Rig(way, line=QUICK)
+    rig = Rig(way, line=QUICK, poll_rate=5.0)
     # what is only said to be carried out, or refused for ever, bends the order of commands
     with contextlib.closing(rig.bus):
         rig.turn()
         rig.meet = lambda key, data: how if (key, data is not None) == step else None
         future = STOPS[stop](rig.drive)
         rig.answer(future)
-        rig.pass_time(8.0)
         held = step == (_NO_OTHER_WAY.get(way), True)
+        end = rig.clock.now + 8.0
+        while rig.clock.now < end and (held or rig.turns or rig.drive.stop_unconfirmed):
+            rig.pass_time(0.5)
         follows = rig.drive.settings.follows_setpoints
         wrong = []
         if rig.turns and (follows or not held or how == 'drop'):
