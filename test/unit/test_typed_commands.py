@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 import contextlib
 import itertools
-import os
 from pathlib import Path
 import re
 import shlex
@@ -20,11 +19,13 @@ import sys
 import pytest
 from support.typed import Typed, typed
 
+from nfo_sinus_driver.cli.main import main
 from nfo_sinus_driver.cli.options import parse
 
 _CLI = 'import sys; from nfo_sinus_driver.cli.main import main; sys.exit(main())'
 _SIMULATOR = 'nfo_sinus_driver.simulator'
 _PATIENCE = 120.0
+_ROOT = Path(__file__).resolve().parents[2]
 #: How long a scan may take at most, s.
 _SCAN = 20.0
 #: What belongs to a page that shows how something is made, and is not there.
@@ -48,7 +49,7 @@ def by_page(found: list[Typed]) -> list[list[Typed]]:
 
 def _simulator(arguments: list[str]) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, '-m', _SIMULATOR, *arguments],
+        [sys.executable, '-m', _SIMULATOR, *arguments], cwd=_ROOT,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )
 
@@ -74,7 +75,13 @@ def test_there_are_such_commands() -> None:
 
 
 @pytest.mark.parametrize('page', by_page(commands('nfo-sinus')), ids=lambda page: page[0].page)
-def test_the_command_line_of_a_page_runs_as_it_is_typed(page: list[Typed], tmp_path: Path) -> None:
+def test_the_command_line_of_a_page_runs_as_it_is_typed(
+    page: list[Typed],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
     # those over one line after the other, on a line of their own
     for number, (protocol, model) in enumerate(dict.fromkeys(map(_line_of, page))):
         mine = [one for one in page if _line_of(one) == (protocol, model)]
@@ -87,7 +94,7 @@ def test_the_command_line_of_a_page_runs_as_it_is_typed(page: list[Typed], tmp_p
             arguments += ['--address', str(address)]
         with simulated(arguments):
             for command in mine:
-                _run(command, link, tmp_path)
+                _run(command, link, capsys)
 
 
 def _line_of(command: Typed) -> tuple[str, str]:
@@ -95,7 +102,7 @@ def _line_of(command: Typed) -> tuple[str, str]:
     return options.protocol, options.model
 
 
-def _run(command: Typed, link: str, folder: Path) -> None:
+def _run(command: Typed, link: str, capsys: pytest.CaptureFixture[str]) -> None:
     words = shlex.split(command.text)[1:]
     options = parse(words)
     extra = ['--port', link]
@@ -105,20 +112,27 @@ def _run(command: Typed, link: str, folder: Path) -> None:
     asked = len(options.addresses) if options.verb == 'scan' else 1
     extra += ['--response-timeout', str(min(2.0, _SCAN / asked))]
     if getattr(options, 'yes', None) is False:
-        # nobody can be asked here
+        # there is no terminal to ask at
         extra += ['--yes']
+    if options.verb == 'monitor' and not options.count:
+        _begin_and_interrupt([*words, *extra])
+        return
+    status = main([*words, *extra])
+    said = capsys.readouterr()
+    assert not status, f'{command}\n{said.out}{said.err}'
+    assert 'Traceback' not in said.err, f'{command}\n{said.err}'
+
+
+def _begin_and_interrupt(words: list[str]) -> None:
     process = subprocess.Popen(
-        [sys.executable, '-c', _CLI, *words, *extra],
-        cwd=folder, env={**os.environ, 'PYTHONPATH': str(Path(__file__).parents[2])},
+        [sys.executable, '-c', _CLI, *words], cwd=_ROOT,
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )
-    if options.verb == 'monitor' and not options.count:
-        assert process.stdout is not None
-        process.stdout.readline()
-        process.send_signal(signal.SIGINT)
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.send_signal(signal.SIGINT)
     out, said = process.communicate(timeout=_PATIENCE)
-    assert process.returncode == 0, f'{command}\n{out}{said}'
-    assert 'Traceback' not in said, f'{command}\n{said}'
+    assert process.returncode == 0 and 'Traceback' not in said, f'{words}\n{out}{said}'
 
 
 @pytest.mark.parametrize('page', by_page(commands('simulator')), ids=lambda page: page[0].page)
