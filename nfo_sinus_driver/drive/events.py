@@ -236,22 +236,6 @@ class Cause(enum.Enum):
         'set-point is written again. Check whether the load drives the motor, and whether another '
         'master commands the drive'
     )
-    BROADCAST_MISSED = (
-        'it did not take the set-point for all drives: it keeps {value:g}; it is given its own'
-    )
-    NO_BROADCAST = (
-        'only the Classic protocol has set-points for all drives at once: publish one to each '
-        'drive'
-    )
-    MEMBER_MONITORED = '{name} is only monitored'
-    MEMBER_BY_OWN_REFERENCE = '{name} follows a reference of its own ({reference})'
-    MEMBER_NOT_ENABLED = '{name} is not enabled'
-    MEMBER_TAKES_SEVERAL_WRITES = '{name} takes a set-point in several writes'
-    MEMBERS_DIFFER = 'it would not mean the same to all drives ({meanings})'
-    MEMBERS_WRITTEN_DIFFERENTLY = 'it would not be written alike to all drives ({names})'
-    SHARED_SETPOINT_LIMITED = (
-        '{value:g} is limited to {limited:g}, the least that a drive allows ({name})'
-    )
     # --- what the drive says of itself
     CURRENT_LIMITED = 'the current limit holds the motor back ({status}). {limit.remedy}'
     ALARM = 'alarm {status}: {alarm.description}. {alarm.remedy}'

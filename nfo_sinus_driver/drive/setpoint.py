@@ -32,8 +32,6 @@ _LONGEST_BUSY = 1.0
 _WATCH_PERIOD = 0.25
 #: How long it is known which set-points the drive had, s.
 _REMEMBERED = 10.0
-#: How often at most it is read back whether the drive took what was told to all drives, s.
-_READ_BACK_PERIOD = 0.5
 
 
 class Request(NamedTuple):
@@ -42,12 +40,10 @@ class Request(NamedTuple):
 
     :ivar value: in the unit of the control mode.
     :ivar at: when it came in, s of the clock of the bus.
-    :ivar most: what whoever asks limits it to, in either direction.
     """
 
     value: float
     at: float
-    most: float = math.inf
 
 
 _NONE = Request(NAN, -math.inf)
@@ -81,10 +77,8 @@ class Setpoint:
         self._refused = refused
         self._slot = LatestValue(self._make, self._done, told)
         self._combining = _Combining.GIVEN_UP
-        #: The newest request to this drive; written by any thread, at once.
-        self._own = _NONE
-        #: The newest one to all drives of the line.
-        self._shared = _NONE
+        #: The newest request; written by any thread, at once.
+        self._request = _NONE
         self.control_mode = ''
         self._limits = Limits()
         self._target: SetpointTarget | None = None
@@ -98,10 +92,6 @@ class Setpoint:
         #: minus infinity where it may be what was written since.
         self._written: dict[Address, tuple[bytes, float]] = {}
         self._watch: Task | None = None
-        #: What reads back whether the drive took what was told to all, and when it last did.
-        self._reading_back: Task | None = None
-        self._read_back_at = -math.inf
-        self._told_missed = False
         self._expired = False
         self._warned = False
         self._waits_for_answer = False
@@ -117,14 +107,9 @@ class Setpoint:
         """Ask for a set-point, from any thread; it must be finite, and counts only while armed."""
         if not math.isfinite(value):
             raise ValueError(f'a set-point of {value} is no number')
-        self._own = Request(value, self._bus.now())
+        self._request = Request(value, self._bus.now())
         if self.armed:
             self._bus.request(self._slot)
-
-    @property
-    def _request(self) -> Request:
-        """The newest request, whomever it was for."""
-        return self._own if self._own.at >= self._shared.at else self._shared
 
     @property
     def armed(self) -> bool:
@@ -178,7 +163,6 @@ class Setpoint:
         self._expired = False
         self._warned = False
         self._waits_for_answer = False
-        self._told_missed = False
         self._busy_since = math.inf
         if follows:
             self._watch = self._bus.spawn(self._watch_age())
@@ -188,10 +172,9 @@ class Setpoint:
         self._armed_at = math.inf
         self.commanded = NAN
         self.clamped = False
-        for task in (self._watch, self._reading_back):
-            if task is not None:
-                self._bus.cancel(task)
-        self._watch = self._reading_back = None
+        if self._watch is not None:
+            self._bus.cancel(self._watch)
+        self._watch = None
 
     def answered(self) -> None:
         """Take note that the drive answers; write what could not be written before."""
@@ -248,35 +231,8 @@ class Setpoint:
         timeout = self._inverter.settings.setpoint_timeout
         return bool(timeout) and self._bus.now() - at > timeout
 
-    # --- together with the other drives of the line, on the bus -------------------------------
-
-    def why_not_shared(self, name: str) -> Report | None:
-        """Return why the drive, of this name, cannot follow a set-point told to all, if so."""
-        settings = self._inverter.settings
-        if settings.method == 'monitor':
-            return Report(Cause.MEMBER_MONITORED, name=name)
-        if not settings.follows_setpoints:
-            reference = settings.reference
-            return Report(Cause.MEMBER_BY_OWN_REFERENCE, name=name, reference=reference)
-        if not self.armed:
-            return Report(Cause.MEMBER_NOT_ENABLED, name=name)
-        if len(self._keys) > 1:
-            return Report(Cause.MEMBER_TAKES_SEVERAL_WRITES, name=name)
-        return None
-
     @property
-    def quantity(self) -> tuple[str, str]:
-        """What a set-point means to it: control mode and unit."""
-        return self.control_mode, self._inverter.unit
-
-    @property
-    def place(self) -> tuple[frozenset[Address], bool]:
-        """Where it takes a set-point, and whether only forward."""
-        assert self._target is not None
-        return frozenset(self._keys), self._target.forward_only
-
-    @property
-    def most(self) -> float:
+    def _most(self) -> float:
         """
         The greatest set-point that it may be given, in either direction.
 
@@ -287,30 +243,16 @@ class Setpoint:
         own = max(limits.most, -limits.least)
         return min(own, self._inverter.settings.setpoint_max or limits.nominal)
 
-    def counts(self, request: Request) -> bool:
-        """Tell whether a request to all came after the drive was enabled, and is still fresh."""
+    def _counts(self, request: Request) -> bool:
+        """Tell whether a request came after the drive was enabled, and is still fresh."""
         return request.at > self._armed_at and not self._is_old(request.at)
-
-    def is_newest(self, request: Request) -> bool:
-        """Tell whether nothing newer was asked of this drive than a request to all."""
-        return request.at >= self._own.at
-
-    def take(self, request: Request) -> None:
-        """Take a request to all for one to this drive; who asks for it writes it, too."""
-        self._shared = request
-        self._accept(self._request)
-
-    def follow(self, request: Request) -> None:
-        """Take a request to all for one to this drive, and write it to this drive."""
-        self._shared = request
-        self._bus.request(self._slot)
 
     def _encoded(self, value: float, before: float) -> tuple[tuple[Address, bytes], ...]:
         """Return what is written, and where, for a set-point in place of the one before."""
         assert self._target is not None
         return tuple(map(self._registers.target, self._target.writes(value, before)))
 
-    def due(self, request: Request) -> list[tuple[Address, bytes]]:
+    def _due(self, request: Request) -> list[tuple[Address, bytes]]:
         """Return what has to be written for a request: else other stands in the drive, or long."""
         assert self._target is not None
         now, period = self._bus.now(), self._rewrite_period
@@ -322,46 +264,8 @@ class Setpoint:
                 found.append((address, data))
         return found
 
-    def was_told(self, address: Address, data: bytes) -> None:
-        """Take note of what was written to all drives; it is read back whether this one took it."""
-        self._may_have(self._meant({**self._standing, address: data}))
-        if not self._inverter.answering:
-            # it gets its own when it answers
-            self._written = {}
-            self._waits_for_answer = True
-            return
-        changed = address not in self._written or data != self._written[address][0]
-        self._take_note(address, data)
-        if changed and self._reading_back is None:
-            self._reading_back = self._bus.spawn(self._read_back())
-
-    async def _read_back(self) -> None:
-        """Find out whether the drive took what was told to all; if not, give it its own."""
-        ((address, key),) = self._keys.items()
-        await self._bus.sleep(self._read_back_at + _READ_BACK_PERIOD - self._bus.now())
-        self._read_back_at = self._bus.now()
-        try:
-            kept = await self._registers.read_data(key, Priority.POLL, once=True)
-        except LinkError as error:
-            self.was_missed(error)
-            return
-        finally:
-            self._reading_back = None
-        # nothing was written between the reading and this; what nobody knows is written anyway
-        if not self._written or kept == self._written[address][0]:
-            return
-        if not self._told_missed:
-            self._told_missed = True
-            self._inverter.tell(
-                Severity.WARNING, Cause.BROADCAST_MISSED, value=self._meant({address: kept})
-            )
-        self._written = {}
-        self._bus.request(self._slot)
-
-    # --- to this drive ------------------------------------------------------------------------
-
     def _limited(self, request: Request) -> float:
-        limits, most = self._limits, min(self.most, request.most)
+        limits, most = self._limits, self._most
         taken = max(limits.least, min(limits.most, request.value))
         # beyond what the drive takes, rather than beyond what the user allows
         return max(-most, min(most, taken))
@@ -378,7 +282,7 @@ class Setpoint:
 
     def _make(self) -> Transfer | None:
         request = self._request
-        if self._target is None or not self.counts(request):
+        if self._target is None or not self._counts(request):
             return None
         if not self._inverter.answering:
             self._waits_for_answer = True
@@ -387,7 +291,7 @@ class Setpoint:
         if self.clamped and not self._clamp_told:
             self._tell_limited(request.value, limited)
         self._clamp_told = self.clamped
-        due = self.due(request)
+        due = self._due(request)
         if not due:
             return None
         # of several writes each has a turn of its own, and a newer set-point comes between
@@ -430,7 +334,7 @@ class Setpoint:
             # no status need tell it: who is between stops the drive, and lets it not go on
             self._refused(Report(Cause.LINE_FAILED, error=str(error)))
         else:
-            self.was_missed(error, transfer.address)
+            self._missed(error, transfer.address)
 
     def _take_note(self, address: Address, data: bytes) -> None:
         self._busy_since = math.inf
@@ -438,7 +342,7 @@ class Setpoint:
         if len(self._written) == len(self._keys):
             self._has(self._meant(self._standing))
 
-    def was_missed(self, error: LinkError, address: Address | None = None) -> None:
+    def _missed(self, error: LinkError, address: Address) -> None:
         """
         Take note that nobody knows what stands in the drive; it is written when it answers.
 

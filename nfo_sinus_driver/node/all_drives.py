@@ -14,7 +14,7 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.drive import DriveError, Report
-from nfo_sinus_driver.drive.setpoint_all import broadcast_stop
+from nfo_sinus_driver.drive.broadcast import broadcast_stop
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.callers import log_call
 from nfo_sinus_driver.node.executor import received_at

@@ -10,6 +10,8 @@ import contextlib
 from dataclasses import dataclass, field
 import threading
 
+from std_msgs.msg import Float32
+
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive.settings import BLOCK_SIZE
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
@@ -29,6 +31,8 @@ class BusContext:
     publish_queue: PublishQueue = field(default_factory=PublishQueue)
     setpoint_subscriber: SetpointSubscriber = field(default_factory=SetpointSubscriber)
     drives: list[ManagedDrive] = field(default_factory=list)
+    #: What takes a set-point for all drives of the line, one for each drive.
+    on_setpoint_all: list[Callable[[Float32], None]] = field(default_factory=list)
 
     def add(self, drive: ManagedDrive) -> None:
         """Take in another drive."""

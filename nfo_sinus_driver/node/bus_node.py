@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import BusStatistics
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from std_msgs.msg import Float32
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.link import BusSettings
@@ -20,7 +21,6 @@ from nfo_sinus_driver.node.all_drives import AllDrives
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.declaring import declare
 from nfo_sinus_driver.node.qos import RELIABLE
-from nfo_sinus_driver.node.setpoints import SetpointsForAll
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 
 _PERIOD = 1.0
@@ -44,7 +44,8 @@ class BusNode(Node):
         limit = settings.max_requests if link.protocol.most_requests else 0.0
         self.bus_context = BusContext(Bus(link, limit), settings.retries)
         AllDrives(self, self.bus_context)
-        SetpointsForAll(self, self.bus_context)
+        subscribe = self.bus_context.setpoint_subscriber.subscribe
+        subscribe(self, Float32, '~/setpoint_all', self._on_setpoint_all)
         self._logged_port: str | None = ''
         self._logged_remarks: set[str] = set()
         self._last_diagnosis: tuple[bytes, str] | None = None
@@ -65,6 +66,11 @@ class BusNode(Node):
         self.bus_context.publish_queue.put(
             lambda: self._log_port(None if error is None else str(error))
         )
+
+    def _on_setpoint_all(self, message: Float32) -> None:
+        with self.bus_context.at_once():
+            for take in self.bus_context.on_setpoint_all:
+                take(message)
 
     def _report(self) -> None:
         if not self.bus_context.bus.alive:

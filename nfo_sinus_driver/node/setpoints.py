@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The set-points of one drive, from three topics, and those for all drives of a line from one: the
+The set-points of one drive, from three topics of its own and one for all drives of its line: the
 newest valid one counts, wherever it came.
 """
 
 from __future__ import annotations
 
 import math
-import time
 
 from nfo_sinus_msgs.msg import Setpoint
 from rclpy.node import Node
@@ -18,7 +17,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive.setpoint_all import SetpointAll, Told
+from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import Joint, control_mode
@@ -56,6 +55,7 @@ class Setpoints:
         subscribe(node, Float32, '~/setpoint', self._on_setpoint)
         subscribe(node, Setpoint, '~/setpoint_stamped', self._on_stamped)
         subscribe(node, JointState, '~/joint_command', self._on_joint_command)
+        context.on_setpoint_all.append(self._on_setpoint_all)
 
     def be_quiet(self, quiet: bool) -> None:
         """Say, or do not say, that set-points arrive while nobody has enabled the drive."""
@@ -63,6 +63,11 @@ class Setpoints:
 
     def _on_setpoint(self, message: Float32) -> None:
         self._take(self._managed.scale.of_drive(message.data))
+
+    def _on_setpoint_all(self, message: Float32) -> None:
+        # a drive that is only watched has no part in what is for all
+        if self._managed.settings.method != MONITOR:
+            self._on_setpoint(message)
 
     def _on_stamped(self, message: Setpoint) -> None:
         if not self._managed.active:
@@ -129,48 +134,3 @@ class Setpoints:
 
     def _ignore(self, text: str) -> None:
         self._log.warning(text, throttle_duration_sec=_LOG_PERIOD)
-
-
-class SetpointsForAll:
-    """Hands set-points for all drives of a line to them; why nobody follows them is logged."""
-
-    def __init__(self, node: Node, context: BusContext) -> None:
-        self._context = context
-        self._log = node.get_logger()
-        self._told = Told()
-        self._told_at = -math.inf
-        self._all = SetpointAll(
-            context.bus,
-            lambda: {managed.name: managed.drive.setpoint for managed in context.drives},
-            self._on_told,
-        )
-        context.setpoint_subscriber.subscribe(node, Float32, '~/setpoint_all', self._on_setpoint)
-
-    def _on_setpoint(self, message: Float32) -> None:
-        factors = {managed.scale.factor: managed for managed in self._context.drives}
-        if len(factors) > 1:
-            told = ', '.join(f'{one.name}: {factor:g}' for factor, one in factors.items())
-            self._ignore(f'setpoint_all refused: the drives differ in scale ({told})')
-            return
-        (managed,) = factors.values()
-        value = managed.scale.of_drive(message.data)
-        if math.isfinite(value):
-            self._all.request(value)
-        else:
-            self._ignore(f'setpoint_all {message.data} ignored: it is not a finite number')
-
-    def _ignore(self, text: str) -> None:
-        self._log.warning(text, throttle_duration_sec=_LOG_PERIOD)
-
-    def _on_told(self, told: Told) -> None:
-        """Say on the bus what has changed; a refusal again and again, but not with each request."""
-        again = told.refused is not None and time.monotonic() - self._told_at > _LOG_PERIOD
-        if told == self._told and not again:
-            return
-        self._told, self._told_at = told, time.monotonic()
-        # it names drives, but nothing that is called
-        say = self._context.drives[0].wording.say
-        if told.refused is not None:
-            self._context.log(self._log.warning, f'setpoint_all refused: {say(told.refused)}')
-        elif told.limited is not None:
-            self._context.log(self._log.warning, f'setpoint_all {say(told.limited)}')

@@ -79,14 +79,15 @@ def test_a_scale_that_is_none_is_refused_at_the_start(bench: Bench) -> None:
 
 
 @pytest.mark.every_way
-@needs('classic')
-def test_one_set_point_for_all_needs_one_scale(bench: Bench) -> None:
+@pytest.mark.shared
+@needs('direct')
+def test_one_set_point_for_all_is_in_the_unit_of_each_drive(bench: Bench) -> None:
     simulator = bench.simulator('--address', '1', '--address', '2')
     parameters = bench.folder / 'two.yaml'
     parameters.write_text("""
 nfo_sinus_bus: {ros__parameters: {drives: [left, right]}}
 left: {ros__parameters: {address: 1, scale: 0.02, unit: m/s}}
-right: {ros__parameters: {address: 2, scale: 0.02, unit: m/s}}
+right: {ros__parameters: {address: 2, scale: 0.04, unit: m/s}}
 """)
     bench.driver('--params-file', str(parameters))
     left, right = (bench.client(name).connected() for name in ('/left', '/right'))
@@ -102,14 +103,12 @@ right: {ros__parameters: {address: 2, scale: 0.02, unit: m/s}}
 
     assert everybody.call('enable_all').success
     publishing(
-        lambda: all(abs(simulator.state(one)['frequency'] - 20.0) < 0.2 for one in (1, 2)),
-        'both have 20 Hz',
+        lambda: all(
+            abs(simulator.state(one)['frequency'] - hertz) < 0.2
+            for one, hertz in ((1, 20.0), (2, 10.0))
+        ),
+        'each has 0.4 m/s',
     )
-    assert left.messages['status'][-1].unit == 'm/s'
+    assert [one.messages['status'][-1].unit for one in (left, right)] == ['m/s', 'm/s']
     assert everybody.call('stop_all').success
     wait_until(lambda: not any(simulator.state(one)['turning'] for one in (1, 2)), 'both stand')
-    assert right.set_parameters(scale=0.03).successful
-    assert everybody.call('enable_all').success
-    told = 'setpoint_all refused: the drives differ in scale (left: 0.02, right: 0.03)'
-    publishing(lambda: told in bench.log, 'it is refused')
-    assert not any(simulator.state(one)['frequency'] for one in (1, 2))

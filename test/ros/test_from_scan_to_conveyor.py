@@ -69,53 +69,23 @@ def setpoints_for_all(client: Client, value: float) -> Iterator[None]:
         thread.join()
 
 
-def to_all(bench: Bench) -> list[str]:
-    """Every set-point that was told to all drives, as it stands in the frame."""
-    frames = [bytes.fromhex(frame['hex']) for frame in bench.frames()]
-    return [frame[9:13].decode() for frame in frames if frame.startswith(b'\x04\x7f\x02E001E=')]
-
-
 @pytest.mark.every_way
-@needs('classic')
-def test_one_message_moves_the_whole_line(bench: Bench) -> None:
-    simulator, clients = start(bench)
-    assert bench.client('/nfo_sinus_bus').call('enable_all').success
-    with setpoints_for_all(clients[0], 20.0):
-        wait_until(lambda: frequencies(simulator) == [20, 20, 20], 'all turn')
-        for client in clients:
-            client.wait_for('status', lambda status: status.setpoint == 20.0, 'each says so')
-        assert set(to_all(bench)) == {'00C8'}
-        holds_for(A_WHILE, lambda: frequencies(simulator) == [20, 20, 20], 'they turn on')
-        # one of them is stopped, and set-points for all are refused from then on
-        assert clients[1].call('stop').success
-        wait_until(lambda: 'setpoint_all refused: middle is not enabled' in bench.log, 'the reason')
-        told = len(to_all(bench))
-        wait_until(lambda: frequencies(simulator) == [0, 0, 0], 'the others had none since')
-        assert len(to_all(bench)) == told
-    assert bench.log.count('setpoint_all refused') <= 2
-    with setpoints_for_all(clients[0], float('nan')):
-        wait_until(lambda: 'setpoint_all nan ignored' in bench.log, 'no number')
-
-
-@pytest.mark.every_way
-@needs('classic')
-def test_no_set_point_for_all_where_one_is_only_watched(bench: Bench) -> None:
+@pytest.mark.shared
+@needs('direct')
+def test_one_message_moves_all_drives_that_are_enabled_and_none_that_is_watched(
+    bench: Bench,
+) -> None:
     simulator, clients = start(bench, third='control_method: monitor')
     assert bench.client('/nfo_sinus_bus').call('enable_all').success
     with setpoints_for_all(clients[0], 20.0):
-        wait_until(lambda: 'setpoint_all refused: outfeed is only monitored' in bench.log, 'why')
-    assert to_all(bench) == []
+        wait_until(lambda: frequencies(simulator) == [20, 20, 0], 'two turn')
+        for client in clients[:2]:
+            client.wait_for('status', lambda status: status.setpoint == 20.0, 'each says so')
+        # one of them is stopped, and the other turns on
+        assert clients[1].call('stop').success
+        wait_until(lambda: frequencies(simulator) == [20, 0, 0], 'one turns')
+        holds_for(A_WHILE, lambda: frequencies(simulator) == [20, 0, 0], 'it turns on')
     assert simulator.state(3)['writes'] == {}
-
-
-@needs('rtu')
-def test_no_set_point_for_all_without_a_broadcast(bench: Bench) -> None:
-    simulator, clients = start(bench)
-    assert bench.client('/nfo_sinus_bus').call('enable_all').success
-    with setpoints_for_all(clients[0], 20.0):
-        wait_until(lambda: 'setpoint_all refused: only the Classic protocol' in bench.log, 'why')
-        with clients[1].setpoints(15.0):
-            wait_until(lambda: frequencies(simulator) == [0, 15, 0], 'its own does it')
 
 
 @needs('direct')
