@@ -128,7 +128,7 @@ class Drive:
     @property
     def powered_since(self) -> float:
         """From this operating hour on the drive is known to have had power; NaN: not known."""
-        return self.log.clock.since
+        return self.log.powered_since
 
     @property
     def stop_unconfirmed(self) -> bool:

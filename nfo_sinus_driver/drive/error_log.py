@@ -22,10 +22,8 @@ from nfo_sinus_driver.link import Address, LinkError, Refused
 _log = logging.getLogger(__name__)
 
 _HOUR = 3600.0
-#: By how much the clocks of drive and computer may drift apart, s for each s.
-_DRIFT = 1e-4
-#: Of how many entries it is remembered when they came.
-_REMEMBERED = 128
+#: By how much the hours may lag behind the clock while the drive has power, h: two ticks.
+_LAG = 2 * TICK
 #: How often the log is read anew when an entry came in meanwhile.
 _READINGS = 3
 #: A counter that was reset may have counted on since, kWh.
@@ -41,44 +39,6 @@ _TRIES = 10
 _SOON = 2.0
 
 
-class OperatingClock:
-    """
-    Maps operating time to the steady clock, as far back as the drive is known to have had power.
-
-    Every reading says within one tick when the drive's hours would have begun if it had had power
-    all the time. While it has power all readings agree, and together they are finer than a tick;
-    one that does not fit shows that it was off, and nothing from before can be mapped any more.
-    Operating times are in hours, moments in seconds of the clock of the bus.
-    """
-
-    def __init__(self) -> None:
-        #: The moment of operating hour 0 is between these.
-        self._earliest, self._latest = -math.inf, math.inf
-        self._noted_at = math.nan
-        #: From this operating time on the drive is known to have had power.
-        self.since = math.nan
-
-    def note(self, hours: float, at: float) -> None:
-        """Take a reading of the operating time, and when that was."""
-        drift = 0.0 if math.isnan(self._noted_at) else _DRIFT * max(0.0, at - self._noted_at)
-        self._noted_at = at
-        latest = at - hours * _HOUR
-        earliest = latest - TICK * _HOUR
-        low = max(self._earliest - drift, earliest)
-        high = min(self._latest + drift, latest)
-        if math.isnan(self.since) or low > high:
-            low, high, self.since = earliest, latest, hours
-        self._earliest, self._latest = low, high
-
-    def moment(self, hours: float) -> float:
-        """Return when the operating time was so, to a tick or so; NaN if that is not known."""
-        # what is in the tick of the first reading may be from before the drive was switched on
-        if math.isnan(self.since) or hours < self.since + TICK / 2:
-            return math.nan
-        middle = (self._earliest + self._latest) / 2 + (hours + TICK / 2) * _HOUR
-        return min(middle, self._noted_at)
-
-
 class ErrorLog:
     """
     The error log and the kWh counter of one drive; used on the bus alone.
@@ -90,9 +50,10 @@ class ErrorLog:
         self._inverter = inverter
         self._registers = inverter.registers
         self._procedures = procedures
-        self.clock = OperatingClock()
-        #: Entries that were seen to come, and when, the newest first.
-        self._sightings: list[tuple[int, float]] = []
+        #: From this operating hour on the drive is known to have had power; NaN: not known.
+        self.powered_since = math.nan
+        #: When it showed that hour, s of the clock of the bus.
+        self._shown_at = math.nan
         #: Where it stands, if not where it was looked for first.
         self._moved: ErrorLogArea | None = None
 
@@ -138,27 +99,23 @@ class ErrorLog:
         return await self._read(limit, known or 0, priority)
 
     async def read_time(self, priority: Priority) -> float:
-        """Read the operating time, h, and have the clock follow it."""
+        """Read the operating time, h, which shows whether the drive was off meanwhile."""
         key = self._inverter.model.key(Role.OPERATING_TIME)
         reply = await self._registers.read_reply(key, priority, once=priority > Priority.POLL)
         hours = self._registers.number(key, reply.data)
-        self.clock.note(hours, reply.arrived)
+        expected = self.powered_since + (reply.arrived - self._shown_at) / _HOUR
+        if not hours >= expected - _LAG:
+            self.powered_since, self._shown_at = hours, reply.arrived
         return hours
 
-    def note_sighting(self, entry: int, at: float) -> None:
-        """Remember when an entry came, s of the clock of the bus."""
-        self._sightings = [(entry, at), *self._sightings[: _REMEMBERED - 1]]
-
     def understood(self, entries: Sequence[int], now: float) -> tuple[LogEntry, ...]:
-        """Return what entries say, newest first, when the operating time is ``now``, h."""
-        sightings = list(self._sightings)
-        found: list[LogEntry] = []
-        for entry in entries:
-            sighting = next((one for one in sightings if one[0] == entry), None)
-            if sighting is not None:
-                sightings.remove(sighting)
-            found.append(self._understood(entry, now, sighting[1] if sighting else math.nan))
-        return tuple(found)
+        """
+        Return what entries say, newest first, when the operating time is ``now``, h.
+
+        An entry was made so many hours before now as the operating time says, to a tick of it, if
+        the drive has had power ever since.
+        """
+        return tuple(self._understood(entry, now) for entry in entries)
 
     async def erase_now(self) -> Report:
         """Erase the error log by SCMD [M0 table 18], and see that it is empty."""
@@ -247,18 +204,18 @@ class ErrorLog:
         )
         return area.codec.decode(data)
 
-    def _understood(self, entry: int, now: float, sighted_at: float) -> LogEntry:
+    def _understood(self, entry: int, now: float) -> LogEntry:
         code, then = self.area.code(entry), self.area.hours(entry)
+        clock, age, at, latest = self._inverter.bus.now, math.nan, math.nan, math.nan
         # one tick of doubt, for the drive rounds
-        age = at = latest = math.nan
         if now > then - TICK:
             age = max(0.0, now - then)
-            at = self.clock.moment(then)
-            latest = self._inverter.bus.now() - max(0.0, age - TICK) * _HOUR
-        if not math.isnan(sighted_at):
-            at = sighted_at
-        text, now_of_bus = self._inverter.text_of(code), self._inverter.bus.now
-        return LogEntry(code, text, round(then, 1), age, at, latest, now=now_of_bus)
+            latest = clock() - max(0.0, age - TICK) * _HOUR
+            # what is in the tick of the first reading may be from before it was switched on
+            if then > self.powered_since:
+                at = clock() - age * _HOUR
+        text = self._inverter.text_of(code)
+        return LogEntry(code, text, round(then, 1), age, at, latest, now=clock)
 
 
 class ErrorLogMonitor:
@@ -345,14 +302,11 @@ class ErrorLogMonitor:
             news = [entry for entry in news if log.area.code(entry) == code]
         elif not news and fault is not None and self._repeats(fault, newest, now):
             news = [newest]
-        for entry in reversed(news):
-            at = self._moment(entry, began)
-            if not math.isnan(at):
-                log.note_sighting(entry, at)
+        entries = [self._sighted(entry, began) for entry in log.understood(news, now)]
         self._looked_at = began
-        if news:
+        if entries:
             self._told_at = self._inverter.bus.now()
-            self._tell(log.understood(news, now))
+            self._tell(entries)
 
     def _repeats(self, fault: InverterStatus, newest: int, now: float) -> bool:
         """Tell whether a fault has left the same entry as the one before, within one tick."""
@@ -360,13 +314,12 @@ class ErrorLogMonitor:
         same = area.code(newest) == fault.code and now - area.hours(newest) < 2 * TICK
         return same and self._told_at < fault.at - _SOON
 
-    def _moment(self, entry: int, began: float) -> float:
-        """Return when a new entry came, as far as that was seen; else NaN."""
+    def _sighted(self, entry: LogEntry, began: float) -> LogEntry:
+        """Return a new entry with the moment when it came, where that was seen."""
         fault = self._fault
-        code = self._error_log.area.code(entry)
-        if fault and fault.code == code and self._inverter.fault_is_fresh:
-            return fault.at
-        return began if began - self._looked_at < 2 * _PERIOD else math.nan
+        if fault and fault.code == entry.code and self._inverter.fault_is_fresh:
+            return replace(entry, at=fault.at)
+        return replace(entry, at=began) if began - self._looked_at < 2 * _PERIOD else entry
 
     def _tell(self, entries: Sequence[LogEntry]) -> None:
         self.newest = entries[0]
