@@ -12,6 +12,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.setting import FIXED, Setting
 
 #: What YAML makes of a character format without quotes.
@@ -32,8 +33,8 @@ _TYPES = {
 def declare(node: Node, settings: Mapping[str, Setting]) -> dict[str, SettingValue]:
     """Declare settings on a node and return their values; a ValueError says which is wrong."""
     for name, one in settings.items():
-        # rclpy has no other way to see an override first, and its own complaints name no remedy
-        given = node._parameter_overrides.get(name)
+        # the complaints of rclpy name no remedy
+        given = overrides_of(node).get(name)
         value = one.default if given is None else _coerced(one, given.value)
         node.declare_parameter(name, value, _descriptor(one), ignore_override=True)
     return {name: node.get_parameter(name).value for name in settings}

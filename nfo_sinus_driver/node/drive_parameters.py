@@ -17,6 +17,7 @@ from rclpy.parameter import Parameter
 from nfo_sinus_driver.catalog import Family, Parameter as CatalogParameter, Value
 from nfo_sinus_driver.drive import Change, Drive
 from nfo_sinus_driver.node.overrides import declared_names, did_you_mean
+from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.wording import NodeError
 
 #: How long a change may wait for the bus before it is said that it is not known, s.
@@ -167,8 +168,7 @@ def coerce(parameter: CatalogParameter, given: object) -> Value:
 
 def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
     """Return the settings of a drive that were given to its node, by file or by ``-p``."""
-    # rclpy has no other way to see the overrides that nobody declared
-    given = node._parameter_overrides
+    given = overrides_of(node)
     wanted: dict[str, Value] = {}
     for parameter in drive.model.settings:
         if parameter.key in given:

@@ -12,6 +12,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin
 
 from nfo_sinus_driver.node.autostart import Autostart
+from nfo_sinus_driver.node.rclpy_internals import change_state_service, state_label
 
 
 class Lifecycle:
@@ -33,8 +34,7 @@ class Lifecycle:
     @property
     def state(self) -> str:
         """Its label, such as ``active``."""
-        label: str = self._node._state_machine.current_state[1]
-        return label
+        return state_label(self._node)
 
     @property
     def why_not_active(self) -> str:
@@ -108,7 +108,7 @@ def _reject_invalid_transitions(node: LifecycleNodeMixin, in_transition: threadi
 
     :param in_transition: held by whoever changes the state of the node.
     """
-    service = node._service_change_state
+    service = change_state_service(node)
     change = service.callback
 
     def answer(

@@ -33,7 +33,6 @@ from nfo_sinus_driver.node.executor import NodeExecutor, end_all
 from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
 from nfo_sinus_driver.node.overrides import (
     bus_overrides,
-    overruled_parameters,
     refuse_other_arguments,
     take_out_end_with,
     take_out_node_name,
@@ -98,7 +97,6 @@ class DriverProcess:
         for warning in (
             *unknown_nodes(arguments, names),
             *unknown_parameters(nodes),
-            *overruled_parameters(arguments, nodes),
         ):
             self._bus_node.get_logger().warning(warning)
 

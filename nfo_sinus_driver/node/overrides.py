@@ -5,18 +5,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 import itertools
 from pathlib import Path
 import re
 from typing import Any
 
-from rcl_interfaces.msg import Parameter as ParameterMessage
 from rclpy.node import Node
-from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
+from rclpy.parameter import Parameter
 from rclpy.utilities import remove_ros_args
 import yaml
 
+from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.version import VERSION
 
@@ -43,37 +43,39 @@ def bus_overrides(name: str) -> list[Parameter]:
     ]
 
 
-def _given_to(name: str) -> dict[str, Parameter]:
+def _given_to(name: str) -> Mapping[str, Parameter]:
     """Let ROS itself say what a node of a name gets: it knows files, wildcards and their order."""
     node = Node(name, enable_rosout=False, start_parameter_services=False)
     try:
-        return dict(node._parameter_overrides)
+        return overrides_of(node)
     finally:
         node.destroy_node()
 
 
 def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
-    """Return a warning for each parameter that was given and that no node declares."""
+    """Return a warning for each parameter that was given to a node that has none such."""
     nodes = list(nodes)
-    declared = {name for node in nodes for name in declared_names(node)}
-    unknown: dict[str, set[str]] = {}
-    for node in nodes:
-        # rclpy has no other way to see the overrides that nobody declared
-        for name in node._parameter_overrides:
-            if name not in declared:
-                unknown.setdefault(name, set()).add(node.get_name())
-    for name, names in sorted(unknown.items()):
+    given = {node.get_name(): overrides_of(node).keys() for node in nodes}
+    known = {node.get_name(): declared_names(node) for node in nodes}
+    unknown: dict[str, list[str]] = {}
+    for node, names in given.items():
+        for name in names - known[node]:
+            # given to all of them, it reaches the right one, too
+            if not all(name in others for others in given.values()) or not _owners(name, known):
+                unknown.setdefault(name, []).append(node)
+    for name, nodes_of in sorted(unknown.items()):
+        owners = _owners(name, known)
+        of_these = {one for node in nodes_of for one in known[node]}
+        meant = f'; {owners[0]} has it' if owners else did_you_mean(name, of_these)
         yield (
-            f'parameter {name} was given to {", ".join(sorted(names))}, but there is none of that '
-            f'name{did_you_mean(name, declared)}'
+            f'parameter {name} was given to {", ".join(sorted(nodes_of))}, but there is none of '
+            f'that name{meant}'
         )
-    for node in nodes:
-        others = declared - declared_names(node)
-        misplaced = set(node._parameter_overrides) & others
-        # given to all of them, it reaches the right one too
-        for name in sorted(misplaced):
-            if not all(name in other._parameter_overrides for other in nodes):
-                yield f'parameter {name} was given to {node.get_name()}, which has none such'
+
+
+def _owners(name: str, known: Mapping[str, set[str]]) -> list[str]:
+    """Return the nodes that have a parameter."""
+    return [node for node, names in known.items() if name in names]
 
 
 def declared_names(node: Node) -> set[str]:
@@ -95,53 +97,6 @@ def unknown_nodes(arguments: list[str], names: Iterable[str]) -> Iterator[str]:
                         f'{path} has parameters for {section}, but the nodes here are '
                         f'{", ".join(sorted(names))}{did_you_mean(name, names)}'
                     )
-
-
-def overruled_parameters(arguments: list[str], nodes: Iterable[Node]) -> Iterator[str]:
-    """
-    Return a warning for each ``-p name:=value`` that a node has another value for.
-
-    To ROS the more specific name counts, wherever it stands, and of the same the later one: what a
-    parameter file gives to a node goes before what the command line gives to all.
-    """
-    rules = list(_rules(arguments))
-    given = {name: text for node_name, name, text in rules if not node_name}
-    # where the command line names the node, too, it overrules itself
-    specific = {(node_name.rsplit('/', 1)[-1], name) for node_name, name, _ in rules}
-    for node in nodes:
-        for name, text in given.items():
-            if (node.get_name(), name) in specific:
-                continue
-            override = node._parameter_overrides.get(name) if name in declared_names(node) else None
-            if override is not None and not _is_value(override, text):
-                counts = parameter_value_to_python(override.get_parameter_value())
-                yield (
-                    f'parameter {name}:={text} of the command line does not count for '
-                    f'{node.get_name()}: a parameter file overrules it by {counts!r}. Change the '
-                    f'file, or give -p {node.get_name()}:{name}:={text} after --params-file'
-                )
-
-
-def _rules(arguments: list[str]) -> Iterator[tuple[str, str, str]]:
-    """Return what the command line gives: to which node (empty: all), name and value."""
-    in_ros = False
-    for argument, following in itertools.pairwise([*arguments, '']):
-        in_ros = argument == _ROS_ARGS or (in_ros and argument != _END)
-        if in_ros and argument in _PARAM_FLAGS:
-            rule = _RULE.fullmatch(following)
-            if rule:
-                yield rule[1] or '', rule[2], rule[3]
-
-
-def _is_value(override: Parameter, text: str) -> bool:
-    """Tell whether a parameter has the value that was given as text, as ROS reads it."""
-    try:
-        given = Parameter.from_parameter_msg(
-            ParameterMessage(name=override.name, value=get_parameter_value(text))
-        ).value
-    except (ValueError, yaml.YAMLError):
-        return True
-    return bool(given == override.value or str(given) == str(override.value))
 
 
 def _load(path: str) -> Any:
@@ -175,9 +130,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 _ROS_ARGS = '--ros-args'
 _END = '--'
-_PARAM_FLAGS = ('-p', '--param')
-#: Node, if one is named, parameter and value.
-_RULE = re.compile(r'(?:([^:=]+):)?([^:=]+):=(.*)', re.DOTALL)
 _REMAP_FLAGS = ('-r', '--remap')
 _NODE = re.compile(r'(?:__node|__name):=(.+)')
 

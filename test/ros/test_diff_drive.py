@@ -56,9 +56,8 @@ def names(parameters: dict[str, Any], prefix: str = '') -> set[str]:
 )
 def test_every_parameter_of_a_file_is_one_of_ours(name: str) -> None:
     nodes = sections(_CONFIG / name)
-    bus = {setting.name for setting in BUS_SETTINGS}
-    drive = {setting.name for setting in DRIVE_SETTINGS}
-    drive |= {parameter.key for parameter in load_family('sinus_g2').settings}
+    bus = {*BUS_SETTINGS}
+    drive = {*DRIVE_SETTINGS} | {parameter.key for parameter in load_family('sinus_g2').settings}
     drives = nodes['nfo_sinus_bus'].get('drives', ['nfo_sinus'])
     assert nodes.keys() - {'/**', 'nfo_sinus_bus'} <= set(drives)
     for node, parameters in nodes.items():

@@ -6,11 +6,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import pytest
 
 from nfo_sinus_driver.catalog import families, load_family
 from nfo_sinus_driver.node.overrides import did_you_mean
-from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS, Setting
+from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
+from nfo_sinus_driver.setting import Setting
 
 #: What rclpy declares for each node.
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
@@ -19,10 +22,10 @@ _OF_ROS = ('use_sim_time', 'start_type_description_service')
 @pytest.mark.parametrize('family', sorted(families()))
 @pytest.mark.parametrize('settings', [BUS_SETTINGS, DRIVE_SETTINGS], ids=['bus', 'drive'])
 def test_no_parameter_name_is_the_prefix_of_another(
-    family: str, settings: tuple[Setting, ...]
+    family: str, settings: Mapping[str, Setting]
 ) -> None:
     # `ros2 param dump` makes a tree of them, in which a name is a value or a branch
-    names = {*_OF_ROS, *(one.name for one in settings), *load_family(family)}
+    names = {*_OF_ROS, *settings, *load_family(family)}
     assert not [(one, other) for one in names for other in names if other.startswith(f'{one}.')]
 
 
