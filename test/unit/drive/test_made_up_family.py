@@ -21,7 +21,7 @@ from typing import Any
 
 from made_up_rig import FarEnd, MadeUpRig
 import pytest
-from support.said import raises, said
+from support.said import raises
 
 from nfo_sinus_driver import families
 from nfo_sinus_driver.catalog import CatalogError, load_family
@@ -222,13 +222,6 @@ def test_a_refused_part_stops_the_motor() -> None:
         rig.pass_time(1.0)
         assert rig.notes.said('it refused set-point -35: not that')
         assert rig.acme.registers[WORD] == REMOTE and not rig.drive.armed
-
-
-def test_it_follows_no_set_point_for_all() -> None:
-    with Bench().connect() as rig:
-        rig.enable()
-        refused = said(rig.drive.setpoint.why_not_shared('acme'))
-        assert refused == 'acme takes a set-point in several writes'
 
 
 @pytest.fixture
