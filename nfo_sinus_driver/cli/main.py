@@ -14,8 +14,7 @@ import signal
 import sys
 import threading
 
-from nfo_sinus_driver.cli.completion import completion
-from nfo_sinus_driver.cli.console import CliError, UsageError, remark, say
+from nfo_sinus_driver.cli.console import CliError, UsageError, put, remark, say
 from nfo_sinus_driver.cli.monitor import monitor
 from nfo_sinus_driver.cli.options import parse
 from nfo_sinus_driver.cli.read import errors, get, info, list_, set_
@@ -24,6 +23,15 @@ from nfo_sinus_driver.cli.scan import scan
 from nfo_sinus_driver.cli.transfer import diff, dump, load
 from nfo_sinus_driver.cli.tune import tune
 from nfo_sinus_driver.drive import DriveError
+
+
+def completion(options: argparse.Namespace) -> int:
+    """Print what makes a shell complete what is typed."""
+    from argcomplete.shell_integration import shellcode
+
+    put(shellcode(['nfo-sinus'], shell=options.shell))
+    return 0
+
 
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     'scan': scan,

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 import math
+import os
 import shlex
 from typing import Any
 
@@ -39,6 +40,11 @@ Reading never changes anything in a drive, and a motor that runs runs on.
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return what was typed, complete with defaults; leave the program if it makes no sense."""
     parser = _parser()
+    if '_ARGCOMPLETE' in os.environ:
+        # a shell asks how a line may go on; loaded for that alone
+        import argcomplete
+
+        argcomplete.autocomplete(parser)
     options = parser.parse_args(arguments)
     defaults = dict(DEFAULTS)
     if options.verb == 'scan':
@@ -59,36 +65,6 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     except ValueError as error:
         parser.error(str(error))
     return options
-
-
-def words() -> dict[str, list[str]]:
-    """Return what may be typed: options and choices after each verb, the verbs after ``''``."""
-    parser = _parser()
-    (verbs,) = (one for one in parser._actions if isinstance(one, argparse._SubParsersAction))
-    found = {'': [*_words(parser), *verbs.choices]}
-    return found | {name: _words(verb) for name, verb in verbs.choices.items()}
-
-
-def _words(parser: argparse.ArgumentParser) -> list[str]:
-    found: list[str] = []
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            continue
-        found += [option for option in action.option_strings if option.startswith('--')]
-        if not action.option_strings and action.choices:
-            found += [str(choice) for choice in action.choices]
-    return found
-
-
-def values_of(option: str) -> list[str]:
-    """Return the values that an option takes, where it takes some that can be listed."""
-    parser = _parser()
-    (verbs,) = (one for one in parser._actions if isinstance(one, argparse._SubParsersAction))
-    for one in (parser, *verbs.choices.values()):
-        for action in one._actions:
-            if option in action.option_strings and action.choices:
-                return [str(choice) for choice in action.choices]
-    return []
 
 
 def command_line(options: argparse.Namespace, *words: str) -> str:
