@@ -15,7 +15,7 @@ from typing import Any
 from nfo_sinus_driver.catalog import example_setting
 from nfo_sinus_driver.cli.tune import PROCEDURES
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive.settings import AUTO, MONITOR
+from nfo_sinus_driver.drive.settings import AUTO, MONITOR, REFERENCES
 from nfo_sinus_driver.link import BIT_RATES, PROTOCOLS, BusSettings
 from nfo_sinus_driver.setting import settings_of
 from nfo_sinus_driver.version import VERSION
@@ -102,15 +102,23 @@ def _add_setting(group: argparse._ActionsContainer, name: str, option: str, **mo
 
     # what argparse calls it in its own words
     value.__name__ = 'number'
-    also = f'; scan: {_OF_SCAN[name]}' if name in _OF_SCAN else ''
-    default = f'default: {setting.default}{also}' if setting.default != '' else ''
-    text = '; '.join(filter(None, (setting.description, setting.also, default)))
     given: dict[str, Any] = {'type': value, 'metavar': option.rpartition('-')[2].upper()}
+    text, also = setting.description, setting.also
     if setting.choices:
-        given = {'choices': [one for one in setting.choices if one not in (MONITOR, AUTO)]}
+        offered = [one for one in setting.choices if one not in (MONITOR, AUTO)]
+        # what it says more is of those that are not offered here
+        also = also if len(offered) == len(setting.choices) else ''
+        given = {'choices': offered}
     elif name == 'baud_rate':
         given['choices'] = (0, *BIT_RATES)
-    group.add_argument(option, help=text.replace('%', '%%'), **{**given, **more})
+    default = f'{setting.default}' if setting.default != '' else setting.zero
+    if setting.default == '':
+        text = setting.text
+    if name in _OF_SCAN:
+        default += f'; scan: {_OF_SCAN[name]}'
+    given['help'] = f'{"; ".join(filter(None, (text, also)))} (default: {default})'
+    given |= more
+    group.add_argument(option, **{**given, 'help': given['help'].replace('%', '%%')})
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -265,14 +273,23 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         metavar='SECONDS',
         help='stop after so long (default: run until Ctrl-C)',
     )
-    for name, option in (
-        ('control_method', '--method'),
-        ('reference', '--reference'),
-        ('expected_control_mode', '--control-mode'),
-        ('setpoint_max', '--setpoint-max'),
-        ('drive_timeout', '--drive-timeout'),
+    for name, option, more in (
+        ('control_method', '--method', {}),
+        ('reference', '--reference', {'metavar': 'REFERENCE', 'help': (
+            f'what the motor follows: {", ".join(REFERENCES)} (default: fieldbus, which is '
+            'SETPOINT)'
+        )}),
+        ('expected_control_mode', '--control-mode', {'help': (
+            'refuse to run in another one; an Optimal, which does not tell it, is taken to be in '
+            'this one (default: any; an Optimal: Freque)'
+        )}),
+        ('setpoint_max', '--setpoint-max', {'help': (
+            'the greatest SETPOINT that is meant to be one (default: what is nominal for the '
+            'motor, where the drive tells it)'
+        )}),
+        ('drive_timeout', '--drive-timeout', {}),
     ):
-        _add_setting(run, name, option, default=_SETTINGS[name].default)
+        _add_setting(run, name, option, default=_SETTINGS[name].default, **more)
     add(
         '--period',
         type=_seconds,

@@ -126,9 +126,9 @@ class DriveSettings:
     )
     control_method: str = setting(
         '',
-        'how the drive is commanded; monitor: not one write to it',
-        choices=CONTROL_METHODS, zero='the usual method of the model',
-        change=UNCONFIGURED,
+        'how the drive is commanded',
+        choices=CONTROL_METHODS, also='monitor: not one write to the drive',
+        zero='the usual method of the model', change=UNCONFIGURED,
     )
     reference: str = setting(
         'fieldbus',
