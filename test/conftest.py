@@ -3,6 +3,7 @@
 
 """Settings of the property tests, and of the garbage collector."""
 
+import contextlib
 import gc
 
 from hypothesis import HealthCheck, settings
@@ -20,6 +21,13 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile('ours')
+if not FULL:
+    # newer versions also try numbers of the modules that are loaded by then, which are others in
+    # each worker
+    with contextlib.suppress(ImportError):
+        from hypothesis.internal.conjecture import providers
+
+        providers._get_local_constants = lambda: providers._local_constants
 
 
 def pytest_collection() -> None:

@@ -1,12 +1,20 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Frames of a CAN bus, and what carries them."""
+"""Frames of a CAN bus, what carries them, and a bus that Linux drives (SocketCAN)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+import errno
+from pathlib import Path
+import select
+import socket
+import struct
+import time
 from typing import NamedTuple, Protocol
+
+from nfo_sinus_driver.link.interface import PortError
 
 #: The most bytes that a frame carries.
 MOST_DATA = 8
@@ -66,3 +74,120 @@ class CanPort(Protocol):
         :returns: none when the time is over, or when what came was no whole frame.
         :raises PortError: it is gone.
         """
+
+
+#: struct can_frame and struct can_filter (linux/can.h).
+_FRAME = struct.Struct('=IB3x8s')
+_FILTER = struct.Struct('=II')
+#: Extended, remote and error frames: in the identifier.
+_OTHER_FRAMES = 0xE000_0000
+#: The second of them alone.
+_REMOTE = 0x4000_0000
+#: The type of a network interface that is a CAN bus (linux/if_arp.h).
+_IS_CAN = '280'
+_INTERFACES = Path('/sys/class/net')
+
+
+class SocketCan:
+    """
+    One CAN interface.
+
+    :param name: of the interface, such as ``can0``.
+    :param filters: identifiers, and by which of their bits frames are let in.
+    """
+
+    def __init__(self, name: str, filters: Iterable[tuple[int, int]]) -> None:
+        self._name = name
+        self._filters = b''.join(
+            _FILTER.pack(identifier, mask | _OTHER_FRAMES) for identifier, mask in filters
+        )
+        self._socket: socket.socket | None = None
+        self.trouble = ''
+
+    def open(self) -> None:
+        """
+        Open the interface.
+
+        :raises PortError: there is no such interface, or the kernel has no CAN.
+        """
+        try:
+            bus = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        except OSError as error:
+            raise PortError(f'this kernel has no SocketCAN ({error.strerror})') from error
+        try:
+            bus.setblocking(False)
+            bus.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, self._filters)
+            bus.bind((self._name,))
+        except OSError as error:
+            bus.close()
+            raise self._lost(error) from error
+        self._socket = bus
+        self.trouble = ''
+
+    def close(self) -> None:
+        """Close it; harmless when it is closed already."""
+        bus, self._socket = self._socket, None
+        if bus is not None:
+            bus.close()
+
+    def send(self, frame: Frame) -> None:
+        """
+        Hand a frame over.
+
+        :raises PortError: the interface is gone or down.
+        """
+        data = frame.data.ljust(MOST_DATA, b'\0')
+        try:
+            flags = _REMOTE if frame.remote else 0
+            self._bus.send(_FRAME.pack(frame.identifier | flags, len(frame.data), data))
+        except OSError as error:
+            if error.errno not in (errno.ENOBUFS, errno.EAGAIN):
+                raise self._lost(error) from error
+            # the queue is full, for nobody acknowledges
+            self.trouble = CANNOT_SEND
+
+    def receive(self, until: float) -> Sequence[Frame]:
+        """
+        Return what has come; wait for the first frame until a moment of ``time.monotonic``, s.
+
+        :raises PortError: the interface is gone or down.
+        """
+        bus = self._bus
+        found: list[Frame] = []
+        try:
+            if not select.select((bus,), (), (), max(0.0, until - time.monotonic()))[0]:
+                return found
+            while True:
+                identifier, length, data = _FRAME.unpack(bus.recv(_FRAME.size))
+                if identifier in IDENTIFIERS and length <= MOST_DATA:
+                    found.append(Frame(identifier, data[:length]))
+                    self.trouble = ''
+        except BlockingIOError:
+            return found
+        except OSError as error:
+            raise self._lost(error) from error
+
+    @property
+    def _bus(self) -> socket.socket:
+        if self._socket is None:
+            raise PortError(f'{self._name} is not open')
+        return self._socket
+
+    def _lost(self, error: OSError) -> PortError:
+        name = self._name
+        if error.errno == errno.ENODEV:
+            there = ', '.join(interfaces()) or 'none'
+            return PortError(f'there is no CAN interface {name}: is the adapter plugged in? '
+                             f'Interfaces there are: {there}')
+        if error.errno == errno.ENETDOWN:
+            return PortError(
+                f'{name} is down: sudo ip link set {name} up type can bitrate 125000 '
+                'restart-ms 100, with the bit rate of the drives'
+            )
+        return PortError(f'{name} was lost ({error.strerror})')
+
+
+def interfaces() -> Sequence[str]:
+    """Return the names of the CAN interfaces that there are."""
+    types = sorted(_INTERFACES.glob('*/type'))
+    return [path.parent.name for path in types if path.read_text('ascii').strip() == _IS_CAN]

@@ -13,7 +13,7 @@ import time
 
 from nfo_sinus_driver.link import nmt, sdo
 from nfo_sinus_driver.link.another_client import AnotherClient
-from nfo_sinus_driver.link.can import FUNCTION_CODE, CanPort, Frame
+from nfo_sinus_driver.link.can import FUNCTION_CODE, CanPort, Frame, SocketCan
 from nfo_sinus_driver.link.canopen_identify import CanopenInquiry
 from nfo_sinus_driver.link.canopen_supervision import CanopenSupervision
 from nfo_sinus_driver.link.interface import (
@@ -29,12 +29,11 @@ from nfo_sinus_driver.link.interface import (
     Reply,
 )
 from nfo_sinus_driver.link.late_replies import LateReplies
-from nfo_sinus_driver.link.lawicel_port import LawicelPort
+from nfo_sinus_driver.link.lawicel import LawicelPort
 from nfo_sinus_driver.link.line_protocols import CANOPEN
 from nfo_sinus_driver.link.object_shapes import SECOND, ObjectShapes
 from nfo_sinus_driver.link.port import port_of
 from nfo_sinus_driver.link.sdo import Download, Kind, Transfer, Upload
-from nfo_sinus_driver.link.socketcan import SocketCan
 
 #: Bit rate of the serial port of an adapter; those on USB do not care.
 _ADAPTER_RATE = 115_200

@@ -38,9 +38,8 @@ from nfo_sinus_driver.link.movitrac import (
     Select,
 )
 from nfo_sinus_driver.link.other_requests import TRIES, OtherRequests
-from nfo_sinus_driver.link.port import Port, port_of
+from nfo_sinus_driver.link.port import NEVER_SILENT, Port, await_silence, port_of
 from nfo_sinus_driver.link.serial_link import Echo
-from nfo_sinus_driver.link.silence import NEVER_SILENT, await_silence
 
 #: How much later than at once a drive may be told to answer (P843), s.
 LONGEST_RESPONSE_TIME = 0.2

@@ -36,8 +36,7 @@ from nfo_sinus_driver.link.modbus_pdu import (
     refusal_head,
     write_and_read_of,
 )
-from nfo_sinus_driver.link.port import Port, port_of
-from nfo_sinus_driver.link.silence import NEVER_SILENT, await_silence
+from nfo_sinus_driver.link.port import NEVER_SILENT, Port, await_silence, port_of
 
 _T = TypeVar('_T')
 

@@ -41,7 +41,7 @@ PORT_CALLS = {'open', 'openpty', 'posix_openpt', 'ptsname'}
 #: Rooms in which the clock is passed in; only what waits for the operating system asks for it.
 WITHOUT_TIME = {'bus', 'drive', 'link'}
 ASKS_FOR_TIME = frozenset(
-    f'link/{name}.py' for name in ('serial_port', 'socketcan', 'tcp_connection', 'url_port')
+    f'link/{name}.py' for name in ('serial_port', 'can', 'tcp_connection', 'url_port')
 )
 
 #: What names a family in a file that is to know none: in an import, an identifier, a text.

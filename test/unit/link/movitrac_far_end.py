@@ -85,7 +85,11 @@ class FarEnd:
 
     def heal(self, *fates: Fate) -> None:
         """Answer from now on, but for the next requests' fates."""
-        self._fates = iter(fates)
+        self.meet(iter(fates))
+
+    def meet(self, fates: Iterator[Fate]) -> None:
+        """Meet the next requests with some fates, each decided when its request comes."""
+        self._fates = fates
 
     def value(self, index: int, number: int) -> bytes:
         """What a parameter holds when the request with this number is carried out."""

@@ -19,12 +19,11 @@ from typing import Any
 from canopen_far_end import Server
 import pytest
 
-from nfo_sinus_driver.link import socketcan
-from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link import can
+from nfo_sinus_driver.link.can import Frame, SocketCan
 from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.interface import Address, LineSettings, NoAnswer, PortError, Refused
-from nfo_sinus_driver.link.lawicel_port import LawicelPort
-from nfo_sinus_driver.link.socketcan import SocketCan
+from nfo_sinus_driver.link.lawicel import LawicelPort
 
 REQUEST = Frame(0x605, bytes.fromhex('4013200000000000'))
 ANSWER = Frame(0x585, bytes.fromhex('4B13200011220000'))
@@ -318,7 +317,7 @@ def paper(monkeypatch: pytest.MonkeyPatch) -> Iterator[PaperSocket]:
         paper._may_fail('socket')
         return paper
 
-    monkeypatch.setattr(socketcan.socket, 'socket', make)
+    monkeypatch.setattr(can.socket, 'socket', make)
     yield paper
     paper.close()
 
@@ -400,7 +399,7 @@ def test_what_is_wrong_with_an_interface(
     for name, kind in (('vcan7', '280'), ('eth0', '1')):
         (tmp_path / name).mkdir()
         (tmp_path / name / 'type').write_text(f'{kind}\n', encoding='ascii')
-    monkeypatch.setattr(socketcan, '_INTERFACES', tmp_path)
+    monkeypatch.setattr(can, '_INTERFACES', tmp_path)
     paper.fails[method] = number
     port = make()
     acts: dict[str, Callable[[], Any]] = {

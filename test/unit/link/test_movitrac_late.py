@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from hypothesis import example, given, settings as hypothesis_settings, strategies as st
 from movitrac_bench import CHAR, LONG, RESYNC, TIMEOUT, VALUE, A, B, Bench
 from movitrac_far_end import Fate
@@ -307,9 +309,19 @@ def test_every_answer_belongs_to_its_request(
 def test_no_value_is_that_of_another_drive(
     late: list[Fate], steps: list[tuple[int, object]], response_time: float
 ) -> None:
-    # however late: all answer in the end; and one at a time
-    bench = Bench(*(fate for one in late for fate in (one, *[Fate()] * 5)))
+    bench = Bench()
     bench.drive.response_time = response_time
+
+    def one_at_a_time() -> Iterator[Fate]:
+        # however late: of two that are, neither names the drive that it comes from
+        there = 0.0
+        for fate in late:
+            while bench.wire.now < there:
+                yield Fate()
+            there = bench.wire.now + (fate.delay + 1) * TIMEOUT + response_time
+            yield fate
+
+    bench.drive.meet(one_at_a_time())
     for unit, address in steps:
         assert isinstance(address, type(A))
         try:
