@@ -1,9 +1,8 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
-The tables of the MOVITRAC against the manual's own text, where that lies beside the clone.
+What [M4] prints of the MOVITRAC 31.
 
 The list of chapter 4 is read by a program here, and by a person for the tables; the conversion list
 of the appendix is a third opinion on indices and P numbers.
@@ -11,14 +10,15 @@ of the appendix is a third opinion on indices and P numbers.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 import functools
 import re
 
-from manual_text import manual
+from manual_text import Fact, manual
 
-from nfo_sinus_driver.catalog import Access, Parameter, load_family
+from nfo_sinus_driver.catalog import Access, load_family
 
 FAMILY = load_family('movitrac31')
 BY_INDEX = {row.at('movitrac').index: row for row in FAMILY.values()}
@@ -60,7 +60,7 @@ class Line:
 @functools.cache
 def lines() -> list[Line]:
     """The parameter list of chapter 4."""
-    text = manual('M4')
+    text = manual(4)
     start = text.index(next(line for line in text if line.startswith('DISPLAY VALUES')))
     end = next(number for number, line in enumerate(text) if line.startswith('Conversion list'))
     found: list[Line] = []
@@ -93,34 +93,6 @@ def plain(printed: str) -> str:
     return re.sub(r'[{}$_ ]', '', printed)
 
 
-def test_every_index_of_the_list_is_there_once() -> None:
-    assert {line.index for line in lines()} == set(BY_INDEX)
-    assert len(BY_INDEX) == 315
-    assert len({line.index for line in lines() if 'W' in line.access}) == 239
-    for line in lines():
-        assert int(line.hexadecimal, 16) == line.index
-
-
-def test_numbers_names_units_and_access() -> None:
-    for line in lines():
-        row = BY_INDEX[line.index]
-        name, unit = re.fullmatch(r'(.*?)(?:\[([^]]*)\])?', line.name).groups('')  # type: ignore[union-attr]
-        number = rf'P(\d\d\d-P)?{line.number}\b' if line.number != '-' else 'Index'
-        if line.index == 13 and line.number == '031':
-            number = 'P030-P032'
-        assert re.search(number, row.description), row.key
-        assert f'ndex {line.index}: ' in row.description
-        if line.index in SEVERAL:
-            assert row.name == SEVERAL[line.index]
-        else:
-            assert plain(row.name) == plain(NAMES.get(line.index, name)), row.key
-        if line.index not in NO_UNIT:
-            unit = re.sub(r'[$ _{}]', '', unit)
-            assert row.unit == UNITS.get(unit, unit), row.key
-        writable = 'W' in line.access and line.index not in ONLY_READ
-        assert row.access is (Access.READ_WRITE if writable else Access.READ), row.key
-
-
 def spans_in(text: str) -> list[tuple[Fraction, Fraction, Fraction | None]]:
     """The ranges that a text prints, and the step of each."""
     number = r'([+-]?\d+(?:\.\d+)?)'
@@ -131,24 +103,6 @@ def spans_in(text: str) -> list[tuple[Fraction, Fraction, Fraction | None]]:
     ]
 
 
-def test_ranges_and_steps() -> None:
-    for line in lines():
-        row = BY_INDEX[line.index]
-        if row.labels or line.index in NO_RANGE:
-            continue
-        spans = spans_in(meaning_of(line))
-        if row.key.startswith('status.') and not spans:
-            assert row.minimum is None, row.key
-            continue
-        if line.index in (254, 256, 257, 258):
-            # nothing between -10 and 10, too
-            (low, *_), (_, high, step) = spans
-            spans = [(low, high, step)]
-        assert (row.minimum, row.maximum) == (spans[0][0], spans[-1][1]), row.key
-        steps = [(low, step) for low, _, step in spans if step is not None]
-        assert list(row.steps) == steps, row.key
-
-
 def labels_of(line: Line) -> dict[int, str]:
     """The labels that are printed of a row; terminals of one kind share a list."""
     text = meaning_of(line)
@@ -156,52 +110,78 @@ def labels_of(line: Line) -> dict[int, str]:
     if group is not None:
         text = '\n'.join(one.meaning for one in lines() if one.number[:2] == line.number[:2])
     parts = re.split(r'\b(\d+)(?:\.00)? ?= ?', text)
-    return {int(code): label for code, label in zip(parts[1::2], parts[2::2], strict=True)}
+    # the text recognition has taken some capital I for a small l
+    return {
+        int(code): plain(label.replace('\n', ' '))
+        .replace('lxt', 'Ixt').removesuffix('(dependsonS1)').rstrip('/')
+        for code, label in zip(parts[1::2], parts[2::2], strict=True)
+    }
 
 
-def test_labels() -> None:
-    checked = 0
+def list_of_movitrac() -> Iterator[Fact]:
+    """Number, name, unit and access of each row; its labels, or its range and steps."""
+    yield 'indices', {line.index for line in lines()}, set(BY_INDEX)
     for line in lines():
-        row: Parameter = BY_INDEX[line.index]
-        if not row.labels:
-            continue
-        printed = labels_of(line)
-        assert set(printed) == set(row.labels), row.key
-        for code, label in row.labels.items():
+        row = BY_INDEX[line.index]
+        yield f'{row.key} hexadecimal', int(line.hexadecimal, 16), line.index
+        name, unit = re.fullmatch(r'(.*?)(?:\[([^]]*)\])?', line.name).groups('')  # type: ignore[union-attr]
+        number = rf'P(\d\d\d-P)?{line.number}\b.*i' if line.number != '-' else 'I'
+        if line.index == 13 and line.number == '031':
+            number = 'P030-P032.*i'
+        described = re.search(rf'{number}ndex {line.index}: .', row.description)
+        yield f'{row.key} description', True, bool(described)
+        if line.index in SEVERAL:
+            yield f'{row.key} name', SEVERAL[line.index], row.name
+        else:
+            yield f'{row.key} name', plain(NAMES.get(line.index, name)), plain(row.name)
+        if line.index not in NO_UNIT:
+            unit = re.sub(r'[$ _{}]', '', unit)
+            yield f'{row.key} unit', UNITS.get(unit, unit), row.unit
+        writable = 'W' in line.access and line.index not in ONLY_READ
+        yield f'{row.key} access', Access.READ_WRITE if writable else Access.READ, row.access
+        if row.labels:
             # what is reserved has its code beside it, and a frequency its unit
-            label = re.sub(r' \(\d+\)$| kHz$', '', label)
-            text = plain(printed[code].replace('\n', ' '))
-            # the text recognition has taken some capital I for a small l
-            text = text.replace('lxt', 'Ixt').removesuffix('(dependsonS1)').rstrip('/')
-            assert text == plain(label), (row.key, code)
-        checked += 1
-    assert checked == sum(bool(row.labels) for row in FAMILY.values())
+            ours = {
+                code: plain(re.sub(r' \(\d+\)$| kHz$', '', label))
+                for code, label in row.labels.items()
+            }
+            yield f'{row.key} labels', labels_of(line), ours
+        elif line.index not in NO_RANGE:
+            spans = spans_in(meaning_of(line))
+            if line.index in (254, 256, 257, 258):
+                # nothing between -10 and 10, too
+                (low, *_), (_, high, step) = spans
+                spans = [(low, high, step)]
+            steps = [(low, step) for low, _, step in spans if step is not None]
+            yield f'{row.key} steps', steps, list(row.steps)
+            assert spans or row.key.startswith('status.'), row.key
+            ends = (spans[0][0], spans[-1][1]) if spans else (None, None)
+            yield f'{row.key} range', ends, (row.minimum, row.maximum)
 
 
-def test_the_conversion_list_agrees() -> None:
-    text = '\n'.join(manual('M4'))
+def conversion_list_of_movitrac() -> Iterator[Fact]:
+    """The list of the appendix, from indices to P numbers."""
+    text = '\n'.join(manual(4))
     text = text[text.index('Conversion list Index → Parameter:') :]
     triples = re.findall(r'(?<![\d.])(\d+)\t([0-9A-F]+)\t([^\t\n]*)', text)
-    found = {int(index): (int(code, 16), number) for index, code, number in triples}
-    assert set(found) == set(BY_INDEX)
+    yield 'indices', {int(index) for index, _, _ in triples}, set(BY_INDEX)
     numbers: dict[int, set[str]] = {}
     for line in lines():
         numbers.setdefault(line.index, set()).add(line.number)
-    for index, (code, number) in found.items():
-        assert code == index
-        told = set(re.findall(r'\b\d{3}\b', number))
-        if told:
-            assert told <= numbers[index], index
-        else:
-            assert numbers[index] == {'-'}, index
+    for index, (code, number) in {int(one): rest for one, *rest in triples}.items():
+        yield f'index {index}', int(code, 16), index
+        printed = set(re.findall(r'\b\d{3}\b', number)) or {'-'}
+        yield f'numbers of {index}', printed, printed & numbers[index]
 
 
-def test_faults() -> None:
+def faults_of_movitrac() -> Iterator[Fact]:
+    """The faults of the fault memory."""
     text = '\n'.join(line.meaning for line in lines() if line.index in range(8, 13))
     pairs = re.findall(r'(\d+) = ([^=]*?)(?=\s+\d+(?:-86)? =|\n)', text + '\n')
     printed = {int(code): label.strip() for code, label in pairs}
-    named = {code: label for code, label in printed.items() if label != 'No function' and code}
-    listed = {code - 100: row.text for code, row in FAMILY.status_codes.items() if code >= 100}
-    assert named == listed
-
-
+    for code, label in printed.items():
+        ours = FAMILY.status_codes.get(code + 100)
+        listed = label if label != 'No function' and code else None
+        yield f'fault {code}', listed, ours and ours.text
+    listed = {code - 100 for code in FAMILY.status_codes if code >= 100}
+    yield 'faults', listed, listed & set(printed)
