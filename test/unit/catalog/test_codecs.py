@@ -1,8 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
-"""Between bytes and numbers: golden values of every codec, and there and back."""
+"""Between bytes and numbers: golden values of every codec, there and back, and steps."""
 
 from __future__ import annotations
 
@@ -13,7 +12,16 @@ import struct
 from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.catalog import Number, Text, codec_of, load_family, to_bytes, to_words
+from nfo_sinus_driver.catalog import (
+    Address,
+    Number,
+    Parameter,
+    Text,
+    codec_of,
+    load_family,
+    to_bytes,
+    to_words,
+)
 
 #: A codec, a raw number, and its bytes as they go over the bus, written down by hand.
 GOLDEN = [
@@ -67,53 +75,51 @@ def refused(call: object, *arguments: object) -> str:
     return str(refusal.value)
 
 
-@pytest.mark.parametrize(('name', 'raw', 'data'), GOLDEN)
-def test_golden_value(name: str, raw: int | str, data: str) -> None:
-    codec = codec_of(name)
-    assert codec.encode(raw) == bytes.fromhex(data)  # type: ignore[arg-type]
-    assert codec.decode(bytes.fromhex(data)) == raw
-    assert codec.size == len(bytes.fromhex(data))
-    assert codec.name == name
+def test_golden_values() -> None:
+    for name, raw, printed in GOLDEN:
+        codec, data = codec_of(name), bytes.fromhex(printed)
+        found = codec.encode(raw), codec.decode(data), codec.size, codec.name  # type: ignore[arg-type]
+        assert found == (data, raw, len(data), name)
 
 
-@pytest.mark.parametrize('name', NUMBERS)
-@given(data=st.data())
-def test_every_number_there_and_back(name: str, data: st.DataObject) -> None:
-    codec = number(name)
-    raw = data.draw(st.integers(codec.minimum, codec.maximum))
-    assert codec.fits(raw)
-    assert len(codec.encode(raw)) == codec.size
-    assert codec.decode(codec.encode(raw)) == raw
+@given(st.data())
+def test_every_number_there_and_back(data: st.DataObject) -> None:
+    for name in NUMBERS:
+        codec = number(name)
+        raw = data.draw(st.integers(codec.minimum, codec.maximum))
+        assert codec.fits(raw)
+        assert len(codec.encode(raw)) == codec.size
+        assert codec.decode(codec.encode(raw)) == raw
 
 
-@pytest.mark.parametrize('name', NUMBERS)
-@given(data=st.data())
-def test_all_bytes_are_a_number_or_refused(name: str, data: st.DataObject) -> None:
-    codec = number(name)
-    received = data.draw(st.binary(min_size=codec.size, max_size=codec.size))
-    try:
-        raw = codec.decode(received)
-    except ValueError as error:
-        assert str(error).endswith((f'is no {name}', 'are no half-bytes'))
-        assert 'bcd' in name or '_hb' in name
-        return
-    assert codec.fits(raw)
-    # of the bits around a field nothing is known
-    assert '[' in name or codec.encode(raw) == received
+@given(st.binary(min_size=8, max_size=8))
+def test_all_bytes_are_a_number_or_refused(received: bytes) -> None:
+    for name in NUMBERS:
+        codec = number(name)
+        part = received[: codec.size]
+        try:
+            raw = codec.decode(part)
+        except ValueError as error:
+            assert str(error).endswith((f'is no {name}', 'are no half-bytes'))
+            assert 'bcd' in name or '_hb' in name
+            continue
+        assert codec.fits(raw)
+        # of the bits around a field nothing is known
+        assert '[' in name or codec.encode(raw) == part
 
 
-@pytest.mark.parametrize('name', NUMBERS)
-def test_ends(name: str) -> None:
-    codec = number(name)
-    assert codec.signed == (codec.minimum < 0) == name.startswith('s')
-    for end in (codec.minimum, codec.maximum):
-        assert codec.decode(codec.encode(end)) == end
-    for raw in (codec.minimum - 1, codec.maximum + 1):
-        assert not codec.fits(raw)
-        assert refused(codec.encode, raw) == f'{raw} does not fit {name}'
-    for size in {0, 1, 2, 3, 4, 5, 8, 9} - {codec.size}:
-        said = refused(codec.decode, bytes(size))
-        assert said == f'{name} takes {codec.size} bytes, not {size}'
+def test_ends() -> None:
+    for name in NUMBERS:
+        codec = number(name)
+        assert codec.signed == (codec.minimum < 0) == name.startswith('s')
+        for end in (codec.minimum, codec.maximum):
+            assert codec.decode(codec.encode(end)) == end
+        for raw in (codec.minimum - 1, codec.maximum + 1):
+            assert not codec.fits(raw)
+            assert refused(codec.encode, raw) == f'{raw} does not fit {name}'
+        for size in {0, 1, 2, 3, 4, 5, 8, 9} - {codec.size}:
+            said = refused(codec.decode, bytes(size))
+            assert said == f'{name} takes {codec.size} bytes, not {size}'
 
 
 @given(st.binary(min_size=4, max_size=4))
@@ -129,25 +135,11 @@ def test_orders_as_the_standard_library_has_them(data: bytes) -> None:
     assert to_bytes((low, high)) == data
 
 
-def test_two_fields_of_one_number() -> None:
-    data = bytes.fromhex('0B 40')
-    assert number('uint16_be[0:7]').decode(data) == 0x40
-    assert number('uint16_be[8:15]').decode(data) == 11
-    assert number('uint16_be[6:6]').decode(data) == 1
-    joined = (a | b for a, b in zip(
-        number('uint16_be[0:7]').encode(0x40), number('uint16_be[8:15]').encode(11), strict=True
-    ))
-    assert bytes(joined) == data
-
-
-@pytest.mark.parametrize('data', ['F0 02 37 00', '00 0A 00 00', '80 00 00 0F'])
-def test_bytes_that_are_no_digits(data: str) -> None:
-    # nobody knows how a sign stands [C105]
-    said = refused(codec_of('bcd32').decode, bytes.fromhex(data))
-    assert said == f'{data.replace(" ", "").lower()} is no bcd32'
-
-
-def test_bytes_that_are_no_half_bytes() -> None:
+def test_bytes_that_are_no_number() -> None:
+    # how a sign stands is not known [C105]
+    for data in ('F0023700', '000A0000', '8000000F'):
+        said = refused(codec_of('bcd32').decode, bytes.fromhex(data))
+        assert said == f'{data.lower()} is no bcd32'
     said = refused(codec_of('uint16_hb').decode, bytes.fromhex('00 10 00 00'))
     assert said == '00 10 00 00 are no half-bytes'
 
@@ -162,51 +154,126 @@ def test_text_there_and_back(text: str) -> None:
         assert refused(codec.encode, text) == f'{text} does not fit string12'
 
 
-@pytest.mark.parametrize('text', ['too long', 'µ', 'a\0b', 'a '])
-def test_text_that_would_not_come_back(text: str) -> None:
-    assert refused(codec_of('string4').encode, text) == f'{text} does not fit string4'
-
-
 def test_text_as_devices_fill_it_up() -> None:
     codec = codec_of('string8')
     for data in (b'NFO\0\0\0\0\0', b'NFO     ', b'NFO\0junk', b'NFO  \0\0\0'):
         assert codec.decode(data) == 'NFO'
     assert refused(codec.decode, b'NF\xd6 G2  ') == "b'NF\\xd6 G2  ' is no string8"
     assert refused(codec.decode, b'NFO') == 'string8 takes 8 bytes, not 3'
+    # what would not come back
+    for text in ('too long', 'µ', 'a\0b', 'a '):
+        assert refused(codec_of('string4').encode, text) == f'{text} does not fit string4'
 
 
-@pytest.mark.parametrize(
-    'name',
-    [
+def test_name_of_no_codec() -> None:
+    for name in (
         *('', 'int16_be', 'uint16', 'uint8_be', 'uint24_be', 'uint16_bE', 'uint16_be ', 'float32'),
         *('bcd', 'bcd0', 'string0', 'string', 'uint16_be[3]', 'uint16_be[0:16]', 'uint16_be[2:1]'),
         *('sint16_be[0:3]', 'bcd32[0:3]', 'uint16_ws', 'bcd12', 'bcd32_be'),
-    ],
+    ):
+        field = name.partition('[')[2].strip(']').replace(':', ' to ')
+        said = refused(codec_of, name)
+        assert said == f'{name!r} is no codec' or said.endswith(f' has no bits {field}')
+
+
+# --- as a parameter has them: what a drive takes only some values of ------------------------------
+
+
+def made(codec: str = 'bcd32', **changed: object) -> Parameter:
+    """A parameter in packed decimal digits with two decimals, the rest as given."""
+    place = Address('modbus', 'register', 0, None, codec_of(codec), HUNDREDTH, '')
+    plain = replace(
+        load_family('sinus_g2')['control.accel'],
+        key='ramp.up',
+        addresses={'modbus': place},
+        minimum=None,
+        maximum=None,
+    )
+    return replace(plain, **changed)  # type: ignore[arg-type]
+
+
+HUNDREDTH = Fraction(1, 100)
+#: The ramp of a drive that takes fewer values the longer it is.
+STEPS = ((0, '0.05'), (10, '0.5'), (100, '5'), (1000, '10'))
+TAKEN = [
+    Fraction(count, 20)
+    for first, last, step in ((0, 200, 1), (200, 2000, 10), (2000, 20000, 100), (20000, 40001, 200))
+    for count in range(first, last, step)
+]
+RAMP = made(
+    minimum=Fraction(0),
+    maximum=Fraction(2000),
+    steps=tuple((Fraction(start), Fraction(step)) for start, step in STEPS),
 )
-def test_name_of_no_codec(name: str) -> None:
-    field = name.partition('[')[2].strip(']').replace(':', ' to ')
-    said = refused(codec_of, name)
-    assert said == f'{name!r} is no codec' or said.endswith(f' has no bits {field}')
 
 
-# --- as a parameter has them ----------------------------------------------------------------------
+@given(st.sampled_from(TAKEN), st.floats(0, 2000))
+def test_a_set_point_goes_to_the_nearest_step(step: Fraction, value: float) -> None:
+    assert RAMP.decode(RAMP.encode(float(step))) == float(step)
+    nearest = min(abs(value - float(taken)) for taken in TAKEN)
+    kept = RAMP.decode(RAMP.quantise(value))
+    assert isinstance(kept, float)
+    assert Fraction(kept).limit_denominator(100) in TAKEN
+    assert abs(kept - value) <= nearest + 1e-9
 
 
-def test_value_with_two_decimals() -> None:
-    row = load_family('sinus_g2')['control.kp_spd']
-    place = replace(row.addresses['modbus'], codec=codec_of('bcd32'), factor=Fraction(1, 100))
-    row = replace(row, addresses={'modbus': place}, minimum=None)
-    assert row.decode(bytes.fromhex('00 00 27 50')) == 27.5
-    assert row.encode(123456.78) == bytes.fromhex('12 34 56 78')
-    assert row.span() == (0, Fraction('999999.99'))
-    assert refused(row.encode, 0.001).endswith('lies between two steps of the drive, 0 and 0.01')
-    assert refused(row.encode, -1).endswith('is out of range, at least 0')
+def test_what_is_between_two_steps_is_refused_with_both() -> None:
+    for value, below, above in (
+        *((0.01, '0', '0.05'), (3.72, '3.7', '3.75'), (9.96, '9.95', '10'), (10.05, '10', '10.5')),
+        *((99.75, '99.5', '100'), (101, '100', '105'), (1999, '1990', '2000')),
+    ):
+        said = f'ramp.up: {value} lies between two steps of the drive, {below} and {above}'
+        assert refused(RAMP.encode, value) == said
+    assert refused(RAMP.encode, 2001) == 'ramp.up: 2001 is out of range, 0 to 2000 s'
+
+
+def test_what_the_steps_are() -> None:
+    assert (RAMP.step(), made().step()) == (Fraction('0.05'), HUNDREDTH)
+    assert RAMP.shown_steps == '0.05, 0.5 from 10, 5 from 100, 10 from 1000'
+    assert all(map(RAMP.on_step, (0, 0.05, 9.95, 10, 10.5, 2000)))
+    assert not any(map(RAMP.on_step, (-0.05, 0.01, 10.05, 102)))
+    assert made().on_step(0.001)
+    # they need not begin at zero
+    low = Fraction('0.1')
+    gain = made(minimum=low, maximum=Fraction(9), steps=((low, 20 * HUNDREDTH),))
+    assert gain.decode(gain.encode(0.3)) == 0.3
+    assert '0.1 and 0.3' in refused(gain.encode, 0.2)
+
+
+def test_the_value_of_an_enumeration_is_its_code() -> None:
+    for labels, value, code in (
+        ({0: 'Coast', 1: 'Ramp'}, 'Ramp', '00000100'),
+        ({0: 'No', 1: 'Yes'}, True, '00000100'),
+        ({0: 'No', 1: 'Yes'}, False, '00000000'),
+        ({0: 'On', 1: 'Off'}, 'Off', '00000100'),
+        ({0: '50', 3: '104'}, 104, '00000300'),
+    ):
+        row = made(labels=labels)
+        assert row.encode(value) == bytes.fromhex(code)
+        assert row.decode(bytes.fromhex(code)) == value
+        assert type(value) is row.kind
+    ramp, switch = made(labels={0: 'Coast', 1: 'Ramp'}), made(labels={0: 'No', 1: 'Yes'})
+    said = refused(ramp.decode, bytes.fromhex('00000150'))
+    assert said.endswith('has code 1.5, which is none of Coast, Ramp')
+    said = refused(switch.decode, bytes.fromhex('00000200'))
+    assert said.endswith('has code 2, which is none of No, Yes')
+    assert ramp.decode(bytes.fromhex('00000700')) == '7'
+
+
+def test_labels_that_are_numbers_have_a_span_and_a_step() -> None:
+    for family, key, span, step in (
+        ('movitrac31', 'frequency.f_base_1', (50, 120), 1),
+        ('movitrac31', 'control.pulses_per_revolution', (128, 2048), 128),
+        # one of two numbers, with nothing between them [C46]
+        ('sinus_g2', 'pi_reg.reg_amp', (-1, 1), 2),
+    ):
+        row = load_family(family)[key]
+        protocol = next(iter(row.addresses))
+        assert (row.span(protocol), row.step(protocol)) == (span, step), key
 
 
 def test_value_that_is_a_text() -> None:
-    row = load_family('sinus_g2')['fieldbus.nfo_ver']
-    place = replace(row.addresses['modbus'], codec=codec_of('string8'))
-    row = replace(row, addresses={'modbus': place})
+    row = made('string8')
     assert row.kind is str
     assert row.decode(b'4018 A\0\0') == '4018 A'
     assert row.encode('4018 B') == b'4018 B\0\0'
