@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What a MOVITRAC 31 is told, step by step, and what it answers."""
 
 from __future__ import annotations
@@ -58,203 +57,144 @@ def assigned(**changed: Any) -> tuple[tuple[Any, Any], ...]:
     )
 
 
-@pytest.mark.parametrize(
-    ('mode', 'holder'),
-    [
-        (STANDARD, Holder.LOCAL),
-        ('Remote setpoint', Holder.LOCAL),
-        (REMOTE, Holder.BUS),
-        (FIELDBUS, Holder.LOCAL),
-        ('9', Holder.UNKNOWN),
-    ],
-)
-def test_who_has_control(mode: str, holder: Holder) -> None:
-    assert play(method.holder(), (Read(MODE), mode)) is holder
-    assert play(method.in_control(), (Read(MODE), mode)) is (holder is Holder.BUS)
-
-
-def test_modes_are_those_of_the_table() -> None:
+def test_who_has_control() -> None:
+    holders = {
+        STANDARD: Holder.LOCAL,
+        'Remote setpoint': Holder.LOCAL,
+        REMOTE: Holder.BUS,
+        FIELDBUS: Holder.LOCAL,
+    }
     assert set(MOVITRAC.profile.holders) == set(MOVITRAC[MODE].labels.values())
+    for mode, holder in {**holders, '9': Holder.UNKNOWN}.items():
+        assert play(method.holder(), (Read(MODE), mode)) is holder
+        assert play(method.in_control(), (Read(MODE), mode)) is (holder is Holder.BUS)
+
+
+def test_there_is_one_control_method() -> None:
+    assert list(MOVITRAC.profile.methods) == ['function_bits']
+    assert play(MOVITRAC.profile.in_charge(None)) == 'function_bits'
 
 
 # --- before an enable -----------------------------------------------------------------------------
 
 
-def test_it_can_be_started() -> None:
-    closed = (Read(TERMINALS), CLOSED_43)
-    mine = (Read(MODE), REMOTE)
-    play(method.require_startable(), *NOTHING_ELSE, *assigned(), closed, mine, *STILL)
-
-
-@pytest.mark.parametrize(
-    ('at', 'found', 'reason'),
-    [
-        (0, 'Positioning control', 'set P770 to V/f mode or Speed control'),
-        (1, True, 'set P760 to No'),
-        (2, True, 'set P880 to No'),
-        (3, True, 'set P870 to No at the keypad'),
-    ],
-)
-def test_what_drives_the_motor_by_itself(at: int, found: Any, reason: str) -> None:
-    script = [*NOTHING_ELSE[:at], (NOTHING_ELSE[at][0], found)]
-    with pytest.raises(NotPossible, match=reason):
+def startable(*script: tuple[Any, Any], refused: str = '') -> None:
+    """Whether it may be started, from what it answers; or why not."""
+    with pytest.raises(NotPossible, match=refused) if refused else contextlib.nullcontext():
         play(method.require_startable(), *script)
 
 
-@pytest.mark.parametrize(
-    ('closed', 'changed', 'reason'),
-    [
+def terminals(closed: int = CLOSED_43, **changed: Any) -> tuple[tuple[Any, Any], ...]:
+    """What is read before an enable, the functions of the terminals and which are closed last."""
+    return (*NOTHING_ELSE, *assigned(**changed), (Read(TERMINALS), closed))
+
+
+def test_it_can_be_started() -> None:
+    mine = (Read(MODE), REMOTE)
+    startable(*terminals(), mine, *STILL)
+    # a terminal that is for something else may be closed or open
+    other = {'t42': 'Ramp selection', 't43': 'No function', 't48': '/External fault'}
+    startable(*terminals(1 << 1, **other), mine, *STILL)
+
+
+def test_what_drives_the_motor_by_itself() -> None:
+    for at, (found, reason) in enumerate((
+        ('Positioning control', 'set P770 to V/f mode or Speed control'),
+        (True, 'set P760 to No'),
+        (True, 'set P880 to No'),
+        (True, 'set P870 to No at the keypad'),
+    )):
+        startable(*NOTHING_ELSE[:at], (NOTHING_ELSE[at][0], found), refused=reason)
+
+
+def test_terminals_are_looked_at_first() -> None:
+    inhibit = '/Controller inhibit'
+    for closed, changed, reason in (
         (CLOSED_43 | 1 << 0, {}, r'terminal 41 \(CW/Stop\) is closed'),
         (CLOSED_43 | 1 << 1, {}, r'terminal 42 \(CCW/Stop\) is closed'),
         (CLOSED_43 | 1 << 18, {'t54': 'CW/Stop'}, r'terminal 54 \(CW/Stop\) is closed'),
         (0, {}, r'terminal 43 \(Enable/Stop\) is open'),
         (CLOSED_43, {'t47': 'Enable/Stop'}, r'terminal 47 \(Enable/Stop\) is open'),
-        (CLOSED_43, {'t47': '/Controller inhibit'}, r'terminal 47 \(/Controller inhibit\) is open'),
-    ],
-)
-def test_terminals_are_looked_at_first(closed: int, changed: dict[str, Any], reason: str) -> None:
-    script = (*NOTHING_ELSE, *assigned(**changed), (Read(TERMINALS), closed))
-    with pytest.raises(NotPossible, match=reason):
-        play(method.require_startable(), *script)
+        (CLOSED_43, {'t47': inhibit}, rf'terminal 47 \({inhibit}\) is open'),
+    ):
+        startable(*terminals(closed, **changed), refused=reason)
 
 
-def test_a_terminal_that_is_for_something_else_may_be_closed_or_open() -> None:
-    other = assigned(t42='Ramp selection', t43='No function', t48='/External fault')
-    closed, mine = (Read(TERMINALS), 1 << 1), (Read(MODE), REMOTE)
-    play(method.require_startable(), *NOTHING_ELSE, *other, closed, mine, *STILL)
+def test_a_motor_that_others_drive_is_left_alone() -> None:
+    for mode in (STANDARD, FIELDBUS):
+        script = (*terminals(), (Read(MODE), mode))
+        reason = 'driven by a fieldbus or by terminals'
+        startable(*script, (Read(FREQUENCY), 12.5), refused=reason)
+        startable(*script, (Read(FREQUENCY), 0.0), *STILL)
 
 
-@pytest.mark.parametrize('mode', [STANDARD, FIELDBUS])
-def test_a_motor_that_others_drive_is_left_alone(mode: str) -> None:
-    script = [*NOTHING_ELSE, *assigned(), (Read(TERMINALS), CLOSED_43), (Read(MODE), mode)]
-    with pytest.raises(NotPossible, match='driven by a fieldbus or by terminals'):
-        play(method.require_startable(), *script, (Read(FREQUENCY), 12.5))
-    play(method.require_startable(), *script, (Read(FREQUENCY), 0.0), *STILL)
-
-
-@pytest.mark.parametrize(
-    ('in_set', 'pattern', 'least'),
-    [
-        (1, 'V/f pattern 1', 'frequency.f_min_1'),
-        (2, 'V/f pattern 2', 'frequency.f_min_2'),
-        (1, 'V/f pattern 3', 'frequency.f_min_3'),
-        (2, 'V/f pattern 3', 'frequency.f_min_3'),
-    ],
-)
-def test_a_motor_that_would_turn_at_set_point_0(in_set: int, pattern: str, least: str) -> None:
-    script = [*NOTHING_ELSE, *assigned(), (Read(TERMINALS), CLOSED_43), (Read(MODE), REMOTE)]
-    script += [(Read(WORD), 0x00010010 | (in_set - 1) << 3)]
-    script += [(Read(f'frequency.vf_pattern_{in_set}'), pattern), (Read(least), 2.0)]
-    with pytest.raises(NotPossible, match=rf'set {least} to 0 \(it is 2 Hz\)'):
-        play(method.require_startable(), *script)
+def test_a_motor_that_would_turn_at_set_point_0() -> None:
+    for in_set, pattern, least in ((1, 1, 1), (2, 2, 2), (1, 3, 3), (2, 3, 3)):
+        key = f'frequency.f_min_{least}'
+        startable(
+            *terminals(),
+            (Read(MODE), REMOTE),
+            (Read(WORD), 0x00010010 | (in_set - 1) << 3),
+            (Read(f'frequency.vf_pattern_{in_set}'), f'V/f pattern {pattern}'),
+            (Read(key), 2.0),
+            refused=rf'set {key} to 0 \(it is 2 Hz\)',
+        )
 
 
 # --- control --------------------------------------------------------------------------------------
 
 
+#: What is written under control, again, for it may have been ignored before [C110].
+CLEARED = ((Write(BITS, 0, head=True), None), *SIZE_0, (Read(BITS), 0))
+TO_REMOTE = Write(MODE, REMOTE, stored=True)
+
+
+def begun(bits: Any, *size: tuple[Any, Any], early: Refusal | None = None) -> Any:
+    """Control is not with the line: bits and set-point are cleared and read first."""
+    cleared = (Write(BITS, 0), early), (Write(SIZE, 0.0), early)
+    return (Read(MODE), STANDARD), *cleared, (Read(BITS), bits), *size
+
+
 def test_control_is_taken_where_the_line_has_it() -> None:
-    play(
-        method.take_control(),
-        (Read(MODE), REMOTE),
-        (Write(BITS, 0, head=True), None),
-        *SIZE_0,
-        (Read(BITS), 0),
-    )
+    play(method.take_control(), (Read(MODE), REMOTE), *CLEARED)
 
 
 @pytest.mark.parametrize('early', [None, REFUSED])
 def test_control_is_stored_once_nothing_is_left_behind(early: Refusal | None) -> None:
-    play(
-        method.take_control(),
-        (Read(MODE), STANDARD),
-        (Write(BITS, 0), early),
-        (Write(SIZE, 0.0), early),
-        (Read(BITS), 0),
-        (Write(MODE, REMOTE, stored=True), None),
-        # written again, for they may have been ignored [C110]
-        (Write(BITS, 0, head=True), None),
-        *SIZE_0,
-        (Read(BITS), 0),
-    )
+    play(method.take_control(), *begun(0, early=early), (TO_REMOTE, None), *CLEARED)
 
 
 @pytest.mark.parametrize('early', [None, REFUSED])
 def test_a_set_point_that_is_left_behind_turns_nothing(early: Refusal | None) -> None:
     # with Remote setpoint it can be changed, and the bits do not count yet
-    begun = (
-        (Read(MODE), STANDARD),
-        (Write(BITS, 0), early),
-        (Write(SIZE, 0.0), early),
-        (Read(BITS), FORWARD),
-        (Read(SIZE), 20.0),
+    script = (
+        *begun(FORWARD, (Read(SIZE), 20.0), early=early),
         (Write(MODE, 'Remote setpoint', stored=True), None),
     )
-    play(
-        method.take_control(),
-        *begun,
-        *SIZE_0,
-        (Write(MODE, REMOTE, stored=True), None),
-        (Write(BITS, 0, head=True), None),
-        *SIZE_0,
-        (Read(BITS), 0),
-    )
+    play(method.take_control(), *script, *SIZE_0, (TO_REMOTE, None), *CLEARED)
     with pytest.raises(NotPossible, match='keeps a set-point of 20'):
-        play(
-            method.take_control(),
-            *begun,
-            *((Write(SIZE, 0.0), None), (Read(SIZE), 20.0)),
-        )
+        play(method.take_control(), *script, (Write(SIZE, 0.0), None), (Read(SIZE), 20.0))
 
 
-@pytest.mark.parametrize(
-    ('bits', 'size'), [(ENABLE, 20.0), (FORWARD, 0.0), (REFUSED, 20.0), (FORWARD, REFUSED)]
-)
-def test_what_is_left_behind_may_turn_nothing(bits: Any, size: Any) -> None:
-    asked = bits is not REFUSED and bits & FORWARD != ENABLE
-    play(
-        method.take_control(),
-        (Read(MODE), STANDARD),
-        (Write(BITS, 0), None),
-        (Write(SIZE, 0.0), None),
-        (Read(BITS), bits),
-        *(((Read(SIZE), size),) if asked else ()),
-        (Write(MODE, REMOTE, stored=True), None),
-        (Write(BITS, 0, head=True), None),
-        *SIZE_0,
-        (Read(BITS), 0),
-    )
+def test_what_is_left_behind_may_turn_nothing() -> None:
+    for bits, *size in (
+        (ENABLE,),
+        (REFUSED,),
+        (FORWARD, (Read(SIZE), 0.0)),
+        (FORWARD, (Read(SIZE), REFUSED)),
+    ):
+        play(method.take_control(), *begun(bits, *size), (TO_REMOTE, None), *CLEARED)
 
 
 def test_control_is_not_taken_from_a_drive_that_keeps_a_command() -> None:
+    cleared = (Read(MODE), REMOTE), (Write(BITS, 0, head=True), None)
     with pytest.raises(NotPossible, match='keeps function bits 0005h'):
-        play(
-            method.take_control(),
-            (Read(MODE), REMOTE),
-            (Write(BITS, 0, head=True), None),
-            *SIZE_0,
-            (Read(BITS), FORWARD),
-        )
+        play(method.take_control(), *cleared, *SIZE_0, (Read(BITS), FORWARD))
+    keeps = (Write(SIZE, 0.0), None), (Read(SIZE), 12.5), (Read(BITS), 0)
     with pytest.raises(NotPossible, match=r'keeps a set-point of 12\.5'):
-        play(
-            method.take_control(),
-            (Read(MODE), REMOTE),
-            (Write(BITS, 0, head=True), None),
-            (Write(SIZE, 0.0), None),
-            (Read(SIZE), 12.5),
-            (Read(BITS), 0),
-        )
-
-
-def test_a_drive_that_refuses_remote_control() -> None:
+        play(method.take_control(), *cleared, *keeps)
     with pytest.raises(Refusal):
-        play(
-            method.take_control(),
-            (Read(MODE), STANDARD),
-            (Write(BITS, 0), None),
-            (Write(SIZE, 0.0), None),
-            (Read(BITS), 0),
-            (Write(MODE, REMOTE, stored=True), REFUSED),
-        )
+        play(method.take_control(), *begun(0), (TO_REMOTE, REFUSED))
 
 
 def test_set_point_0_leaves_the_bits_alone() -> None:
@@ -267,32 +207,22 @@ def test_it_runs_forward_at_first() -> None:
     assert target.writes(0.0)[-2:] == (Write(BITS, FORWARD), Write(SIZE, 0.0))
 
 
-@pytest.mark.parametrize(
-    ('stands', 'left'),
-    [
+def test_a_stop_takes_the_direction_away_and_gives_no_enable() -> None:
+    for stands, left in (
         (FORWARD, ENABLE),
         (BACKWARD, ENABLE),
         (0, 0),
         (INHIBIT, INHIBIT),
         (FORWARD | RESET | 1 << 3 | 1 << 12, ENABLE),
-    ],
-)
-def test_a_stop_takes_the_direction_away_and_gives_no_enable(stands: int, left: int) -> None:
-    play(
-        method.stop('Freque'),
-        (Read(BITS, once=True), stands),
-        (Write(BITS, left, once=True), None),
-        (Write(SIZE, 0.0, once=True), None),
-    )
-
-
-def test_a_stop_keeps_nothing_of_bits_that_it_cannot_read() -> None:
-    play(
-        method.stop('Freque'),
-        (Read(BITS, once=True), REFUSED),
-        (Write(BITS, 0, once=True), None),
-        (Write(SIZE, 0.0, once=True), REFUSED),
-    )
+        # it keeps nothing of bits that it cannot read
+        (REFUSED, 0),
+    ):
+        play(
+            method.stop('Freque'),
+            (Read(BITS, once=True), stands),
+            (Write(BITS, left, once=True), None),
+            (Write(SIZE, 0.0, once=True), REFUSED if stands is REFUSED else None),
+        )
 
 
 def test_a_stop_that_is_refused() -> None:
@@ -315,19 +245,15 @@ def test_set_point_0_is_written_although_the_bits_are_refused() -> None:
     assert Write(SIZE, 0.0, once=True) in asked
 
 
-@pytest.mark.parametrize('late', [None, REFUSED])
-def test_a_quick_stop_inhibits_the_controller(late: Refusal | None) -> None:
+def test_a_quick_stop_inhibits_the_controller() -> None:
     assert method.coasts
-    play(method.quick_stop('Freque'), (Write(BITS, INHIBIT), None), (Write(SIZE, 0.0), late))
+    for late in (None, REFUSED):
+        play(method.quick_stop('Freque'), (Write(BITS, INHIBIT), None), (Write(SIZE, 0.0), late))
 
 
 def test_release_removes_the_bits_and_never_writes_p841() -> None:
-    play(
-        method.release(),
-        (Read(MODE), REMOTE),
-        (Write(BITS, 0), None),
-        (Write(SIZE, 0.0), None),
-    )
+    cleared = (Write(BITS, 0), None), (Write(SIZE, 0.0), None)
+    play(method.release(), (Read(MODE), REMOTE), *cleared)
     play(method.release(), (Read(MODE), STANDARD))
     assert 'P841' in method.keeps_control
 
@@ -335,73 +261,38 @@ def test_release_removes_the_bits_and_never_writes_p841() -> None:
 # --- faults ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ('bits', 'size', 'removed'),
-    [
+def test_what_a_fault_lets_go_of() -> None:
+    kept = ((Write(SIZE, 0.0), REFUSED),)
+    for bits, size, removed in (
         (None, SIZE_0, Removal.COMMAND),
-        (None, ((Write(SIZE, 0.0), REFUSED),), Removal.COMMAND),
+        (None, kept, Removal.COMMAND),
         (REFUSED, SIZE_0, Removal.SETPOINT),
-        (REFUSED, ((Write(SIZE, 0.0), REFUSED),), Removal.NOTHING),
-    ],
-)
-def test_what_a_fault_lets_go_of(bits: Any, size: Any, removed: Removal) -> None:
-    assert play(method.remove('Freque'), (Write(BITS, 0), bits), *size) is removed
+        (REFUSED, kept, Removal.NOTHING),
+    ):
+        assert play(method.remove('Freque'), (Write(BITS, 0), bits), *size) is removed
+
+
+def acknowledged(*script: tuple[Any, Any], closed: int = CLOSED_43) -> object:
+    """Acknowledge a time-out of the line, from what the drive answers."""
+    looked = *assigned(), (Read(TERMINALS), closed)
+    return play(method.acknowledge(TIMED_OUT, 'Freque'), *looked, *script)
 
 
 def test_a_fault_is_acknowledged_by_an_edge_without_run_bits() -> None:
-    told = play(
-        method.acknowledge(TIMED_OUT, 'Freque'),
-        *assigned(),
-        (Read(TERMINALS), CLOSED_43),
-        (Write(BITS, 0), None),
-        *SIZE_0,
-        (Write(BITS, RESET), None),
-        (Write(BITS, 0), None),
-        (Read(MODE), 'Remote control'),
-    )
-    assert told == ''
+    edge = (Write(BITS, 0), None), *SIZE_0, (Write(BITS, RESET), None), (Write(BITS, 0), None)
+    assert acknowledged(*edge, (Read(MODE), REMOTE)) == ''
+    elsewhere = (*edge, (Read(MODE), STANDARD))
+    acknowledged(*elsewhere, (Read(WORD), 0x00010000))
+    with pytest.raises(NotPossible, match='P841 is not Remote control'):
+        acknowledged(*elsewhere, (Read(WORD), 0x2D010000))
 
 
-@pytest.mark.parametrize('word', [0x2D010000, 0x00010000])
-def test_a_reset_that_the_drive_ignores_is_told(word: int) -> None:
-    ignored = pytest.raises(NotPossible, match='P841 is not Remote control')
-    with ignored if word >> 24 else contextlib.nullcontext():
-        play(
-            method.acknowledge(TIMED_OUT, 'Freque'),
-            *assigned(),
-            (Read(TERMINALS), CLOSED_43),
-            (Write(BITS, 0), None),
-            *SIZE_0,
-            (Write(BITS, RESET), None),
-            (Write(BITS, 0), None),
-            (Read(MODE), 'Standard'),
-            (Read(WORD), word),
-        )
-
-
-def test_no_fault_is_acknowledged_where_a_terminal_would_start_the_motor() -> None:
+def test_no_fault_is_acknowledged_where_the_motor_would_start() -> None:
     with pytest.raises(NotPossible, match='terminal 41'):
-        play(
-            method.acknowledge(TIMED_OUT, 'Freque'),
-            *assigned(),
-            (Read(TERMINALS), CLOSED_43 | 1),
-        )
-
-
-def test_no_fault_is_acknowledged_while_run_bits_stand() -> None:
+        acknowledged(closed=CLOSED_43 | 1)
+    # while run bits stand
     with pytest.raises(NotPossible, match='reset it at the keypad or by a terminal'):
-        play(
-            method.acknowledge(TIMED_OUT, 'Freque'),
-            *assigned(),
-            (Read(TERMINALS), CLOSED_43),
-            (Write(BITS, 0), REFUSED),
-            *SIZE_0,
-        )
-
-
-def test_there_is_one_control_method() -> None:
-    assert list(MOVITRAC.profile.methods) == ['function_bits']
-    assert play(MOVITRAC.profile.in_charge(None)) == 'function_bits'
+        acknowledged((Write(BITS, 0), REFUSED), *SIZE_0)
 
 
 # --- set-points -----------------------------------------------------------------------------------
@@ -419,29 +310,22 @@ def carried_out(value: float, standing: dict[str, Any]) -> list[Write]:
         standing[due[0].key] = due[0].value
 
 
-@pytest.mark.parametrize(
-    ('bits', 'size', 'value', 'written'),
-    [
-        (FORWARD, 0.0, 20.0, [(SIZE, 20.0)]),
-        (FORWARD, 20.0, 30.0, [(SIZE, 30.0)]),
-        (FORWARD, 20.0, 0.0, [(SIZE, 0.0)]),
-        (FORWARD, 20.0, -30.0, [(SIZE, 0.0), (BITS, BACKWARD), (SIZE, 30.0)]),
-        (FORWARD, 0.0, -30.0, [(BITS, BACKWARD), (SIZE, 30.0)]),
-        (BACKWARD, 30.0, -20.0, [(SIZE, 20.0)]),
+def test_a_set_point_goes_through_zero() -> None:
+    for bits, size, value, *written in (
+        (FORWARD, 0.0, 20.0, (SIZE, 20.0)),
+        (FORWARD, 20.0, 30.0, (SIZE, 30.0)),
+        (FORWARD, 20.0, 0.0, (SIZE, 0.0)),
+        (FORWARD, 20.0, -30.0, (SIZE, 0.0), (BITS, BACKWARD), (SIZE, 30.0)),
+        (FORWARD, 0.0, -30.0, (BITS, BACKWARD), (SIZE, 30.0)),
+        (BACKWARD, 30.0, -20.0, (SIZE, 20.0)),
         # the direction stays: no way through the other one
-        (BACKWARD, 30.0, 0.0, [(SIZE, 0.0)]),
-        (BACKWARD, 0.0, 0.0, []),
-        (BACKWARD, 30.0, 20.0, [(SIZE, 0.0), (BITS, FORWARD), (SIZE, 20.0)]),
-    ],
-)
-def test_a_set_point_goes_through_zero(
-    bits: int, size: float, value: float, written: list[tuple[str, Any]]
-) -> None:
-    done = carried_out(value, {BITS: bits, SIZE: size})
-    assert [(write.key, write.value) for write in done] == written
-
-
-def test_where_nobody_knows_what_stands_the_size_is_0_first() -> None:
+        (BACKWARD, 30.0, 0.0, (SIZE, 0.0)),
+        (BACKWARD, 0.0, 0.0),
+        (BACKWARD, 30.0, 20.0, (SIZE, 0.0), (BITS, FORWARD), (SIZE, 20.0)),
+    ):
+        done = carried_out(value, {BITS: bits, SIZE: size})
+        assert [(write.key, write.value) for write in done] == written
+    # where it is not known what stands, the size is 0 first
     done = carried_out(-12.0, {})
     assert [(w.key, w.value) for w in done] == [(SIZE, 0.0), (BITS, BACKWARD), (SIZE, 12.0)]
 
@@ -470,44 +354,36 @@ def test_a_set_point_is_rounded_to_the_steps_of_the_drive() -> None:
     assert target.most == 400
 
 
-@pytest.mark.parametrize(
-    ('word', 'setting', 'pattern', 'base', 'nominal'),
-    [
-        (0x00010010, 'frequency.vf_pattern_1', 'V/f pattern 1', ('frequency.f_base_1', '50'), 50.0),
-        (0x00010018, 'frequency.vf_pattern_2', 'V/f pattern 3', ('frequency.f_base_3', 87.0), 87.0),
-    ],
-)
-def test_nominal_is_the_base_frequency_of_the_pattern_in_use(
-    word: int, setting: str, pattern: str, base: tuple[str, Any], nominal: float
-) -> None:
-    key, value = base
-    steps = ((Read(WORD), word), (Read(setting), pattern), (Read(key), value))
-    assert play(target.read_nominal(MOVITRAC.__contains__), *steps) == nominal
+def test_nominal_is_the_base_frequency_of_the_pattern_in_use() -> None:
+    for word, in_set, pattern, base, nominal in (
+        (0x00010010, 1, 1, '50', 50.0), (0x00010018, 2, 3, 87.0, 87.0)
+    ):
+        steps = (
+            (Read(WORD), word),
+            (Read(f'frequency.vf_pattern_{in_set}'), f'V/f pattern {pattern}'),
+            (Read(f'frequency.f_base_{pattern}'), base),
+        )
+        assert play(target.read_nominal(MOVITRAC.__contains__), *steps) == nominal
 
 
 # --- what the tables have of it -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ('key', 'labels'),
-    [
+def test_labels_that_are_spoken_of_exist() -> None:
+    for key, labels in (
         (MODE, {STANDARD, REMOTE, FIELDBUS}),
         ('control.operating_mode', {'Positioning control', 'V/f mode', 'Speed control'}),
         ('terminal.input_42', {'CW/Stop', 'CCW/Stop', 'Enable/Stop', '/Controller inhibit'}),
         ('frequency.vf_pattern_1', {'V/f pattern 1', 'V/f pattern 3'}),
         ('frequency.vf_pattern_2', {'V/f pattern 2', 'V/f pattern 3'}),
-    ],
-)
-def test_labels_that_are_spoken_of_exist(key: str, labels: set[str]) -> None:
-    assert labels <= set(MOVITRAC[key].labels.values())
+    ):
+        assert labels <= set(MOVITRAC[key].labels.values()), key
 
 
-@pytest.mark.parametrize('number', [10, 12, 13])
-@pytest.mark.parametrize('fault', [0, 45])
-def test_a_motor_that_stands_is_not_driven(number: int, fault: int) -> None:
-    # with the enable kept it may show a normal stop for ever
-    word = fault << 24 | number << 16
-    status = InverterStatus(0.0, word, words.code_of(word), MOVITRAC)
-    assert replace(status, frequency=3.0).driven
-    assert replace(status, frequency=math.nan).driven
-    assert not replace(status, frequency=0.0).driven
+def test_a_motor_that_stands_is_not_driven() -> None:
+    # with the enable kept it may show a normal stop without end
+    for word in (number << 16 | fault << 24 for number in (10, 12, 13) for fault in (0, 45)):
+        status = InverterStatus(0.0, word, words.code_of(word), MOVITRAC)
+        assert replace(status, frequency=3.0).driven
+        assert replace(status, frequency=math.nan).driven
+        assert not replace(status, frequency=0.0).driven

@@ -1,12 +1,9 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What the G2 is told, step by step, whatever it answers."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import pytest
 from support.steps import REFUSED, Wait, play, status
@@ -54,17 +51,17 @@ ZEROED = ((zero(), None), (Read('status.frq_set'), 0.0))
 KEPT = ((zero(), None), (Read('status.frq_set'), 5.0))
 
 
+def _method(name: str, reference: str, classic: bool) -> ControlMethod:
+    protocol = 'classic' if classic else 'modbus'
+    return G2.profile.methods[name](reference, lambda key: protocol in G2[key].addresses)
+
+
 def scmd(reference: str = 'fieldbus', *, classic: bool = False) -> ControlMethod:
     return _method('mode_scmd', reference, classic)
 
 
 def control(reference: str = 'fieldbus', *, classic: bool = False) -> ControlMethod:
     return _method('drive_control', reference, classic)
-
-
-def _method(name: str, reference: str, classic: bool) -> ControlMethod:
-    protocol = 'classic' if classic else 'modbus'
-    return G2.profile.methods[name](reference, lambda key: protocol in G2[key].addresses)
 
 
 def change(clear: int, add: int = 0, *, once: bool = True) -> Write:
@@ -75,59 +72,40 @@ def change(clear: int, add: int = 0, *, once: bool = True) -> Write:
 # --- MODE and SCMD --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ('mode', 'holder'),
-    [
+def test_who_has_control() -> None:
+    for mode, holder in (
         (INHIBIT, Holder.INHIBITED),
         (STOP, Holder.NOBODY),
         (EXT, Holder.LOCAL),
         (BUS, Holder.BUS),
         (9, Holder.UNKNOWN),
-    ],
-)
-def test_who_has_control(mode: int, holder: Holder) -> None:
-    for method in (scmd(), control()):
-        assert play(method.holder(), (Read(MODE), mode)) is holder
-    assert play(scmd().in_control(), (Read(MODE), mode)) is (mode == BUS)
+    ):
+        for method in (scmd(), control()):
+            assert play(method.holder(), (Read(MODE), mode)) is holder
+        assert play(scmd().in_control(), (Read(MODE), mode)) is (mode == BUS)
 
 
 def test_control_is_taken_and_the_stop_is_the_next_frame() -> None:
-    first = Write(SCMD, 0, head=True)
-    play(scmd().take_control(), (Read(MODE), STOP), (Write(MODE, BUS), None), (first, None))
-    play(scmd().take_control(), (Read(MODE), EXT), (Write(MODE, BUS), None), (first, None))
+    first, taken = Write(SCMD, 0, head=True), (Write(MODE, BUS), None)
+    for mode in (STOP, EXT):
+        play(scmd().take_control(), (Read(MODE), mode), taken, (first, None))
     play(scmd().take_control(), (Read(MODE), BUS), (first, None))
-
-
-def test_a_stop_that_comes_too_soon_is_given_again_under_control() -> None:
-    first = Write(SCMD, 0, head=True)
-    reached = Wait(status(from_bus=True), not_by=[status()])
-    play(
-        scmd().take_control(),
-        (Read(MODE), STOP),
-        (Write(MODE, BUS), None),
-        (first, REFUSED),
-        (reached, None),
-        (first, None),
-    )
-
-
-def test_control_that_is_refused_is_not_followed_by_anything() -> None:
+    # one that comes too soon is given again under control
+    reached = Wait(status(from_bus=True), not_by=[status()]), None
+    play(scmd().take_control(), (Read(MODE), STOP), taken, (first, REFUSED), reached, (first, None))
+    # control that is refused is not followed by anything
     with pytest.raises(Refusal):
         play(scmd().take_control(), (Read(MODE), STOP), (Write(MODE, BUS), REFUSED))
+    for method in (scmd(), control()):
+        with pytest.raises(NotPossible, match='MODE is Inhibit'):
+            play(method.take_control(), (Read(MODE), INHIBIT))
 
 
-@pytest.mark.parametrize('method', [scmd(), control()])
-def test_nobody_takes_control_under_inhibit(method: ControlMethod) -> None:
-    with pytest.raises(NotPossible, match='MODE is Inhibit'):
-        play(method.take_control(), (Read(MODE), INHIBIT))
-
-
-@pytest.mark.parametrize(
-    ('reference', 'command'),
-    [('fieldbus', 0x101), ('terminal', 0x81), ('op_mode', 0x41), ('fix7_reverse', 0x3D)],
-)
-def test_the_run_command_says_where_the_reference_comes_from(reference: str, command: int) -> None:
-    play(scmd(reference).run(), (Write(SCMD, command, once=True), None))
+def test_the_run_command_says_where_the_reference_comes_from() -> None:
+    for reference, command in (
+        *(('fieldbus', 0x101), ('terminal', 0x81), ('op_mode', 0x41), ('fix7_reverse', 0x3D)),
+    ):
+        play(scmd(reference).run(), (Write(SCMD, command, once=True), None))
 
 
 def test_stop() -> None:
@@ -140,17 +118,13 @@ def test_stop() -> None:
     play(scmd().stop('Freque'), (stop, None), (to_zero, REFUSED))
 
 
-@pytest.mark.parametrize('mode', [BUS, INHIBIT, REFUSED])
-def test_a_refused_stop_is_told_where_the_bus_may_have_control(mode: Any) -> None:
+def test_a_refused_stop_is_told_where_the_bus_may_have_control() -> None:
     first = Refusal('the first')
-    with pytest.raises(Refusal) as told:
-        play(
-            scmd().stop('Freque'),
-            (Write(SCMD, 0, once=True), first),
-            (Read(MODE), mode),
-            (zero(once=True), None),
-        )
-    assert told.value is first
+    refused, to_zero = (Write(SCMD, 0, once=True), first), (zero(once=True), None)
+    for mode in (BUS, INHIBIT, REFUSED):
+        with pytest.raises(Refusal) as told:
+            play(scmd().stop('Freque'), refused, (Read(MODE), mode), to_zero)
+        assert told.value is first
 
 
 def test_quick_stop_gives_control_back() -> None:
@@ -168,38 +142,33 @@ def test_control_is_given_back_only_where_it_is_ours() -> None:
     play(control().release(), (Read(STATUS), 0))
 
 
-@pytest.mark.parametrize(
-    ('command', 'setpoint', 'mode', 'removed'),
-    [
-        (None, ZEROED, ((TO_NOBODY, None), NOT_IN_CONTROL), Removal.COMMAND),
-        (None, ((zero(), REFUSED),), ((TO_NOBODY, REFUSED),), Removal.COMMAND),
-        (REFUSED, KEPT, ((TO_NOBODY, None), NOT_IN_CONTROL), Removal.COMMAND),
-        (REFUSED, ZEROED, ((TO_NOBODY, None), IN_CONTROL), Removal.SETPOINT),
-        (REFUSED, ZEROED, ((TO_NOBODY, REFUSED),), Removal.SETPOINT),
-        (REFUSED, KEPT, ((TO_NOBODY, REFUSED),), Removal.NOTHING),
-        (REFUSED, ((zero(), REFUSED),), ((TO_NOBODY, REFUSED),), Removal.NOTHING),
-    ],
-)
-def test_what_is_removed(command: Any, setpoint: Any, mode: Any, removed: Removal) -> None:
-    assert play(scmd().remove('Freque'), (SCMD_STOP, command), *setpoint, *mode) is removed
+def test_what_is_removed() -> None:
+    refused, given_back = ((TO_NOBODY, REFUSED),), (TO_NOBODY, None)
+    for command, setpoint, mode, removed in (
+        (None, ZEROED, (given_back, NOT_IN_CONTROL), Removal.COMMAND),
+        (None, ((zero(), REFUSED),), refused, Removal.COMMAND),
+        (REFUSED, KEPT, (given_back, NOT_IN_CONTROL), Removal.COMMAND),
+        (REFUSED, ZEROED, (given_back, IN_CONTROL), Removal.SETPOINT),
+        (REFUSED, ZEROED, refused, Removal.SETPOINT),
+        (REFUSED, KEPT, refused, Removal.NOTHING),
+        (REFUSED, ((zero(), REFUSED),), refused, Removal.NOTHING),
+    ):
+        assert play(scmd().remove('Freque'), (SCMD_STOP, command), *setpoint, *mode) is removed
 
 
 NOTHING_REMOVED = ((SCMD_STOP, REFUSED), (zero(), REFUSED), (TO_NOBODY, REFUSED))
 COMMAND_REMOVED = ((SCMD_STOP, None), *ZEROED, (TO_NOBODY, None), NOT_IN_CONTROL)
 
 
-@pytest.mark.parametrize(
-    'script',
-    [
+def test_a_fault_is_acknowledged_by_reading() -> None:
+    for script in (
         (NOT_IN_CONTROL, (Acknowledge(ACK), 5)),
         (IN_CONTROL, *COMMAND_REMOVED, (Acknowledge(ACK), 5)),
         # what releases the motor soonest is the very next frame
         (IN_CONTROL, *NOTHING_REMOVED, (AcknowledgeThenWrite(ACK, TO_NOBODY), None)),
         (IN_CONTROL, *NOTHING_REMOVED, (AcknowledgeThenWrite(ACK, TO_NOBODY), REFUSED)),
-    ],
-)
-def test_a_fault_is_acknowledged_by_reading(script: Any) -> None:
-    assert play(scmd().acknowledge(OVERLOAD, 'Freque'), *script) == ''
+    ):
+        assert play(scmd().acknowledge(OVERLOAD, 'Freque'), *script) == ''
 
 
 GONE, STANDS = (Read('fieldbus.inv_st'), 37), (Read('fieldbus.inv_st'), SIO_FAIL.code)
@@ -237,21 +206,19 @@ def test_a_serial_fault_takes_no_control_from_the_terminals() -> None:
         play(control().acknowledge(SIO_FAIL, 'Freque'), *begins, *edge, STANDS)
 
 
-@pytest.mark.parametrize(
-    ('procedure', 'command'),
-    [
-        (Procedure.FULL, 0x201),
-        (Procedure.BASIC, 0x301),
-        (Procedure.STATOR_RESISTANCE, 0x401),
-        (Procedure.CALCULATE, 0x501),
-        (Reset.ERROR_LOG, 0x800),
-        (Reset.ENERGY, 0x900),
-    ],
-)
-def test_procedures(procedure: Procedure | Reset, command: int) -> None:
+def test_procedures() -> None:
     # once, and behind no stop that comes later
-    assert scmd().procedures[procedure] == Write(SCMD, command, once=True, head=True)
-    assert G2.profile.methods_with(procedure) == ['mode_scmd']
+    commands = {
+        Procedure.FULL: 0x201,
+        Procedure.BASIC: 0x301,
+        Procedure.STATOR_RESISTANCE: 0x401,
+        Procedure.CALCULATE: 0x501,
+        Reset.ERROR_LOG: 0x800,
+        Reset.ENERGY: 0x900,
+    }
+    for procedure, command in commands.items():
+        assert scmd().procedures[procedure] == Write(SCMD, command, once=True, head=True)
+        assert G2.profile.methods_with(procedure) == ['mode_scmd']
 
 
 # --- the control word -----------------------------------------------------------------------------
@@ -262,22 +229,20 @@ def test_the_network_has_control() -> None:
     assert play(control().in_control(), (Read(STATUS), 0x31)) is False
 
 
-@pytest.mark.parametrize(
-    ('reference', 'ready'), [('fieldbus', READY | NET_REF), ('terminal', READY)]
-)
-def test_the_control_word_is_taken_and_runs(reference: str, ready: int) -> None:
-    method = control(reference)
-    play(method.take_control(), (Read(MODE), STOP), (Write(WORD, ready), None))
+def test_the_control_word_is_taken_and_runs() -> None:
     # from a motor that still stops, too: no state between shows then
     others = [status(state=state) for state in (State.FAULTED, State.OPERATION_ENABLED)]
     stopping = status(state=State.STOPPING)
-    play(
-        method.run(),
-        (Wait(status(state=State.READY_TO_SWITCH_ON), stopping, not_by=others), None),
-        (Write(WORD, ready | 1, once=True), None),
-        (Wait(status(state=State.SWITCHED_ON), stopping, not_by=others), None),
-        (Write(WORD, ready | 9, once=True), None),
-    )
+    for reference, ready in (('fieldbus', READY | NET_REF), ('terminal', READY)):
+        method = control(reference)
+        play(method.take_control(), (Read(MODE), STOP), (Write(WORD, ready), None))
+        play(
+            method.run(),
+            (Wait(status(state=State.READY_TO_SWITCH_ON), stopping, not_by=others), None),
+            (Write(WORD, ready | 1, once=True), None),
+            (Wait(status(state=State.SWITCHED_ON), stopping, not_by=others), None),
+            (Write(WORD, ready | 9, once=True), None),
+        )
 
 
 def test_the_run_bits_are_reset_and_the_others_left() -> None:
@@ -320,35 +285,16 @@ NOT_RESET = (
 )
 
 
-@pytest.mark.parametrize(
-    ('script', 'removed'),
-    [
+def test_what_is_removed_by_the_control_word() -> None:
+    given_back, refused = (TO_NOBODY, None), (TO_NOBODY, REFUSED)
+    for script, removed in (
         (((change(RUN_BITS, once=False), None),), Removal.COMMAND),
-        (
-            (*NOT_RESET, (TO_NOBODY, None), (Read(STATUS), 0)),
-            Removal.COMMAND,
-        ),
-        (
-            (
-                *NOT_RESET,
-                (TO_NOBODY, None),
-                (Read(STATUS), FROM_NET),
-                *ZEROED,
-            ),
-            Removal.SETPOINT,
-        ),
-        (
-            (*NOT_RESET, (TO_NOBODY, REFUSED), *ZEROED),
-            Removal.SETPOINT,
-        ),
-        (
-            (*NOT_RESET, (TO_NOBODY, REFUSED), *KEPT),
-            Removal.NOTHING,
-        ),
-    ],
-)
-def test_what_is_removed_by_the_control_word(script: Any, removed: Removal) -> None:
-    assert play(control().remove('Freque'), *script) is removed
+        ((*NOT_RESET, given_back, (Read(STATUS), 0)), Removal.COMMAND),
+        ((*NOT_RESET, given_back, (Read(STATUS), FROM_NET), *ZEROED), Removal.SETPOINT),
+        ((*NOT_RESET, refused, *ZEROED), Removal.SETPOINT),
+        ((*NOT_RESET, refused, *KEPT), Removal.NOTHING),
+    ):
+        assert play(control().remove('Freque'), *script) is removed
 
 
 def test_a_fault_is_acknowledged_by_an_edge() -> None:
@@ -373,13 +319,13 @@ def test_where_no_edge_is_taken_reading_has_to_do() -> None:
 # --- set-points, and who was in charge ------------------------------------------------------------
 
 
-@pytest.mark.parametrize('method', [scmd(), control()])
-def test_set_point_0_is_read_back(method: ControlMethod) -> None:
-    play(method.zero_setpoint('Freque'), *ZEROED)
-    with pytest.raises(NotPossible, match='keeps a set-point of 5 where 0 was written'):
-        play(method.zero_setpoint('Freque'), *KEPT)
-    with pytest.raises(NotPossible, match=r'no set-point over the bus in control mode \?'):
-        play(method.zero_setpoint(''))
+def test_set_point_0_is_read_back() -> None:
+    for method in (scmd(), control()):
+        play(method.zero_setpoint('Freque'), *ZEROED)
+        with pytest.raises(NotPossible, match='keeps a set-point of 5 where 0 was written'):
+            play(method.zero_setpoint('Freque'), *KEPT)
+        with pytest.raises(NotPossible, match=r'no set-point over the bus in control mode \?'):
+            play(method.zero_setpoint(''))
 
 
 def test_in_charge() -> None:

@@ -1,12 +1,9 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What the Optimal is told, step by step, where it differs from the G2."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import pytest
 from support.steps import REFUSED, Wait, play, status
@@ -29,17 +26,14 @@ SPEED_0 = ((Write(SPEED, 0.0), None), (Read(SPEED), 0.0))
 STAYS = ((Write(FREQUENCY, 0.0), None), (Read(FREQUENCY), 3.0))
 
 
-@pytest.mark.parametrize(
-    ('mode', 'holder'),
-    [
-        (MANUAL, Holder.LOCAL),
-        (AUTO, Holder.LOCAL),
-        (BUS, Holder.BUS),
-        (0, Holder.UNKNOWN),
-    ],
-)
-def test_who_has_control(mode: int, holder: Holder) -> None:
-    assert play(smode.holder(), (Read(MODE), mode)) is holder
+def test_who_has_control() -> None:
+    for mode, holder in (
+        (MANUAL, Holder.LOCAL), (AUTO, Holder.LOCAL), (BUS, Holder.BUS), (0, Holder.UNKNOWN)
+    ):
+        assert play(smode.holder(), (Read(MODE), mode)) is holder
+    for word, holder in ((FROM_BUS, Holder.BUS), (0, Holder.LOCAL)):
+        assert play(control.holder(), (Read(STATUS), word)) is holder
+    assert not smode.procedures and not control.procedures
 
 
 def test_no_way_releases_the_motor_at_once() -> None:
@@ -67,56 +61,37 @@ def test_control_is_taken_and_given_to_the_keypad() -> None:
         play(smode.release(), (Read(MODE), BUS), (Write(SMODE, 0), REFUSED))
 
 
-@pytest.mark.parametrize('control_mode', ['Freque', 'Speed', ''])
-def test_every_set_point_is_0_before_it_runs(control_mode: str) -> None:
-    play(smode.zero_setpoint(control_mode), *FREQUENCY_0, *SPEED_0)
-    with pytest.raises(NotPossible, match='keeps a set-point of 3'):
-        play(smode.zero_setpoint(control_mode), *STAYS)
+def test_every_set_point_is_0_before_it_runs() -> None:
+    for mode in ('Freque', 'Speed', ''):
+        play(smode.zero_setpoint(mode), *FREQUENCY_0, *SPEED_0)
+        with pytest.raises(NotPossible, match='keeps a set-point of 3'):
+            play(smode.zero_setpoint(mode), *STAYS)
 
 
-@pytest.mark.parametrize(
-    ('command', 'setpoint', 'removed'),
-    [
+def test_mode_is_left_where_something_is_removed() -> None:
+    for command, setpoint, removed in (
         (None, FREQUENCY_0, Removal.COMMAND),
         (REFUSED, FREQUENCY_0, Removal.SETPOINT),
         # both are written even if the first one is not taken
         (REFUSED, STAYS, Removal.NOTHING),
         (REFUSED, ((Write(FREQUENCY, 0.0), REFUSED),), Removal.NOTHING),
-    ],
-)
-def test_mode_is_left_where_something_is_removed(
-    command: Any, setpoint: Any, removed: Removal
-) -> None:
-    script = ((Write(SMODE, 0), command), *setpoint, *SPEED_0)
-    assert play(smode.remove('Freque'), *script) is removed
+    ):
+        script = ((Write(SMODE, 0), command), *setpoint, *SPEED_0)
+        assert play(smode.remove('Freque'), *script) is removed
 
 
-@pytest.mark.parametrize('shown', [OVERLOAD, SIO_FAIL])
-def test_no_fault_is_acknowledged_by_mode(shown: Any) -> None:
-    refused = (
-        (Write(SMODE, 0), REFUSED),
-        (Write(FREQUENCY, 0.0), REFUSED),
-        (Write(SPEED, 0.0), REFUSED),
-    )
+def test_no_fault_is_acknowledged_by_mode() -> None:
+    refused = [(Write(key, 0), REFUSED) for key in (SMODE, FREQUENCY, SPEED)]
     stop = AcknowledgeThenWrite(ACK, Write(SMODE, 0))
-    reads = [(Read('fieldbus.inv_st'), shown.code)] * 2 if shown is SIO_FAIL else []
-    script = (*reads, (Read(MODE), BUS), *refused, (stop, REFUSED))
-    assert play(smode.acknowledge(shown, 'Freque'), *script) == ''
-    script = (*reads, (Read(MODE), AUTO), (Acknowledge(ACK), shown.code))
-    assert play(smode.acknowledge(shown, 'Freque'), *script) == ''
-
-
-def test_no_procedure_is_known() -> None:
-    assert not smode.procedures
-    assert not control.procedures
+    for shown in (OVERLOAD, SIO_FAIL):
+        reads = [(Read('fieldbus.inv_st'), shown.code)] * 2 if shown is SIO_FAIL else []
+        script = (*reads, (Read(MODE), BUS), *refused, (stop, REFUSED))
+        assert play(smode.acknowledge(shown, 'Freque'), *script) == ''
+        script = (*reads, (Read(MODE), AUTO), (Acknowledge(ACK), shown.code))
+        assert play(smode.acknowledge(shown, 'Freque'), *script) == ''
 
 
 # --- Drive Control --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(('word', 'holder'), [(FROM_BUS, Holder.BUS), (0, Holder.LOCAL)])
-def test_who_has_control_by_drive_control(word: int, holder: Holder) -> None:
-    assert play(control.holder(), (Read(STATUS), word)) is holder
 
 
 def test_lost_control_is_asked_for_anew() -> None:
@@ -149,12 +124,10 @@ def test_enable_is_taken_back_and_the_bus_control_kept() -> None:
     play(control.release(), (Read(STATUS), 0))
 
 
-@pytest.mark.parametrize(
-    ('answer', 'removed'), [(None, Removal.COMMAND), (REFUSED, Removal.NOTHING)]
-)
-def test_what_is_removed(answer: Any, removed: Removal) -> None:
-    script = (Read(WORD), 0x4009), (Write(WORD, 0x4008), answer)
-    assert play(control.remove('Freque'), *script) is removed
+def test_what_is_removed() -> None:
+    for answer, removed in ((None, Removal.COMMAND), (REFUSED, Removal.NOTHING)):
+        script = (Read(WORD), 0x4009), (Write(WORD, 0x4008), answer)
+        assert play(control.remove('Freque'), *script) is removed
 
 
 def test_a_fault_is_acknowledged_by_an_edge() -> None:
@@ -163,9 +136,7 @@ def test_a_fault_is_acknowledged_by_an_edge() -> None:
     play(control.zero_setpoint('Freque'))
 
 
-@pytest.mark.parametrize('from_bus', [True, False])
-def test_in_charge(from_bus: bool) -> None:
-    in_charge = OPTIMAL.profile.in_charge
-    for seen in (None, status(from_bus=from_bus)):
-        assert play(in_charge(seen), (Read(WORD), 0x4009)) == 'drive_control'
-        assert play(in_charge(seen), (Read(WORD), 0x4008)) == 'mode_scmd'
+def test_in_charge() -> None:
+    for seen in (None, status(from_bus=True), status()):
+        for word, method in ((0x4009, 'drive_control'), (0x4008, 'mode_scmd')):
+            assert play(OPTIMAL.profile.in_charge(seen), (Read(WORD), word)) == method
