@@ -33,6 +33,10 @@ SETTINGS = {*BUS_SETTINGS, *DRIVE_SETTINGS}
 NO_PARAMETERS = {'__node', '__ns', 'name'}
 
 
+def read(path: Path) -> str:
+    return path.read_text(encoding='utf-8')
+
+
 # --- what is public -------------------------------------------------------------------------------
 
 
@@ -78,39 +82,26 @@ def launch_arguments(source: str) -> set[str]:
     return names | keys_of(source, 'OVERRIDES')
 
 
-def options(source: str) -> set[str]:
-    """The options of a command."""
-    found = calls(source, 'add', 'add_argument')
-    return {text for call in found for text in texts(call) if re.fullmatch('--[a-z-]+', text)}
-
-
-def switches(source: str) -> set[str]:
-    """The options that ``simulator inject`` makes of arguments that are on or off."""
-    found = [call.args[:2] for call in calls(source, 'Argument')]
+def of_simulator(injections: str, main: str) -> set[str]:
+    """The options of the simulator, and the verbs and switches of ``simulator inject``."""
+    verbs = [call.args[0] for call in calls(main, 'add_parser')]
+    switches = [
+        call.args[0]
+        for call in calls(injections, 'Argument')
+        if isinstance(call.args[1], ast.Name) and call.args[1].id == 'bool'
+    ]
     return {
-        f'--{name.value}'
-        for name, type_ in found
-        if isinstance(type_, ast.Name) and type_.id == 'bool'
+        *(text for call in calls(main, 'add', 'add_argument') for text in texts(call)
+          if re.fullmatch('--[a-z-]+', text)),
+        *keys_of(injections, 'VERBS'),
+        *(verb.value for verb in verbs if isinstance(verb, ast.Constant)),
+        *(f'--{name.value}' for name in switches if isinstance(name, ast.Constant)),
     }
 
 
-def verbs(injections: str, inject: str) -> set[str]:
-    """The verbs of ``simulator inject``."""
-    parsers = calls(inject, 'add_parser')
-    more = {
-        call.args[0].value for call in parsers if isinstance(call.args[0], ast.Constant)
-    }
-    return keys_of(injections, 'VERBS') | more
-
-
-def executables(setup: str) -> set[str]:
-    """What ``ros2 run`` can run."""
-    return set(re.findall(r"f'([\w-]+) = \{NAME\}", setup))
-
-
-def make_targets(makefile: str) -> set[str]:
+def make_targets() -> set[str]:
     """The targets that ``make help`` lists."""
-    return set(re.findall(r'^([a-z-]+):.*##', makefile, re.MULTILINE))
+    return set(re.findall(r'^([a-z-]+):.*##', read(ROOT / 'Makefile'), re.MULTILINE))
 
 
 def fields(message: str) -> set[str]:
@@ -121,25 +112,23 @@ def fields(message: str) -> set[str]:
 # --- what is written ------------------------------------------------------------------------------
 
 
-def words_of(span: str) -> list[str]:
-    """The words of a piece of code, without the brackets of what may be left out."""
-    return [word.strip('[],') for word in span.split()]
-
-
 def code_spans(text: str) -> list[str]:
     """Every piece of code between backticks."""
     return re.findall(r'`([^`]+)`', text)
 
 
-def code_lines(text: str) -> list[str]:
-    """Every line of code that stands by itself."""
-    return [line.strip() for line in text.splitlines() if line.startswith('    ')]
+def code_of(text: str) -> list[str]:
+    """Every piece of code, between backticks or in lines by itself."""
+    lines = [line.strip() for line in text.splitlines() if line.startswith('    ')]
+    return [*code_spans(text), *lines]
 
 
 def documented(text: str) -> set[str]:
     """Every word that stands as code in the first column of some table."""
     rows = [line.split('|')[1] for line in text.splitlines() if line.startswith('|')]
-    return {word for cell in rows for span in code_spans(cell) for word in words_of(span)}
+    spans = [span for cell in rows for span in code_spans(cell)]
+    # without the brackets of what may be left out
+    return {word.strip('[],') for span in spans for word in span.split()}
 
 
 def headings(text: str) -> set[str]:
@@ -163,21 +152,19 @@ def broken_links(page: Path, text: str) -> list[str]:
         target = page.parent / file if file else page
         if not target.exists():
             broken.append(file)
-        elif anchor and anchor not in headings(target.read_text(encoding='utf-8')):
+        elif anchor and anchor not in headings(read(target)):
             broken.append(f'{file}#{anchor}')
     return broken
 
 
 def named_targets(text: str) -> set[str]:
     """The make targets that a page speaks of."""
-    code = (*code_spans(text), *code_lines(text))
-    return {match[1] for piece in code if (match := re.match(r'make ([a-z-]+)', piece))}
+    return {match[1] for piece in code_of(text) if (match := re.match(r'make ([a-z-]+)', piece))}
 
 
 def named_parameters(text: str) -> set[str]:
     """The parameters and launch arguments that the commands of a page set."""
-    code = (*code_spans(text), *code_lines(text))
-    names = {name for piece in code for name in re.findall(r'(?<![\w/])(\w+):=', piece)}
+    names = {name for piece in code_of(text) for name in re.findall(r'(?<![\w/])(\w+):=', piece)}
     return names - NO_PARAMETERS
 
 
@@ -190,31 +177,24 @@ def named_files(text: str) -> set[str]:
 # --- the tests ------------------------------------------------------------------------------------
 
 
-def read(path: Path) -> str:
-    return path.read_text(encoding='utf-8')
-
-
 def all_launch_arguments() -> set[str]:
     return {name for path in LAUNCH_FILES for name in launch_arguments(read(path))}
 
 
-def test_topics_and_services_are_documented() -> None:
-    names = {
+def test_what_is_public_is_documented() -> None:
+    topics = {
         name for path in (PACKAGE / 'node').glob('*.py') for name in topics_and_services(read(path))
     }
-    assert {'~/status', '~/setpoint', '~/enable', '/diagnostics'} <= names
-    assert names - documented(read(INTERFACE)) == set()
-
-
-def test_tables_of_parameters_are_current() -> None:
-    made = runpy.run_path(str(ROOT / 'tools' / 'settings_page.py'))['page'](read(INTERFACE))
-    assert read(INTERFACE) == made, 'make parameters'
-
-
-def test_executables_are_documented() -> None:
-    names = executables(read(ROOT / 'setup.py'))
-    assert {'driver', 'simulator'} <= names
-    assert names - documented(read(INTERFACE)) == set()
+    executables = set(re.findall(r"f'([\w-]+) = \{NAME\}", read(ROOT / 'setup.py')))
+    names = topics | executables | SETTINGS
+    assert names >= {
+        *('~/status', '~/setpoint', '~/enable', '/diagnostics', 'driver', 'simulator'),
+        *('port', 'drives', 'address', 'drive_timeout'),
+    }
+    page = read(INTERFACE)
+    assert names - documented(page) == set()
+    made = runpy.run_path(str(ROOT / 'tools' / 'settings_page.py'))['page'](page)
+    assert page == made, 'make parameters'
 
 
 @pytest.mark.parametrize('path', LAUNCH_FILES, ids=lambda path: path.name)
@@ -226,19 +206,14 @@ def test_launch_file_is_documented(path: Path) -> None:
     compile(read(path), path, 'exec')
 
 
-def test_simulator_is_documented() -> None:
+def test_simulator_and_make_targets_are_documented() -> None:
     folder = PACKAGE / 'simulator'
-    injections, main = read(folder / 'injections.py'), read(folder / 'main.py')
-    names = options(main) | verbs(injections, main) | switches(injections)
+    names = of_simulator(read(folder / 'injections.py'), read(folder / 'main.py'))
     assert {'--link', '--paced', '--standing', 'fault', 'power-cycle', 'state'} <= names
     # a name of older versions
     assert names - documented(read(SIMULATOR)) == {'--baud'}
-
-
-def test_make_targets_are_documented() -> None:
-    names = make_targets(read(ROOT / 'Makefile'))
-    assert {'demo', 'test', 'run'} <= names
-    assert names - named_targets(read(DEVELOPMENT)) == set()
+    assert {'demo', 'test', 'run'} <= make_targets()
+    assert make_targets() - named_targets(read(DEVELOPMENT)) == set()
 
 
 def test_messages_are_documented() -> None:
@@ -253,24 +228,29 @@ def test_messages_are_documented() -> None:
     assert missing - {f'{name}.header' for name in names} == set()
 
 
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_what_a_page_names_exists(page: Path) -> None:
-    text = read(page)
-    assert broken_links(page, text) == []
-    assert named_targets(text) - make_targets(read(ROOT / 'Makefile')) == set()
-    assert named_parameters(text) - SETTINGS - all_launch_arguments() == set()
-    for name in named_files(text):
-        assert any((folder / name).exists() for folder in (ROOT, PACKAGE)), name
+def test_what_a_page_names_exists() -> None:
+    parameters = SETTINGS | all_launch_arguments()
+    missing = {}
+    for page in PAGES:
+        text = read(page)
+        missing[page.name] = [
+            *broken_links(page, text),
+            *named_targets(text) - make_targets(),
+            *named_parameters(text) - parameters,
+            *(name for name in named_files(text)
+              if not any((folder / name).exists() for folder in (ROOT, PACKAGE))),
+        ]
+    assert {page: names for page, names in missing.items() if names} == {}
 
 
 def test_every_reading_that_is_cited_is_listed() -> None:
-    listed = set(re.findall(r'^(\d+)\. ', (ROOT / 'docs' / 'readings.md').read_text('utf-8'), re.M))
+    listed = set(re.findall(r'^(\d+)\. ', read(ROOT / 'docs' / 'readings.md'), re.M))
     found = {
         number: path.name
         for folder, kinds in ((PACKAGE, ('*.py', '*.csv')), (ROOT / 'docs', ('*.md',)))
         for kind in kinds
         for path in folder.rglob(kind)
-        for number in re.findall(r'\bC(\d+)\b(?=[\],;])', path.read_text('utf-8'))
+        for number in re.findall(r'\bC(\d+)\b(?=[\],;])', read(path))
     }
     assert found.keys() > {'12', '98'}
     assert {number: name for number, name in found.items() if number not in listed} == {}
@@ -281,12 +261,12 @@ def test_every_page_is_in_the_index() -> None:
     assert {page.name for page in (ROOT / 'docs').glob('*.md')} - index == {'README.md'}
 
 
-@pytest.mark.parametrize('path', PICTURES, ids=lambda path: path.name)
-def test_picture_is_whole_and_shown_and_says_what_it_shows(path: Path) -> None:
-    drawing = ElementTree.parse(path).getroot()
-    assert {'title', 'desc'} <= {part.tag.rpartition('}')[2] for part in drawing}
-    shown = re.compile(rf'!\[[^\]]+\]\({re.escape(path.name)}\)')
-    assert any(shown.search(read(page)) for page in PAGES)
+def test_pictures_are_whole_and_shown_and_say_what_they_show() -> None:
+    for path in PICTURES:
+        drawing = ElementTree.parse(path).getroot()
+        assert {'title', 'desc'} <= {part.tag.rpartition('}')[2] for part in drawing}, path
+        shown = re.compile(rf'!\[[^\]]+\]\({re.escape(path.name)}\)')
+        assert any(shown.search(read(page)) for page in PAGES), path
 
 
 def test_the_picture_of_control_names_the_time_outs_of_its_page() -> None:
@@ -297,69 +277,34 @@ def test_the_picture_of_control_names_the_time_outs_of_its_page() -> None:
     assert not [name for name in named if name not in picture]
 
 
-@pytest.mark.parametrize('path', CONFIGS, ids=lambda path: path.name)
-def test_parameter_file_names_parameters_that_exist(path: Path) -> None:
-    names = set(re.findall(r'^    (\w+):', read(path), re.MULTILINE))
-    assert 'port' in names
-    assert names - SETTINGS == set()
+def test_parameter_files_name_parameters_that_exist() -> None:
+    for path in CONFIGS:
+        names = set(re.findall(r'^    (\w+):', read(path), re.MULTILINE))
+        assert 'port' in names, path
+        assert names - SETTINGS == set(), path
 
 
 # --- the checker itself ---------------------------------------------------------------------------
 
 
-def test_checker_finds_what_is_public() -> None:
-    node = "self.create_service(Trigger, '~/tune', f)\nlog('call ~/enable')\npub(A, '/diagnostics')"
-    assert topics_and_services(node) == {'~/tune', '/diagnostics'}
-    launch = "OVERRIDES = {'port': 1}\ndeclare('link')\nDeclareLaunchArgument('x')\ndeclare(name)"
-    assert launch_arguments(launch) == {'port', 'link', 'x'}
-    assert options("add('--link', '-l')\nparser.add_argument('--tcp', help='--x y')") == {
-        '--link',
-        '--tcp',
-    }
-    assert switches("Argument('standing', bool, '')\nArgument('code', int, '')") == {'--standing'}
-    assert verbs("VERBS: M = {'fault': 1}", "v.add_parser('state')\nv.add_parser(name)") == {
-        'fault',
-        'state',
-    }
-    assert executables("    f'nfo-sinus = {NAME}.cli:main',") == {'nfo-sinus'}
-    assert make_targets('demo: setup ## ride\n.PHONY: demo\nhidden: demo\n') == {'demo'}
-    assert fields('uint8 HZ=0  # Hz\nstd_msgs/Header header  # x\nfloat32 value\n') == {
-        'header',
-        'value',
-    }
-
-
-def test_checker_sees_what_is_missing() -> None:
-    page = 'Prose of `port`.\n\n| name | meaning |\n|---|---|\n| `address` | as `model` |\n'
-    assert {'port', 'address', 'model', '~/stop'} - documented(page) == {'port', 'model', '~/stop'}
-    assert documented('| `fault CODE [--standing]`, `run on` |') == {
-        'fault',
-        'CODE',
-        '--standing',
-        'run',
-        'on',
-    }
-
-
-def test_checker_sees_what_does_not_exist(tmp_path: Path) -> None:
-    page = tmp_path / 'page.md'
-    page.write_text('# The first\n\n## What, then?\n')
-    for link in ('page.md', '#the-first', 'page.md#what-then', 'https://example.org/x'):
-        assert broken_links(page, f'[see\nthere]({link})') == []
-    for link in ('other.md', '#the-last', 'page.md#then', '../nowhere/'):
-        assert broken_links(page, f'[there]({link})') == [link]
-    assert named_targets('Type `make tea`.\n\n    make coffee\n\nWe make nothing.') == {
-        'tea',
-        'coffee',
-    }
+def test_checker_sees_what_is_missing(tmp_path: Path) -> None:
+    page = 'Prose of `port`.\n\n| name | meaning |\n|---|---|\n| `address [N]` | as `model` |\n'
+    assert documented(page) == {'address', 'N'}
+    assert named_targets('Type `make tea`.\n\n    make it\n\nWe make none.') == {'tea', 'it'}
     parameters = '`-p sugar:=2` and\n\n    run milk:=1 -r __ns:=/x -r ~/tea:=/x'
     assert named_parameters(parameters) == {'sugar', 'milk'}
     assert named_files('`config/no.yaml`, `no.yaml`, `/dev/x`') == {'config/no.yaml'}
+    path = tmp_path / 'page.md'
+    path.write_text('# The first\n\n## What, then?\n')
+    for link in ('page.md', '#the-first', 'page.md#what-then', 'https://example.org/x'):
+        assert broken_links(path, f'[see\nthere]({link})') == []
+    for link in ('other.md', '#the-last', 'page.md#then', '../nowhere/'):
+        assert broken_links(path, f'[there]({link})') == [link]
 
 
 def test_the_readme_says_what_is_a_safety_function_and_what_is_not() -> None:
     # law 10: it stands near the top, where it is read
-    top = ' '.join((ROOT / 'README.md').read_text(encoding='utf-8')[:2000].split())
+    top = ' '.join(read(ROOT / 'README.md')[:2000].split())
     assert 'safety function' in top
     assert 'RUN input' in top
     assert 'drive_timeout' in top
