@@ -9,7 +9,6 @@ import json
 from pathlib import Path
 import re
 
-import pytest
 import yaml
 
 from nfo_sinus_driver.drive import DriveSettings
@@ -26,13 +25,10 @@ def commands(beginning: str) -> list[str]:
     return [line.strip() for line in README.splitlines() if line.strip().startswith(beginning)]
 
 
-@pytest.mark.parametrize('beginning', ['rosdep install', 'colcon build'])
-def test_it_is_built_as_the_readme_says(beginning: str) -> None:
-    (command,) = commands(beginning)
-    assert command in RUN
-
-
-def test_it_is_used_as_the_readme_says() -> None:
+def test_it_is_built_and_used_as_the_readme_says() -> None:
+    for beginning in ('rosdep install', 'colcon build'):
+        (command,) = commands(beginning)
+        assert command in RUN
     build, run = commands('docker')
     assert f'#   {build}\n' in DOCKERFILE and f'#   {run}\n' in DOCKERFILE
     assert ' --init ' in run

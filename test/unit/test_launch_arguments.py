@@ -12,51 +12,30 @@ import pytest
 from nfo_sinus_driver.launch_arguments import number, parameter_file, require_packages
 
 
-@pytest.fixture
-def config(tmp_path: Path) -> Path:
-    folder = tmp_path / 'config'
-    folder.mkdir()
-    for name in ('conveyor.yaml', 'single.yaml'):
-        (folder / name).touch()
-    return folder
-
-
-def test_a_number_is_taken() -> None:
+def test_a_number_is_taken_and_what_is_none_refused_by_name() -> None:
     assert number('exit_timeout', '15') == 15.0
     assert number('baud_rate', '19200', whole=True) == 19200
+    for name, given, whole in (
+        *(('exit_timeout', given, False) for given in ('soon', '-1', 'inf', 'nan')),
+        *(('baud_rate', given, True) for given in ('fast', '19200.5')),
+    ):
+        with pytest.raises(ValueError, match=f'{name}:={given}: write a .*number, such as'):
+            number(name, given, whole=whole)
 
 
-@pytest.mark.parametrize(
-    ('name', 'given', 'whole'),
-    [
-        ('exit_timeout', 'soon', False),
-        ('exit_timeout', '-1', False),
-        ('exit_timeout', 'inf', False),
-        ('exit_timeout', 'nan', False),
-        ('baud_rate', 'fast', True),
-        ('baud_rate', '19200.5', True),
-    ],
-)
-def test_what_is_no_number_is_refused_by_name(name: str, given: str, whole: bool) -> None:
-    with pytest.raises(ValueError, match=f'{name}:={given}: write a .*number, such as'):
-        number(name, given, whole=whole)
-
-
-def test_a_parameter_file_is_found_by_path(config: Path) -> None:
-    path = config / 'single.yaml'
-    assert parameter_file(str(path), config) == str(path)
-
-
-def test_a_bare_name_is_one_of_the_package(
-    config: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+def test_a_parameter_file_is_found_by_path_or_is_one_of_the_package(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    config = tmp_path / 'config'
+    config.mkdir()
+    for name in ('conveyor.yaml', 'single.yaml'):
+        (config / name).touch()
+    path = str(config / 'single.yaml')
+    assert parameter_file(path, config) == path
     monkeypatch.chdir(tmp_path)
     assert parameter_file('conveyor.yaml', config) == str(config / 'conveyor.yaml')
     (tmp_path / 'conveyor.yaml').touch()
     assert parameter_file('conveyor.yaml', config) == 'conveyor.yaml', 'the nearer one counts'
-
-
-def test_a_parameter_file_that_is_not_there_is_refused(config: Path) -> None:
     with pytest.raises(ValueError, match=r'params_file:=conveyer\.yaml: there is no') as no:
         parameter_file('conveyer.yaml', config)
     assert 'conveyor.yaml, single.yaml' in str(no.value)

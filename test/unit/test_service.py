@@ -24,20 +24,14 @@ CONFIG = ROOT / 'config'
 SERVICE = CONFIG / 'nfo-sinus.service'
 
 
-def unit_settings(text: str) -> dict[str, list[str]]:
-    """Every setting of a unit with its values; lines that end in a backslash go on."""
-    settings: dict[str, list[str]] = {}
-    lines = [line for line in text.splitlines() if not line.startswith(('#', ';'))]
-    for line in '\n'.join(lines).replace('\\\n', ' ').splitlines():
-        name, equals, value = line.partition('=')
-        if equals:
-            settings.setdefault(name, []).append(value)
-    return settings
-
-
 @pytest.fixture(scope='module')
 def unit() -> dict[str, list[str]]:
-    return unit_settings(SERVICE.read_text())
+    """Every setting of the unit with its values; lines that end in a backslash go on."""
+    found: dict[str, list[str]] = {}
+    text = re.sub(r'^[#;].*\n', '', SERVICE.read_text(), flags=re.MULTILINE)
+    for name, value in re.findall(r'^(\w+)=(.*)$', text.replace('\\\n', ' '), re.MULTILINE):
+        found.setdefault(name, []).append(value)
+    return found
 
 
 def constants_of(path: Path) -> dict[str, float]:
@@ -98,10 +92,9 @@ def test_service_starts_the_driver_again_after_a_crash_but_not_for_a_wrong_param
 
 
 def test_service_may_use_the_port_and_little_else(unit: dict[str, list[str]]) -> None:
-    assert unit['User'] != ['root']
     groups = re.findall(r'GROUP="(\w+)"', (CONFIG / '99-nfo-sinus-serial.rules').read_text())
     assert unit['SupplementaryGroups'] == groups
-    assert unit['NoNewPrivileges'] == ['true']
+    assert unit['User'] != ['root'] and unit['NoNewPrivileges'] == ['true']
 
 
 def test_service_starts_what_is_installed(unit: dict[str, list[str]]) -> None:
