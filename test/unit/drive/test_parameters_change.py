@@ -253,9 +253,12 @@ def test_what_needs_a_standing_motor_waits_for_it() -> None:
         assert answer.startswith(f'{MAGN}: only while the motor is stopped, but it is not (')
         # a drive that is lax about it is not trusted
         assert not rig.written(MAGN) + rig.written(RETARD)
-        # what is the same needs no stop
-        rig.result(parameters.change({RETARD: 7, MAGN: 1.8}))
-        assert rig.far.writes == {RETARD: 1}
+        # what is the same needs no stop; a wanted state is written as far as it can be
+        rig.result(parameters.change({RETARD: 8, MAGN: 1.8}))
+        rig.result(parameters.apply({MAGN: 2.0, RETARD: 7}, write=True))
+        assert rig.far.writes == {RETARD: 2}
+        assert [drift.key for drift in parameters.drift] == [MAGN]
+        assert rig.notes.said(Cause.WANTED_BUT_REFUSED)
         assert rig.turns
         rig.send(None)
         rig.result(rig.drive.stop())
