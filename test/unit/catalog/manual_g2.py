@@ -18,20 +18,11 @@ G2 = load_family('sinus_g2')
 
 #: Names that the manuals spell in more than one way, or wrongly [C29], once they are squashed.
 SPELLINGS = {
-    'adress': 'address',
-    'siadr': 'address',
-    'sitout': 'siotot',
-    'ilimit': 'ilimt',
-    'kpspdp': 'kpspd',
-    'tispdp': 'tispd',
-    'kpsp': 'kpspd',
-    'tisp': 'tispd',
-    'overload/overid': 'overload/overld',
-    'imagnlow/imagnlow': 'imagnlow/imaglow',
-    'curlow/errcnttriescurrentlowalarm': 'curlow/errcnt',
-    'busfail/autoreset': 'autoreset',
-    'busfail/autostop': 'autostop',
-    'drivecontrolmaskwrite': 'drvctrlwritemask',
+    **{'adress': 'address', 'siadr': 'address', 'sitout': 'siotot', 'ilimit': 'ilimt'},
+    **{'kpspdp': 'kpspd', 'tispdp': 'tispd', 'kpsp': 'kpspd', 'tisp': 'tispd'},
+    **{'overload/overid': 'overload/overld', 'imagnlow/imagnlow': 'imagnlow/imaglow'},
+    **{'curlow/errcnttriescurrentlowalarm': 'curlow/errcnt', 'busfail/autoreset': 'autoreset'},
+    **{'busfail/autostop': 'autostop', 'drivecontrolmaskwrite': 'drvctrlwritemask'},
 }
 #: Names under which the tables of PROFIBUS and CANopen have two parameters of the catalog.
 PAIRS = {
