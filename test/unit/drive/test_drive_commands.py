@@ -6,9 +6,8 @@
 from __future__ import annotations
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import Rig
 
-from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 from nfo_sinus_driver.simulator.classic_frames import LineError
@@ -46,18 +45,6 @@ def test_stop_that_coasts_says_so() -> None:
         assert not rig.far.motor.driven
 
 
-def test_quick_stop_lets_the_motor_coast() -> None:
-    with Rig(parameters={'control.retard': 60.0}).turn() as rig:
-        assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
-        assert not rig.far.motor.driven
-        assert rig.written(MODE)[-1] == Mode.STOP
-        rig.pass_time(1.0)
-        assert rig.far.control_unit.mode is Mode.STOP
-        # and again from there
-        rig.far.motor.rotor = 0.0
-        rig.assert_only_enable_helps()
-
-
 def test_a_stop_says_what_it_finds() -> None:
     with Rig().turn() as rig:
         rig.far.trip(OVERLOAD)
@@ -72,28 +59,6 @@ def test_a_stop_says_what_it_finds() -> None:
             # whoever runs it at the keypad is not disturbed
             assert rig.far.motor.driven
         assert rig.written(MODE) == []
-
-
-def test_a_stop_goes_ahead_of_all_that_waits() -> None:
-    with Rig().turn() as rig:
-        ended = False
-        status = rig.drive.registers.address('fieldbus.drive_status')
-
-        async def flood(priority: Priority) -> None:
-            while not ended:
-                await rig.bus.read(1, status, priority)
-
-        others = [priority for priority in Priority if priority is not Priority.STOP]
-        flooding = [rig.bus.run(flood(priority)) for priority in others * 20]
-        rig.pass_time(0.5)
-        begun = len(rig.asked)
-        assert rig.answer(rig.drive.stop()) == 'stopping: it ramps down'
-        # before it comes at most what was about to be sent
-        stop = [(key, data) for _, key, data in rig.asked[begun:]].index((SCMD, b'\0\0'))
-        assert stop <= 1
-        ended = True
-        for future in flooding:
-            rig.result(future)
 
 
 def test_enable_needs_an_active_drive() -> None:
@@ -121,16 +86,6 @@ def test_two_at_a_time_cannot_enable_and_a_start_delay_of_the_drive_is_waited_fo
         # what follows the delay has as long as everything else
         rig.enable()
         assert rig.far.motor.driven
-
-
-def test_a_fault_that_stands_keeps_it_from_being_enabled() -> None:
-    with Rig().connect() as rig:
-        rig.far.trip(OVERLOAD)
-        message = rig.answer(rig.drive.enable())
-        assert message.startswith('fault 5 Overload is active: The power monitor has tripped')
-        assert 'Reduce the load' in message
-        assert message.endswith('then call ~/fault_ack')
-        assert Scmd.FIELDBUS not in rig.written(SCMD)
 
 
 def test_run_input_is_missing() -> None:
@@ -172,43 +127,10 @@ def test_drive_that_refuses_the_run_command() -> None:
 
 # --- acknowledging --------------------------------------------------------------------------------
 
-SINUS = [
-    name for name, way in WAYS.items() if way.model != 'movitrac31' and way.protocol != 'telegram1'
-]
 SIO_FAIL = 14
-every_sinus = pytest.mark.parametrize('way', SINUS)
 every_serial = pytest.mark.parametrize(
     'way', ['rtu', 'rtu, control word', 'classic', 'classic, control word', 'classic v5.0']
 )
-
-
-@every_sinus
-def test_acknowledge(way: str) -> None:
-    with Rig(way).connect() as rig:
-        assert rig.answer(rig.drive.acknowledge()).startswith('nothing to acknowledge (')
-        assert rig.far.control_unit.ack_reads == 0
-        rig.far.trip(OVERLOAD)
-        rig.pass_time(1.0)
-        told = rig.drive.snapshot
-        assert (told.kind, told.text) == (Kind.FAULT, 'Overload') and told.remedy
-        assert told.requires_ack
-        assert rig.notes.said('fault 5 Overload')
-        rig.acknowledged = 1
-        assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 5 Overload'
-        unit, reads = rig.far.control_unit, rig.way.method == 'mode_scmd'
-        assert (unit.ack_reads, unit.sio_err_reads, unit.mode_ext_writes) == (reads, 0, 0)
-        assert rig.far.faults.codes == []
-
-
-@every_sinus
-def test_acknowledge_what_still_stands(way: str) -> None:
-    with Rig(way).connect() as rig:
-        rig.far.trip(OVERLOAD, cause_present=True)
-        rig.acknowledged = 1
-        message = rig.answer(rig.drive.acknowledge())
-        assert message.startswith('5 Overload is still active: ')
-        assert 'Reduce the load' in message
-        assert rig.far.faults.codes == [OVERLOAD]
 
 
 @every_serial

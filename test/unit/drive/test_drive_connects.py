@@ -138,14 +138,6 @@ def test_clean_exit(way: str) -> None:
         rig.enable()
 
 
-def test_exit_of_one_that_never_had_control() -> None:
-    with Rig().connect() as rig:
-        rig.far.control_unit.press('start')
-        assert rig.answer(rig.drive.disconnect(1.0)) == 'not under bus control'
-        rig.pass_time(1.0)
-        assert rig.far.motor.driven and written(rig) == []
-
-
 @pytest.mark.parametrize('drive_timeout', [0.0, 20.0])
 def test_exit_leaves_a_slow_motor_to_its_ramp_unless_a_fault_would_end_it(
     drive_timeout: float,
@@ -164,20 +156,6 @@ def test_exit_leaves_a_slow_motor_to_its_ramp_unless_a_fault_would_end_it(
             assert rig.written(SCMD)[-1] == 0 and Mode.STOP not in rig.written(MODE)
         rig.pass_time(30.0)
         assert rig.far.faults.codes == []
-
-
-@pytest.mark.parametrize('retries', [0, 2])
-def test_exit_in_the_middle_of_silence(retries: int) -> None:
-    # a driver that cannot stop the motor says so and keeps trying
-    with Rig(retries=retries).turn() as rig:
-        rig.send(None)
-        rig.line.state = 'silent'
-        assert 'NOT' in rig.answer(rig.drive.disconnect(0.1))
-        assert not rig.drive.armed and rig.drive.stop_unconfirmed
-        rig.pass_time(5.0)
-        rig.line.mend()
-        rig.pass_time(5.0)
-        assert not rig.far.motor.driven and not rig.drive.stop_unconfirmed
 
 
 NO_SENSE: list[tuple[dict[str, Any], str]] = [

@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Future
 import dataclasses
 from typing import Any
 
@@ -15,7 +13,6 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.drive import Drive, Procedure
 from nfo_sinus_driver.simulator.movitrac31.codes import Mode
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
 
@@ -117,25 +114,6 @@ def test_an_enable_is_refused_in_another_operating_mode(
         rig.connect()
         assert reason in rig.answer(rig.drive.enable())
         assert not rig.drive.armed
-
-
-@pytest.mark.parametrize(
-    'ask',
-    [
-        lambda drive: drive.tune(Procedure.FULL),
-        lambda drive: drive.erase_error_log(),
-        lambda drive: drive.reset_energy(),
-    ],
-    ids=['tune', 'erase', 'energy'],
-)
-def test_what_it_has_not_is_answered_so(ask: Callable[[Drive], Future[Any]]) -> None:
-    with make() as rig:
-        rig.connect()
-        before = len(rig.asked)
-        future = ask(rig.drive)
-        assert not succeeded(rig, future)
-        assert 'movitrac' in rig.answer(future).lower()
-        assert all(data is None for _, _, data in rig.asked[before:])
 
 
 def test_the_last_five_faults_are_shown_newest_first() -> None:

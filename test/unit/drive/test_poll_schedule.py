@@ -324,16 +324,3 @@ def test_a_change_of_the_idle_rate_counts_at_once() -> None:
         rig.drive.settings = dataclasses.replace(rig.drive.settings, idle_poll_rate=2.0)
         rig.pass_time(0.5)
         assert polls(rig, 5.0) <= 11
-
-
-def test_a_drive_that_stands_is_kept_alive_by_its_polls_alone() -> None:
-    with Rig(poll_rate=0.1, telemetry_rate=0.0, drive_timeout=2.0) as rig:
-        rig.turn()
-        rig.send(None)
-        assert rig.answer(rig.drive.stop()).startswith('stop')
-        rig.pass_time(25.0)
-        assert rig.drive.snapshot.status is not None
-        # control is still ours, or this shows nothing
-        assert rig.drive.snapshot.status.from_bus
-        assert not rig.drive.snapshot.status.faulted
-        rig.enable()

@@ -177,16 +177,6 @@ def test_an_impossible_status_that_comes_with_a_set_point_stops_nothing() -> Non
         assert not rig.notes.events
 
 
-def test_a_stop_goes_before_a_set_point_that_waits() -> None:
-    with quiet() as rig:
-        begun = len(rig.asked)
-        rig.drive.set_setpoint(30.0)
-        assert rig.answer(rig.drive.stop()).startswith('stop')
-        writes = [one for one in asked(rig, begun) if one[1] is not None]
-        assert writes[0] == (SCMD, 0)
-        assert (SETPOINT, 300) not in writes
-
-
 def test_a_poll_that_waits_is_spared_what_the_set_point_brought() -> None:
     with Rig(poll_rate=0.0, telemetry_rate=0.0) as rig:
         rig.turn()

@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 import math
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import Rig
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.drive import Cause, Severity
-from nfo_sinus_driver.families.sinus_g2.words import Mode
 
 
 @dataclass(frozen=True)
@@ -119,15 +118,10 @@ def test_a_process_set_point_lies_between_setmin_and_setmax(ends: tuple[float, f
             assert rig.far.memory.number('status.reg_set') == limited
             assert rig.drive.snapshot.setpoint == limited
             assert rig.drive.snapshot.setpoint_clamped == (value != limited)
-
-
-def test_setpoint_max_is_kept_where_it_is_less_than_the_drive_takes() -> None:
-    process = {'control.mode': 'PI-Reg', 'pi_reg.setmin': 100.0, 'pi_reg.setmax': 400.0}
-    with Rig(parameters=process, setpoint_max=50.0).connect() as rig:
-        rig.enable()
-        rig.send(80.0)
+        # and setpoint_max counts where it is less
+        rig.drive.settings = replace(rig.drive.settings, setpoint_max=50.0)
+        rig.drive.set_setpoint(380.0)
         rig.pass_time(0.3)
-        assert rig.drive.snapshot.setpoint_clamped
         assert rig.drive.snapshot.setpoint == 50.0
 
 
@@ -165,37 +159,6 @@ def test_the_newest_set_point_counts_and_what_is_no_number_is_none() -> None:
         rig.pass_time(0.4)
         assert rig.drive.snapshot.setpoint == 20.0
         assert not rig.notes.said(Cause.SETPOINT_LIMITED, Severity.WARNING)
-
-
-def test_unchanged_set_point_is_written_every_five_seconds() -> None:
-    with Rig().turn(10.0) as rig:
-        before = len(rig.written('status.frq_set'))
-        rig.pass_time(10.0)
-        # it is written all the same, for the drive may have lost it
-        assert len(rig.written('status.frq_set')) - before in (2, 3)
-
-
-def test_set_points_that_stop_coming_are_no_stop() -> None:
-    with Rig(setpoint_timeout=0.3).turn(10.0) as rig:
-        rig.send(None)
-        rig.pass_time(1.5)
-        assert rig.far.motor.frequency == rig.drive.snapshot.setpoint == 0.0
-        text = 'no set-point for 0.3 s: the motor ramps to a stop'
-        assert rig.notes.said(text, Severity.WARNING)
-        # the next one is followed
-        assert rig.drive.armed and rig.far.motor.driven
-        rig.send(8.0)
-        rig.pass_time(1.0)
-        assert rig.far.motor.frequency == pytest.approx(8.0, abs=0.2)
-        assert rig.notes.said(Cause.SETPOINTS_AGAIN, Severity.INFO)
-        # with 0 one is enough, for as long as that is so
-        rig.drive.settings = replace(rig.drive.settings, setpoint_timeout=0.0)
-        rig.send(None)
-        rig.pass_time(8.0)
-        assert rig.far.motor.frequency == pytest.approx(8.0, abs=0.2)
-        rig.drive.settings = replace(rig.drive.settings, setpoint_timeout=0.1)
-        rig.pass_time(1.5)
-        assert rig.far.motor.frequency == 0.0 and rig.drive.armed
 
 
 # --- the control mode changes ---------------------------------------------------------------------
@@ -265,27 +228,9 @@ def test_mode_that_was_changed_at_a_standstill_is_found_by_enable(way: str) -> N
         assert rig.written('status.frq_set') == frequencies
 
 
-@both_methods
-def test_expected_control_mode_guards_enable(way: str) -> None:
-    # of an Optimal nothing tells it [C58]
-    for mode in MODES:
-        with enabled(way, mode) as rig:
-            rig.answer(rig.drive.stop())
-            other = 'Speed' if mode == 'Freque' else 'Freque'
-            rig.drive.settings = replace(rig.drive.settings, expected_control_mode=other)
-            assert f'expected is {other}' in rig.answer(rig.drive.enable())
-            assert not rig.drive.armed
-
-
 # --- the drive's own time-out ---------------------------------------------------------------------
 
 TOT, STOP = 'serial.sio_tot', 'serial.auto_stop'
-TIMED = [
-    name for name, way in WAYS.items()
-    if way.model == 'sinus_g2' and way.protocol not in ('canopen', 'telegram1')
-]
-
-
 def timeouts(rig: Rig) -> tuple[int, int]:
     """SioTot (tenths of a second) and AutoStop in the drive."""
     return rig.far.memory.raw(TOT), rig.far.memory.raw(STOP)
@@ -336,15 +281,3 @@ def test_drive_timeout_that_no_manual_allows() -> None:
         rig.far.memory.put(TOT, 300)
         rig.connect()
         assert timeouts(rig) == (20, 1)
-
-
-@pytest.mark.parametrize('way', TIMED)
-def test_bus_is_never_silent_for_long(way: str) -> None:
-    # polls are wanted less often than the drive must hear of us
-    rare = {'poll_rate': 0.1, 'telemetry_rate': 0.0, 'setpoint_timeout': 0.0}
-    with Rig(way, drive_timeout=2.5, **rare).connect() as rig:
-        rig.enable()
-        rig.answer(rig.drive.stop())
-        rig.pass_time(30.0)
-        assert rig.far.control_unit.mode is Mode.BUS
-        assert rig.far.faults.codes == []

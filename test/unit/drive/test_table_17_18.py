@@ -83,32 +83,3 @@ def test_no_code_is_left_out() -> None:
     for reference in RUNS.keys() - OPTIMAL_RUNS:
         with pytest.raises(ValueError, match='it must be fieldbus or terminal'):
             DriveSettings(model='sinus_optimal', reference=reference)
-
-
-@both_models
-def test_mode_2_is_read_from_the_terminals_and_never_written(way: str) -> None:
-    with Rig(way).turn() as rig:
-        rig.far.control_unit.press('ext')
-        rig.pass_time(1.0)
-        assert not rig.drive.armed
-        assert (rig.far.motor.driven, rig.far.control_unit.mode) == (True, 2)
-        assert rig.notes.said('terminals have control now')
-        # who enables it takes it from them
-        rig.enable()
-        rig.answer(rig.drive.disconnect(4.0))
-        assert rig.far.control_unit.mode_ext_writes == 0
-
-
-@both_models
-def test_mode_3_takes_control_and_stops_what_runs(way: str) -> None:
-    with Rig(way) as rig:
-        rig.far.control_unit.press('ext')
-        rig.connect()
-        rig.pass_time(0.3)
-        assert rig.far.motor.driven
-        rig.enable()
-        assert rig.written(MODE) == [Mode.BUS]
-        # with no set-point yet it goes to 0
-        rig.pass_time(1.0)
-        assert rig.far.motor.frequency == 0.0
-        assert rig.far.control_unit.mode == Mode.BUS
