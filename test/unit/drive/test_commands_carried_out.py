@@ -12,11 +12,7 @@ import math
 from types import SimpleNamespace
 from typing import Any, cast
 
-import pytest
-from support.said import raises
-
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import NotPossible, Refusal
 from nfo_sinus_driver.catalog.profile import (
     Acknowledge,
     AcknowledgeThenWrite,
@@ -25,12 +21,8 @@ from nfo_sinus_driver.catalog.profile import (
     Until,
     Write,
 )
-from nfo_sinus_driver.drive import Cause, DriveError
 from nfo_sinus_driver.drive.commands import carry_out
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
-from nfo_sinus_driver.link import NoAnswer, Refused
-
-NO = Refused(Refused.ILLEGAL_VALUE, 'no')
 
 
 class Noted:
@@ -43,10 +35,7 @@ class Noted:
 
     def _next(self, *asked: Any) -> Any:
         self.asked.append(asked)
-        answer = self._answers.pop(0)
-        if isinstance(answer, Exception):
-            raise answer
-        return answer
+        return self._answers.pop(0)
 
     def require_fitted(self, key: str) -> None:
         pass
@@ -69,12 +58,6 @@ class Noted:
         self._next('until', condition(SimpleNamespace(at=math.inf, word=1)))
 
 
-def carried_out(noted: Noted, steps: Steps[Any], priority: Priority = Priority.SERVICE) -> Any:
-    """What a sequence returns, or raises."""
-    done = carry_out(steps, cast(ParameterAccess, noted), priority, noted.reached)
-    return asyncio.run(done)
-
-
 def test_each_step_brings_what_the_next_one_is_given() -> None:
     def steps() -> Steps[int]:
         first = yield Read('a', once=True)
@@ -85,7 +68,8 @@ def test_each_step_brings_what_the_next_one_is_given() -> None:
         return int(first + flags)
 
     noted = Noted(3, None, 4, None, None)
-    assert carried_out(noted, steps(), Priority.STOP) == 7
+    done = carry_out(steps(), cast(ParameterAccess, noted), Priority.STOP, noted.reached)
+    assert asyncio.run(done) == 7
     assert noted.asked == [
         ('read', 'a', Priority.STOP, True),
         ('write', Write('b', 3), Priority.STOP),
@@ -93,52 +77,3 @@ def test_each_step_brings_what_the_next_one_is_given() -> None:
         ('acknowledge and write', 'c', Write('b', 0)),
         ('until', True),
     ]
-
-
-def test_a_refusal_is_raised_where_the_step_was_yielded() -> None:
-    def steps() -> Steps[str]:
-        try:
-            yield Write('a', 1)
-        except Refusal as refusal:
-            # the answer to what came before is not given again
-            return f'{refusal}, {(yield Read("b"))}'
-        return ''
-
-    assert carried_out(Noted(NO, 5), steps()) == 'no, 5'
-
-
-def test_a_refusal_that_ends_the_sequence_is_that_of_the_drive() -> None:
-    def steps() -> Steps[None]:
-        try:
-            yield Write('a', 1)
-        except Refusal:
-            if (yield Read('b')):
-                raise
-
-    with pytest.raises(Refused) as told:
-        carried_out(Noted(NO, True), steps())
-    assert told.value is NO
-    carried_out(Noted(NO, False), steps())
-
-
-@pytest.mark.parametrize('error', [NoAnswer('silence'), DriveError(Cause.NOT_CONFIRMED)])
-def test_anything_else_ends_the_sequence(error: Exception) -> None:
-    def steps() -> Steps[None]:
-        try:
-            yield Write('a', 1)
-        except Refusal:
-            yield Write('b', 2)
-
-    noted = Noted(error)
-    with pytest.raises(type(error)):
-        carried_out(noted, steps())
-    assert len(noted.asked) == 1
-
-
-def test_what_is_not_possible_is_told_to_a_person() -> None:
-    def steps() -> Steps[None]:
-        yield Read('a')
-        raise NotPossible('it is tuning')
-
-    with raises(Cause.NOT_POSSIBLE):
-        carried_out(Noted(0), steps())
