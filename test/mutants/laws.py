@@ -245,7 +245,7 @@ LAWS = (
         COMMANDS,
         'carry_out(self._method.stop(control_mode), self._registers, Priority.STOP)',
         'carry_out(self._method.stop(control_mode), self._registers, Priority.REFRESH)',
-        ('test/unit/drive/test_laws.py', '-k', 'rtu and test_3'),
+        ('test/unit/drive/test_drive_commands.py', '-k', 'ahead_of_all'),
     ),
     Mutant(
         4,
@@ -465,7 +465,7 @@ LAWS = (
         WATCH,
         '                period = min(period, patience * _KEEP_ALIVE_SHARE)',
         '                pass',
-        ('test/unit/drive/test_laws.py', '-k', 'rtu and test_9'),
+        ('test/unit/drive/test_poll_schedule.py', '-k', 'striking'),
     ),
     Mutant(
         9,

@@ -11,8 +11,8 @@ from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.link import Address, LinkError
 
 
-async def neighbour(bus: Bus, address: Address) -> None:
-    """Read something again and again, with the urgency of a poll; never ends by itself."""
+async def neighbour(bus: Bus, address: Address, priority: Priority = Priority.POLL) -> None:
+    """Read something again and again, with this urgency; never ends by itself."""
     while True:
         with contextlib.suppress(LinkError):
-            await bus.read(1, address, Priority.POLL)
+            await bus.read(1, address, priority)

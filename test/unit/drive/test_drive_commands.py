@@ -5,9 +5,11 @@
 
 from __future__ import annotations
 
+from neighbour import neighbour
 import pytest
 from support.rig import Rig
 
+from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 from nfo_sinus_driver.simulator.classic_frames import LineError
@@ -59,6 +61,20 @@ def test_a_stop_says_what_it_finds() -> None:
             # whoever runs it at the keypad is not disturbed
             assert rig.far.motor.driven
         assert rig.written(MODE) == []
+
+
+def test_a_stop_goes_ahead_of_all_that_waits() -> None:
+    with Rig().turn() as rig:
+        status = rig.drive.registers.address('fieldbus.drive_status')
+        for priority in [one for one in Priority if one is not Priority.STOP] * 20:
+            rig.bus.run(neighbour(rig.bus, status, priority))
+        rig.pass_time(0.5)
+        begun = len(rig.asked)
+        rig.drive.stop()
+        rig.pass_time(0.5)
+        # before it comes at most what was about to be sent
+        stop = [(key, data) for _, key, data in rig.asked[begun:]].index((SCMD, b'\0\0'))
+        assert stop <= 1
 
 
 def test_enable_needs_an_active_drive() -> None:
