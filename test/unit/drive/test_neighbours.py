@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections import Counter
 from concurrent.futures import Future
+import sys
+from types import FrameType
 from typing import Any
 
 import pytest
@@ -224,3 +226,40 @@ def test_a_drive_that_is_silent_when_it_is_read_slows_no_other(patient: bool) ->
         rig.answer(reading)
         rig.pass_time(_SETTLED)
         assert polls(rig, 5.0)[1] > 100
+
+
+# --- what a transaction costs the computer, in function calls ------------------------------------
+
+
+class Calls:
+    """Counts what the driver calls, built-in functions too, but not what the line does."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self, frame: FrameType, event: str, argument: Any) -> None:
+        where = frame.f_code.co_filename
+        if event in ('call', 'c_call') and 'nfo_sinus_driver' in where and 'simulator' not in where:
+            self.count += 1
+
+
+def calls_per_transaction(drives: int) -> float:
+    """Return what a transaction costs while drives are polled as fast as the line allows."""
+    with Rig(drives=drives, poll_rate=50.0) as rig:
+        rig.connect()
+        rig.pass_time(0.2 * drives)
+        begun, counter = len(rig.asked), Calls()
+        sys.setprofile(counter)
+        try:
+            while len(rig.asked) < begun + 600:
+                # and nothing of what the rig looks after
+                rig.line.go_to(min(rig.bus.step(), rig.clock.now + SLICE))
+        finally:
+            sys.setprofile(None)
+        return counter.count / (len(rig.asked) - begun)
+
+
+def test_a_transaction_costs_no_more_with_many_drives() -> None:
+    alone = calls_per_transaction(1)
+    among_many = calls_per_transaction(16)
+    assert among_many <= 1.1 * alone

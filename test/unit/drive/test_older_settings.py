@@ -17,7 +17,7 @@ import pytest
 from support.rig import Rig, Way
 from support.said import raises, said
 
-from nfo_sinus_driver.drive import Cause, DriveError, DriveSettings, Severity
+from nfo_sinus_driver.drive import Cause, DriveError, Severity
 from nfo_sinus_driver.drive.tuning import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.classic_frames import LineError
@@ -211,17 +211,6 @@ def test_a_run_command_that_the_drive_has_kept_is_removed(rig: Older) -> None:
     assert rig.modes == [BUS, STOP]
 
 
-def test_the_drives_time_out_is_set() -> None:
-    with Older(drive_timeout=4.0) as rig:
-        rig.connect()
-        assert [rig.far.peek(key) for key in TIMEOUT] == [4.0, True]
-        assert rig.modes == [BUS, STOP]
-        rig.result(rig.drive.set_drive_timeout(5.0))
-        assert rig.far.peek('serial.sio_tot') == 5.0
-        assert rig.modes == [BUS, STOP] * 2
-        assert not rig.flags
-
-
 def test_the_drives_time_out_is_set_when_the_bus_gets_control() -> None:
     with Older(drive_timeout=4.0) as rig:
         rig.far.control_unit.press('ext')
@@ -288,11 +277,6 @@ def test_the_firmware_is_asked_for_while_the_bus_has_no_control(
         assert rig.drive.snapshot.connected
         assert firmware in str(rig.drive.identity)
         assert not rig.notes.said('the bus has control')
-
-
-def test_no_control_word_is_asked_of_it() -> None:
-    with pytest.raises(ValueError, match=r'classic_dialect v5\.0 has no control word'):
-        DriveSettings(classic_dialect='v5.0', control_method='drive_control')
 
 
 def test_nothing_at_all_is_asked_that_it_does_not_know() -> None:
