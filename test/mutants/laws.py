@@ -489,7 +489,7 @@ LAWS = (
         'nfo_sinus_driver/drive/drive.py',
         '            if self._controller.method.keeps_control:',
         '            if False:',
-        ('test/unit/drive/test_movitrac_timeout.py', '-k', 'clean_end'),
+        ('test/unit/drive/test_movitrac_commands.py', '-k', 'clean_end'),
     ),
     Mutant(
         2,

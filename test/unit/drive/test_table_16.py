@@ -263,18 +263,6 @@ def test_table_16_misled(exits: Exits) -> None:
         assert not rows_that_fail(MISLED, check)
 
 
-def test_table_16_disable_leaves_at_zero_rpm(exits: Exits) -> None:
-    with Rig(WAY).turn() as rig:
-        exits.clear()
-        command(rig, ON)
-        rig.far.advance(2.0)
-        assert exits == ['EB', 'BS']
-        rig.pass_time(3.0)
-        assert rig.notes.said(STOPPED)
-        require_stopped(rig)
-        assert 'SR' in exits
-
-
 UNASKED = 'although it was not enabled'
 #: From a motor that stands under our control: the last exits, the words, and what the driver says.
 IDLE: list[tuple[str, list[Control], str]] = [
@@ -356,17 +344,3 @@ def test_table_16_fault_reaction_active_leaves_when_the_voltage_is_off(exits: Ex
         assert shown(rig) is State.FAULT_REACTION_ACTIVE
         assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 5 Overload'
         assert [exit for exit in exits if 'A' in exit] == ['EA', 'AF']
-
-
-def test_table_16_faulted_stays_while_the_fault_stands() -> None:
-    with Rig(WAY).turn() as rig:
-        rig.far.trip(OVERLOAD, cause_present=True)
-        rig.pass_time(1.0)
-        assert '5 Overload is still active' in rig.answer(rig.drive.acknowledge())
-        assert phase(rig) is F
-        assert 'fault 5 Overload is active' in rig.answer(rig.drive.enable())
-        rig.far.end_fault_causes()
-        rig.pass_time(0.5)
-        # bit 7 has to rise again
-        assert phase(rig) is F
-        assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 5 Overload'
