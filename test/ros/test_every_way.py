@@ -18,7 +18,7 @@ from lifecycle_msgs.msg import Transition
 from nfo_sinus_msgs.msg import DriveStatus
 from parameter_bench import refused, set_one
 import pytest
-from unit.catalog import setting_names
+from setting_names import SETTINGS
 from ways import Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
@@ -35,7 +35,7 @@ _BOOT = ('--boot-time', '0.5')
 #: The computer has more to do than this one driver.
 _MODEST = ('-p', 'poll_rate:=10')
 
-_NAMES = {line.split(',')[2] for line in setting_names.SETTINGS.splitlines() if line}
+_NAMES = {line.split(',')[2] for line in SETTINGS.splitlines() if line}
 
 def _simulator(bench: Bench) -> Simulated:
     return bench.simulator(*bench.drives.ramps(0.3), *_BOOT, paced=False)

@@ -13,13 +13,13 @@ from bench import Bench, Client
 from parameter_bench import QUIET, Wire, says_once, settings, values
 import pytest
 from rcl_interfaces.srv import DescribeParameters
+from setting_names import SETTINGS
 from support.parameter_ends import Ends
-from unit.catalog import setting_names
 from ways import needs
 
 pytestmark = needs('parameters')
 
-ROWS = [line.split(',') for line in setting_names.SETTINGS.splitlines() if line]
+ROWS = [line.split(',') for line in SETTINGS.splitlines() if line]
 #: The name in the manual, by the name of the ROS parameter.
 MANUAL = {ros: name for _, name, ros, _ in ROWS}
 #: The type of the ROS parameter.
