@@ -103,7 +103,7 @@ def _add_setting(group: argparse._ActionsContainer, name: str, option: str, **mo
     # what argparse calls it in its own words
     value.__name__ = 'number'
     given: dict[str, Any] = {'type': value, 'metavar': option.rpartition('-')[2].upper()}
-    text, also = setting.description, setting.also
+    also = setting.also
     if setting.choices:
         offered = [one for one in setting.choices if one not in (MONITOR, AUTO)]
         # what it says more is of those that are not offered here
@@ -111,9 +111,10 @@ def _add_setting(group: argparse._ActionsContainer, name: str, option: str, **mo
         given = {'choices': offered}
     elif name == 'baud_rate':
         given['choices'] = (0, *BIT_RATES)
-    default = f'{setting.default}' if setting.default != '' else setting.zero
     if setting.default == '':
-        text = setting.text
+        text, default = setting.text, setting.zero
+    else:
+        text, default = setting.description, str(setting.default)
     if name in _OF_SCAN:
         default += f'; scan: {_OF_SCAN[name]}'
     given['help'] = f'{"; ".join(filter(None, (text, also)))} (default: {default})'

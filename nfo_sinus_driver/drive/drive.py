@@ -411,6 +411,7 @@ class Drive:
         identity = await inverter.introduce()
         self._watch.connected()
         self.setpoint.connected()
+        self.log.connected()
         inverter.found()
         if self._controller is not None:
             self._controller.connected()

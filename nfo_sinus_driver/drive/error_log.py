@@ -22,8 +22,8 @@ from nfo_sinus_driver.link import Address, LinkError, Refused
 _log = logging.getLogger(__name__)
 
 _HOUR = 3600.0
-#: By how much the hours may lag behind the clock while the drive has power, h: two ticks.
-_LAG = 2 * TICK
+#: By how much the clocks of drive and computer may drift apart, h for each h.
+_DRIFT = 1e-4
 #: How often the log is read anew when an entry came in meanwhile.
 _READINGS = 3
 #: A counter that was reset may have counted on since, kWh.
@@ -103,10 +103,15 @@ class ErrorLog:
         key = self._inverter.model.key(Role.OPERATING_TIME)
         reply = await self._registers.read_reply(key, priority, once=priority > Priority.POLL)
         hours = self._registers.number(key, reply.data)
-        expected = self.powered_since + (reply.arrived - self._shown_at) / _HOUR
-        if not hours >= expected - _LAG:
+        elapsed = (reply.arrived - self._shown_at) / _HOUR
+        # what is shown is less than a tick behind what was counted
+        if not hours > self.powered_since + elapsed * (1 - _DRIFT) - TICK:
             self.powered_since, self._shown_at = hours, reply.arrived
         return hours
+
+    def connected(self) -> None:
+        """Take note that the drive may have been off until now."""
+        self.powered_since = math.nan
 
     def understood(self, entries: Sequence[int], now: float) -> tuple[LogEntry, ...]:
         """

@@ -58,6 +58,8 @@ class Following:
     def begin(self) -> None:
         """Begin anew."""
         self._after_expiry, self._backwards, self._beyond = _Fall(), _Fall(), _Fall()
+        #: In which direction all set-points of late point; 0: in none, or in both.
+        self._way = 0
         self._wrong_way = 0
         self._told = False
 
@@ -94,16 +96,17 @@ class Following:
 
         One that has begun to, through standstill, has been told by another master.
         """
-        # a motor that only ramps down from before comes nearer to standstill
+        way = 0
         if least >= 0 and most > 0:
-            back = -frequency
+            way = 1
         elif most <= 0 and least < 0 and self._signed:
-            back = frequency
-        else:
-            back = math.nan
-        if math.isnan(back):
-            self._backwards, self._wrong_way = _Fall(), 0
+            way = -1
+        if way != self._way:
+            # a motor that ramps down from the other direction was never seen to begin in this one
+            self._way, self._backwards, self._wrong_way = way, _Fall(), 0
+        if not way:
             return False
+        back = -way * frequency
         endless = self._backwards.take(max(back, 0.0), at)
         begun = self._backwards.least < _STANDS
         self._wrong_way = self._wrong_way + 1 if back > _BACKWARDS and (begun or endless) else 0

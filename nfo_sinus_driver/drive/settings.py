@@ -287,8 +287,8 @@ class DriveSettings:
         own = _own_timeouts(self.model) or _own_timeouts(AUTO)
         longest, step = max(most for most, _ in own), min(least for _, least in own)
         whose = f' with {self.model}' if len(own) == 1 else ''
-        own_span = replace(settings_of(DriveSettings)['drive_timeout'], high=float(longest))
-        replace(own_span, unit=f's{whose}').check(self.drive_timeout)
+        declared = settings_of(DriveSettings)['drive_timeout']
+        replace(declared, high=float(longest), unit=f's{whose}').check(self.drive_timeout)
         least = self.lost_after + DRIVE_TIMEOUT_MARGIN
         if 0 < self.drive_timeout < least - 1e-9:
             raise ValueError(

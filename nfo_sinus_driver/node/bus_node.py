@@ -68,9 +68,8 @@ class BusNode(Node):
         )
 
     def _on_setpoint_all(self, message: Float32) -> None:
-        with self.bus_context.at_once():
-            for take in self.bus_context.on_setpoint_all:
-                take(message)
+        for take in self.bus_context.on_setpoint_all:
+            take(message)
 
     def _report(self) -> None:
         if not self.bus_context.bus.alive:

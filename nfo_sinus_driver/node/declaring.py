@@ -32,9 +32,10 @@ _TYPES = {
 
 def declare(node: Node, settings: Mapping[str, Setting]) -> dict[str, SettingValue]:
     """Declare settings on a node and return their values; a ValueError says which is wrong."""
+    overrides = overrides_of(node)
     for name, one in settings.items():
         # the complaints of rclpy name no remedy
-        given = overrides_of(node).get(name)
+        given = overrides.get(name)
         value = one.default if given is None else _coerced(one, given.value)
         node.declare_parameter(name, value, _descriptor(one), ignore_override=True)
     return {name: node.get_parameter(name).value for name in settings}

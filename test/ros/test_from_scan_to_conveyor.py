@@ -86,6 +86,7 @@ def test_one_message_moves_all_drives_that_are_enabled_and_none_that_is_watched(
         wait_until(lambda: frequencies(simulator) == [20, 0, 0], 'one turns')
         holds_for(A_WHILE, lambda: frequencies(simulator) == [20, 0, 0], 'it turns on')
     assert simulator.state(3)['writes'] == {}
+    assert 'control_method is monitor' not in bench.log, 'it was not even asked'
 
 
 @needs('direct')

@@ -124,7 +124,7 @@ def list_of_movitrac() -> Iterator[Fact]:
     for line in lines():
         row = BY_INDEX[line.index]
         yield f'{row.key} hexadecimal', int(line.hexadecimal, 16), line.index
-        name, unit = re.fullmatch(r'(.*?)(?:\[([^]]*)\])?', line.name).groups('')  # type: ignore[union-attr]
+        name, unit = re.fullmatch(r'(.*?)(?:\[([^]]*)\])?', line.name).groups('')
         number = rf'P(\d\d\d-P)?{line.number}\b.*i' if line.number != '-' else 'I'
         if line.index == 13 and line.number == '031':
             number = 'P030-P032.*i'

@@ -78,7 +78,7 @@ def refused(call: object, *arguments: object) -> str:
 def test_golden_values() -> None:
     for name, raw, printed in GOLDEN:
         codec, data = codec_of(name), bytes.fromhex(printed)
-        found = codec.encode(raw), codec.decode(data), codec.size, codec.name  # type: ignore[arg-type]
+        found = codec.encode(raw), codec.decode(data), codec.size, codec.name
         assert found == (data, raw, len(data), name)
 
 
@@ -189,7 +189,7 @@ def made(codec: str = 'bcd32', **changed: object) -> Parameter:
         minimum=None,
         maximum=None,
     )
-    return replace(plain, **changed)  # type: ignore[arg-type]
+    return replace(plain, **changed)
 
 
 HUNDREDTH = Fraction(1, 100)

@@ -147,7 +147,7 @@ def test_wrong_row_is_refused_with_its_line(folder: Path) -> None:
     for file, cells, change, message in WRONG:
         whole = (folder / file).read_text(encoding='utf-8')
         line = line_of(folder / file, *cells.split())
-        rewrite(folder / file, lambda rows: rows[line - 2].update(change))  # noqa: B023
+        rewrite(folder / file, lambda rows, at=line - 2, new=change: rows[at].update(new))
         said = refusal()
         if not (said.startswith(f'{NAME}/{file}, line {line}: ') and message in said):
             found.append((file, change, said))

@@ -360,3 +360,18 @@ def test_an_entry_has_its_wall_time_if_the_drive_has_had_power_ever_since() -> N
                 assert newest.age == pytest.approx((rig.clock.now - tripped) / 3600, abs=0.11)
                 assert began < newest.at == pytest.approx(tripped, abs=400.0)
                 assert rig.drive.powered_since == HOURS
+
+
+def test_an_entry_from_before_a_loss_has_no_wall_time() -> None:
+    # for the drive may have been off, be it for less than its hours show
+    with Rig(poll_rate=0.2, telemetry_rate=0.1).connect() as rig:
+        rig.pass_time(800.0)
+        rig.far.trip(5)
+        rig.acknowledged = 1
+        rig.answer(rig.drive.acknowledge())
+        rig.line.state = 'silent'
+        rig.pass_time(20.0)
+        rig.line.mend()
+        rig.wait_until(lambda: rig.drive.snapshot.connected)
+        (newest,) = rig.result(rig.drive.error_log())
+        assert math.isnan(newest.at) and newest.wall_time.endswith(' or before')

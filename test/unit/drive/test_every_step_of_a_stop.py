@@ -52,7 +52,7 @@ def steps_of(way: str, stop: str) -> set[tuple[str, bool]]:
 def goes_wrong(way: str, stop: str, step: tuple[str, bool], how: str) -> str:
     """Return what is wrong with a stop of which one step always goes wrong; ``''``: nothing."""
     rig = Rig(way, line=QUICK, poll_rate=5.0)
-    # what is only said to be carried out, or refused for ever, bends the order of commands
+    # what is only said to be carried out, or always refused, bends the order of commands
     with contextlib.closing(rig.bus):
         rig.turn()
         rig.meet = lambda key, data: how if (key, data is not None) == step else None

@@ -155,3 +155,23 @@ def test_a_motor_that_ramps_through_an_earlier_set_point_is_not_stopped() -> Non
             rig.pass_time(25.0)
             assert rig.drive.armed
         assert rig.notes.events[-1].severity is not Severity.WARNING
+
+
+@pytest.mark.parametrize('pause', [0.9, 0.95, 1.0, 1.05, 1.1, 1.5])
+@pytest.mark.parametrize('first', [20.0, -20.0])
+def test_a_motor_that_ramps_slowly_through_a_pause_at_0_is_not_stopped(
+    first: float, pause: float
+) -> None:
+    # however long the set-point is 0 between the two directions
+    with Rig('movitrac') as rig:
+        rig.turn(20.0)
+        rig.send(first)
+        rig.pass_time(3.0)
+        _, down = ramps('movitrac31', 0.5, 0.5)
+        rig.far.set_from_keypad(down, 200.0)
+        rig.send(0.0)
+        rig.pass_time(pause)
+        rig.send(-first)
+        rig.pass_time(3.0)
+        assert rig.far.motor.frequency * first > 0
+        assert rig.drive.armed, rig.notes.events
