@@ -4,62 +4,60 @@
 """
 The states of control of one drive, and what leads from one to another.
 
-This is the one place that knows whether the motor may turn; :mod:`.controller` turns the table.
-``docs/control.md`` has it as a table made from here.
+This is the one place that knows whether the motor may turn, and whether it is being stopped:
+:mod:`.controller` and :mod:`.stopping` dispatch the events. ``docs/control.md`` has the table as it
+is here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import enum
+import math
 
 
 class ControlState(enum.Enum):
-    """What the driver is doing with the drive; the values say it to people."""
+    """What the driver is doing with the drive; the values describe it to users."""
 
     OFFLINE = 'the drive is not connected, and nothing has to be stopped'
     IDLE = 'connected; nothing was begun that could make the motor turn'
     ENABLING = 'an enable is on its way: control is taken, a run command may stand'
     ENABLED = 'the motor runs and follows set-points, or the reference of the drive'
-    PROCEDURE = 'a procedure, such as tuning, has the drive to itself'
-    ABORTING = 'a procedure was stopped and has not ended yet'
+    PROCEDURE = 'a procedure, such as tuning, has exclusive access to the drive'
     STOPPING = 'the run command is removed, again and again until the drive says that it stops'
     BLOCKED = 'a fault keeps the motor still, and the drive from taking the stop until it is over'
-    CLOSED = 'the driver is ending: the motor is stopped, and nothing can start it any more'
 
 
 class ControlEvent(enum.Enum):
-    """What can happen; the values say it to people."""
+    """What can happen; the values describe it to users."""
 
     CONNECTED = 'the drive is connected'
     LOST = 'the drive is lost, or left alone'
-    ENABLE = 'somebody enables the motor'
+    ENABLE = 'a client enables the motor'
     REFUSED = 'an enable is refused before anything was written'
     RUNNING = 'the status says that the motor runs, at set-point 0'
     STOP = 'a reason to stop: a service, a fault, a refusal, control lost, a failed enable …'
     STOPPED = 'the status confirms that the drive stops'
     FAULT_BLOCKS = 'the drive has a fault, stands, and refuses the stop'
     FAULT_OVER = 'it may take commands again'
-    BEGIN = 'a procedure asks for the drive'
-    END = 'the procedure has ended'
-    CLOSE = 'the driver ends'
+    BEGIN = 'a procedure begins'
+    END = 'a procedure has ended by itself'
 
 
 #: Where each event leads from each state; with a dot it changes nothing, or is refused.
 _TABLE = """
-              OFFLINE   IDLE      ENABLING ENABLED  PROCEDURE ABORTING STOPPING BLOCKED  CLOSED
-CONNECTED     IDLE      .         .        .        .         .        .        .        .
-LOST          .         OFFLINE   STOPPING STOPPING ABORTING  .        .        STOPPING .
-ENABLE        .         ENABLING  .        .        .         .        .        .        .
-REFUSED       .         .         IDLE     .        .         .        .        .        .
-RUNNING       .         .         ENABLED  .        .         .        .        .        .
-STOP          STOPPING  STOPPING  STOPPING STOPPING ABORTING  .        .        .        .
-STOPPED       .         .         .        .        .         .        IDLE     .        .
-FAULT_BLOCKS  .         .         .        .        .         .        BLOCKED  .        .
-FAULT_OVER    .         .         .        .        .         .        .        STOPPING .
-BEGIN         PROCEDURE PROCEDURE .        .        .         .        .        .        .
-END           .         .         .        .        IDLE      IDLE     .        .        .
-CLOSE         CLOSED    CLOSED    CLOSED   CLOSED   CLOSED    CLOSED   CLOSED   CLOSED   .
+              OFFLINE   IDLE      ENABLING ENABLED  PROCEDURE STOPPING BLOCKED
+CONNECTED     IDLE      .         .        .        .         .        .
+LOST          .         OFFLINE   STOPPING STOPPING STOPPING  .        STOPPING
+ENABLE        .         ENABLING  .        .        .         .        .
+REFUSED       .         .         IDLE     .        .         .        .
+RUNNING       .         .         ENABLED  .        .         .        .
+STOP          STOPPING  STOPPING  STOPPING STOPPING STOPPING  .        .
+STOPPED       .         .         .        .        .         IDLE     .
+FAULT_BLOCKS  .         .         .        .        .         BLOCKED  .
+FAULT_OVER    .         .         .        .        .         .        STOPPING
+BEGIN         PROCEDURE PROCEDURE .        .        .         .        .
+END           .         .         .        .        IDLE      .        .
 """
 
 
@@ -78,6 +76,52 @@ def _read(table: str) -> Mapping[tuple[ControlState, ControlEvent], ControlState
 TRANSITIONS = _read(_TABLE)
 
 #: Something that the driver has begun may drive the motor.
-COMMANDED = frozenset(
-    (ControlState.ENABLING, ControlState.ENABLED, ControlState.PROCEDURE, ControlState.ABORTING)
-)
+COMMANDED = frozenset((ControlState.ENABLING, ControlState.ENABLED, ControlState.PROCEDURE))
+
+
+class Control:
+    """
+    The state of control of one drive.
+
+    :param now: the clock of the bus.
+    :param on_change: called with the state before, after each transition to another one.
+    :ivar state: what the driver is doing with the drive.
+    :ivar since: when the last event was, s: a status from before says nothing of it.
+    :ivar stopped_at: when a stop was confirmed last, s.
+    """
+
+    def __init__(self, now: Callable[[], float], on_change: Callable[[ControlState], None]) -> None:
+        self.state = ControlState.OFFLINE
+        self.since = 0.0
+        self.stopped_at = -math.inf
+        self._now = now
+        self._on_change = on_change
+
+    def dispatch(self, event: ControlEvent) -> None:
+        """Go where an event leads."""
+        before = self.state
+        self.state = TRANSITIONS.get((before, event), before)
+        self.since = self._now()
+        if event is ControlEvent.STOPPED:
+            self.stopped_at = self.since
+        if self.state is not before:
+            self._on_change(before)
+
+    def accepts(self, event: ControlEvent) -> bool:
+        """Whether an event leads to another state."""
+        return (self.state, event) in TRANSITIONS
+
+    @property
+    def commanded(self) -> bool:
+        """Something that the driver has begun may drive the motor."""
+        return self.state in COMMANDED
+
+    @property
+    def stopping(self) -> bool:
+        """A stop is not confirmed yet."""
+        return self.state is ControlState.STOPPING or self.blocked
+
+    @property
+    def blocked(self) -> bool:
+        """The motor stands by a fault, and the drive refuses the stop until that is over."""
+        return self.state is ControlState.BLOCKED

@@ -4,9 +4,9 @@
 """
 Who may make the motor turn, and how it is made to stop.
 
-The controller of a drive turns the table of :mod:`.control_state`: every command, everything that
-the status tells and every loss is an event in it. The motor follows set-points only while the state
-is ENABLED, to which a person's :meth:`Controller.enable` alone leads. All of this runs on the bus.
+Every command, everything that the status shows and every loss is an event of
+:mod:`.control_state`. The motor follows set-points only while the state is ENABLED, to which
+:meth:`Controller.enable` alone leads. All of this runs on the bus.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ import math
 
 from nfo_sinus_driver.bus import Cancelled, Priority, Task
 from nfo_sinus_driver.catalog import InverterStatus, Kind, Limits, State
-from nfo_sinus_driver.drive import control_state
 from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.control_state import COMMANDED, ControlEvent, ControlState
+from nfo_sinus_driver.drive.control_state import Control, ControlEvent, ControlState
 from nfo_sinus_driver.drive.diagnosis import (
     explain_fall,
     explain_fault,
@@ -30,30 +29,23 @@ from nfo_sinus_driver.drive.diagnosis import (
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.following import Following
-from nfo_sinus_driver.drive.sequences import StartSequence, StopSequence
 from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.drive.starting import StartSequence
+from nfo_sinus_driver.drive.stopping import StopSequence
 from nfo_sinus_driver.link import LinkError, Refused
 
 
 class ExclusiveAccess:
-    """The drive in the hands of a procedure, such as a tuning, whose name is ``what``."""
+    """Exclusive access for one procedure, such as a tuning, whose name is ``what``."""
 
     def __init__(self, what: str) -> None:
         self.what = what
-        self._aborted = False
-
-    @property
-    def aborted(self) -> bool:
-        """The procedure shall stop what it does, or not begin it."""
-        return self._aborted
-
-    def abort(self) -> None:
-        """Have the procedure stop."""
-        self._aborted = True
+        #: The procedure shall stop what it does, or not begin it.
+        self.aborted = False
 
     def require_wanted(self) -> None:
-        """Raise a :class:`DriveError` if somebody has stopped the procedure meanwhile."""
-        if self._aborted:
+        """Raise a :class:`DriveError` if the procedure was stopped meanwhile."""
+        if self.aborted:
             raise DriveError(Cause.PROCEDURE_NOT_BEGUN, what=self.what)
 
 
@@ -61,8 +53,8 @@ class Controller:
     """
     Enables, stops and judges one drive.
 
-    What a person asks for says in a :class:`DriveError` why it was not done. A stop that the drive
-    does not confirm is such an error, too; it is retried until it does.
+    A :class:`DriveError` says why a command was not carried out. A stop that the drive does not
+    confirm is such an error, too; it is retried until it does.
     """
 
     def __init__(self, inverter: DriveState, method: Commands, setpoint: Setpoint) -> None:
@@ -71,16 +63,14 @@ class Controller:
         #: How the drive is commanded, for a procedure too.
         self.method = method
         self._setpoint = setpoint
-        self._state = ControlState.OFFLINE
-        #: When something happened last: what was read before says nothing of it.
-        self._since = 0.0
-        #: When a stop was confirmed last.
-        self._stopped_at = -math.inf
-        #: What enables, and who has the drive, while there is one.
+        self._control = Control(self._bus.now, self._changed)
+        #: The driver ends: the motor is stopped, and nothing can start it any more.
+        self.closed = False
+        #: What enables, to be cancelled; and what no other procedure and no enable may run beside.
         self._enabling: Task | None = None
         self._access: ExclusiveAccess | None = None
         self._starting = StartSequence(inverter, method)
-        self._sequence = StopSequence(inverter, method, self._happened)
+        self._sequence = StopSequence(inverter, method, self._control)
         self._following = Following(inverter, setpoint)
         #: A set-point that the drive did not take: when, and what it answered.
         self._refusal: tuple[float, Report] | None = None
@@ -94,22 +84,22 @@ class Controller:
     @property
     def state(self) -> ControlState:
         """What the driver is doing with the drive."""
-        return self._state
+        return self._control.state
 
     @property
     def enabled(self) -> bool:
         """The motor follows set-points, or the reference of the drive."""
-        return self._state is ControlState.ENABLED
+        return self.state is ControlState.ENABLED
 
     @property
     def stopping(self) -> bool:
         """A stop is not confirmed yet."""
-        return self._sequence.active
+        return self._control.stopping
 
     @property
     def blocked_by_fault(self) -> bool:
         """The motor stands by a fault, and the drive refuses the stop until it is acknowledged."""
-        return self._sequence.blocked_by_fault
+        return self._control.blocked
 
     @property
     def stop_overdue(self) -> bool:
@@ -119,7 +109,12 @@ class Controller:
     @property
     def commanded(self) -> bool:
         """Something that the driver has begun may drive the motor."""
-        return self._state in COMMANDED
+        return self._control.commanded
+
+    @property
+    def procedure_runs(self) -> bool:
+        """A procedure has the drive; it may have been stopped, and not have ended yet."""
+        return self._access is not None
 
     @property
     def changing(self) -> bool:
@@ -133,110 +128,77 @@ class Controller:
         commanded = self.commanded or self.stopping
         return commanded or seen is None or seen.from_bus or seen.tuning
 
-    # --- the table ----------------------------------------------------------------------------
+    # --- transitions --------------------------------------------------------------------------
 
-    def _happened(self, event: ControlEvent) -> None:
-        """Turn the table by one event, and do what leaving a state means."""
-        before = self._state
-        self._state = control_state.TRANSITIONS.get((before, event), before)
-        self._since = self._bus.now()
-        if event is ControlEvent.STOPPED:
-            self._stopped_at = self._since
-        if self._state is before:
-            return
+    def _changed(self, before: ControlState) -> None:
+        """Do what leaving a state means."""
         if before is ControlState.ENABLED:
             self._setpoint.disarm()
-        gone = before is ControlState.ENABLING and self._state is not ControlState.ENABLED
-        if gone and self._enabling not in (None, self._bus.current):
-            self._bus.cancel(self._enabling)
-        if self._access is not None and self._state is not ControlState.PROCEDURE:
-            self._access.abort()
-        self._catch_up()
-
-    def _catch_up(self) -> None:
-        """See to it that IDLE is what is left: a stop may be pending, or the drive be lost."""
-        if self._state is not ControlState.IDLE:
-            return
-        if self.blocked_by_fault:
-            self._happened(ControlEvent.STOP)
-            self._happened(ControlEvent.FAULT_BLOCKS)
-        elif self.stopping:
-            self._happened(ControlEvent.STOP)
-        elif not self._inverter.connected:
-            self._happened(ControlEvent.LOST)
-
-    def _stop(self, *, anew: bool = False) -> None:
-        """End what drives the motor; ``anew``: what attempts show that have begun counts not."""
-        self._happened(ControlEvent.STOP)
-        if anew:
-            self._sequence.request_anew()
-        else:
-            self._sequence.request()
-
-    @contextlib.contextmanager
-    def _stopped_by_itself(self) -> Iterator[None]:
-        """Be stopping while something goes on that stops the motor in its own way."""
-        with self._sequence.held():
-            self._happened(ControlEvent.STOP)
-            yield
+        elif before is ControlState.ENABLING:
+            if not self.enabled and self._enabling not in (None, self._bus.current):
+                self._bus.cancel(self._enabling)
+        elif before is ControlState.PROCEDURE and self._access is not None:
+            self._access.aborted = True
+        if self.state is ControlState.IDLE and not self._inverter.connected:
+            self._control.dispatch(ControlEvent.LOST)
 
     @contextlib.contextmanager
     def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
-        """Have the drive for a procedure: whoever stops it ends that, and its preparations."""
+        """Have the drive for a procedure: a stop ends that, and its preparations."""
         self.require_idle(what)
         self._access = access = ExclusiveAccess(what)
-        self._happened(ControlEvent.BEGIN)
+        self._control.dispatch(ControlEvent.BEGIN)
         try:
             yield access
         finally:
             self._access = None
-            self._happened(ControlEvent.END)
+            self._control.dispatch(ControlEvent.END)
 
     def require_idle(self, what: str) -> None:
         """See to it that a procedure may begin."""
-        if (self._state, ControlEvent.BEGIN) in control_state.TRANSITIONS:
-            return
+        if self.closed:
+            raise DriveError(Cause.ENDING)
         if self._access is not None:
             other = self._access.what
             raise DriveError(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=other)
+        if self._control.accepts(ControlEvent.BEGIN):
+            return
         if self.commanded:
             raise DriveError(Cause.MOTOR_ENABLED, what=what)
-        if self._state is ControlState.CLOSED:
-            raise DriveError(Cause.ENDING)
         if self.blocked_by_fault and self._inverter.seen is not None:
             require_no_fault(self._inverter, self._inverter.seen)
         raise DriveError(Cause.STOP_NOT_CONFIRMED_YET, what=what)
 
     def require_newer(self, asked_at: float) -> None:
         """
-        See to it that no stop was confirmed since somebody asked for a motion, s, monotonic.
+        See to it that no stop was confirmed since a client asked for a motion, s, monotonic.
 
-        Whoever asks for one thing and then for a stop may be heard in the other order.
+        The request for a motion and that for a stop after it may arrive in the other order.
         """
-        if asked_at < self._stopped_at:
+        if asked_at < self._control.stopped_at:
             raise DriveError(Cause.STOPPED_SINCE_ASKED)
 
     async def _require_enable(self) -> None:
         """
         See to it that an enable may begin.
 
-        A stop that nobody has confirmed forbids it: who enables may not know of that.
+        A stop that is not confirmed forbids it: the client may not know of that.
         """
-        if (self._state, ControlEvent.ENABLE) in control_state.TRANSITIONS:
-            return
-        if self._enabling is not None:
-            raise DriveError(Cause.ENABLING_ALREADY)
+        if self.closed:
+            raise DriveError(Cause.NOT_ACTIVE)
         if self._access is not None:
             raise DriveError(Cause.PROCEDURE_GOES_ON, what=self._access.what)
-        if self._state is ControlState.CLOSED:
-            raise DriveError(Cause.NOT_ACTIVE)
+        if self._control.accepts(ControlEvent.ENABLE):
+            return
+        if self.state is ControlState.ENABLING:
+            raise DriveError(Cause.ENABLING_ALREADY)
         if self.blocked_by_fault:
             seen = await self._inverter.look(Priority.SERVICE)
             self._explain_refusal(seen)
             require_no_fault(self._inverter, seen)
         raise DriveError(Cause.STOP_PENDING)
 
-    # --- what a person asks for ---------------------------------------------------------------
+    # --- commands -----------------------------------------------------------------------------
 
     async def enable(
         self, prepare: Callable[[], Awaitable[None]], asked_at: float = math.inf
@@ -252,7 +214,7 @@ class Controller:
             return Report(Cause.ENABLED_ALREADY)
         await self._require_enable()
         self._enabling = self._bus.current
-        self._happened(ControlEvent.ENABLE)
+        self._control.dispatch(ControlEvent.ENABLE)
         try:
             control_mode, limits = await self._check()
             await self._start(control_mode, limits, prepare)
@@ -276,7 +238,7 @@ class Controller:
                 self._explain_refusal(await self._inverter.look(Priority.SERVICE))
             return await self._starting.check()
         except Exception as error:
-            self._happened(ControlEvent.REFUSED)
+            self._control.dispatch(ControlEvent.REFUSED)
             raise DriveError(report_of(error)) from error
 
     async def _start(
@@ -285,14 +247,14 @@ class Controller:
         """Start the motor, and follow set-points from then on; else remove the run command."""
         try:
             await self._starting.start(control_mode, prepare)
-            self._happened(ControlEvent.RUNNING)
+            self._control.dispatch(ControlEvent.RUNNING)
             if not self.enabled:
                 raise Cancelled
             self._setpoint.arm(control_mode, limits)
             self._following.begin()
         except Exception as error:
             # whatever went wrong, a run command may stand by now
-            self._stop()
+            self._sequence.start()
             await self._settle()
             raise DriveError(report_of(error)) from error
 
@@ -302,7 +264,7 @@ class Controller:
 
         :param patience: how long the drive may take to confirm it, s.
         """
-        self._stop()
+        self._sequence.start()
         await self._sequence.wait_confirmed(patience or None)
         seen = self._inverter.seen
         if self.blocked_by_fault:
@@ -329,7 +291,7 @@ class Controller:
 
     async def withdraw_run_command(self) -> None:
         """Remove what a procedure has commanded; control is kept."""
-        self._sequence.request()
+        self._sequence.start()
         await self._sequence.wait_confirmed()
 
     async def quick_stop(self) -> Report:
@@ -341,7 +303,7 @@ class Controller:
         if not self.method.coasts:
             return Report(Cause.NO_QUICK_STOP, stop=await self.stop())
         may_run = self.may_run
-        with self._stopped_by_itself():
+        with self._sequence.external_stop():
             try:
                 may_run = may_run or await self.method.in_control(Priority.STOP)
                 may_run = may_run or (await self._inverter.look(Priority.LOOK)).tuning
@@ -354,7 +316,7 @@ class Controller:
                     )
             except Exception as error:
                 # even after a mistake of ours the motor is not left as it is
-                self._sequence.request()
+                self._sequence.start()
                 with contextlib.suppress(LinkError):
                     await self._inverter.look(Priority.LOOK)
                 seen = self._inverter.seen
@@ -366,7 +328,7 @@ class Controller:
                 ) from error
             if not may_run:
                 return self._no_control(self._inverter.seen)
-            self._sequence.request()
+            self._sequence.start()
             await self._settle()
             return Report(Cause.QUICK_STOPPED)
 
@@ -378,7 +340,7 @@ class Controller:
         if not seen.faulted and fault.kind is Kind.STATUS:
             return inverter.report(Cause.NOTHING_TO_ACKNOWLEDGE)
         may_run = self.may_run or await self.method.in_control(Priority.SERVICE)
-        with self._stopped_by_itself():
+        with self._sequence.external_stop():
             return await self._acknowledge(seen, may_run=may_run)
 
     async def _acknowledge(self, seen: InverterStatus, *, may_run: bool) -> Report:
@@ -395,7 +357,7 @@ class Controller:
         finally:
             # even if no answer came, the drive may be free to run now
             if may_run:
-                self._sequence.request_anew()
+                self._sequence.restart()
         try:
             await self._inverter.wait_until(
                 lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
@@ -426,7 +388,7 @@ class Controller:
         seen = self._inverter.seen
         may_run = self.commanded or self.stopping or (seen is not None and seen.from_bus)
         # nobody enables it while it is waited for that the motor stands
-        with self._stopped_by_itself():
+        with self._sequence.external_stop():
             return await self._release(timeout, may_run=may_run)
 
     async def _release(self, timeout: float, *, may_run: bool) -> Report:
@@ -462,10 +424,9 @@ class Controller:
 
     def close(self) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
-        # first, for another thread may look in between, and no stop would be pending
+        self.closed = True
         if self.may_run:
-            self._sequence.request()
-        self._happened(ControlEvent.CLOSE)
+            self._sequence.start()
 
     # --- what happens by itself ---------------------------------------------------------------
 
@@ -476,21 +437,20 @@ class Controller:
             turns = seen is not None and (seen.runs_by_bus or abs(seen.frequency) > 0)
             if turns and not self.stopping:
                 inverter.tell(Severity.WARNING, inverter.report(Cause.FOUND_RUNNING))
-            self._stop(anew=True)
+            self._sequence.restart()
         elif self._lost_in_use and seen is not None and not seen.faulted:
             inverter.tell(Severity.WARNING, inverter.report(Cause.CONTROL_LOST_WHILE_AWAY))
         self._lost_in_use = False
 
     def connected(self) -> None:
         """Take note that the drive is connected."""
-        self._happened(ControlEvent.CONNECTED)
+        self._control.dispatch(ControlEvent.CONNECTED)
 
     def disconnected(self) -> None:
         """Take note that the drive is left alone; what still drives the motor is stopped."""
-        commanded = self.commanded
-        self._happened(ControlEvent.LOST)
-        if commanded:
-            self._stop()
+        self._control.dispatch(ControlEvent.LOST)
+        if self.stopping:
+            self._sequence.start()
 
     def lost(self) -> bool:
         """Take note that the drive does not answer any more; true if it may have followed us."""
@@ -499,14 +459,14 @@ class Controller:
             # no status will come that could tell a better reason
             (_, reason), self._refusal = self._refusal, None
             self._inverter.tell(Severity.WARNING, Cause.STOPPING_BECAUSE, why=reason)
-        self._happened(ControlEvent.LOST)
+        self._control.dispatch(ControlEvent.LOST)
         if self._lost_in_use:
-            self._stop()
+            self._sequence.start()
         return self._lost_in_use
 
     def alarmed_by(self, seen: InverterStatus) -> bool:
         """Tell whether a status is a reason to stop."""
-        follows = self.enabled and seen.at >= self._since
+        follows = self.enabled and seen.at >= self._control.since
         return follows and self._why_stopped(seen) is not None
 
     def judge(self, seen: InverterStatus) -> bool:
@@ -514,10 +474,10 @@ class Controller:
         self._setpoint.answered()
         before, self._judged = self._judged, seen
         if self.blocked_by_fault and not seen.faulted:
-            self._sequence.request_anew()
+            self._sequence.restart()
         if self._explain_refusal(seen):
             return True
-        if seen.at < self._since:
+        if seen.at < self._control.since:
             return False
         reason = None
         if self.enabled:
@@ -527,13 +487,13 @@ class Controller:
         elif not (self.commanded or self.stopping) and seen.keeps_running:
             reason = Report(Cause.RUNS_UNASKED)
         if reason is not None:
-            self._stop()
+            self._sequence.start()
             self._tell_stopped(reason)
         return reason is not None
 
     def refused(self, reason: Report) -> None:
         """Stop because of a set-point; the next status may tell a better reason."""
-        self._stop()
+        self._sequence.start()
         self._refusal = (self._bus.now(), reason)
 
     def _explain_refusal(self, seen: InverterStatus) -> bool:
@@ -562,7 +522,9 @@ class Controller:
         return explain_stop(self._inverter, seen, self._setpoint.control_mode)
 
     def _why_slower(self, seen: InverterStatus, before: InverterStatus | None) -> Report | None:
-        if before is None or before.at < self._since or self._setpoint.control_mode != 'Freque':
+        if before is None or before.at < self._control.since:
+            return None
+        if self._setpoint.control_mode != 'Freque':
             return None
         least = self._setpoint.least_since(before.at, reverse=before.frequency < 0)
         return explain_fall(self._inverter, before, seen, least)

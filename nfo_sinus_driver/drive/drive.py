@@ -14,7 +14,6 @@ from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Statistics, Task
 from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
 from nfo_sinus_driver.drive.commands import Commands, carry_out, read_scales
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
-from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.drive_state import DriveState
@@ -132,12 +131,8 @@ class Drive:
 
     @property
     def stop_unconfirmed(self) -> bool:
-        """A stop was asked for that the drive has not confirmed yet."""
-        controller = self._controller
-        if controller is None:
-            return False
-        # another thread may look between the reason for a stop and its first attempt
-        return controller.stopping or controller.state is ControlState.STOPPING
+        """A stop was requested that the drive has not confirmed yet."""
+        return self._controller is not None and self._controller.stopping
 
     @property
     def blocked_by_fault(self) -> bool:
@@ -387,7 +382,7 @@ class Drive:
 
     def _require_open(self) -> None:
         # a procedure would take control that nobody gives back any more
-        if self._controller is not None and self._controller.state is ControlState.CLOSED:
+        if self._controller is not None and self._controller.closed:
             raise DriveError(Cause.ENDING)
 
     async def _connect(self, patient: bool) -> None:

@@ -12,7 +12,6 @@ import contextlib
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family, Holder, Procedure, Reset, Role
 from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller, ExclusiveAccess
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
@@ -100,8 +99,7 @@ class Procedures:
     async def abort(self) -> Report | None:
         """End the procedure that has the drive; anything else goes on."""
         controller = self._controller
-        procedure = (ControlState.PROCEDURE, ControlState.ABORTING)
-        if controller is None or controller.state not in procedure:
+        if controller is None or not controller.procedure_runs:
             return None
         return await controller.stop()
 

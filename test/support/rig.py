@@ -340,11 +340,10 @@ class Rig:
             controller = drive._controller
             if controller is None:
                 continue
-            state, stopping = controller.state, controller.stopping
-            if state in (ControlState.STOPPING, ControlState.BLOCKED):
-                assert stopping, f'{state.name}, and nothing stops it'
-            elif state not in (ControlState.PROCEDURE, ControlState.ABORTING, ControlState.CLOSED):
-                assert not stopping, f'{state.name}, and a stop is on its way'
+            state, sequence = controller.state, controller._sequence
+            active = sequence._task is not None or sequence._external > 0
+            said = f'{state.name}, and a stop is {"" if active else "not "}on its way'
+            assert controller.stopping == active, said
             assert drive.armed == (state is ControlState.ENABLED)
 
     # --- usual steps ---

@@ -76,17 +76,15 @@ def test_what_may_turn_the_motor_begins_from_idle_alone_and_ends_from_everywhere
     assert (enabled, running) == ([ControlState.IDLE], [ControlState.ENABLING])
     ends = {
         TRANSITIONS[state, event]
-        for state in COMMANDED - {ControlState.ABORTING}
-        for event in (ControlEvent.STOP, ControlEvent.LOST, ControlEvent.CLOSE)
+        for state in COMMANDED
+        for event in (ControlEvent.STOP, ControlEvent.LOST)
     }
-    assert ends & COMMANDED <= {ControlState.ABORTING}
+    assert ends == {ControlState.STOPPING}
 
 
-def test_every_state_is_reached_and_left_but_closed() -> None:
-    assert reached(ControlState.OFFLINE, frozenset()) == set(ControlState)
-    assert reached(ControlState.CLOSED, frozenset()) == {ControlState.CLOSED}
-    for state in set(ControlState) - {ControlState.CLOSED}:
-        assert ControlState.IDLE in reached(state, frozenset((ControlEvent.CLOSE,)))
+def test_every_state_is_reached_and_left() -> None:
+    for state in ControlState:
+        assert reached(state, frozenset()) == set(ControlState)
 
 
 def test_the_page_shows_the_table_as_it_is() -> None:
@@ -184,6 +182,19 @@ def test_every_row_is_visited(monkeypatch: pytest.MonkeyPatch) -> None:
                 state.mend_line(wait=5.0)
             if 'shut' in end:
                 state.shut_down(wait=1.0)
+            state.let(15.0)
+    with history() as state:
+        # a tuning that is refused before it has written anything, and the port gone in one: once
+        # it is the poll that finds out
+        state.fault(5, standing=False, wait=1.0)
+        state.tune(Procedure.STATOR_RESISTANCE, give='')
+        state.acknowledge(wait=1.0)
+        for step in range(50):
+            if (ControlState.PROCEDURE, ControlEvent.LOST) in visited.rows:
+                break
+            state.tune(Procedure.STATOR_RESISTANCE, after=0.4 + 0.005 * step, give='')
+            state.break_line('gone', wait=1.0)
+            state.mend_line(wait=2.5)
             state.let(15.0)
     with Rig('classic v5.0', drive_timeout=4.0) as rig:
         # firmware that has to be under control to take a setting, while it is connected to

@@ -193,7 +193,7 @@ def test_what_was_seen_before_a_new_reason_to_stop_confirms_nothing() -> None:
             if data is None and len(rig.written(SCMD)) > begun:
                 # it is being looked whether the drive stops
                 rig.meet = lambda key, data: None
-                rig.drive._controller._sequence.request_anew()
+                rig.drive._controller._sequence.restart()
 
         rig.meet = know_better
         rig.answer(rig.drive.stop())

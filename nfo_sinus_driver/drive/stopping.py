@@ -1,21 +1,21 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Starts the motor of a drive, and removes its run command; each is confirmed by its status."""
+"""Removes the run command of a drive, until its status confirms that it stops."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Iterator
 import contextlib
 import enum
 import math
 
 from nfo_sinus_driver.bus import Priority, Task
-from nfo_sinus_driver.catalog import Fact, InverterStatus, Limits, Meaning, Removal, Role, State
+from nfo_sinus_driver.catalog import InverterStatus, Removal, State
 from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.drive.commands import Commands, read_limits, read_scales
-from nfo_sinus_driver.drive.control_state import ControlEvent
-from nfo_sinus_driver.drive.diagnosis import report_of, require_no_fault
+from nfo_sinus_driver.drive.commands import Commands
+from nfo_sinus_driver.drive.control_state import Control, ControlEvent
+from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
@@ -24,8 +24,6 @@ from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
 _RETRY_PERIOD = 0.2
 #: How often one is that a lost drive does not hear, for its neighbours' sake, s.
 _LOST_RETRY_PERIOD = 1.0
-#: How long all that a start waits for may take together, s, the start delay of the drive aside.
-_START_TIMEOUT = 4.0
 #: How often it is said that a stop is not confirmed, s.
 _COMPLAINT_PERIOD = 5.0
 #: Each time it is said after a longer while, up to this, s.
@@ -51,26 +49,23 @@ class _Outcome(enum.Enum):
 
 class StopSequence:
     """
-    Removes the run command of one drive; there is one for a drive, shared by all who ask.
+    Removes the run command of one drive; there is one for a drive, shared by all reasons.
 
-    :param report: called with ``STOPPED`` when it is over, and after each attempt before with
-        ``FAULT_BLOCKS`` or ``FAULT_OVER``.
+    It begins with the event ``STOP``, and ends with ``STOPPED``. After each attempt before it
+    dispatches ``FAULT_BLOCKS`` or ``FAULT_OVER``.
     """
 
-    def __init__(
-        self, inverter: DriveState, method: Commands, report: Callable[[ControlEvent], None]
-    ) -> None:
+    def __init__(self, inverter: DriveState, method: Commands, control: Control) -> None:
         self._bus = inverter.bus
         self._inverter = inverter
         self._method = method
-        self._report = report
-        #: What removes the run command, while there may be one that nobody wants any more.
+        self._control = control
+        #: What removes the run command, while there may be one that no client wants any more.
         self._task: Task | None = None
-        #: How many stops are on their way that come with something else.
-        self._held = 0
-        #: What became of the last attempt, and when; ``None`` before the first has ended.
-        self._outcome: _Outcome | None = None
-        self._tried_at = 0.0
+        #: How many operations are on their way that stop the motor by other means.
+        self._external = 0
+        #: When the last attempt ended that counts; minus infinity before the first.
+        self._tried_at = -math.inf
         #: How often there was a new reason; what an earlier attempt shows says nothing of it.
         self._reasons = 0
         #: Why it has not been confirmed yet.
@@ -89,40 +84,32 @@ class StopSequence:
     @property
     def overdue(self) -> bool:
         """A stop is not confirmed although there was time; no fault keeps the motor still."""
-        waiting = self._task is not None and not self.blocked_by_fault
+        waiting = self._task is not None and not self._control.blocked
         return waiting and self._bus.now() >= self._due
 
-    @property
-    def blocked_by_fault(self) -> bool:
-        """The drive stands by a fault, and refuses the stop until it is acknowledged."""
-        return self._task is not None and self._outcome is _Outcome.BLOCKED_BY_FAULT
-
-    @property
-    def active(self) -> bool:
-        """A stop is not confirmed yet."""
-        return self._task is not None or self._held > 0
-
     @contextlib.contextmanager
-    def held(self) -> Iterator[None]:
-        """Count as active while something goes on that stops the motor in its own way."""
-        self._held += 1
+    def external_stop(self) -> Iterator[None]:
+        """Be stopping while an operation stops the motor by other means."""
+        self._external += 1
+        self._control.dispatch(ControlEvent.STOP)
         try:
             yield
         finally:
-            self._held -= 1
+            self._external -= 1
             self._report_end()
 
-    def request(self) -> None:
+    def start(self) -> None:
         """
         Remove the run command, again and again until the drive says that it stops.
 
-        Where that is going on already nothing has to be added: nobody is let start the motor
+        Where that is going on already nothing has to be added: no client can start the motor
         meanwhile. Only what a fault has blocked is tried once more, for it may be over by now.
         """
-        if self.blocked_by_fault and self._bus.now() > self._tried_at + _RETRY_PERIOD:
-            self.request_anew()
+        self._control.dispatch(ControlEvent.STOP)
+        if self._control.blocked and self._bus.now() > self._tried_at + _RETRY_PERIOD:
+            self.restart()
         if self._task is None:
-            self._outcome = None
+            self._tried_at = -math.inf
             self._unconfirmed = _NO_ANSWER_YET
             self._told_at = self._force_at = math.inf
             self._refusals = self._unheard = 0
@@ -131,15 +118,15 @@ class StopSequence:
             task = self._bus.spawn(self._keep_trying())
             self._task = None if task.future.done() else task
 
-    def request_anew(self) -> None:
-        """Request it, or try again at once: what attempts show that have begun counts no more."""
+    def restart(self) -> None:
+        """Start, or try again at once: what attempts show that have begun counts no more."""
         if self._task is None:
-            self.request()
+            self.start()
         else:
-            self._outcome = None
+            self._tried_at = -math.inf
             self._told_at = math.inf
             self._reasons += 1
-            self._report_fault()
+            self._control.dispatch(ControlEvent.FAULT_OVER)
             self._bus.wake(self._task)
 
     async def wait_confirmed(self, patience: float | None = None) -> None:
@@ -155,10 +142,11 @@ class StopSequence:
             self._force_at = min(self._force_at, self._bus.now() + patience / 2)
         deadline = self._bus.now() + (drive_state.TIMEOUT if patience is None else patience)
         while task is not None and not await self._bus.join(task, drive_state.LOOK_PERIOD):
-            if self.blocked_by_fault:
+            if self._control.blocked:
                 return
-            # who waits for a drive that is not there keeps others waiting, and learns no more
-            lost = patience is None and not self._inverter.connected and self._outcome is not None
+            # a drive that is not there keeps others waiting, and the answer would be the same
+            tried = self._tried_at > -math.inf
+            lost = patience is None and not self._inverter.connected and tried
             if lost or self._bus.now() > deadline:
                 raise DriveError(Cause.STOP_UNCONFIRMED, why=self._unconfirmed)
         if task is not None and task.future.exception() is not None:
@@ -168,8 +156,9 @@ class StopSequence:
         complain_at = self._due
         pause = 0.0
         stood = False
-        while await self._attempt() is not _Outcome.CONFIRMED:
-            if self.blocked_by_fault:
+        outcome = _Outcome.UNCONFIRMED
+        while (outcome := await self._attempt(outcome)) is not _Outcome.CONFIRMED:
+            if self._control.blocked:
                 await self._fault_gone()
                 self._due = complain_at = self._bus.now() + drive_state.TIMEOUT
                 continue
@@ -187,7 +176,7 @@ class StopSequence:
                         Severity.ERROR, Cause.CANNOT_STOP, why=why, enable_input=by
                     )
                 stood = stands
-            await self._rest()
+            await self._rest(outcome)
         self._task = None
         self._report_end()
         if pause:
@@ -205,7 +194,7 @@ class StopSequence:
 
     async def _fault_gone(self) -> None:
         """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
-        while self.blocked_by_fault:
+        while self._control.blocked:
             await self._bus.sleep(_RETRY_PERIOD)
             seen = self._inverter.seen
             if not self._inverter.connected:
@@ -217,16 +206,16 @@ class StopSequence:
                     self._inverter.tell(Severity.WARNING, started)
                 return
 
-    async def _rest(self) -> None:
+    async def _rest(self, outcome: _Outcome) -> None:
         """Let some time pass before the next attempt, but none after one that nobody heard."""
         if not self._inverter.connected:
             await self._bus.sleep(_LOST_RETRY_PERIOD)
         elif self._is_lost or self._bus.now() >= self._due:
             # what helps neither at once nor in a while must not keep the line from all others
             await self._bus.sleep(_RETRY_PERIOD)
-        elif self._outcome is _Outcome.BUSY:
+        elif outcome is _Outcome.BUSY:
             await self._bus.sleep(drive_state.LOOK_PERIOD)
-        elif self._outcome is not _Outcome.UNHEARD:
+        elif outcome is not _Outcome.UNHEARD:
             await self._bus.sleep(_RETRY_PERIOD)
 
     @property
@@ -236,31 +225,28 @@ class StopSequence:
         silent = self._bus.silences.lasts(settings.address, self._bus.now())
         return silent >= settings.lost_after
 
-    async def _attempt(self) -> _Outcome:
+    async def _attempt(self, before: _Outcome) -> _Outcome:
         reasons = self._reasons
         try:
-            self._outcome = await self._try_once()
+            outcome = await self._try_once(before)
         except (NoAnswer, DamagedAnswer) as error:
-            self._outcome, self._unconfirmed = _Outcome.UNHEARD, report_of(error)
+            outcome, self._unconfirmed = _Outcome.UNHEARD, report_of(error)
         except Exception as error:
             # even a mistake of ours must not end the trying
-            self._outcome, self._unconfirmed = _Outcome.UNCONFIRMED, report_of(error)
+            outcome, self._unconfirmed = _Outcome.UNCONFIRMED, report_of(error)
         if self._reasons > reasons:
-            self._outcome, self._unconfirmed = _Outcome.UNHEARD, _NO_ANSWER_YET
+            outcome, self._unconfirmed = _Outcome.UNHEARD, _NO_ANSWER_YET
             self._told_at = math.inf
         self._tried_at = self._bus.now()
-        self._report_fault()
-        return self._outcome
-
-    def _report_fault(self) -> None:
-        blocked = self._outcome is _Outcome.BLOCKED_BY_FAULT
-        self._report(ControlEvent.FAULT_BLOCKS if blocked else ControlEvent.FAULT_OVER)
+        blocked = outcome is _Outcome.BLOCKED_BY_FAULT
+        self._control.dispatch(ControlEvent.FAULT_BLOCKS if blocked else ControlEvent.FAULT_OVER)
+        return outcome
 
     def _report_end(self) -> None:
-        if not self.active:
-            self._report(ControlEvent.STOPPED)
+        if self._task is None and not self._external:
+            self._control.dispatch(ControlEvent.STOPPED)
 
-    async def _try_once(self) -> _Outcome:
+    async def _try_once(self, before: _Outcome) -> _Outcome:
         control_mode = self._inverter.control_mode
         reasons = self._reasons
         failure: LinkError | None = None
@@ -277,7 +263,7 @@ class StopSequence:
         except (NoAnswer, DamagedAnswer) as error:
             self._unheard += 1
             # among late answers a refusal is not believed, until something else was answered
-            if isinstance(error, DamagedAnswer) and self._outcome is _Outcome.UNHEARD:
+            if isinstance(error, DamagedAnswer) and before is _Outcome.UNHEARD:
                 await self._inverter.look(Priority.LOOK, once=True)
             if self._unheard < _UNHEARD_BEFORE_FORCE:
                 raise
@@ -353,92 +339,3 @@ class StopSequence:
             return _NO_ANSWER_YET
         keeps_running = seen.keeps_running_since(self._told_at)
         return self._inverter.report(Cause.DRIVE_SAYS) if keeps_running else None
-
-
-class StartSequence:
-    """Starts the motor of one drive, or says in a :class:`DriveError` why not; on the bus alone."""
-
-    def __init__(self, inverter: DriveState, method: Commands) -> None:
-        self._inverter = inverter
-        self._method = method
-        #: When the start has to be over, s of the clock of the bus.
-        self._deadline = math.inf
-
-    async def check(self) -> tuple[str, Limits]:
-        """
-        See to it that the motor may be started, writing nothing.
-
-        :returns: the control mode, and what its set-points may be.
-        """
-        inverter = self._inverter
-        seen = await inverter.look(Priority.SERVICE)
-        require_no_fault(inverter, seen)
-        control_mode = await inverter.read_control_mode()
-        expected = inverter.settings.expected_control_mode
-        if expected and control_mode != expected:
-            key = inverter.model.key(Role.CONTROL_MODE)
-            raise DriveError(
-                Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
-            )
-        await self._method.require_startable()
-        # it may have been changed since the drive was connected, at its keypad
-        await read_scales(inverter)
-        return control_mode, await read_limits(inverter, control_mode)
-
-    async def start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
-        """
-        Take control and run at set-point 0; after an error a run command may stand all the same.
-
-        :param prepare: does what has to be done before a run command, once the bus has control.
-        """
-        await self.take_control(control_mode)
-        await self._await_status(lambda now: now.from_bus)
-        if self._inverter.settings.follows_setpoints:
-            await self._method.zero_setpoint(control_mode, Priority.SERVICE)
-        await prepare()
-        await self._method.run(self._await_start)
-        run_at = self._inverter.bus.now()
-        # behind a PLC a status from before the run command is shown for a while
-        await self._await_start(lambda now: now.runs and now.at > run_at)
-
-    async def _await_status(self, wanted: Callable[[InverterStatus], bool]) -> None:
-        """Wait for a step that every drive makes soon."""
-        left = self._deadline - self._inverter.bus.now()
-        await self._inverter.wait_until(wanted, timeout=min(left, drive_state.TIMEOUT))
-
-    async def _await_start(self, wanted: Callable[[InverterStatus], bool]) -> None:
-        """Wait until the drive has made a step on its way to run."""
-        deadline = min(self._inverter.bus.now() + drive_state.TIMEOUT, self._deadline)
-        delayed = False
-        while True:
-            seen = await self._inverter.look(Priority.SERVICE)
-            if wanted(seen):
-                return
-            if seen.faulted:
-                raise DriveError(self._inverter.report(Cause.START_FAULTED))
-            # in standby after the start delay it has forgotten the start, and must not wait for
-            # another one
-            if Fact.RUN_INPUT_MISSING in seen.facts or (delayed and seen.standby):
-                raise DriveError(self._inverter.report(Cause.NO_RUN_INPUT))
-            if seen.means(Meaning.START_DELAY) and not delayed:
-                delayed = True
-                delay = await self._inverter.read_start_delay()
-                self._deadline += delay
-                deadline += delay
-            if self._inverter.bus.now() > deadline:
-                cause = Cause.NO_RUN_INPUT if seen.standby else Cause.NOT_STARTED
-                raise DriveError(self._inverter.report(cause))
-            await self._inverter.bus.sleep(drive_state.LOOK_PERIOD)
-
-    async def take_control(self, control_mode: str) -> None:
-        """
-        Put the drive under bus control, with no run command standing.
-
-        The set-point of an earlier session is removed before, where the drive lets us: one that has
-        kept its run command, too, would turn the motor at once.
-        """
-        self._deadline = self._inverter.bus.now() + _START_TIMEOUT
-        if not self._inverter.settings_need_control:
-            with contextlib.suppress(DriveError, Refused):
-                await self._method.zero_setpoint(control_mode, Priority.SERVICE)
-        await self._method.take_control(self._await_status)
