@@ -98,12 +98,8 @@ class Poller:
         #: When the control mode was last read.
         self._mode_read_at = 0.0
         self._complaint: Report | None = None
-        #: A status word that came with something else, and has not been judged yet; and who judges
-        #: it beside a poll that waits for its turn.
+        #: A status word that came with a set-point, and has not been judged yet.
         self._told: Reply | None = None
-        self._urgent: Task | None = None
-        #: The newest status that has been judged.
-        self._judged: InverterStatus | None = None
         self._told_fault = 0
         self._conditions = Conditions(inverter)
         inverter.on_missed(self._look_soon)
@@ -122,7 +118,6 @@ class Poller:
         if self._task is not None:
             task, self._task = self._task, None
             self._bus.cancel(task)
-        self._bus.cancel(self._urgent)
         self._bus.recorder.cycle(self._unit, math.nan)
         self._publish(None)
 
@@ -131,8 +126,8 @@ class Poller:
         Take a status word that the drive has told with something else, if it told one.
 
         It is the answer to a look that waits for it; else, if it is news, the next poll comes at
-        once. On a full line that may wait for its turn to read something else, so what may have to
-        stop the motor is looked at beside it.
+        once. A poll that may have to stop the motor replaces one that waits for its turn to read
+        something else: on a full line that may take long.
         """
         inverter, registers = self._inverter, self._registers
         if self._task is None or not inverter.connected or not reply.data:
@@ -146,25 +141,14 @@ class Poller:
         word = inverter.status_word(reply.data)
         if inverter.seen is None or word == inverter.seen.word:
             return
+        if self._told is not None and word == inverter.status_word(self._told.data):
+            return
         self._told = reply
         if self._alarming(inverter.told_by_word(word, reply.arrived)):
-            self._look_beside()
+            self._bus.cancel(self._task)
+            self.begin()
         else:
             self.wake()
-
-    def _look_beside(self) -> None:
-        async def look() -> None:
-            try:
-                await self._look()
-            except Interrupted as error:
-                # told once only, so that nobody else would find out
-                self._begin_anew(error)
-            except (LinkError, DriveError):
-                # the poll finds out, too
-                return
-
-        if self._urgent is None or self._urgent.future.done():
-            self._urgent = self._bus.spawn(look())
 
     def restarted(self) -> None:
         """Take note that the drive has started anew: it is lost until it is connected to again."""
@@ -206,7 +190,7 @@ class Poller:
         self._failing_since = math.inf
         self._failures = 0
         self._complaint = None
-        self._told = self._judged = None
+        self._told = None
         self._inverter.forget_polled()
 
     async def _poll_for_ever(self) -> None:
@@ -320,29 +304,30 @@ class Poller:
     async def _look(self) -> InverterStatus:
         inverter = self._inverter
 
+        told = taken = self._told
+        if told is not None and inverter.seen and told.arrived <= inverter.seen.at:
+            # a command has looked since
+            told = None
+
         async def look() -> InverterStatus:
-            told, self._told = self._told, None
-            if told is not None and inverter.seen and told.arrived <= inverter.seen.at:
-                # somebody else has looked since
-                told = None
+            # once: both words of a status are of one moment, so they are repeated together
+            nonlocal told
+            word, told = told, None
             return await inverter.look(
                 Priority.POLL,
                 once=True,
                 alarming=self._alarming,
-                told=told,
+                told=word,
                 code_for=self._code_holds,
             )
 
-        # both words of a status are of one moment, so they are repeated together
         seen = await self._insist(look)
+        if self._told is taken:
+            self._told = None
         inverter.require_fresh(seen)
-        if self._judged is not None and seen.at < self._judged.at:
-            # a newer one has been judged beside it
-            return self._judged
-        self._judged = seen
         inverter.looked_at()
-        told = self._controller is not None and self._controller.judge(seen)
-        self._tell_fault(seen, told)
+        reported = self._controller is not None and self._controller.judge(seen)
+        self._tell_fault(seen, reported)
         self._conditions.take(seen)
         return seen
 
@@ -368,10 +353,10 @@ class Poller:
                 await self._measure(role)
         self._publish(seen)
 
-    def _tell_fault(self, seen: InverterStatus, told: bool) -> None:
-        """Say on change that a fault is active, unless who ended a ride because of it has told."""
+    def _tell_fault(self, seen: InverterStatus, reported: bool) -> None:
+        """Report on change that a fault is active, unless a stop because of it was reported."""
         code = seen.code if seen.faulted else 0
-        if code and code != self._told_fault and not told:
+        if code and code != self._told_fault and not reported:
             fault = explain_fault(self._inverter, seen)
             self._inverter.tell(Severity.ERROR, Cause.FAULT_APPEARED, fault=fault)
         self._told_fault = code
@@ -451,7 +436,6 @@ class Poller:
     def _lose(self, error: LinkError | DriveError) -> None:
         """Give the drive up until it can be connected to again, and say why."""
         inverter = self._inverter
-        self._bus.cancel(self._urgent)
         inverter.lost()
         why = explain_failure(error, inverter)
         self._bus.recorder.cycle(self._unit, math.nan)
