@@ -456,7 +456,7 @@ LAWS = (
         WATCH,
         '            self._look_beside()\n',
         '            self.wake()\n',
-        ('test/unit/drive/test_look_beside.py', '-k', 'whatever'),
+        ('test/unit/drive/test_status_with_setpoint.py', '-k', 'whatever'),
     ),
     Mutant(
         9,
