@@ -14,8 +14,13 @@ from support.rig import Rig
 from nfo_sinus_driver.catalog import Value
 
 
-def test_the_ends_of_every_setting_go_there_and_back_and_nothing_beyond() -> None:
-    registers = Rig('classic').drive.registers
+@pytest.mark.parametrize(('way', 'dialect'), [('classic', '2.03'), ('classic v5.0', '5.0')])
+def test_the_ends_of_every_setting_go_there_and_back_and_nothing_beyond(
+    way: str, dialect: str
+) -> None:
+    with Rig(way) as rig:
+        registers = rig.connect().drive.registers
+        has = rig.drive.inverter.has
     wrong: list[tuple[str, object]] = []
 
     def there_and_back(key: str, value: Value) -> bytes | None:
@@ -27,7 +32,7 @@ def test_the_ends_of_every_setting_go_there_and_back_and_nothing_beyond() -> Non
         back = registers.value(key, data)
         return data if back == value and type(back) is type(value) else b''
 
-    for ends in (on_classic(ends, '2.03') for ends in ENDS):
+    for ends in (on_classic(ends, dialect) for ends in ENDS if has(ends.name)):
         for value, words in ((ends.low, ends.low_words), (ends.high, ends.high_words)):
             if there_and_back(ends.name, value) != packed(*words):
                 wrong.append((ends.name, value))

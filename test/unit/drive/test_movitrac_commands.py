@@ -216,3 +216,17 @@ def test_a_drive_that_answers_late_is_followed_all_the_same() -> None:
         rig.pass_time(30.0)
         assert rig.drive.armed and not rig.far.faults
         assert succeeded(rig, rig.drive.stop())
+
+
+@pytest.mark.parametrize('number', [1, 2])
+def test_a_setting_that_needs_another_is_refused_without_it_and_taken_with_it(number: int) -> None:
+    hoist, needed = f'control.hoist_{number}', f'special.four_quadrant_{number}'
+    with Rig('movitrac') as rig:
+        change = rig.connect(parameters=True).drive.parameters.change
+        assert hoist in rig.answer(change({hoist: True}))
+        assert not rig.far.memory.raw(hoist)
+        rig.result(change({needed: True}))
+        rig.result(change({hoist: True}))
+        assert rig.far.memory.raw(hoist) and rig.far.memory.raw(needed)
+        assert 'hoist' in rig.answer(change({needed: False}))
+        assert rig.far.memory.raw(needed)
