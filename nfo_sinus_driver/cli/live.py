@@ -131,14 +131,14 @@ class LineSource:
 
     def _read(self, drive: Remote) -> DriveView:
         try:
-            if drive.inverter.identity is None:
+            if drive.state.identity is None:
                 drive.identify(thoroughly=False)
             seen, values = drive.do(lambda: measure(drive))
         except DriveError as error:
             self._tell(drive, Level.ERROR, say(error))
             return DriveView(_name(drive), Condition.SILENT, 'not connected')
         self._session.polled(drive.address)
-        described = drive.inverter.describe()
+        described = drive.state.describe()
         grave = seen.kind is not Kind.STATUS
         level = Level.WARNING if grave else Level.INFO
         self._tell(drive, level, described)

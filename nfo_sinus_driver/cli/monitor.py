@@ -84,7 +84,7 @@ def _show(
     """Print one line; return whether the drive answered."""
     now = datetime.now().astimezone()
     try:
-        if drive.inverter.identity is None:
+        if drive.state.identity is None:
             drive.identify(thoroughly=False)
         seen, values = drive.do(lambda: measure(drive))
     except DriveError as error:
@@ -121,15 +121,15 @@ def _facts(drive: Remote, seen: InverterStatus, values: Mapping[Role, float]) ->
     return {
         'connected': True,
         'code': seen.code,
-        'text': drive.inverter.text,
-        'kind': drive.inverter.kind.value,
+        'text': drive.state.text,
+        'kind': drive.state.kind.value,
         'state': seen.state.name,
         **measured,
     }
 
 
 def _line(drive: Remote, values: Mapping[Role, float]) -> str:
-    cells = [f'{drive.inverter.describe():<18}']
+    cells = [f'{drive.state.describe():<18}']
     for role, (_, width, decimals) in VALUES.items():
         value, key = values[role], drive.model.key(role)
         number = '-' if math.isnan(value) else f'{value:.{decimals}f}'

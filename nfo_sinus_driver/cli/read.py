@@ -65,7 +65,7 @@ def info(options: argparse.Namespace) -> int:
             'vendor': identity.vendor,
             'firmware': identity.versions,
             'serial number': identity.serial,
-            'status': f'{drive.inverter.describe()} ({seen.listed.description})',
+            'status': f'{drive.state.describe()} ({seen.listed.description})',
             'state': seen.state.name.lower().replace('_', ' '),
             'control mode': ''.join(mode.values()),
             'motor': ', '.join(nameplate.values()),
@@ -129,7 +129,7 @@ def errors(options: argparse.Namespace) -> int:
         drive.identify(thoroughly=False)
         entries = drive.error_log(0 if options.erase else options.count)
         if options.erase and drive.look().driven:
-            raise CliError(f'the motor runs ({drive.inverter.describe()}): stop it first')
+            raise CliError(f'the motor runs ({drive.state.describe()}): stop it first')
     rows = [_as_row(entry) for entry in entries]
     if options.erase:
         for line in _as_lines(entries) if not options.json else ():
@@ -202,14 +202,14 @@ def _read(drive: Remote, wanted: Mapping[str, Parameter]) -> Mapping[str, Value]
     drive.identify(thoroughly=False)
     settings = [key for key, parameter in wanted.items() if parameter.is_setting]
     values = dict(drive.read(settings)) if settings or not wanted else {}
-    others = [key for key in wanted if key not in settings and drive.inverter.has(key)]
+    others = [key for key in wanted if key not in settings and drive.state.has(key)]
     values.update(_measure(drive, others))
     return values
 
 
 def _measure_roles(drive: Remote, roles: Iterable[Role]) -> dict[Role, str]:
     keys = {role: drive.model.key(role) for role in roles}
-    found = _measure(drive, filter(drive.registers.reaches, keys.values()))
+    found = _measure(drive, filter(drive.params.reaches, keys.values()))
     return {
         role: shown(found[key], drive.model[key].unit) for role, key in keys.items() if key in found
     }
@@ -277,7 +277,7 @@ def set_(options: argparse.Namespace) -> int:
                     if barred and not same(exact, values.get(name)):
                         wrong.append(f'{name}: {BARRED}')
                     else:
-                        drive.parameters.admit(name, value)
+                        drive.parameters.validate(name, value)
                 except ParameterError as error:
                     wrong.append(say(error))
         if wrong:

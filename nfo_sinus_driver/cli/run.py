@@ -96,7 +96,7 @@ class _Ride:
         remote, options = self._session.remote, self._options
         remote.identify(thoroughly=False)
         seen = remote.look()
-        told = remote.inverter.describe()
+        told = remote.state.describe()
         if seen.driven:
             by = 'the bus: nfo-sinus stop stops it' if seen.from_bus else 'keypad or terminals'
             raise CliError(f'the motor runs already ({told}), by {by}')
@@ -106,9 +106,9 @@ class _Ride:
                 f'fault {told} is active: {fault.description}. {fault.remedy}; '
                 'then type nfo-sinus ack'
             )
-        mode = remote.do(remote.inverter.read_control_mode)
+        mode = remote.do(remote.state.read_control_mode)
         key = remote.model.key(Role.CONTROL_MODE)
-        if not remote.registers.reaches(key):
+        if not remote.params.reaches(key):
             # nothing tells it, so it is what was typed
             mode = options.control_mode or mode
         if options.control_mode not in ('', mode):
@@ -121,8 +121,8 @@ class _Ride:
         target = remote.model.profile.setpoints.get(mode)
         if target is None:
             raise CliError(f'the drive takes no set-point over the bus in control mode {mode}')
-        unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or remote.inverter.unit
-        limits = remote.do(lambda: read_limits(remote.inverter, mode))
+        unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or remote.state.unit
+        limits = remote.do(lambda: read_limits(remote.state, mode))
         if not limits.least <= options.setpoint <= limits.most:
             raise CliError(
                 f'set-point {options.setpoint:g} {unit} is out of range: '
@@ -171,7 +171,7 @@ class _Ride:
                 # without --for this is how one ends it
                 wanted = name == 'SIGINT' and options.seconds is None
                 raise Ended(name, 0 if wanted else _INTERRUPTED, name)
-            if not drive.armed:
+            if not drive.following:
                 raise Ended(self._why_disarmed(), _FAILED)
             if self._screen.gone:
                 raise Ended('nobody reads the output any more', _FAILED)
@@ -263,7 +263,7 @@ def _stop(control: ControlSession, options: argparse.Namespace) -> tuple[bool, s
     remote = control.remote
     remote.identify(thoroughly=False)
     seen = remote.look()
-    told = remote.inverter.describe()
+    told = remote.state.describe()
     if not seen.from_bus:
         if seen.driven or seen.means(Meaning.START_DELAY):
             return False, (
@@ -310,7 +310,7 @@ def ack(options: argparse.Namespace) -> int:
         remote = control.remote
         remote.identify(thoroughly=False)
         seen = remote.look()
-        told = remote.inverter.describe()
+        told = remote.state.describe()
         error: DriveError | CliError | None = None
         acknowledged = False
         if not seen.faulted and seen.kind is Kind.STATUS:
@@ -326,9 +326,9 @@ def ack(options: argparse.Namespace) -> int:
             facts = {
                 'acknowledged': acknowledged,
                 'code': seen.code,
-                'text': remote.inverter.text_of(seen.code),
+                'text': remote.state.text_of(seen.code),
                 'code_now': now.code,
-                'text_now': remote.inverter.text,
+                'text_now': remote.state.text,
                 'message': answer,
             }
             control.screen.put(json.dumps(facts, ensure_ascii=False))
@@ -344,7 +344,7 @@ def _acknowledge(control: ControlSession, seen: InverterStatus) -> Report:
     remote = control.remote
     if seen.driven:
         raise CliError(
-            f'the motor runs ({remote.inverter.describe()}), and to acknowledge would stop it: '
+            f'the motor runs ({remote.state.describe()}), and to acknowledge would stop it: '
             'type nfo-sinus stop first'
         )
     drive = _in_charge(control)

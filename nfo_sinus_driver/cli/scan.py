@@ -167,7 +167,7 @@ async def _first_answer(drive: Remote, silence_retries: int) -> None:
     status = drive.model.key_of_status
     while True:
         try:
-            await drive.registers.read_data(status, Priority.POLL, once=True)
+            await drive.params.read_data(status, Priority.POLL, once=True)
             return
         except NoAnswer:
             if not silence_retries:

@@ -47,8 +47,8 @@ class Remote:
         self._drive = drive = Drive(bus, settings, self)
         self.address = settings.address
         self.model: Family = drive.model
-        self.registers = drive.registers
-        self.inverter = drive.inverter
+        self.params = drive.params
+        self.state = drive.state
         self.parameters = drive.parameters
         self._step: Callable[[], None] = lambda: None
 

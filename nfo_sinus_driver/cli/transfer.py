@@ -77,7 +77,7 @@ def load(options: argparse.Namespace) -> int:
         require_names(file.values, drive.parameters.data, str(drive), _NOTHING)
         data = _differing(file, drive, options)
         for key in data:
-            new = drive.registers.value(key, data[key])
+            new = drive.params.value(key, data[key])
             put(str(Change(key, _old(drive, values, key), new, drive.model[key].unit)))
         count = 'one parameter' if len(data) == 1 else f'{len(data)} parameters'
         if not data:
@@ -135,14 +135,14 @@ def _differing(file: ParameterFile, drive: Remote, options: argparse.Namespace) 
         if same(value, drive.parameters.values.get(key)):
             continue
         try:
-            data = drive.registers.encode(key, value)
+            data = drive.params.encode(key, value)
             if data == drive.parameters.data[key]:
                 continue
             if is_barred(key, drive.model, options):
                 kept.append(key)
                 continue
             if not options.dry_run:
-                drive.parameters.admit(key, value)
+                drive.parameters.validate(key, value)
         except (ParameterError, ValueError) as error:
             wrong.append(say(error))
         else:
@@ -172,7 +172,7 @@ def _require_standstill(drive: Remote, data: Mapping[str, bytes]) -> None:
     """See to it that what only a standing motor allows is not tried while it runs."""
     keys = [key for key in data if drive.model[key].stopped]
     if keys and drive.look().driven:
-        head = f'the motor runs ({drive.inverter.describe()}), and these need it stopped{_NOTHING}:'
+        head = f'the motor runs ({drive.state.describe()}), and these need it stopped{_NOTHING}:'
         raise CliError(listed(head, keys))
 
 

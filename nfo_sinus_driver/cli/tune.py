@@ -51,7 +51,7 @@ def tune(options: argparse.Namespace) -> int:
         drive.identify(thoroughly=False)
         require_known(procedure, drive.model)
         if drive.look().driven:
-            raise CliError(f'{what}: the motor runs ({drive.inverter.describe()}): stop it first')
+            raise CliError(f'{what}: the motor runs ({drive.state.describe()}): stop it first')
     require_yes(options, f'{what[0].upper()}{what[1:]}: {_warning(procedure)} Go on?')
     mute = {*NO_TIMEOUT, Cause.FAULT_APPEARED, *_OUTCOMES}
     with control_session(options, mute=mute, live=not options.json) as control:

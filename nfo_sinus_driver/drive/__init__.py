@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One inverter in engineering units. No ROS."""
+"""One drive in engineering units. No ROS."""
 
 from nfo_sinus_driver.catalog import InverterStatus, Procedure
 from nfo_sinus_driver.drive.drive import Drive

@@ -55,9 +55,9 @@ class StopSequence:
     dispatches ``FAULT_BLOCKS`` or ``FAULT_OVER``.
     """
 
-    def __init__(self, inverter: DriveState, method: Commands, control: Control) -> None:
-        self._bus = inverter.bus
-        self._inverter = inverter
+    def __init__(self, state: DriveState, method: Commands, control: Control) -> None:
+        self._bus = state.bus
+        self._state = state
         self._method = method
         self._control = control
         #: What removes the run command, while there may be one that no client wants any more.
@@ -146,7 +146,7 @@ class StopSequence:
                 return
             # a drive that is not there keeps others waiting, and the answer would be the same
             tried = self._tried_at > -math.inf
-            lost = patience is None and not self._inverter.connected and tried
+            lost = patience is None and not self._state.connected and tried
             if lost or self._bus.now() > deadline:
                 raise DriveError(Cause.STOP_UNCONFIRMED, why=self._unconfirmed)
         if task is not None and task.future.exception() is not None:
@@ -168,11 +168,11 @@ class StopSequence:
                 complain_at = self._bus.now() + pause
                 why = self._unconfirmed
                 if stands:
-                    standing = self._inverter.report(Cause.CANNOT_STOP_BUT_STANDS, why=why)
-                    self._inverter.tell(Severity.WARNING, standing)
+                    standing = self._state.report(Cause.CANNOT_STOP_BUT_STANDS, why=why)
+                    self._state.tell(Severity.WARNING, standing)
                 else:
-                    by = self._inverter.model.profile.enable_input
-                    self._inverter.tell(
+                    by = self._state.model.profile.enable_input
+                    self._state.tell(
                         Severity.ERROR, Cause.CANNOT_STOP, why=why, enable_input=by
                     )
                 stood = stands
@@ -180,35 +180,35 @@ class StopSequence:
         self._task = None
         self._report_end()
         if pause:
-            self._inverter.tell(Severity.INFO, self._inverter.report(Cause.STOP_CONFIRMED_LATE))
+            self._state.tell(Severity.INFO, self._state.report(Cause.STOP_CONFIRMED_LATE))
 
     @property
     def _stands(self) -> bool:
         """The drive has just shown that the motor stands, and no run command."""
-        seen = self._inverter.seen
-        if seen is None or self._bus.now() - seen.at > _RETRY_PERIOD:
+        status = self._state.status
+        if status is None or self._bus.now() - status.at > _RETRY_PERIOD:
             return False
         # a code that is not in the manual shows nothing
-        shows = seen.state is not State.UNKNOWN or seen.standby
-        return shows and not (seen.driven or seen.runs)
+        shows = status.state is not State.UNKNOWN or status.standby
+        return shows and not (status.driven or status.runs)
 
     async def _fault_gone(self) -> None:
         """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
         while self._control.blocked:
             await self._bus.sleep(_RETRY_PERIOD)
-            seen = self._inverter.seen
-            if not self._inverter.connected:
+            status = self._state.status
+            if not self._state.connected:
                 # one that is only being connected to has no polls yet
                 return
-            if seen is not None and not seen.faulted:
-                if seen.runs_by_bus:
-                    started = self._inverter.report(Cause.STARTED_AFTER_FAULT)
-                    self._inverter.tell(Severity.WARNING, started)
+            if status is not None and not status.faulted:
+                if status.runs_by_bus:
+                    started = self._state.report(Cause.STARTED_AFTER_FAULT)
+                    self._state.tell(Severity.WARNING, started)
                 return
 
     async def _rest(self, outcome: _Outcome) -> None:
         """Let some time pass before the next attempt, but none after one that nobody heard."""
-        if not self._inverter.connected:
+        if not self._state.connected:
             await self._bus.sleep(_LOST_RETRY_PERIOD)
         elif self._is_lost or self._bus.now() >= self._due:
             # what helps neither at once nor in a while must not keep the line from all others
@@ -221,7 +221,7 @@ class StopSequence:
     @property
     def _is_lost(self) -> bool:
         """The drive has been silent for so long that the next poll gives it up."""
-        settings = self._inverter.settings
+        settings = self._state.settings
         silent = self._bus.silences.lasts(settings.address, self._bus.now())
         return silent >= settings.lost_after
 
@@ -247,7 +247,7 @@ class StopSequence:
             self._control.dispatch(ControlEvent.STOPPED)
 
     async def _try_once(self, before: _Outcome) -> _Outcome:
-        control_mode = self._inverter.control_mode
+        control_mode = self._state.control_mode
         reasons = self._reasons
         failure: LinkError | None = None
         try:
@@ -264,78 +264,78 @@ class StopSequence:
             self._unheard += 1
             # among late answers a refusal is not believed, until something else was answered
             if isinstance(error, DamagedAnswer) and before is _Outcome.UNHEARD:
-                await self._inverter.look(Priority.LOOK, once=True)
+                await self._state.read_status(Priority.LOOK, once=True)
             if self._unheard < _UNHEARD_BEFORE_FORCE:
                 raise
             failure = error
         # one that answers nothing at all ends it here
-        seen = await self._inverter.look(Priority.LOOK, once=True)
+        status = await self._state.read_status(Priority.LOOK, once=True)
         if failure is None:
-            seen = await self._newer(seen, reasons, self._told_at)
-        if isinstance(failure, Refused) and seen.faulted and not seen.runs_by_bus:
+            status = await self._newer(status, reasons, self._told_at)
+        if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
             if await self._method.remove(control_mode) is Removal.COMMAND:
                 return _Outcome.CONFIRMED
             self._unconfirmed = report_of(failure)
             return _Outcome.BLOCKED_BY_FAULT
-        unconfirmed = self._why_not(seen, failure)
-        if unconfirmed is not None and self._needs_force(seen, failure):
+        unconfirmed = self._why_not(status, failure)
+        if unconfirmed is not None and self._needs_force(status, failure):
             unconfirmed = await self._force(control_mode, reasons, unconfirmed)
         if unconfirmed is None:
             return _Outcome.CONFIRMED
         self._unconfirmed = unconfirmed
         return _Outcome.UNCONFIRMED
 
-    def _needs_force(self, seen: InverterStatus, failure: LinkError | None) -> bool:
+    def _needs_force(self, status: InverterStatus, failure: LinkError | None) -> bool:
         """Tell whether an ordinary stop will not do: refused again, ignored, or without effect."""
-        if seen.local:
+        if status.local:
             return False
         if isinstance(failure, Refused):
             # once may have been a moment at which it could not
-            return self._refusals > 1 and (seen.from_bus or seen.driven)
+            return self._refusals > 1 and (status.from_bus or status.driven)
         if failure is not None:
             return True
         shows_at = min(self._told_at + _RAMP_SHOWS_BY, self._force_at)
         # what a PLC has from before says nothing of a motor that may well be ramping down
-        return seen.at > self._told_at and self._bus.now() >= shows_at
+        return status.at > self._told_at and self._bus.now() >= shows_at
 
     async def _force(self, control_mode: str, reasons: int, why: Report) -> Report | None:
         """Stop by all that is left [C126]; return what keeps that from being confirmed."""
         obeyed = await self._method.force_stop(control_mode)
         told_at = self._bus.now()
-        seen = await self._inverter.look(Priority.LOOK, once=True)
+        status = await self._state.read_status(Priority.LOOK, once=True)
         if not obeyed:
             return why
         self._told_at = min(self._told_at, told_at)
-        unconfirmed = self._why_not(await self._newer(seen, reasons, told_at), None)
+        unconfirmed = self._why_not(await self._newer(status, reasons, told_at), None)
         if unconfirmed is None:
             self.forced = True
-            self._inverter.tell(Severity.WARNING, self._inverter.report(Cause.STOP_FORCED, why=why))
+            self._state.tell(Severity.WARNING, self._state.report(Cause.STOP_FORCED, why=why))
         return unconfirmed
 
-    async def _newer(self, seen: InverterStatus, reasons: int, told_at: float) -> InverterStatus:
+    async def _newer(self, status: InverterStatus, reasons: int, told_at: float) -> InverterStatus:
         """
         Look until a status is from after the stop: a PLC shows for a while what was before.
 
         :param reasons: those that the stop was for; with a new one it has to be written again.
         """
         until = self._bus.now() + _RETRY_PERIOD
-        while self._reasons == reasons and seen.at <= told_at:
+        while self._reasons == reasons and status.at <= told_at:
             if self._bus.now() > until:
                 break
             await self._bus.sleep(drive_state.LOOK_PERIOD)
-            seen = await self._inverter.look(Priority.LOOK, once=True)
-        return seen
+            status = await self._state.read_status(Priority.LOOK, once=True)
+        return status
 
-    def _why_not(self, seen: InverterStatus, refusal: LinkError | None) -> Report | None:
+    def _why_not(self, status: InverterStatus, refusal: LinkError | None) -> Report | None:
         """Return what keeps a stop from being confirmed; ``None`` if nothing does."""
-        if seen.tuning and refusal:
-            return self._inverter.report(Cause.TUNING_REFUSES, error=str(refusal))
-        if seen.tuning:
-            return self._inverter.report(Cause.TUNING_ENERGISES)
-        if refusal and not seen.local:
+        if status.tuning and refusal:
+            return self._state.report(Cause.TUNING_REFUSES, error=str(refusal))
+        if status.tuning:
+            return self._state.report(Cause.TUNING_ENERGISES)
+        if refusal and not status.local:
             return report_of(refusal)
-        if refusal is None and seen.at < self._told_at:
+        if refusal is None and status.at < self._told_at:
             # a PLC whose data stand still goes on showing what was before
             return _NO_ANSWER_YET
-        keeps_running = seen.keeps_running_since(self._told_at)
-        return self._inverter.report(Cause.DRIVE_SAYS) if keeps_running else None
+        keeps_running = status.keeps_running_since(self._told_at)
+        return self._state.report(Cause.DRIVE_SAYS) if keeps_running else None

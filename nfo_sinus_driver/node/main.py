@@ -147,7 +147,7 @@ class DriverProcess:
         for node, stop in _as_they_end(stops):
             if self._may_be_there(node) and not _confirmed(node, stop):
                 unconfirmed.append(node)
-            elif node.managed.drive.heard:
+            elif node.managed.drive.ever_responded:
                 # one that is silent must not take the others' time to be released
                 releases[node.managed.drive.disconnect(_time_left(node, begun))] = node
         unconfirmed += [
@@ -162,7 +162,7 @@ class DriverProcess:
 
     def _may_be_there(self, node: DriveNode) -> bool:
         """Tell whether there may be a motor: one that never answered was never started by us."""
-        return node.managed.drive.heard or self._context.bus.port_error is None
+        return node.managed.drive.ever_responded or self._context.bus.port_error is None
 
 
 def _time_left(node: DriveNode, begun: float) -> float:
@@ -191,7 +191,7 @@ def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
         log.error('the stop is NOT confirmed: the drive did not answer in time')
         return False
     except Exception as error:
-        if not node.managed.drive.heard:
+        if not node.managed.drive.ever_responded:
             log.warning('the drive has not answered yet: if its motor was left running, it runs on')
             return True
         # whatever it is, the other drives have to be waited for, too

@@ -344,7 +344,7 @@ class Rig:
             active = sequence._task is not None or sequence._external > 0
             said = f'{state.name}, and a stop is {"" if active else "not "}on its way'
             assert controller.stopping == active, said
-            assert drive.armed == (state is ControlState.ENABLED)
+            assert drive.following == (state is ControlState.ENABLED)
 
     # --- usual steps ---
 
@@ -382,7 +382,7 @@ class Rig:
         """Nothing turns although set-points keep arriving, until enable is called."""
         self.send(frequency)
         self.pass_time(1.5)
-        assert not self.drive.armed
+        assert not self.drive.following
         assert not self.turns
         self.enable()
         self.pass_time(1.5)
@@ -419,7 +419,7 @@ class Rig:
         return int.from_bytes(data, 'big')
 
     def _places(self, drive: Drive) -> dict[tuple[Any, ...], str]:
-        registers, keys = drive.registers, {}
+        registers, keys = drive.params, {}
         for key in registers.model:
             if registers.reaches(key):
                 for part in self.link.parts(registers.address(key)):

@@ -19,8 +19,8 @@ def test_the_ends_of_every_setting_go_there_and_back_and_nothing_beyond(
     way: str, dialect: str
 ) -> None:
     with Rig(way) as rig:
-        registers = rig.connect().drive.registers
-        has = rig.drive.inverter.has
+        registers = rig.connect().drive.params
+        has = rig.drive.state.has
     wrong: list[tuple[str, object]] = []
 
     def there_and_back(key: str, value: Value) -> bytes | None:
