@@ -67,7 +67,7 @@ class Scheduler:
 
     A unit that does not answer keeps the line for a time-out with every poll. They all together
     have no more than their share of the time as long as anybody else waits. A stop that a unit does
-    not answer is repeated at once, and after each of them somebody else has a turn, too: the most
+    not answer is repeated at once, and after each of them another unit has a turn, too: the most
     urgent, whatever the others are owed.
 
     Those that have been silent for long are missing. What is asked of them, and stops that they
@@ -132,7 +132,7 @@ class Scheduler:
                 return entry
         if self._unheard is None:
             return None
-        # nobody else waits
+        # no other unit waits
         self._unheard = None
         return self.take(missing=missing, only_stops=only_stops)
 
@@ -169,7 +169,7 @@ class Scheduler:
                 continue
             owed = self._owed[rank] + seconds * share
             if rank == self._given:
-                # no debt beyond this one transaction, for what is sent on an idle line harms nobody
+                # no debt beyond this transaction: what is sent on an idle line delays none
                 self._owed[rank] = max(owed - seconds, -seconds)
             else:
                 most = _MOST_OWED if self._queues[rank] else _MOST_SAVED
@@ -200,7 +200,7 @@ class Scheduler:
             yield _SLOT
         first, second = _BACKGROUND
         background = _BACKGROUND if self._owed[first] >= self._owed[second] else (second, first)
-        # one turn after a stop that nobody has heard: it is for the most urgent of the others
+        # one turn after a stop without an answer: it is for the most urgent of the others
         between_stops = self._unheard is not None
         for priority in background:
             if self._owed[priority] > 0 and not between_stops:
@@ -241,7 +241,7 @@ class Silences:
     How long each unit has said nothing although it was asked; all times are of one clock, s.
 
     Silence begins when the first answer has failed to come, however long it was waited for: a unit
-    that nobody asks is not silent, and one lost answer is no silence yet. Any valid frame ends it.
+    that is not asked is not silent, and one lost answer is no silence yet. Any valid frame ends it.
 
     Each request to a unit that is missing costs the others a whole time-out, so there is a pause
     behind it, in which none of the missing units is asked.

@@ -122,7 +122,7 @@ async def set_up(unit: int, watch: Watch, priority: Priority, tries: int) -> str
     """
     Have a unit watch over this end, each step a transaction; return by what it does.
 
-    :param tries: how often a step is tried that nobody answers: each may be done again.
+    :param tries: how often a step without an answer is tried: each may be done again.
     """
     left = tries
     while not watch.done:
@@ -165,7 +165,7 @@ class Task:
         self.pause = 0
         self.asleep = False
         self._joiners: list[Task] = []
-        # nobody may cancel the future behind the worker's back
+        # the future is cancelled by the worker alone
         self.future.set_running_or_notify_cancel()
 
     @property
@@ -224,7 +224,7 @@ class Task:
 
 
 def log_unexpected(future: Future[Any]) -> None:
-    """Log how a task failed for which nobody waits, unless it was cancelled or the line's fault."""
+    """Log how a task failed that is not awaited, unless it was cancelled or the line's fault."""
     error = future.exception()
     if error is not None and not isinstance(error, (Cancelled, LinkError)):
         _log.error('a job on the bus failed', exc_info=error)
@@ -252,7 +252,7 @@ class Sleepers:
 
     @property
     def next_moment(self) -> float:
-        """When to look again, s; infinity if nobody sleeps."""
+        """When to look again, s; infinity if no task sleeps."""
         return self._pauses[0][0] if self._pauses else math.inf
 
 

@@ -226,7 +226,7 @@ class Bus:
         self, unit: int, source: Address, address: Address, data: bytes, priority: Priority
     ) -> Transfer:
         """
-        Read a parameter whose value nobody needs, then write another: one turn, whatever was read.
+        Read a parameter whose value is not needed, then write another: one turn, whatever was read.
 
         :param source: what is read in one transaction.
         :raises LinkError: as for a write; ``maybe_done`` once the read was sent.
@@ -269,7 +269,7 @@ class Bus:
         return task.future.done()
 
     def spawn(self, coroutine: Coroutine[Any, Any, Any]) -> Task:
-        """Start a coroutine beside the present one; errors nobody expects are logged."""
+        """Start a coroutine beside the present one; unexpected errors are logged."""
         task = Task(coroutine)
         task.future.add_done_callback(log_unexpected)
         self._advance(task, None, None)
@@ -345,7 +345,7 @@ class Bus:
         """
         Do what is due, and send one transaction at most; for who never calls :meth:`start`.
 
-        :returns: when there is more to do, s on the steady clock, unless somebody asks before.
+        :returns: when there is more to do, s on the steady clock, unless a request comes before.
         """
         self._awake.clear()
         self._take_in()
@@ -455,7 +455,7 @@ class Bus:
         except NotReady as error:
             self._later(error.until, functools.partial(self._resume, task, transfer))
         except Exception as error:
-            # the line failed, or nobody wants it any more
+            # the line failed, or it is not wanted any more
             self._advance(task, None, error)
         else:
             self._advance(task, reply, None)

@@ -5,7 +5,8 @@
 """
 A drive family: its parameters, status codes and profile, read from its folder in ``families/``.
 
-Nobody imports such a folder: its name is all that is known of it, and :func:`load_family` reads it.
+No module imports such a folder: its name is all that is known of it, and :func:`load_family`
+reads it.
 More folders are found where the search path of that package, its ``__path__``, leads.
 """
 
@@ -137,7 +138,7 @@ def families() -> tuple[str, ...]:
 
 
 def usual_family() -> str:
-    """Return the name of the family of a drive of which nobody says what it is."""
+    """Return the name of the family of a drive whose model is not given."""
     return str(importlib.import_module(_FAMILIES).USUAL)
 
 

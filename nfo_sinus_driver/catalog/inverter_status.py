@@ -194,7 +194,7 @@ class InverterStatus:
         The motor stands or runs, without alarm or fault, and nothing is on its way.
 
         As long as the status word stays as it is then, the code can only change to another that
-        makes nobody do anything: speeding up, at the reference, slowing down, the brake chopper,
+        requires no action: speeding up, at the reference, slowing down, the brake chopper,
         standing by for keypad or terminals [M0 tables 15, 16 and 19].
         """
         if self.kind is not Kind.STATUS or self.means(Meaning.TUNING, Meaning.START_DELAY):

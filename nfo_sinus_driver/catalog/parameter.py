@@ -85,7 +85,7 @@ class Address:
 
     @property
     def occupied(self) -> Sequence[tuple[int, ...]]:
-        """All that it takes and nobody else may: registers and ids one by one."""
+        """All that it takes and no other may: registers and ids one by one."""
         if self.space == 'register':
             return [(self.index + word,) for word in range(self.codec.size // 2)]
         return [(id_,) for id_ in self.numbers] if self.space == 'id' else [self.numbers]

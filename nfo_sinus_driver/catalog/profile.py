@@ -234,7 +234,7 @@ class SetpointTarget:
         harm alone: where the size stands beside the direction, one that is not 0 is made 0 before
         the direction changes. A key may stand in it twice, then.
 
-        :param before: the set-point that the drive has; NaN if nobody knows.
+        :param before: the set-point that the drive has; NaN if unknown.
         """
         return (Write(self.key, value, at=self.at),)
 
@@ -268,7 +268,7 @@ class Holder(enum.Enum):
     BUS = enum.auto()
     #: Keypad or terminals.
     LOCAL = enum.auto()
-    #: Nobody can take it now.
+    #: It cannot be taken now.
     INHIBITED = enum.auto()
     #: The drive says what its manual does not.
     UNKNOWN = enum.auto()
@@ -315,8 +315,8 @@ class ControlMethod(abc.ABC):
     :cvar addressing: how it reaches the parameters of its tables, where that is another way than
         that of the line; ``''``: that of the line.
     :cvar plc_time: who is between stops the drive after so long without a word of ours, s; 0:
-        there is nobody between.
-    :cvar caution: what of the drive itself decides whether it stops when nobody reaches it, and
+        there is no PLC between.
+    :cvar caution: what of the drive itself decides whether it stops when the line is gone, and
         cannot be read; ``''``: nothing.
     :cvar keeps_control: why :meth:`release` leaves control to the bus, and how a person gets it
         back; ``''`` where it does not.
@@ -362,7 +362,7 @@ class ControlMethod(abc.ABC):
 
     @abc.abstractmethod
     def run(self) -> Steps[None]:
-        """Give the run command; once, for nobody knows what has happened before a second one."""
+        """Give the run command; once, for the state before a second one would be unknown."""
 
     @abc.abstractmethod
     def stop(self, control_mode: str) -> Steps[None]:

@@ -183,7 +183,7 @@ class Commands:
     Each is the sequence of that name in :class:`~nfo_sinus_driver.catalog.profile.ControlMethod`.
 
     :raises DriveError: it cannot be carried out.
-    :raises LinkError: the drive does not answer, so that nobody knows; or it refuses.
+    :raises LinkError: the drive does not answer, so that the outcome is unknown; or it refuses.
     """
 
     def __init__(self, state: DriveState) -> None:
@@ -241,7 +241,7 @@ class Commands:
         await carry_out(self._method.zero_setpoint(control_mode), self._params, priority)
 
     async def run(self, reached: Reached) -> None:
-        """Give the run command; once, for nobody knows what has happened before a second one."""
+        """Give the run command; once, for the state before a second one would be unknown."""
         await carry_out(self._method.run(), self._params, Priority.SERVICE, reached)
 
     async def stop(self, control_mode: str) -> None:
@@ -282,7 +282,7 @@ class Commands:
 
     async def begin(self, procedure: Procedure | Reset, require_wanted: Callable[[], None]) -> None:
         """
-        Have the drive begin a procedure; once, for nobody knows what happened before a second time.
+        Have the drive begin a procedure; once, for the state before a second time would be unknown.
 
         It waits for its turn with the stops, so that one which comes later does not overtake it; if
         ``require_wanted`` raises then, nothing is written.

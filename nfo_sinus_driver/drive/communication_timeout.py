@@ -14,7 +14,7 @@ from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 
 class CommunicationTimeout:
     """
-    The time-outs by which one drive notices that nobody speaks to it, as far as they are known.
+    The time-outs by which one drive notices silence on the line, as far as they are known.
 
     :param has: tells whether the drive has a parameter.
     """

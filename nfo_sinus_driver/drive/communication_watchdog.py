@@ -99,7 +99,7 @@ class CommunicationWatchdog:
         """
         Put back what was found, at a clean end after which the drive would go on watching.
 
-        What somebody else has set meanwhile is left alone. Tells why the drive will have a fault,
+        What another master has set meanwhile is left alone. Tells why the drive will have a fault,
         if it will; nothing of that keeps the driver from ending.
         """
         state = self._state

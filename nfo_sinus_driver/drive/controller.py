@@ -207,7 +207,7 @@ class Controller:
         Take control and run at set-point 0, then follow set-points that arrive from now on.
 
         :param prepare: does what has to be done before a run command, once the bus has control.
-        :param asked_at: when somebody asked for it, s, monotonic.
+        :param requested_at: when the client requested it, s, monotonic.
         """
         self.require_newer(requested_at)
         if self.enabled:
@@ -387,7 +387,7 @@ class Controller:
         # it, one may stand that an acknowledgement has not come to remove yet
         status = self._state.status
         may_run = self.commanded or self.stopping or (status is not None and status.from_bus)
-        # nobody enables it while it is waited for that the motor stands
+        # no client can enable it until the motor stands
         with self._sequence.external_stop():
             return await self._release(timeout, may_run=may_run)
 
@@ -433,7 +433,7 @@ class Controller:
     # --- what happens by itself ---------------------------------------------------------------
 
     async def secure_found(self) -> None:
-        """Make sure that nothing runs under bus control that nobody has enabled since."""
+        """Stop a motor that runs under bus control and was not enabled since."""
         state, status = self._state, self._state.status
         if await self.method.in_control(Priority.SERVICE):
             turns = status is not None and (status.runs_by_bus or abs(status.frequency) > 0)

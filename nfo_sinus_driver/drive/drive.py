@@ -106,12 +106,12 @@ class Drive:
 
     @property
     def identity(self) -> Identity | None:
-        """Who answered, or ``None`` if nobody did yet."""
+        """What answered; ``None`` before the first answer."""
         return self.state.identity
 
     @property
     def ever_responded(self) -> bool:
-        """Somebody has answered at its address, be it only once."""
+        """A drive has answered at its address at least once."""
         return self._bus.silences.heard_at(self._unit) > -math.inf
 
     @property
@@ -201,7 +201,7 @@ class Drive:
                 try:
                     await self.parameters.read_now()
                 except BaseException:
-                    # nobody watches it yet
+                    # no poller watches it yet
                     self._set_disconnected()
                     raise
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
@@ -227,7 +227,7 @@ class Drive:
     @on_bus
     async def disconnect(self, timeout: float) -> Report:
         """Stop the motor, wait so long, s, until it stands, and give control back."""
-        # nobody may enable it while it is awaited that the motor stands
+        # no client may enable it until the motor stands
         self._set_active(False)
         try:
             if self._controller is None:
@@ -267,7 +267,7 @@ class Drive:
         """
         Take control and run at set-point 0, then follow set-points that come in.
 
-        :param asked_at: when somebody asked for that, s of the clock, if not just now: it
+        :param requested_at: when the client requested it, s of the clock, if not just now: it
             is refused if a stop was confirmed since.
         """
         self._require_active()
@@ -347,7 +347,7 @@ class Drive:
 
         :param progress: told on the bus what the drive says, and how long it takes already, s:
             whenever the inverter status changes, and twice a second.
-        :param asked_at: as for :meth:`enable`.
+        :param requested_at: as for :meth:`enable`.
         """
         # as with enable, the motor may turn
         self._require_active()
@@ -381,7 +381,7 @@ class Drive:
             raise DriveError(Cause.NOT_ACTIVE)
 
     def _require_open(self) -> None:
-        # a procedure would take control that nobody gives back any more
+        # a procedure would take control and could not give it back
         if self._controller is not None and self._controller.closed:
             raise DriveError(Cause.ENDING)
 

@@ -68,7 +68,7 @@ class DriveState:
         #: What the catalog knows of its family.
         self.model = load_family(settings.model, settings.method, settings.telegram_words)
         method = settings.method_class
-        #: Who is between stops the drive after so long without a word of ours, s; 0: nobody is.
+        #: A PLC stops the drive after so long without a word of the driver, s; 0: there is none.
         self.plc_time = method.plc_time
         #: Its parameters.
         self.params = ParameterAccess(
@@ -82,13 +82,13 @@ class DriveState:
         #: Who is told about every poll and event.
         self.listener = listener
         self.connected = False
-        #: The last poll was answered; while it was not, nobody else should wait for the drive.
+        #: The last poll was answered; while it was not, no other request should wait for it.
         self.responsive = False
         #: Called when a request to it failed, whoever asked.
         self._on_missed: Callable[[], None] = lambda: None
         #: It did not answer just before it was last looked at.
         self.missed_reply = False
-        #: How many requests nobody had answered when it was last looked at.
+        #: How many requests had got no answer when the status was last read.
         self._unanswered = 0
         self.identity: Identity | None = None
         self.status: InverterStatus | None = None
@@ -299,7 +299,7 @@ class DriveState:
             self._on_fault()
 
     def missed(self) -> None:
-        """Take note that a request failed; until it is known why, nobody should wait for it."""
+        """Take note that a request failed; until it is known why, no request should wait for it."""
         self.responsive = False
         self._on_missed()
 
@@ -409,9 +409,9 @@ class DriveState:
 
     async def identify(self, *, patient: bool = True) -> Identity:
         """
-        Find out whether somebody answers, and with which firmware.
+        Find out whether a drive answers, and with which firmware.
 
-        :param patient: ask again if nobody does; a silent drive costs its neighbours time-outs.
+        :param patient: ask again if none does; a silent drive costs its neighbours time-outs.
         """
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if patient else Priority.POLL
@@ -512,7 +512,7 @@ class DriveState:
         if mode == 'PI-Reg':
             key = self.model.key(Role.PROCESS_UNIT)
             unit = str(await self.params.read(key, priority, once=once))
-        # both at once: nobody is told of the one without the other
+        # both at once: neither is published without the other
         self.control_mode, self.unit = mode, unit
         return mode
 

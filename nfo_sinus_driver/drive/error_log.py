@@ -28,7 +28,7 @@ _DRIFT = 1e-4
 _READINGS = 3
 #: A counter that was reset may have counted on since, kWh.
 _NEARLY_NOTHING = 0.1
-#: How often it is looked whether a fault that nobody saw has left an entry, s.
+#: How often it is looked whether a fault between two polls has left an entry, s.
 _PERIOD = 30.0
 #: How often it is looked whether the drive is there again, s.
 _WAIT = 1.0
@@ -203,7 +203,7 @@ class ErrorLog:
             return entry
 
     async def _entry_of(self, area: ErrorLogArea, number: int, priority: Priority) -> int:
-        # nobody waits for what is read in the background, so it is not asked for again at once
+        # no client waits for what is read in the background, so it is not retried at once
         data = await self._params.read_from(
             Address(*area.place(number)), priority, once=priority > Priority.POLL
         )
@@ -257,7 +257,7 @@ class ErrorLogMonitor:
         self._looked_at = self._told_at = -math.inf
         self._state.on_fault(self._expect)
         self._expect()
-        self._task = self._bus.spawn(self._watch_for_ever())
+        self._task = self._bus.spawn(self._watch_repeatedly())
 
     def end(self) -> None:
         """Leave the log alone."""
@@ -268,7 +268,7 @@ class ErrorLogMonitor:
         self._fault, self._tries = self._state.fault, _TRIES
         self._bus.wake(self._task)
 
-    async def _watch_for_ever(self) -> None:
+    async def _watch_repeatedly(self) -> None:
         state = self._state
         while True:
             there = state.connected and state.responsive

@@ -41,7 +41,7 @@ class ParameterAccess:
 
     :param addressing: how they are addressed; ``''``: as the line does.
     :param block_address: where the block of registers begins that they stand in, behind a PLC.
-    :param retries: how often a request that nobody answered is sent again, where ``once`` is false.
+    :param retries: how often a request without an answer is sent again, where ``once`` is false.
     :raises LinkError: reading or writing fails, as the link does.
     :raises ValueError: a value that the drive cannot have, or bytes that mean none.
     """
@@ -61,7 +61,7 @@ class ParameterAccess:
         self.now = bus.now
         self._unit = unit
         self._retries = retries
-        #: How many requests nobody answered.
+        #: How many requests got no answer.
         self.unanswered = 0
         #: What cannot be, and what the drive says all the same, read more than once.
         self._odd: dict[str, bytes] = {}
@@ -249,7 +249,7 @@ class ParameterAccess:
         return reply
 
     def count(self, error: LinkError) -> None:
-        """Count a request that nobody answered, whoever made it."""
+        """Count a request that got no answer, of this object or another."""
         self.unanswered += isinstance(error, NoAnswer)
 
     async def _ask(

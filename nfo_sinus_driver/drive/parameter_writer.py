@@ -311,7 +311,7 @@ class WriteAccess:
     """
     Has one drive take settings; used on the bus alone.
 
-    Firmware of the v5.0 dialect takes them only while the bus has control. Where nobody has it, it
+    Firmware of the v5.0 dialect takes them only while the bus has control. Where it is free, it
     is taken while the motor stands, with no run command and set-point 0, and given back. Everything
     else takes settings at any time.
     """
@@ -332,7 +332,7 @@ class WriteAccess:
                     return
                 if await self._procedures.controller.method.in_control(Priority.SERVICE):
                     return
-                # what was had was lost: to somebody who stopped it, or by a serial fault that a
+                # what was had was lost: to a client that stopped it, or by a serial fault that a
                 # refused write has caused
                 if access.aborted:
                     raise DriveError(Cause.PROCEDURE_STOPPED, what=_WHAT)

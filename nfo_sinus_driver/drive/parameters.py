@@ -246,7 +246,7 @@ class Parameters:
             )
 
     async def watch_now(self) -> None:
-        """Read the settings one after the other, again and again, for ever."""
+        """Read the settings one after the other, again and again."""
         with self._bus.refreshing() as sharers:
             while True:
                 await self._watch_round(sharers)
@@ -374,7 +374,7 @@ class Parameters:
 
     @contextlib.asynccontextmanager
     async def _alone(self, keys: Collection[str]) -> AsyncIterator[None]:
-        """Change parameters while nobody else does; they are no news before it is done."""
+        """Change parameters exclusively; they are no news before it is done."""
         async with self._turn:
             self._changing = keys
             try:
@@ -424,7 +424,7 @@ class Parameters:
         try:
             values[key] = self._params.value(key, data)
         except ValueError as error:
-            # and nobody may rely on what it was before
+            # and the value before is not to be relied on
             self._state.tell(Severity.WARNING, Cause.NOT_POSSIBLE, why=str(error))
         self._values = values
         if not quiet and before is not None and key in values:
@@ -507,7 +507,7 @@ def _not_as_wanted(drift: Change) -> Report:
     return Report(Cause.NOT_AS_WANTED, key=drift.key, has=has, wanted=show(drift.old))
 
 
-#: Nobody has to look: who leaves wakes the next one, s.
+#: There is no need to look: the one that leaves wakes the next one, s.
 _LONG = 60.0
 
 

@@ -64,7 +64,7 @@ _MODE_TURNS = 60
 
 class Poller:
     """
-    Watches one drive, for ever once it was begun; used on the bus alone.
+    Watches one drive from :meth:`begin` to :meth:`end`; used on the bus alone.
 
     :param controller: how it is commanded; ``None`` if this driver only reads.
     :param connect: connects to the drive again after it was lost.
@@ -111,7 +111,7 @@ class Poller:
 
     def begin(self) -> None:
         """Poll from now on."""
-        self._task = self._bus.spawn(self._poll_for_ever())
+        self._task = self._bus.spawn(self._poll_repeatedly())
 
     def end(self) -> None:
         """Leave the drive alone."""
@@ -175,7 +175,7 @@ class Poller:
             self._bus.wake(self._task)
 
     def _look_soon(self) -> None:
-        """Find out at once whether a drive is there that did not answer somebody else."""
+        """Find out at once whether a drive is there that did not answer another request."""
         if self._state.connected:
             self.wake()
 
@@ -193,7 +193,7 @@ class Poller:
         self._told = None
         self._state.forget_polled()
 
-    async def _poll_for_ever(self) -> None:
+    async def _poll_repeatedly(self) -> None:
         polled_at = -math.inf
         while True:
             started = self._bus.now()
@@ -229,7 +229,7 @@ class Poller:
                 pause = min(pause, max(strikes_in - _LAST_CHANCE, _SHORTEST_PAUSE))
             return pause
         pause = polled_at + self._period - self._bus.now()
-        # however seldom somebody wants to read the status, a motor that runs is watched, and so is
+        # however seldom the status is to be published, a motor that runs is watched, and so is
         # one whose run command may still stand, for a fault that ends would let it go on
         controller = self._controller
         watched = controller is not None and (controller.stopping or self._setpoint.following)
@@ -254,12 +254,12 @@ class Poller:
 
     @property
     def yields(self) -> bool:
-        """It leaves the line to one whose settings nobody knows yet: that takes many reads."""
+        """It leaves the line to one whose settings are read for the first time: many reads."""
         return self._bus.reads_another_first(self._unit) and self._is_idle
 
     @property
     def _is_idle(self) -> bool:
-        """The motor stands, and nobody has begun anything that may change that."""
+        """The motor stands, and nothing was begun that may change that."""
         controller, status = self._controller, self._state.status
         commanded = controller is not None and (controller.commanded or controller.stopping)
         if commanded or status is None or status.driven:
@@ -269,7 +269,7 @@ class Poller:
 
     @property
     def _silent_for_long(self) -> bool:
-        """It has answered nobody for so long that it is lost."""
+        """It has answered no request for so long that it is lost."""
         silent = self._bus.silences.lasts(self._unit, self._bus.now())
         return silent >= self._state.settings.lost_after
 
@@ -379,7 +379,7 @@ class Poller:
         try:
             return await self._insist(lambda: self._state.measure(role, Priority.POLL))
         except (PortError, Interrupted):
-            # told once only: the status that is read next would find a drive that somebody stopped
+            # raised once only: the status that is read next would show a drive that was stopped
             raise
         except Refused:
             return NAN

@@ -105,7 +105,7 @@ class Procedures:
 
     async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
         """
-        Have the drive begin; once, for nobody knows what has happened before a second time.
+        Have the drive begin; once, for the state before a second time would be unknown.
 
         It waits for its turn with the stops, so that none that comes later overtakes it. Only a
         drive that is busy is told again for a while, for it has done nothing.
@@ -147,7 +147,7 @@ class Procedures:
         return found
 
     async def _give_back(self, found: Holder) -> None:
-        """Remove the command, and give control back where nobody had it; not while faulted."""
+        """Remove the command, and give control back where it was free; not while faulted."""
         controller = self.controller
         await controller.withdraw_run_command()
         if found is Holder.NOBODY and not controller.blocked_by_fault:

@@ -19,8 +19,8 @@ from nfo_sinus_driver.drive.events import Cause, Report, Severity
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.link import Address, Interrupted, LinkError, NoAnswer, Refused, Reply
 
-#: An unchanged set-point is written again when the last write is this old, s: somebody else may
-#: have changed it meanwhile.
+#: An unchanged set-point is written again when the last write is this old, s: another master
+#: may have changed it meanwhile.
 _REWRITE_PERIOD = 5.0
 #: And this share of the drive's own time-out. Any message keeps that from striking over Classic
 #: [M0 §6.1.5], so the polls do; what counts over Modbus no manual says [M0 §5.3.3], and it might be
@@ -36,7 +36,7 @@ _REMEMBERED = 10.0
 
 class Request(NamedTuple):
     """
-    A set-point that somebody asks for.
+    A requested set-point.
 
     :ivar value: in the unit of the control mode.
     :ivar at: when it came in, s of the clock of the bus.
@@ -52,7 +52,7 @@ _NONE = Request(NAN, -math.inf)
 class _Combining(enum.Enum):
     """Whether the drive takes a set-point and tells its status in one transaction."""
 
-    #: Nobody knows, for none has been answered yet.
+    #: Not known, for none has been answered yet.
     UNTRIED = enum.auto()
     TAKEN = enum.auto()
     #: Not while it stays connected: it has refused the function, or has none.
@@ -186,7 +186,7 @@ class Setpoint:
         """
         Return the slowest that the drive can have been told to turn since then, in one direction.
 
-        :param at: s of the clock of the bus; longer ago than 10 s nobody knows any more.
+        :param at: s of the clock of the bus; longer ago than 10 s is not known.
         """
         return min(
             (max(0.0, -value if reverse else value) for value, until in self._had if until >= at),
@@ -204,7 +204,7 @@ class Setpoint:
         self._bus.request(self._slot)
 
     def _may_have(self, value: float) -> None:
-        """Take note that the drive may have a set-point from now on; NaN: nobody knows which."""
+        """Take note that the drive may have a set-point from now on; NaN: it is not known which."""
         value = 0.0 if math.isnan(value) else value
         oldest = self._bus.now() - _REMEMBERED
         self._had = [one for one in self._had if one[1] >= oldest]
@@ -236,7 +236,7 @@ class Setpoint:
         """
         The greatest set-point that it may be given, in either direction.
 
-        More than nominal only where somebody says so: what was meant in another unit, rpm for Hz,
+        More than nominal only where a setting says so: what was meant in another unit, rpm for Hz,
         must not race the motor.
         """
         limits = self._limits
@@ -344,7 +344,7 @@ class Setpoint:
 
     def _missed(self, error: LinkError, address: Address) -> None:
         """
-        Take note that nobody knows what stands in the drive; it is written when it answers.
+        Take note that what stands in the drive is unknown; it is written when it answers.
 
         :param address: of several, where alone that is not known: the old or the new.
         """
@@ -410,7 +410,7 @@ class Setpoint:
                 else:
                     await self._expire(timeout)
         except Exception as error:
-            # a set-point that nobody watches must not be followed
+            # a set-point without a time-out must not be followed
             self._refused(Report(Cause.DRIVER_ERROR, error=repr(error)))
 
     async def _expire(self, timeout: float) -> None:

@@ -37,7 +37,7 @@ _NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
 
 class _Outcome(enum.Enum):
     CONFIRMED = enum.auto()
-    #: Nobody knows whether the drive has heard it: it is repeated at once, for a while.
+    #: It is unknown whether the drive has received it: it is repeated at once, for a while.
     UNHEARD = enum.auto()
     #: The drive was too busy for it, and may take it the next moment.
     BUSY = enum.auto()
@@ -207,7 +207,7 @@ class StopSequence:
                 return
 
     async def _rest(self, outcome: _Outcome) -> None:
-        """Let some time pass before the next attempt, but none after one that nobody heard."""
+        """Let some time pass before the next attempt, but none after one without an answer."""
         if not self._state.connected:
             await self._bus.sleep(_LOST_RETRY_PERIOD)
         elif self._is_lost or self._bus.now() >= self._due:

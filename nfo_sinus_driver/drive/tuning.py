@@ -82,7 +82,7 @@ class Tuning:
         The motor gets current and may turn, whatever the set-point is.
 
         :param progress: told whenever the inverter status changes, and twice a second.
-        :raises DriveError: it was not begun, and why; or nobody knows how it ended.
+        :raises DriveError: it was not begun, and why; or its end is unknown.
         """
         what = procedure.value
         # from here on a stop is one of the tuning, too

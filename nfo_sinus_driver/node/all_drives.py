@@ -81,7 +81,7 @@ class AllDrives:
             bus.run(broadcast_stop(bus, models)).result(_LONGEST_STOP)
         except Exception as error:
             return f'a stop for all could not be broadcast: {error}'
-        return 'a stop for all was broadcast, which releases every motor and nobody confirms'
+        return 'a stop for all was broadcast, which releases every motor; no drive confirms it'
 
     def _enable(self, given: Callable[[], None]) -> tuple[list[str], list[str]]:
         requested_at = received_at()

@@ -53,7 +53,7 @@ class Autostart:
         self._over.set()
 
     def join(self, timeout: float) -> None:
-        """Wait for the end of the thread after :meth:`give_up`, but not for ever (s)."""
+        """Wait for the end of the thread after :meth:`give_up`, for a limited time (s)."""
         if self._thread.is_alive():
             self._thread.join(timeout)
 

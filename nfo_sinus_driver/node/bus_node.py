@@ -80,14 +80,14 @@ class BusNode(Node):
         stamp = self.get_clock().now().to_msg()
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
         error = self.bus_context.bus.port_error
-        nobody = not any(drive.drive.ever_responded for drive in self.bus_context.drives)
+        none = not any(drive.drive.ever_responded for drive in self.bus_context.drives)
         status = diagnostics.bus_status(
             self.get_fully_qualified_name().lstrip('/'),
             self._port,
             statistics,
             error,
             silent,
-            self._check if nobody else '',
+            self._check if none else '',
             self.bus_context.bus.remarks,
         )
         self._diagnostics.publish(diagnostics.array(status, stamp))

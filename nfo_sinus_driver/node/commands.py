@@ -285,7 +285,7 @@ class TuningServices:
     def _on_goal(self, request: Tune.Goal) -> GoalResponse:
         if request.procedure in _PROCEDURES:
             return GoalResponse.ACCEPT
-        # who asks is only told that it is rejected
+        # the client only learns that it is rejected
         self._node.get_logger().error(
             f'goal of {self._node.resolve_service_name("~/tune")} rejected: there is no procedure '
             f'{request.procedure}, only 0 to 3'
@@ -313,7 +313,7 @@ class TuningServices:
         procedure = _PROCEDURES[goal.request.procedure]
         log_call(self._node, '~/tune/_action/send_goal', procedure.name.lower())
         drive = self._managed.require_active()
-        # the bus reports how far it is, and nobody may keep it waiting
+        # the bus reports how far it is, and nothing may keep it waiting
         reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()
         future = drive.tune(procedure, lambda *report: reports.put(report), requested_at)
         cancelling = False

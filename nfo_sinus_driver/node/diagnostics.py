@@ -37,7 +37,7 @@ def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str
         return DiagnosticStatus.ERROR, message
     if not snapshot.connected:
         if not managed.is_silent:
-            # a node that nobody configured has nothing to complain about
+            # a node that is not configured has nothing to report
             return DiagnosticStatus.STALE, 'not connected: the node is not configured'
         why = managed.why_silent or 'the log of the node says what to check'
         return DiagnosticStatus.ERROR, f'not connected: {why}'

@@ -104,7 +104,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         context.add(self.managed)
 
     def stop_for_good(self, patience: float) -> Future[Report | None]:
-        """Stop the motor within so many s, and see to it that nobody can start it again."""
+        """Stop the motor within so many s, and see to it that no client can start it again."""
         self._ending = True
         self.lifecycle.end()
         self._setpoints.be_quiet(True)
@@ -230,7 +230,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         return settings
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Set parameters for somebody outside, all or none: only so the drive is written to."""
+        """Set parameters for a client, all or none: only so the drive is written to."""
         try:
             coerced = [coerce(parameter, DRIVE_SETTINGS) for parameter in parameter_list]
             admitted = self._drive_parameters.validate(coerced)

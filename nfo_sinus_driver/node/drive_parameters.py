@@ -60,7 +60,7 @@ class DriveParameters:
         self.note(self._declared)
 
     def undeclare(self) -> None:
-        """Take back what was declared: nobody knows any more what the drive has."""
+        """Take back what was declared: what the drive has is not known any more."""
         self._drive = None
         while self._declared:
             self._node.undeclare_parameter(self._declared.pop())
@@ -120,7 +120,7 @@ class DriveParameters:
 
     def write(self, parameters: Iterable[Parameter]) -> tuple[Change, ...]:
         """
-        Write parameters to the drive that somebody sets, all or none; return what was changed.
+        Write parameters to the drive that a client sets, all or none; return what was changed.
 
         :raises DriveError: why not; the drive is as it was, or the error says what is not.
         :raises NodeError: the bus does not get to it.

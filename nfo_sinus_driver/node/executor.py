@@ -48,7 +48,7 @@ _LONGEST_WAIT = 4000.0
 #: When an answer that was dropped is sent again, s after the last time. Each time that is in vain
 #: holds up all threads for 0.1 s, for rclpy lets none of them run while the middleware waits.
 _SENT_AGAIN_AFTER = (0.2, 0.5, 2.0)
-#: How rclpy tells that an answer was dropped: as a warning, which nobody may see a second time.
+#: How rclpy tells that an answer was dropped: as a warning, which is not shown a second time.
 _DROPPED = 'failed to send response'
 _received: ContextVar[float] = ContextVar('received')
 
@@ -65,7 +65,7 @@ def received_at() -> float:
 def _received_at(received: int) -> float:
     """Return the moment of a wall time in ns, s, monotonic; the present if it cannot be one."""
     ago = (time.time_ns() - received) / 1e9
-    # a middleware may tell 0 or count from elsewhere, and somebody may set the clock just now
+    # a middleware may tell 0 or count from elsewhere, and the clock may be set just now
     return time.monotonic() - (ago if 0.0 <= ago <= _LONGEST_WAIT else 0.0)
 
 
@@ -75,7 +75,7 @@ class NodeExecutor(Executor):
 
     An executor of rclpy looks through everything of all its nodes before it waits again. This has
     one node, so that a call to one drive costs the same however many there are, and no time-out,
-    so that nothing is looked through while nobody asks.
+    so that nothing is looked through while no request comes.
 
     :param threads: how many callbacks may be waiting for something at once.
     """
@@ -104,7 +104,7 @@ class NodeExecutor(Executor):
         self.wake()
 
     def join(self, timeout: float) -> None:
-        """Wait for the end of the thread after :meth:`end`, but not for ever."""
+        """Wait for the end of the thread after :meth:`end`, for a limited time."""
         self._thread.join(timeout)
 
     def finish(self) -> None:
@@ -166,7 +166,7 @@ class NodeExecutor(Executor):
             with contextlib.suppress(InvalidHandle):
                 _log.warning(
                     'an answer of %s was dropped by the middleware, which does not find the '
-                    'caller: he may be gone; if he waits, call again', srv.service_name,
+                    'caller: it may be gone; if it waits, call again', srv.service_name,
                 )
             return
         # not on a thread of the pool, for the next call may need it
@@ -197,7 +197,7 @@ def _is_dropped(error: BaseException) -> bool:
 
 
 async def _do_nothing() -> None:
-    """Somebody else has taken the request."""
+    """Another thread has taken the request."""
 
 
 def _run(task: Task, begun: threading.Event) -> None:
@@ -210,7 +210,7 @@ def _run(task: Task, begun: threading.Event) -> None:
 
 
 def end_all(executors: Iterable[NodeExecutor], timeout: float) -> None:
-    """Let callbacks end before what they use is destroyed, but not for ever (s)."""
+    """Let callbacks end before what they use is destroyed, for a limited time (s)."""
     executors = list(executors)
     for executor in executors:
         executor.end()

@@ -47,7 +47,7 @@ class Lifecycle:
 
     @property
     def wanted(self) -> bool:
-        """Somebody has configured the node, or autostart goes on trying to."""
+        """A client has configured the node, or autostart goes on trying to."""
         return self.state != 'unconfigured' or self._autostart.going_on
 
     @property
@@ -70,7 +70,7 @@ class Lifecycle:
         self._autostart.give_up()
 
     def join(self, timeout: float) -> None:
-        """Wait for the last try of autostart after :meth:`end`, but not for ever (s)."""
+        """Wait for the last try of autostart after :meth:`end`, for a limited time (s)."""
         self._autostart.join(timeout)
 
     def note_transition(self) -> None:
@@ -92,7 +92,7 @@ class Lifecycle:
     def _try_to_start(self) -> bool:
         """Configure and activate; return whether the node is active."""
         with self._in_transition:
-            # meanwhile somebody else may have taken the lifecycle over
+            # meanwhile another client may have taken the lifecycle over
             if not self._autostart.over and self.state == 'unconfigured':
                 self._node.trigger_configure()
             if not self._autostart.over and self.state == 'inactive':
@@ -104,7 +104,8 @@ def _reject_invalid_transitions(node: LifecycleNodeMixin, in_transition: threadi
     """
     Have ``~/change_state`` wait for others, and answer also what the node's state does not have.
 
-    rclpy raises an error then and never answers, and nav2's lifecycle manager would wait for ever.
+    rclpy raises an error then and never answers, and nav2's lifecycle manager would wait
+    without end.
 
     :param in_transition: held by whoever changes the state of the node.
     """

@@ -67,7 +67,7 @@ _NOT_STARTED = (
 _ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
 
 class DriverProcess:
-    """The nodes of one bus, spun until somebody ends them."""
+    """The nodes of one bus, spun until they are shut down."""
 
     def __init__(self, arguments: list[str], single_name: str | None) -> None:
         if single_name is None:
@@ -135,7 +135,7 @@ class DriverProcess:
 
     def _stop_motors(self, why: str) -> bool:
         begun = time.monotonic()
-        # all are told before the first is waited for, and nobody can enable any of them again
+        # all are requested before the first is awaited, and none can be enabled again
         with self._context.at_once():
             stops = {
                 node.stop_for_good(node.managed.settings.shutdown_timeout): node
@@ -247,7 +247,7 @@ def main(signals: HeldSignals, parent: OtherProcess | None, args: list[str] | No
     try:
         return _run(signals, parent, *take_out_node_name(sys.argv if args is None else args))
     except Exception:
-        # while somebody can yet be told
+        # while it can still be logged
         traceback.print_exc()
         return 1
     finally:

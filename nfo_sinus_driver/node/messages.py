@@ -118,7 +118,7 @@ def telemetry(measured: Telemetry, stamp: Time, frame_id: str) -> TelemetryMessa
 
 
 def error_log_entry(entry: LogEntry, stamp: Time) -> ErrorLogEntry:
-    """Return the ErrorLogEntry of an entry (stamp: when it happened; 0 if nobody knows)."""
+    """Return the ErrorLogEntry of an entry (stamp: when it happened; 0 if unknown)."""
     return ErrorLogEntry(
         # as in InvSt
         code=min(entry.code, 0xFF),

@@ -56,7 +56,7 @@ _GONE_AFTER = 3.5
 _LONGEST_TELEMETRY = 30.0
 #: After so long without an answer a stop is said not to be confirmed, s.
 _ANSWER_TIME = 5.0
-#: Before that nobody misses one, s.
+#: Before that none is missing, s.
 _SOON = 1.0
 
 _LEVELS = {
@@ -78,7 +78,7 @@ _TRIGGER = 'std_srvs/srv/Trigger'
 #: Of a publisher it can be known before, or after, which node it belongs to.
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'
 _NOT_KNOWN_YET = rclpy_implementation.RCLError
-#: What the log has said before somebody listened, a little of it.
+#: The end of what was logged before the view was open.
 _ROSOUT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 #: What lines about new entries of the error log begin with.
 _ERROR_LOG = 'error log: '
@@ -115,7 +115,7 @@ class _Topics:
 
 
 def _nothing(_: object) -> None:
-    """Never called: nobody spins the node."""
+    """Never called: the node is not spun."""
 
 
 @dataclass
@@ -244,7 +244,7 @@ class GraphSource:
         for teller in sorted(known, key=lambda teller: teller.is_drive):
             self._call(teller)
         if not known:
-            self._note(Level.ERROR, '', 'there is nobody to be stopped')
+            self._note(Level.ERROR, '', 'there is no drive to be stopped')
 
     def stops(self, now: float) -> list[str]:
         """Return what is to be known of stops that are not confirmed, failures first."""
@@ -286,7 +286,7 @@ class GraphSource:
         verb = 'stop' if teller.is_drive else 'stop_all'
         for service, types in self._node.get_service_names_and_types_by_node(name, space or '/'):
             if _TRIGGER in types and service.rpartition('/')[2] == verb:
-                # now, so that both ends know each other when somebody is in a hurry
+                # now, so that both ends have discovered each other before the first stop
                 teller.stop = self._caller.create_client(Trigger, service)
                 return
 
@@ -422,7 +422,7 @@ def _condition(teller: _Teller, now: float) -> Condition:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Show the view until somebody ends it; return the exit status."""
+    """Show the view until the operator ends it; return the exit status."""
     given = sys.argv[1:] if args is None else args
     options = _parser().parse_args(rclpy.utilities.remove_ros_args(['', *given])[1:])
     write_forbidden = terminal.write_forbidden()

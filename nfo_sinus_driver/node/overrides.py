@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who gets which ROS arguments, and what nobody takes: a misspelt parameter or node."""
+"""Which node gets which ROS arguments, and what none takes: a misspelt parameter or node."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from nfo_sinus_driver.version import VERSION
 _PARAMS_FILE = '--params-file'
 _PARAMETERS = 'ros__parameters'
 #: A name, hidden from ``ros2 node list``, that no parameter file knows.
-_NOBODY = '_nobody'
+_NO_NODE = '_no_node'
 
 
 def bus_overrides(name: str) -> list[Parameter]:
@@ -34,7 +34,7 @@ def bus_overrides(name: str) -> list[Parameter]:
     which becomes the drive's: the bus node, too, is to see what was meant for it. What is given to
     every node reaches it anyway.
     """
-    for_all = _given_to(_NOBODY)
+    for_all = _given_to(_NO_NODE)
     given = _given_to(name)
     return [
         given[key]
@@ -147,7 +147,7 @@ Drives NFO Sinus inverters on one serial line. For example:
 
 
 def refuse_other_arguments(arguments: list[str]) -> None:
-    """Refuse what is meant for nobody, saying how to give it; ``--help`` prints the usage."""
+    """Refuse what is meant for no node, saying how to give it; ``--help`` prints the usage."""
     others = remove_ros_args(arguments)[1:]
     if '-h' in others or '--help' in others:
         print(_HELP)

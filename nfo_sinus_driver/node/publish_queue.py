@@ -83,7 +83,7 @@ class PublishQueue:
                 _log.exception('a message could not be published; the same is logged once a minute')
 
     def _time_to_spare(self) -> float | None:
-        """Return for how long nothing is due by the clock, s; ``None`` is for ever."""
+        """Return for how long nothing is due by the clock, s; ``None``: until a change."""
         moment = self._schedule.next_moment
         return None if moment == math.inf else max(0.0, moment - time.monotonic())
 

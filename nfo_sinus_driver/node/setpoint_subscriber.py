@@ -85,7 +85,8 @@ class SetpointSubscriber:
             with self._context.handle:
                 self._take_all()
         except Exception:
-            # who is deaf must not go on as if nobody spoke: the process ends, and stops the motors
+            # a driver that cannot receive must not go on as if none came: the process ends, and
+            # stops the motors
             _log.exception('set-points can no longer be received')
 
     def _take_all(self) -> None:

@@ -58,7 +58,7 @@ class Setpoints:
         context.on_setpoint_all.append(self._on_setpoint_all)
 
     def be_quiet(self, quiet: bool) -> None:
-        """Say, or do not say, that set-points arrive while nobody has enabled the drive."""
+        """Say, or do not say, that set-points arrive while the drive is not enabled."""
         self._logged_idle = quiet
 
     def _on_setpoint(self, message: Float32) -> None:

@@ -177,7 +177,7 @@ LAWS = (
         3,
         'what stops the motor by force is not tried',
         SEQUENCE,
-        'if unconfirmed is not None and self._needs_force(seen, failure):',
+        'if unconfirmed is not None and self._needs_force(status, failure):',
         'if False:',
         (EVERY_STEP,),
     ),

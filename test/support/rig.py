@@ -404,8 +404,8 @@ class Rig:
 
     def written(self, key: str, address: int = 1) -> list[int]:
         """Return what was written to a parameter, each as one number of the drive, in order."""
-        registers = self.drives[address].registers
-        codec = registers.model[key].at(registers.protocol).codec
+        params = self.drives[address].params
+        codec = params.model[key].at(params.protocol).codec
         return [
             codec.decode(data)
             for unit, asked, data in self.asked
@@ -419,10 +419,10 @@ class Rig:
         return int.from_bytes(data, 'big')
 
     def _places(self, drive: Drive) -> dict[tuple[Any, ...], str]:
-        registers, keys = drive.params, {}
-        for key in registers.model:
-            if registers.reaches(key):
-                for part in self.link.parts(registers.address(key)):
+        params, keys = drive.params, {}
+        for key in params.model:
+            if params.reaches(key):
+                for part in self.link.parts(params.address(key)):
                     keys.setdefault(part[:3], key)
         return keys
 

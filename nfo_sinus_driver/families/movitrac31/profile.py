@@ -103,8 +103,8 @@ class DirectionAndSize(SetpointTarget):
         """
         Return what is to be written for a set-point: where the direction changes, size 0 first.
 
-        :param before: the set-point that the drive has, -0.0 being one in reverse; NaN if nobody
-            knows.
+        :param before: the set-point that the drive has, -0.0 being one in reverse; NaN if
+            unknown.
         """
         unknown = math.isnan(before)
         reverse = _reverse(before if value == 0 and not unknown else value)
@@ -220,7 +220,7 @@ class FunctionBits(ControlMethod):
         yield from _SETPOINT.set_to_zero()
 
     def run(self) -> Steps[None]:
-        """Enable, forward; once, for nobody knows what has happened before a second one."""
+        """Enable, forward; once, for the state before a second one would be unknown."""
         yield Write(BITS, int(Bits.ENABLE | Bits.CLOCKWISE), once=True)
 
     def stop(self, control_mode: str) -> Steps[None]:

@@ -208,7 +208,7 @@ class ModeScmd(_G2):
         yield stop
 
     def run(self) -> Steps[None]:
-        """Give the run command; once, for nobody knows what has happened before a second one."""
+        """Give the run command; once, for the state before a second one would be unknown."""
         yield Write(self._command, _COMMANDS[self._reference], once=True)
 
     def stop(self, control_mode: str) -> Steps[None]:
@@ -216,14 +216,14 @@ class ModeScmd(_G2):
         Take the run command back and write set-point 0, each step by itself [C126].
 
         Does nothing to a drive that is under the control of its keypad or terminals. Refused
-        although the bus has control or, under Inhibit, nobody can say who has: it may be tuning
+        although the bus has control or, under Inhibit, nothing tells which: it may be tuning
         [C101].
         """
         zeroes = (target.zero(once=True) for target in self._targets(control_mode))
         yield from self._stop_by(one(Write(self._command, Scmd.STOP, once=True)), *zeroes)
 
     def perhaps_in_control(self) -> Steps[bool]:
-        """Tell whether the bus may have control: under Inhibit nobody can say who has."""
+        """Tell whether the bus may have control: under Inhibit nothing tells."""
         try:
             return (yield Read(MODE)) in (Mode.INHIBIT, Mode.BUS)
         except Refusal:

@@ -179,7 +179,7 @@ class DriveControl(ControlMethod):
         Take Enable back, and keep the bus control.
 
         Without it the terminals would have control, and a RUN input that is active might start the
-        motor; [M1] names no way to give control back to nobody.
+        motor; [M1] names no way to give control back.
         """
         if (yield from self.in_control()):
             yield Write(CONTROL_WORD, _READY)

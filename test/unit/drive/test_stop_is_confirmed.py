@@ -239,7 +239,7 @@ def test_who_sees_a_drive_disarmed_sees_that_its_stop_is_not_confirmed(way: str)
             stop_following()
             seen.append(rig.drive.stop_unconfirmed)
 
-        with mock.patch.object(rig.drive.setpoint, 'disarm', note):
+        with mock.patch.object(rig.drive.setpoint, 'stop_following', note):
             if way == 'keypad':
                 rig.far.control_unit.press('stop')
                 rig.pass_time(1.0)
