@@ -454,7 +454,7 @@ LAWS = (
         3,
         'what a drive tells with a set-point waits until the poll has its turn',
         WATCH,
-        '            self._look_beside()\n',
+        '            self._bus.cancel(self._task)\n            self.begin()\n',
         '            self.wake()\n',
         ('test/unit/drive/test_status_with_setpoint.py', '-k', 'whatever'),
     ),
