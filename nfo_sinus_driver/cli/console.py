@@ -10,10 +10,13 @@ Remarks go to standard error, so that the output stays what a script wants.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import contextlib
+import json
+import math
 import sys
 import threading
+from typing import Any
 import unicodedata
 
 from tqdm import tqdm
@@ -58,6 +61,19 @@ def put(text: str) -> None:
     sys.stdout.flush()
 
 
+def as_json(facts: Any, indent: int | None = None) -> str:
+    """Return a JSON document; JSON has no NaN, so that it becomes null."""
+    return json.dumps(_without_nan(facts), ensure_ascii=False, indent=indent)
+
+
+def _without_nan(facts: Any) -> Any:
+    if isinstance(facts, Mapping):
+        return {name: _without_nan(fact) for name, fact in facts.items()}
+    if isinstance(facts, (list, tuple)):
+        return [_without_nan(fact) for fact in facts]
+    return None if isinstance(facts, float) and math.isnan(facts) else facts
+
+
 class CliError(Exception):
     """It was not done; the message says why and what to do."""
 
@@ -94,23 +110,19 @@ def require_yes(options: argparse.Namespace, question: str) -> None:
 
 def columns(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[str]:
     """Return rows as lines with aligned columns, some of them to the ``right``."""
-    widths = [max(_width(cell) for cell in column) for column in zip(*rows, strict=True)]
-    return [
-        '  '.join(
-            _pad(cell, width, to_right=place in right)
-            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
 
+    def width(text: str) -> int:
+        return sum(not unicodedata.combining(character) for character in text)
 
-def _width(text: str) -> int:
-    return sum(not unicodedata.combining(character) for character in text)
-
-
-def _pad(text: str, width: int, *, to_right: bool) -> str:
-    blank = ' ' * (width - _width(text))
-    return blank + text if to_right else text + blank
+    widths = [max(map(width, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        padded = []
+        for place, cell in enumerate(row):
+            blank = ' ' * (widths[place] - width(cell))
+            padded.append(blank + cell if place in right else cell + blank)
+        lines.append('  '.join(padded).rstrip())
+    return lines
 
 
 _CALLS = Calls(

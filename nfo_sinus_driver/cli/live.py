@@ -17,7 +17,7 @@ import time
 from nfo_sinus_driver.catalog import Kind, State
 from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.measure import VALUES, measure, statistics_table
-from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.view import terminal
 from nfo_sinus_driver.view.picture import (
@@ -63,7 +63,7 @@ class LineSource:
     only_looks = 'only looks: nfo-sinus stop stops'
 
     def __init__(
-        self, options: argparse.Namespace, session: Session, drives: Sequence[Remote]
+        self, options: argparse.Namespace, session: Session, drives: Sequence[OfflineDrive]
     ) -> None:
         self.title: str = options.port
         self._period: float = options.period
@@ -129,16 +129,16 @@ class LineSource:
             # a line that is slower than that is read without a pause, and catches up with nothing
             started = max(started, time.monotonic() - turn * self._period)
 
-    def _read(self, drive: Remote) -> DriveView:
+    def _read(self, drive: OfflineDrive) -> DriveView:
         try:
-            if drive.inverter.identity is None:
+            if drive.state.identity is None:
                 drive.identify(thoroughly=False)
             seen, values = drive.do(lambda: measure(drive))
         except DriveError as error:
             self._tell(drive, Level.ERROR, say(error))
             return DriveView(_name(drive), Condition.SILENT, 'not connected')
         self._session.polled(drive.address)
-        described = drive.inverter.describe()
+        described = drive.state.describe()
         grave = seen.kind is not Kind.STATUS
         level = Level.WARNING if grave else Level.INFO
         self._tell(drive, level, described)
@@ -158,12 +158,12 @@ class LineSource:
             line=line_view(_name(drive), self._session.statistics(drive.address)),
         )
 
-    def _tell(self, drive: Remote, level: Level, text: str) -> None:
+    def _tell(self, drive: OfflineDrive, level: Level, text: str) -> None:
         """Put it into the log, if it is not what the last line about this drive says."""
         if self._said.get(drive.address) != text:
             self._said[drive.address] = text
             self._notes.put(Note(time.time(), level, _name(drive), text))
 
 
-def _name(drive: Remote) -> str:
+def _name(drive: OfflineDrive) -> str:
     return f'drive {drive.address}'

@@ -18,8 +18,9 @@ from nfo_sinus_driver.cli.console import CliError, UsageError, put, remark, say
 from nfo_sinus_driver.cli.monitor import monitor
 from nfo_sinus_driver.cli.options import parse
 from nfo_sinus_driver.cli.read import errors, get, info, list_, set_
-from nfo_sinus_driver.cli.run import ack, run, stop
+from nfo_sinus_driver.cli.run import run
 from nfo_sinus_driver.cli.scan import scan
+from nfo_sinus_driver.cli.stop import ack, stop
 from nfo_sinus_driver.cli.transfer import diff, dump, load
 from nfo_sinus_driver.cli.tune import tune
 from nfo_sinus_driver.drive import DriveError

@@ -11,7 +11,7 @@ import math
 
 from nfo_sinus_driver.bus import Priority, Statistics
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import InverterStatus
 from nfo_sinus_driver.link import Refused
 
@@ -27,16 +27,16 @@ VALUES = {
 }
 
 
-async def measure(drive: Remote) -> tuple[InverterStatus, Mapping[Role, float]]:
+async def measure(drive: OfflineDrive) -> tuple[InverterStatus, Mapping[Role, float]]:
     """Read the status of a drive and what it measures; NaN for what it has not got."""
-    seen = await drive.inverter.look(Priority.POLL, once=True)
+    seen = await drive.state.look(Priority.POLL, once=True)
     values = dict.fromkeys(VALUES, math.nan)
     for role in VALUES:
         key = drive.model.key(role)
-        if not drive.registers.reaches(key):
+        if not drive.params.reaches(key):
             continue
         try:
-            values[role] = await drive.registers.read_number(key, Priority.POLL, once=True)
+            values[role] = await drive.params.read_number(key, Priority.POLL, once=True)
         except Refused:
             # it has none
             continue

@@ -21,7 +21,7 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.console import UsageError, put, remark, say
 from nfo_sinus_driver.cli.live import live
 from nfo_sinus_driver.cli.measure import VALUES, as_facts, measure, statistics_table
-from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, InverterStatus
 from nfo_sinus_driver.link import PortError
 from nfo_sinus_driver.view import terminal
@@ -79,12 +79,12 @@ def _by_lines(options: argparse.Namespace) -> int:
 
 
 def _show(
-    drive: Remote, session: Session, options: argparse.Namespace, *, one_line: bool
+    drive: OfflineDrive, session: Session, options: argparse.Namespace, *, one_line: bool
 ) -> bool:
     """Print one line; return whether the drive answered."""
     now = datetime.now().astimezone()
     try:
-        if drive.inverter.identity is None:
+        if drive.state.identity is None:
             drive.identify(thoroughly=False)
         seen, values = drive.do(lambda: measure(drive))
     except DriveError as error:
@@ -113,7 +113,9 @@ def _show(
     return answered
 
 
-def _facts(drive: Remote, seen: InverterStatus, values: Mapping[Role, float]) -> dict[str, object]:
+def _facts(
+    drive: OfflineDrive, seen: InverterStatus, values: Mapping[Role, float]
+) -> dict[str, object]:
     measured = {
         name: None if math.isnan(values[role]) else values[role]
         for role, (name, _, _) in VALUES.items()
@@ -121,15 +123,15 @@ def _facts(drive: Remote, seen: InverterStatus, values: Mapping[Role, float]) ->
     return {
         'connected': True,
         'code': seen.code,
-        'text': drive.inverter.text,
-        'kind': drive.inverter.kind.value,
+        'text': drive.state.text,
+        'kind': drive.state.kind.value,
         'state': seen.state.name,
         **measured,
     }
 
 
-def _line(drive: Remote, values: Mapping[Role, float]) -> str:
-    cells = [f'{drive.inverter.describe():<18}']
+def _line(drive: OfflineDrive, values: Mapping[Role, float]) -> str:
+    cells = [f'{drive.state.describe():<18}']
     for role, (_, width, decimals) in VALUES.items():
         value, key = values[role], drive.model.key(role)
         number = '-' if math.isnan(value) else f'{value:.{decimals}f}'

@@ -22,7 +22,7 @@ from nfo_sinus_driver.cli.console import (
     require_yes,
     say,
 )
-from nfo_sinus_driver.cli.control_session import NO_TIMEOUT, control_session
+from nfo_sinus_driver.cli.control_session import control_session
 from nfo_sinus_driver.cli.parameter_file import (
     BARRED,
     is_barred,
@@ -33,8 +33,8 @@ from nfo_sinus_driver.cli.parameter_file import (
     same,
     shown,
 )
-from nfo_sinus_driver.cli.session import Remote, Session
-from nfo_sinus_driver.drive import Cause, DriveError, LogEntry
+from nfo_sinus_driver.cli.session import OfflineDrive, Session
+from nfo_sinus_driver.drive import DriveError, LogEntry
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.link import Refused
 
@@ -53,7 +53,7 @@ def info(options: argparse.Namespace) -> int:
     with Session(options) as session:
         drive = session.drive()
         identity = drive.identify()
-        seen = drive.look()
+        seen = drive.read_status()
         mode = _measure_roles(drive, [Role.CONTROL_MODE])
         nameplate = _measure_roles(drive, _NAMEPLATE)
         hours = _measure_roles(drive, _COUNTERS)
@@ -65,7 +65,7 @@ def info(options: argparse.Namespace) -> int:
             'vendor': identity.vendor,
             'firmware': identity.versions,
             'serial number': identity.serial,
-            'status': f'{drive.inverter.describe()} ({seen.listed.description})',
+            'status': f'{drive.state.describe()} ({seen.listed.description})',
             'state': seen.state.name.lower().replace('_', ' '),
             'control mode': ''.join(mode.values()),
             'motor': ', '.join(nameplate.values()),
@@ -128,8 +128,8 @@ def errors(options: argparse.Namespace) -> int:
         drive = session.drive()
         drive.identify(thoroughly=False)
         entries = drive.error_log(0 if options.erase else options.count)
-        if options.erase and drive.look().driven:
-            raise CliError(f'the motor runs ({drive.inverter.describe()}): stop it first')
+        if options.erase and drive.read_status().driven:
+            raise CliError(f'the motor runs ({drive.state.describe()}): stop it first')
     rows = [_as_row(entry) for entry in entries]
     if options.erase:
         for line in _as_lines(entries) if not options.json else ():
@@ -184,7 +184,7 @@ def as_json(wanted: Mapping[str, Parameter], values: Mapping[str, Value]) -> str
     return json.dumps(shown_, ensure_ascii=False, indent=2)
 
 
-def _of_group(drive: Remote, name: str) -> dict[str, Parameter]:
+def _of_group(drive: OfflineDrive, name: str) -> dict[str, Parameter]:
     every = (*drive.model.settings, *measured(drive.model))
     found = {
         parameter.key: parameter
@@ -197,25 +197,25 @@ def _of_group(drive: Remote, name: str) -> dict[str, Parameter]:
     return found
 
 
-def _read(drive: Remote, wanted: Mapping[str, Parameter]) -> Mapping[str, Value]:
+def _read(drive: OfflineDrive, wanted: Mapping[str, Parameter]) -> Mapping[str, Value]:
     """Return the values of settings and measured values, without those that the drive lacks."""
     drive.identify(thoroughly=False)
     settings = [key for key, parameter in wanted.items() if parameter.is_setting]
     values = dict(drive.read(settings)) if settings or not wanted else {}
-    others = [key for key in wanted if key not in settings and drive.inverter.has(key)]
+    others = [key for key in wanted if key not in settings and drive.state.has(key)]
     values.update(_measure(drive, others))
     return values
 
 
-def _measure_roles(drive: Remote, roles: Iterable[Role]) -> dict[Role, str]:
+def _measure_roles(drive: OfflineDrive, roles: Iterable[Role]) -> dict[Role, str]:
     keys = {role: drive.model.key(role) for role in roles}
-    found = _measure(drive, filter(drive.registers.reaches, keys.values()))
+    found = _measure(drive, filter(drive.params.reaches, keys.values()))
     return {
         role: shown(found[key], drive.model[key].unit) for role, key in keys.items() if key in found
     }
 
 
-def _measure(drive: Remote, keys: Iterable[str]) -> dict[str, Value]:
+def _measure(drive: OfflineDrive, keys: Iterable[str]) -> dict[str, Value]:
     keys = list(keys)
     found = {}
     with progress(f'reading {drive}', len(keys)) as step:
@@ -230,19 +230,15 @@ def _measure(drive: Remote, keys: Iterable[str]) -> dict[str, Value]:
     return found
 
 
-_MUTE = {*NO_TIMEOUT, Cause.FAULT_APPEARED}
-_LONGEST = 15.0
-
-
 def erase(options: argparse.Namespace, entries: Sequence[LogEntry], rows: object) -> int:
     """Erase the error log, whose entries are ``rows`` for a script; see that it is empty."""
     count = '1 entry' if len(entries) == 1 else f'{len(entries)} entries'
     if entries:
         require_yes(options, f'Erase the error log ({count}) of address {options.address}?')
-        with control_session(options, mute=_MUTE) as control:
-            drive = control.drive()
-            control.finish(drive.connect(), _LONGEST)
-            control.finish(drive.erase_error_log(), _LONGEST)
+        with control_session(options) as control:
+            drive = control.command()
+            control.finish(drive.connect())
+            control.finish(drive.erase_error_log())
     if options.json:
         put(json.dumps({'erased': rows}, ensure_ascii=False, indent=2))
     else:

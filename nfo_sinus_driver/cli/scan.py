@@ -17,7 +17,7 @@ from nfo_sinus_driver.catalog import Role, load_family
 from nfo_sinus_driver.cli.console import CliError, UsageError, listed, progress, put, remark, say
 from nfo_sinus_driver.cli.options import DEFAULTS
 from nfo_sinus_driver.cli.parameter_file import STANDARD, write_file
-from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.link import PROTOCOLS, DamagedAnswer, NoAnswer, PortError, Refused
@@ -129,7 +129,7 @@ def _who_answers(
                 yield address, facts
 
 
-def _ask(drive: Remote, silence_retries: int) -> dict[str, str] | None:
+def _ask(drive: OfflineDrive, silence_retries: int) -> dict[str, str] | None:
     """Return who answers at an address (DriveError: the port cannot be used)."""
     try:
         drive.do(lambda: _first_answer(drive, silence_retries))
@@ -156,7 +156,7 @@ def _ask(drive: Remote, silence_retries: int) -> dict[str, str] | None:
     }
 
 
-async def _first_answer(drive: Remote, silence_retries: int) -> None:
+async def _first_answer(drive: OfflineDrive, silence_retries: int) -> None:
     """
     Have an address answer once.
 
@@ -167,7 +167,7 @@ async def _first_answer(drive: Remote, silence_retries: int) -> None:
     status = drive.model.key_of_status
     while True:
         try:
-            await drive.registers.read_data(status, Priority.POLL, once=True)
+            await drive.params.read_data(status, Priority.POLL, once=True)
             return
         except NoAnswer:
             if not silence_retries:

@@ -39,7 +39,7 @@ from nfo_sinus_driver.cli.parameter_file import (
     shown,
     write_file,
 )
-from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, Identity
 from nfo_sinus_driver.drive.parameter_writer import Change, ParameterError, shown_raw
 
@@ -77,7 +77,7 @@ def load(options: argparse.Namespace) -> int:
         require_names(file.values, drive.parameters.data, str(drive), _NOTHING)
         data = _differing(file, drive, options)
         for key in data:
-            new = drive.registers.value(key, data[key])
+            new = drive.params.value(key, data[key])
             put(str(Change(key, _old(drive, values, key), new, drive.model[key].unit)))
         count = 'one parameter' if len(data) == 1 else f'{len(data)} parameters'
         if not data:
@@ -92,7 +92,7 @@ def load(options: argparse.Namespace) -> int:
     return 0
 
 
-def _header(drive: Remote, identity: Identity) -> dict[str, str]:
+def _header(drive: OfflineDrive, identity: Identity) -> dict[str, str]:
     try:
         version = metadata.version('nfo_sinus_driver')
     except metadata.PackageNotFoundError:
@@ -108,7 +108,7 @@ def _header(drive: Remote, identity: Identity) -> dict[str, str]:
     }
 
 
-def _notes(file: ParameterFile, drive: Remote, identity: Identity) -> list[str]:
+def _notes(file: ParameterFile, drive: OfflineDrive, identity: Identity) -> list[str]:
     """Return what a person should know before a file goes into a drive."""
     notes = []
     if file.skipped:
@@ -127,7 +127,9 @@ def _notes(file: ParameterFile, drive: Remote, identity: Identity) -> list[str]:
     return notes
 
 
-def _differing(file: ParameterFile, drive: Remote, options: argparse.Namespace) -> dict[str, bytes]:
+def _differing(
+    file: ParameterFile, drive: OfflineDrive, options: argparse.Namespace
+) -> dict[str, bytes]:
     """Return what has to be written; all that cannot be is listed in a CliError."""
     found: dict[str, bytes] = {}
     wrong, kept = [], []
@@ -135,7 +137,7 @@ def _differing(file: ParameterFile, drive: Remote, options: argparse.Namespace) 
         if same(value, drive.parameters.values.get(key)):
             continue
         try:
-            data = drive.registers.encode(key, value)
+            data = drive.params.encode(key, value)
             if data == drive.parameters.data[key]:
                 continue
             if is_barred(key, drive.model, options):
@@ -154,7 +156,7 @@ def _differing(file: ParameterFile, drive: Remote, options: argparse.Namespace) 
     return found
 
 
-def _left_as_it_is(file: ParameterFile, drive: Remote, keys: list[str]) -> str:
+def _left_as_it_is(file: ParameterFile, drive: OfflineDrive, keys: list[str]) -> str:
     lines = [
         f'{key}: {shown(drive.parameters.values.get(key), "")}, not {shown(file.values[key], "")}'
         for key in keys
@@ -163,16 +165,16 @@ def _left_as_it_is(file: ParameterFile, drive: Remote, keys: list[str]) -> str:
     return listed(head, lines)
 
 
-def _old(drive: Remote, values: Mapping[str, Value], key: str) -> Value:
+def _old(drive: OfflineDrive, values: Mapping[str, Value], key: str) -> Value:
     """Return what the drive has, as bytes where they mean nothing."""
     return values.get(key, shown_raw(drive.parameters.data[key]))
 
 
-def _require_standstill(drive: Remote, data: Mapping[str, bytes]) -> None:
+def _require_standstill(drive: OfflineDrive, data: Mapping[str, bytes]) -> None:
     """See to it that what only a standing motor allows is not tried while it runs."""
     keys = [key for key in data if drive.model[key].stopped]
-    if keys and drive.look().driven:
-        head = f'the motor runs ({drive.inverter.describe()}), and these need it stopped{_NOTHING}:'
+    if keys and drive.read_status().driven:
+        head = f'the motor runs ({drive.state.describe()}), and these need it stopped{_NOTHING}:'
         raise CliError(listed(head, keys))
 
 
@@ -183,7 +185,7 @@ class Loading:
     """Writes what differs into one drive; the options say what to do when it fails half-way."""
 
     def __init__(
-        self, drive: Remote, data: Mapping[str, bytes], options: argparse.Namespace
+        self, drive: OfflineDrive, data: Mapping[str, bytes], options: argparse.Namespace
     ) -> None:
         self._drive = drive
         self._data = data
@@ -357,7 +359,7 @@ def _side(file: ParameterFile) -> _Side:
     return _Side(file.name, file.values, file.header.get('address', ''))
 
 
-def _read(drive: Remote) -> _Side:
+def _read(drive: OfflineDrive) -> _Side:
     drive.identify(thoroughly=False)
     return _Side(f'address {drive.address}', drive.read(), str(drive.address))
 
