@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from typing import Any
 
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.console import CliError, UsageError, as_json, say
@@ -17,9 +18,11 @@ from nfo_sinus_driver.cli.control_session import (
     Ended,
     control_session,
 )
+from nfo_sinus_driver.cli.options import SETTINGS, Verb, add_setting, duration, period, setpoint
 from nfo_sinus_driver.cli.screen import as_facts, as_line
 from nfo_sinus_driver.drive import Cause, DriveError
 from nfo_sinus_driver.drive.commands import read_limits
+from nfo_sinus_driver.drive.settings import REFERENCES
 
 #: How often the set-point is sent anew, s; it is given up as old after 2.5 s.
 _PERIOD = 0.1
@@ -32,20 +35,67 @@ _SHUTDOWN_TIMEOUT = 4.0
 #: Why a motor follows set-points no more.
 _ENDS = (Cause.STOPPED_BECAUSE, Cause.STOPPED_BECAUSE_OF_FAULT, Cause.LOST, Cause.LOST_IN_USE)
 _FAILED = 1
+#: Settings of a drive that may be given for one run: how they are typed, and what they mean here.
+_SETTINGS: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ('control_method', '--method', {}),
+    ('reference', '--reference', {'metavar': 'REFERENCE', 'help': (
+        f'what the motor follows: {", ".join(REFERENCES)} (default: fieldbus, which is '
+        'SETPOINT)'
+    )}),
+    ('expected_control_mode', '--control-mode', {'help': (
+        'refuse to run in another one; an Optimal, which does not tell it, is taken to be in '
+        'this one (default: any; an Optimal: Freque)'
+    )}),
+    ('setpoint_max', '--setpoint-max', {'help': (
+        'the greatest SETPOINT that is meant to be one (default: what is nominal for the '
+        'motor, where the drive tells it)'
+    )}),
+    ('drive_timeout', '--drive-timeout', {}),
+)
 
 
-def run(options: argparse.Namespace) -> int:
-    """Run the motor until it is ended; however that happens, the motor is stopped."""
-    follows = options.reference == 'fieldbus'
-    if follows and options.setpoint is None:
-        raise UsageError('which set-point? Such as: nfo-sinus run 10')
-    if not follows and options.setpoint is not None:
-        raise UsageError(
-            f'with --reference {options.reference} the drive follows its own reference: '
-            'leave the set-point out'
+class Run(Verb):
+    """Run the motor, until Ctrl-C or --for is over; then stop it."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            'setpoint',
+            nargs='?',
+            type=setpoint,
+            metavar='SETPOINT',
+            help='in the unit of the control mode: Hz, rpm, %% of nominal torque, or that of the '
+            'process; negative is reverse',
         )
-    with control_session(options, mute=(), live=not options.json) as control:
-        return _Run(control, options).run()
+        parser.add_argument(
+            '--for',
+            dest='seconds',
+            type=duration,
+            metavar='SECONDS',
+            help='stop after so long (default: run until Ctrl-C)',
+        )
+        for name, option, more in _SETTINGS:
+            add_setting(parser, name, option, default=SETTINGS[name].default, **more)
+        parser.add_argument(
+            '--period',
+            type=period,
+            default=0.5,
+            metavar='SECONDS',
+            help='from one status to the next (default: 0.5)',
+        )
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Run the motor until it is ended; however that happens, the motor is stopped."""
+        follows = options.reference == 'fieldbus'
+        if follows and options.setpoint is None:
+            raise UsageError('which set-point? Such as: nfo-sinus run 10')
+        if not follows and options.setpoint is not None:
+            raise UsageError(
+                f'with --reference {options.reference} the drive follows its own reference: '
+                'leave the set-point out'
+            )
+        with control_session(options, mute=(), live=not options.json) as control:
+            return _Run(control, options).run()
 
 
 class _Run:

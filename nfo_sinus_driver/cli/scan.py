@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 import copy
 from datetime import datetime
 import json
@@ -14,14 +14,23 @@ from pathlib import Path
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role, load_family
-from nfo_sinus_driver.cli.console import CliError, UsageError, listed, progress, put, remark, say
-from nfo_sinus_driver.cli.options import DEFAULTS
+from nfo_sinus_driver.cli.console import (
+    CliError,
+    UsageError,
+    as_json,
+    listed,
+    progress,
+    put,
+    remark,
+    say,
+)
+from nfo_sinus_driver.cli.options import DEFAULTS, OF_SCAN, Verb, add_flag, addresses
 from nfo_sinus_driver.cli.parameter_file import STANDARD, write_file
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.link import PROTOCOLS, DamagedAnswer, NoAnswer, PortError, Refused
-from nfo_sinus_driver.link.interface import BAUD_RATES, NeverSilent
+from nfo_sinus_driver.link.interface import NeverSilent
 
 #: Parity and stop bits that are tried [M0 §6.2.2].
 _PARITIES = ('E1', 'O1', 'N2')
@@ -32,43 +41,91 @@ _DAMAGE_RETRIES = 2
 _COLUMNS = (('address', 7), ('line', 10), ('product', 20), ('firmware', 11), ('serial number', 0))
 
 
-def scan(options: argparse.Namespace) -> int:
+class Scan(Verb):
     """Find out who answers on the line."""
-    assert set(_LIKELIEST) == set(BAUD_RATES)
-    if options.params:
-        require_new(options.params, force=options.force)
-    # a parameter file on the standard output is alone there
-    show = remark if options.params == STANDARD else put
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            '--addresses',
+            type=addresses,
+            default=(),
+            metavar='LIST',
+            help='such as 1-10,20 (default: 1-247; classic: 1-94; movitrac: 0-63; canopen: 1-127)',
+        )
+        add_flag(
+            parser,
+            '--all-settings',
+            'try every baud rate and parity; takes long; not for canopen',
+        )
+        parser.add_argument(
+            '--params',
+            metavar='FILE',
+            help='write a parameter file for the driver, with all that was found; - is the '
+            'standard output',
+        )
+        add_flag(parser, '--force', 'let --params replace a file')
+
+    def complete(self, options: argparse.Namespace) -> None:
+        """Ask every address, and briefly; ``--retries`` is for silent addresses, too."""
+        options.silence_retries = getattr(options, 'retries', OF_SCAN['retries'])
+        if not hasattr(options, 'response_timeout'):
+            options.response_timeout = OF_SCAN['response_timeout']
+        if not options.addresses:
+            protocol = PROTOCOLS[getattr(options, 'protocol', DEFAULTS['protocol'])]
+            alone = protocol.point_to_point
+            options.addresses = tuple(unit for unit in protocol.units if unit != alone)
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Find out who answers on the line."""
+        if options.params:
+            _require_new(options.params, force=options.force)
+        # a parameter file on the standard output is alone there
+        show = remark if options.params == STANDARD else put
+        found: dict[int, dict[str, str]] = {}
+        lines_of: dict[int, tuple[int, str]] = {}
+        for address, line, facts in _find(options):
+            if not options.json:
+                if not found:
+                    show(_row({name: name for name, _ in _COLUMNS}))
+                show(_row({'address': f'{address:>7}', **facts}))
+            found[address], lines_of[address] = facts, line
+        if options.json:
+            drives = [{'address': address, **facts} for address, facts in sorted(found.items())]
+            show(as_json(drives, indent=2))
+        if not found:
+            protocol = PROTOCOLS[options.protocol]
+            others = '' if protocol.rates_disturb else (
+                ' (--all-settings tries all that the protocol can have), A and B of the wires'
+            )
+            raise CliError(f'no response: check in this order: {protocol.check}{others}')
+        if options.params:
+            _write_params(options, found, lines_of)
+        return 0
+
+
+_Found = tuple[int, tuple[int, str], dict[str, str]]
+
+
+def _find(options: argparse.Namespace) -> Iterator[_Found]:
+    """Yield each drive that answers, once: its address, its line, and what it says of itself."""
     lines = _lines(options)
-    found: dict[int, dict[str, str]] = {}
-    lines_of: dict[int, tuple[int, str]] = {}
-    with progress('scanning', len(lines) * len(options.addresses)) as step:
+    left = list(options.addresses)
+    with progress('scanning', len(lines) * len(left)) as step:
         for baud_rate, char_format in lines:
+            for _ in range(len(options.addresses) - len(left)):
+                step()
             line = copy.copy(options)
             line.baud_rate, line.char_format = baud_rate, char_format
-            asked = [address for address in options.addresses if address not in found]
-            for _ in range(len(options.addresses) - len(asked)):
-                step()
-            for address, facts in _who_answers(line, asked, step):
-                facts['line'] = f'{baud_rate} {char_format}'.rstrip() if baud_rate else 'gateway'
-                if not found and not options.json:
-                    show(_row({name: name for name, _ in _COLUMNS}))
-                found[address] = facts
-                lines_of[address] = line.baud_rate, line.char_format
-                if not options.json:
-                    show(_row({'address': f'{address:>7}', **facts}))
-    if options.json:
-        drives = [{'address': address, **facts} for address, facts in sorted(found.items())]
-        show(json.dumps(drives, ensure_ascii=False, indent=2))
-    if not found:
-        protocol = PROTOCOLS[options.protocol]
-        others = '' if protocol.rates_disturb else (
-            ' (--all-settings tries all that the protocol can have), A and B of the wires'
-        )
-        raise CliError(f'no response: check in this order: {protocol.check}{others}')
-    if options.params:
-        _write_params(options, found, lines_of)
-    return 0
+            with Session(line) as session:
+                for address in tuple(left):
+                    facts = _ask(session.drive(address), options.silence_retries)
+                    step()
+                    if facts is not None:
+                        named = f'{baud_rate} {char_format}'.rstrip()
+                        facts['line'] = named if baud_rate else 'gateway'
+                        left.remove(address)
+                        yield address, (baud_rate, char_format), facts
 
 
 def _write_params(
@@ -89,7 +146,7 @@ def _write_params(
             )
         )
     baud_rate, char_format = next(iter(lines.values()))
-    write_file(options.params, driver_params(options, baud_rate, char_format, found))
+    write_file(options.params, _driver_params(options, baud_rate, char_format, found))
     if options.params != STANDARD:
         remark(
             f'saved in {options.params}; start the driver with it: ros2 run nfo_sinus_driver '
@@ -111,22 +168,10 @@ def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
         return [(0, '')]
     if options.all_settings:
         usual = [format_ for format_ in protocol.char_formats if format_[1:] in _PARITIES]
-        rates = [rate for rate in _LIKELIEST if rate in protocol.baud_rates]
+        rates = sorted(protocol.baud_rates, key=_LIKELIEST.index)
         formats = usual or protocol.char_formats
         return [(baud_rate, format_) for baud_rate in rates for format_ in formats]
     return [(options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)]
-
-
-def _who_answers(
-    options: argparse.Namespace, addresses: Sequence[int], step: Callable[[], None]
-) -> Iterator[tuple[int, dict[str, str]]]:
-    """Ask one address after the other, as one line is set."""
-    with Session(options) as session:
-        for address in addresses:
-            facts = _ask(session.drive(address), options.silence_retries)
-            step()
-            if facts is not None:
-                yield address, facts
 
 
 def _ask(drive: OfflineDrive, silence_retries: int) -> dict[str, str] | None:
@@ -214,13 +259,13 @@ _DRIVE = """
 _IF_OTHER = ('response_timeout', 'retries')
 
 
-def require_new(name: str, *, force: bool) -> None:
+def _require_new(name: str, *, force: bool) -> None:
     """See to it that no file is replaced that somebody may have edited since."""
     if name != STANDARD and not force and Path(name).exists():
         raise CliError(f'{name} exists already: choose another name, or say --force to replace it')
 
 
-def driver_params(
+def _driver_params(
     options: argparse.Namespace,
     baud_rate: int,
     char_format: str,

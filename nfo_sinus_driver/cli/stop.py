@@ -12,29 +12,37 @@ import time
 from nfo_sinus_driver.catalog import Kind, Meaning
 from nfo_sinus_driver.cli.console import CliError, as_json, say
 from nfo_sinus_driver.cli.control_session import RELEASED, ControlSession, control_session
+from nfo_sinus_driver.cli.options import Verb, add_flag
 from nfo_sinus_driver.cli.screen import as_line
 from nfo_sinus_driver.drive import Cause, DriveError, InverterStatus, Report
 
 _STATUS_PERIOD = 0.2
 
 
-def stop(options: argparse.Namespace) -> int:
-    """Stop a motor that the bus runs."""
-    with control_session(options, live=not options.json) as control:
-        try:
-            done, answer = _stop(control, options)
-        except DriveError as error:
-            done, answer = False, (
-                f'the stop is NOT confirmed: {say(error)}. '
-                'Use the enable input or the emergency stop if the motor turns'
-            )
-        if options.json:
-            control.screen.put(as_json({'confirmed': done, 'message': answer}))
-        elif done:
-            control.screen.put(answer)
-    if not done:
-        raise CliError(answer)
-    return 0
+class Stop(Verb):
+    """Stop a motor that the bus runs, and give control back."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        add_flag(parser, '--quick', 'release the motor at once: it coasts')
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Stop a motor that the bus runs."""
+        with control_session(options, live=not options.json) as control:
+            try:
+                done, answer = _stop(control, options)
+            except DriveError as error:
+                done, answer = False, (
+                    f'the stop is NOT confirmed: {say(error)}. '
+                    'Use the enable input or the emergency stop if the motor turns'
+                )
+            if options.json:
+                control.screen.put(as_json({'confirmed': done, 'message': answer}))
+            elif done:
+                control.screen.put(answer)
+        if not done:
+            raise CliError(answer)
+        return 0
 
 
 def _stop(control: ControlSession, options: argparse.Namespace) -> tuple[bool, str]:
@@ -71,33 +79,36 @@ def _stop(control: ControlSession, options: argparse.Namespace) -> tuple[bool, s
     return True, say(control.answer)
 
 
-def ack(options: argparse.Namespace) -> int:
-    """Acknowledge a fault or an alarm."""
-    with control_session(options) as control:
-        offline = control.offline
-        offline.identify(thoroughly=False)
-        status = offline.read_status()
-        answer, failed = '', False
-        try:
-            answer = say(_acknowledge(control, status))
-        except (DriveError, CliError) as failure:
-            answer, failed = say(failure), True
-        if options.json:
-            now = offline.read_status()
-            facts = {
-                'acknowledged': not failed and _is_to_acknowledge(status),
-                'code': status.code,
-                'text': offline.state.text_of(status.code),
-                'code_now': now.code,
-                'text_now': offline.state.text,
-                'message': answer,
-            }
-            control.screen.put(as_json(facts))
-        elif not failed:
-            control.screen.put(answer)
-    if failed:
-        raise CliError(answer)
-    return 0
+class Ack(Verb):
+    """Acknowledge a fault; nothing starts by it."""
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Acknowledge a fault or an alarm."""
+        with control_session(options) as control:
+            offline = control.offline
+            offline.identify(thoroughly=False)
+            status = offline.read_status()
+            answer, failed = '', False
+            try:
+                answer = say(_acknowledge(control, status))
+            except (DriveError, CliError) as failure:
+                answer, failed = say(failure), True
+            if options.json:
+                now = offline.read_status()
+                facts = {
+                    'acknowledged': not failed and _is_to_acknowledge(status),
+                    'code': status.code,
+                    'text': offline.state.text_of(status.code),
+                    'code_now': now.code,
+                    'text_now': offline.state.text,
+                    'message': answer,
+                }
+                control.screen.put(as_json(facts))
+            elif not failed:
+                control.screen.put(answer)
+        if failed:
+            raise CliError(answer)
+        return 0
 
 
 def _is_to_acknowledge(status: InverterStatus) -> bool:

@@ -11,7 +11,6 @@ import contextlib
 from dataclasses import dataclass
 from datetime import datetime
 from importlib import metadata
-import json
 import signal
 import sys
 import threading
@@ -21,6 +20,7 @@ from nfo_sinus_driver.cli.console import (
     CliError,
     Interrupted,
     UsageError,
+    as_json,
     columns,
     listed,
     progress,
@@ -28,7 +28,7 @@ from nfo_sinus_driver.cli.console import (
     remark,
     say,
 )
-from nfo_sinus_driver.cli.options import command_line
+from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, address, command_line
 from nfo_sinus_driver.cli.parameter_file import (
     ParameterFile,
     format_file,
@@ -46,50 +46,77 @@ from nfo_sinus_driver.drive.parameter_writer import Change, ParameterError, show
 _NOTHING = ', nothing was written'
 
 
-def dump(options: argparse.Namespace) -> int:
+class Dump(Verb):
     """Save all settings of the drive."""
-    with Session(options) as session:
-        drive = session.drive()
-        identity = drive.identify()
-        values = drive.read()
-        lost = [key for key in drive.parameters.data if key not in values]
-    write_file(options.file, format_file(_header(drive, identity), values, drive.model))
-    where = '' if options.file == '-' else f' saved in {options.file}'
-    told = ', '.join(filter(None, (str(drive), str(identity))))
-    remark(f'{len(values)} parameters of {told}{where}')
-    if lost:
-        remark(listed('NOT saved, for the drive has a code that means nothing there:', lost))
-    return int(bool(lost))
+
+    json = False
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            'file', nargs='?', default='-', metavar='FILE', help='default: standard output'
+        )
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Save all settings of the drive."""
+        with Session(options) as session:
+            drive = session.drive()
+            identity = drive.identify()
+            values = drive.read()
+            lost = [key for key in drive.parameters.data if key not in values]
+        write_file(options.file, format_file(_header(drive, identity), values, drive.model))
+        where = '' if options.file == '-' else f' saved in {options.file}'
+        told = ', '.join(filter(None, (str(drive), str(identity))))
+        remark(f'{len(values)} parameters of {told}{where}')
+        if lost:
+            remark(listed('NOT saved, for the drive has a code that means nothing there:', lost))
+        return int(bool(lost))
 
 
-def load(options: argparse.Namespace) -> int:
+class Load(Verb):
     """Put saved settings into the drive; only what differs is written."""
-    file = read_file(options.file)
-    # what another model has is refused before anything is asked of the drive
-    settings = {parameter.key for parameter in load_family(options.model).settings}
-    require_names(file.values, settings, options.model, _NOTHING)
-    with Session(options, writes=not options.dry_run) as session:
-        drive = session.drive()
-        identity = drive.identify()
-        for note in _notes(file, drive, identity):
-            remark(note)
-        values = drive.read(file.values)
-        require_names(file.values, drive.parameters.data, str(drive), _NOTHING)
-        data = _differing(file, drive, options)
-        for key in data:
-            new = drive.params.value(key, data[key])
-            put(str(Change(key, _old(drive, values, key), new, drive.model[key].unit)))
-        count = 'one parameter' if len(data) == 1 else f'{len(data)} parameters'
-        if not data:
-            remark(f'nothing to write: {drive} has all of it already')
-            return 0
-        _require_standstill(drive, data)
-        if options.dry_run:
-            remark(f'a dry run: {count} would be written, nothing was')
-            return 0
-        Loading(drive, data, options).run()
-    remark(f'{count} written and read back')
-    return 0
+
+    json = False
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument('file', metavar='FILE', help='- is the standard input')
+        add_flag(parser, '--dry-run', 'only show what would change; write nothing')
+        add_allow(parser)
+        after = parser.add_mutually_exclusive_group()
+        add_flag(
+            after, '--put-back', 'if it fails half-way, put back what was written without asking'
+        )
+        add_flag(after, '--keep', 'if it fails half-way, leave what was written')
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Put saved settings into the drive; only what differs is written."""
+        file = read_file(options.file)
+        # what another model has is refused before anything is asked of the drive
+        settings = {parameter.key for parameter in load_family(options.model).settings}
+        require_names(file.values, settings, options.model, _NOTHING)
+        with Session(options, writes=not options.dry_run) as session:
+            drive = session.drive()
+            identity = drive.identify()
+            for note in _notes(file, drive, identity):
+                remark(note)
+            values = drive.read(file.values)
+            require_names(file.values, drive.parameters.data, str(drive), _NOTHING)
+            data = _differing(file, drive, options)
+            for key in data:
+                new = drive.params.value(key, data[key])
+                put(str(Change(key, _old(drive, values, key), new, drive.model[key].unit)))
+            count = 'one parameter' if len(data) == 1 else f'{len(data)} parameters'
+            if not data:
+                remark(f'nothing to write: {drive} has all of it already')
+                return 0
+            _require_standstill(drive, data)
+            if options.dry_run:
+                remark(f'a dry run: {count} would be written, nothing was')
+                return 0
+            Loading(drive, data, options).run()
+        remark(f'{count} written and read back')
+        return 0
 
 
 def _header(drive: OfflineDrive, identity: Identity) -> dict[str, str]:
@@ -305,29 +332,45 @@ class _Side:
     address: str = ''
 
 
-def diff(options: argparse.Namespace) -> int:
-    """Compare; 1 if there are differences, as diff(1) does."""
-    left, right = _sides(options)
-    differing = [
-        key
-        for key in (*left.values, *(key for key in right.values if key not in left.values))
-        if not same(left.values.get(key), right.values.get(key))
-    ]
-    model = load_family(options.model)
-    own = model.key(Role.BUS_ADDRESS)
-    if own in differing and left.address != right.address and left.address and right.address:
-        # two drives on one line cannot have the same
-        differing.remove(own)
-    if options.json:
-        table = {
-            key: {'left': left.values.get(key), 'right': right.values.get(key)} for key in differing
-        }
-        put(json.dumps(table, ensure_ascii=False, indent=2))
-    elif differing:
-        rows = [(key, _cell(left, key, model), _cell(right, key, model)) for key in differing]
-        for line in columns([('', left.name, right.name), *rows]):
-            put(line)
-    return int(bool(differing))
+class Diff(Verb):
+    """Compare a drive with a file, two files, or two drives."""
+
+    #: 1 is: there are differences.
+    failed = 2
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            'files', nargs='*', metavar='FILE', help='with the drive, or two of them'
+        )
+        parser.add_argument(
+            '--against', type=address, metavar='N', help='compare with the drive at this address'
+        )
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Compare; 1 if there are differences, as diff(1) does."""
+        left, right = _sides(options)
+        differing = [
+            key
+            for key in (*left.values, *(key for key in right.values if key not in left.values))
+            if not same(left.values.get(key), right.values.get(key))
+        ]
+        model = load_family(options.model)
+        own = model.key(Role.BUS_ADDRESS)
+        if own in differing and left.address != right.address and left.address and right.address:
+            # two drives on one line cannot have the same
+            differing.remove(own)
+        if options.json:
+            sides = {'left': left.values, 'right': right.values}
+            table = {
+                key: {side: values.get(key) for side, values in sides.items()} for key in differing
+            }
+            put(as_json(table, indent=2))
+        elif differing:
+            rows = [(key, _cell(left, key, model), _cell(right, key, model)) for key in differing]
+            for line in columns([('', left.name, right.name), *rows]):
+                put(line)
+        return int(bool(differing))
 
 
 def _sides(options: argparse.Namespace) -> tuple[_Side, _Side]:

@@ -16,11 +16,12 @@ from nfo_sinus_driver.cli.control_session import (
     Ended,
     control_session,
 )
+from nfo_sinus_driver.cli.options import Verb, add_yes
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.drive import Cause, DriveError, Procedure, Report, Tuned
 from nfo_sinus_driver.drive.procedure import require_known
 
-PROCEDURES = {
+_PROCEDURES = {
     'full': Procedure.FULL,
     'basic': Procedure.BASIC,
     'rs': Procedure.STATOR_RESISTANCE,
@@ -37,24 +38,37 @@ _OUTCOMES = (
 )
 
 
-def tune(options: argparse.Namespace) -> int:
-    """Tune, and tell which parameters have changed."""
-    procedure = PROCEDURES[options.procedure]
-    what = procedure.value
-    with Session(options) as session:
-        drive = session.drive()
-        drive.identify(thoroughly=False)
-        require_known(procedure, drive.model)
-        if drive.read_status().driven:
-            raise CliError(f'{what}: the motor runs ({drive.state.describe()}): stop it first')
-    effect = (
-        'the drive changes its motor parameters.'
-        if procedure is Procedure.CALCULATE
-        else 'the motor is energised and may turn, for minutes.'
-    )
-    require_yes(options, f'{what[0].upper()}{what[1:]}: {effect} Go on?')
-    with control_session(options, mute={*MUTE, *_OUTCOMES}, live=not options.json) as control:
-        return _Tuning(control, options, procedure).run()
+class Tune(Verb):
+    """Have the drive measure or calculate its motor."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            'procedure',
+            choices=_PROCEDURES,
+            help='full or basic tuning, rs: only the stator resistance, calculate: from the motor '
+            'plate alone',
+        )
+        add_yes(parser)
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Tune, and tell which parameters have changed."""
+        procedure = _PROCEDURES[options.procedure]
+        what = procedure.value
+        with Session(options) as session:
+            drive = session.drive()
+            drive.identify(thoroughly=False)
+            require_known(procedure, drive.model)
+            if drive.read_status().driven:
+                raise CliError(f'{what}: the motor runs ({drive.state.describe()}): stop it first')
+        effect = (
+            'the drive changes its motor parameters.'
+            if procedure is Procedure.CALCULATE
+            else 'the motor is energised and may turn, for minutes.'
+        )
+        require_yes(options, f'{what[0].upper()}{what[1:]}: {effect} Go on?')
+        with control_session(options, mute={*MUTE, *_OUTCOMES}, live=not options.json) as control:
+            return _Tuning(control, options, procedure).run()
 
 
 class _Tuning:
