@@ -75,10 +75,10 @@ def main() -> int:
     if bag:
         print(f'Its bag: {bag}; {replay_warning("/nfo_sinus")}')
     if not missing:
-        from nfo_sinus_driver.demo import plot
+        from nfo_sinus_driver.demo.picture import draw
 
         picture = folder / 'ride.png'
-        plot.draw(bag, picture)
+        draw(bag, picture)
         print(f'Its picture: {picture}')
     return 0
 

@@ -100,10 +100,10 @@ def _draw(command: str, bag: Path, drive: str | None, picture: Path) -> int:
     # here and not above: a recorder has use for neither library before
     from rosbags.highlevel import AnyReaderError
 
-    from nfo_sinus_driver.demo import bag as bags, plot as plots
+    from nfo_sinus_driver.demo.picture import draw, only_drive
 
     try:
-        plots.draw(bag, picture, drive or bags.only_drive(bag))
+        draw(bag, picture, drive or only_drive(bag))
     except (AnyReaderError, OSError, ValueError) as error:
         print(f'{command}: cannot draw {bag}: {error}', file=sys.stderr)
         return 1
