@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What the tool says to a person: errors, questions, progress and remarks, columns of text.
+What the tool says to the operator: errors, questions, progress and remarks, columns of text.
 
 Remarks go to standard error, so that the output stays what a script wants.
 """
@@ -50,7 +50,7 @@ def progress(what: str, total: int) -> Iterator[Callable[[], None]]:
 
 
 def remark(text: str) -> None:
-    """Say something to a person, above the bar if there is one."""
+    """Say something to the operator, above the bar if there is one."""
     tqdm.write(f'nfo-sinus: {text}', file=sys.stderr)
     sys.stderr.flush()
 
@@ -83,7 +83,7 @@ class UsageError(Exception):
 
 
 class Interrupted(Exception):
-    """A person or the system ended it."""
+    """The operator or the system ended it."""
 
     def __init__(self) -> None:
         super().__init__('interrupted')
@@ -95,7 +95,7 @@ def listed(head: str, lines: Iterable[str]) -> str:
 
 
 def require_yes(options: argparse.Namespace, question: str) -> None:
-    """See to it that a person wants it, by asking or by ``--yes``; else an error."""
+    """See to it that the operator wants it, by asking or by ``--yes``; else an error."""
     if options.yes:
         return
     if not (sys.stdin.isatty() and sys.stderr.isatty()):

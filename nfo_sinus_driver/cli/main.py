@@ -44,10 +44,7 @@ class Completion(Verb):
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Take the shell."""
         parser.add_argument(
-            'shell',
-            nargs='?',
-            choices=('bash', 'zsh'),
-            default='bash',
+            'shell', nargs='?', choices=('bash', 'zsh'), default='bash',
             help='type: source <(nfo-sinus completion bash), or put it into ~/.bashrc '
             '(default: bash)',
         )
@@ -127,10 +124,8 @@ def make_parser() -> argparse.ArgumentParser:
     for name in LINE_AND_DRIVE:
         add_setting(group, name, f'--{name.replace("_", "-")}')
     parser = argparse.ArgumentParser(
-        prog='nfo-sinus',
-        description='Looks after frequency inverters on a serial line.',
-        epilog=_EPILOG,
-        parents=[common],
+        prog='nfo-sinus', description='Looks after frequency inverters on a serial line.',
+        epilog=_EPILOG, parents=[common],
     )
     parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
     verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True, title='verbs')

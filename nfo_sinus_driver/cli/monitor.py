@@ -79,28 +79,20 @@ class Monitor(Verb):
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add what may be typed."""
         parser.add_argument(
-            '--period',
-            type=period,
-            default=0.5,
-            metavar='SECONDS',
+            '--period', type=period, default=0.5, metavar='SECONDS',
             help='from one line to the next (default: 0.5)',
         )
         parser.add_argument('--count', type=int, metavar='TIMES', help='end after so many')
         add_flag(
-            parser,
-            '--lines',
+            parser, '--lines',
             'a line each time, where a terminal would show the view; so does --count',
         )
         add_flag(
-            parser,
-            '--ros',
+            parser, '--ros',
             'show the drives of running drivers, on the graph of ROS, instead of a line',
         )
         parser.add_argument(
-            '--addresses',
-            type=addresses,
-            default=(),
-            metavar='LIST',
+            '--addresses', type=addresses, default=(), metavar='LIST',
             help='several drives of the line, such as 1-10,20 (default: that of --address)',
         )
 
@@ -217,8 +209,8 @@ def _show_line(
         whole = {'time': now.isoformat(), 'address': drive.address, **facts, 'statistics': figures}
         put(as_json(whole))
         return answered
-    who = f'{drive.address:>3}  ' if options.addresses else ''
-    text = f'{now:%H:%M:%S}  {who}{text}'
+    address = f'{drive.address:>3}  ' if options.addresses else ''
+    text = f'{now:%H:%M:%S}  {address}{text}'
     if one_line:
         width = shutil.get_terminal_size().columns - 1
         print(f'{_CLEAR_LINE}{text[:width]}', end='', flush=True)
@@ -355,14 +347,9 @@ class LineSource:
         runs = status.runs or status.tuning or status.state in _RUNS or abs(named['frequency']) > 0
         usual = Condition.RUNS if runs else Condition.STANDS
         self._set(
-            drive,
-            _CONDITIONS.get(status.kind, usual),
-            shown,
-            cause=status.listed.description if grave else '',
-            remedy=status.listed.remedy,
-            requires_ack=status.listed.requires_ack,
-            unit='Hz',
-            actual=named['frequency'],
+            drive, _CONDITIONS.get(status.kind, usual), shown,
+            cause=status.listed.description if grave else '', remedy=status.listed.remedy,
+            requires_ack=status.listed.requires_ack, unit='Hz', actual=named['frequency'],
             measured=Measured(**named),
             line=line_view(_name(drive), self._session.statistics(drive.address)),
         )

@@ -57,7 +57,7 @@ class Info(Verb):
         with Session(options) as session:
             drive = session.drive()
             identity = drive.identify()
-            seen = drive.read_status()
+            status = drive.read_status()
             mode = _measure_roles(drive, [Role.CONTROL_MODE])
             nameplate = _measure_roles(drive, _NAMEPLATE)
             hours = _measure_roles(drive, _COUNTERS)
@@ -69,8 +69,8 @@ class Info(Verb):
                 'vendor': identity.vendor,
                 'firmware': identity.versions,
                 'serial number': identity.serial,
-                'status': f'{drive.state.describe()} ({seen.listed.description})',
-                'state': seen.state.name.lower().replace('_', ' '),
+                'status': f'{drive.state.describe()} ({status.listed.description})',
+                'state': status.state.name.lower().replace('_', ' '),
                 'control mode': ''.join(mode.values()),
                 'motor': ', '.join(nameplate.values()),
                 **{_COUNTERS[role]: text for role, text in hours.items()},
@@ -89,8 +89,7 @@ class List(Verb):
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add what may be typed."""
         parser.add_argument(
-            '--group',
-            metavar='GROUP',
+            '--group', metavar='GROUP',
             help='only this one, such as Motor; Status are the measured values',
         )
 
@@ -151,10 +150,7 @@ class Errors(Verb):
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add what may be typed."""
         parser.add_argument(
-            '--count',
-            type=count,
-            default=0,
-            metavar='TIMES',
+            '--count', type=count, default=0, metavar='TIMES',
             help='at most so many entries; more than 32 where a drive has them (default: 0, which '
             'is all, or 32)',
         )
@@ -286,10 +282,7 @@ class Set(Verb):
         """Add what may be typed."""
         setting, value = example_setting()
         parser.add_argument(
-            'changes',
-            nargs='+',
-            type=change,
-            metavar='NAME=VALUE',
+            'changes', nargs='+', type=change, metavar='NAME=VALUE',
             help=f'such as {setting}={value:g}',
         )
         add_allow(parser)

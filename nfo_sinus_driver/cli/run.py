@@ -60,27 +60,18 @@ class Run(Verb):
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add what may be typed."""
         parser.add_argument(
-            'setpoint',
-            nargs='?',
-            type=setpoint,
-            metavar='SETPOINT',
+            'setpoint', nargs='?', type=setpoint, metavar='SETPOINT',
             help='in the unit of the control mode: Hz, rpm, %% of nominal torque, or that of the '
             'process; negative is reverse',
         )
         parser.add_argument(
-            '--for',
-            dest='seconds',
-            type=duration,
-            metavar='SECONDS',
+            '--for', dest='seconds', type=duration, metavar='SECONDS',
             help='stop after so long (default: run until Ctrl-C)',
         )
         for name, option, more in _SETTINGS:
             add_setting(parser, name, option, default=SETTINGS[name].default, **more)
         parser.add_argument(
-            '--period',
-            type=period,
-            default=0.5,
-            metavar='SECONDS',
+            '--period', type=period, default=0.5, metavar='SECONDS',
             help='from one status to the next (default: 0.5)',
         )
 
@@ -253,7 +244,7 @@ class _Run:
             if confirmed:
                 stop = control.answer
                 control.screen.say(say(stop))
-                # who ended it so is in a hurry, or not there any more
+                # whoever ended it so is in a hurry, or not there any more
                 hurry = signal not in ('', 'SIGINT') or control.screen.gone
                 confirmed = control.give_back(_SHUTDOWN_TIMEOUT if hurry else math.inf)
                 if confirmed and control.answer != stop:

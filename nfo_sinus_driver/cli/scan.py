@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The verb ``scan``: who answers on the line, and the parameter file of a driver for them."""
+"""The verb ``scan``: what answers on the line, and the parameter file of a driver for them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from nfo_sinus_driver.link.interface import NeverSilent
 #: Parity and stop bits that are tried [M0 §6.2.2].
 _PARITIES = ('E1', 'O1', 'N2')
 _LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
-#: How often who gave a damaged answer is asked again.
+#: How often an address that gave a damaged answer is asked again.
 _DAMAGE_RETRIES = 2
 #: The columns and their widths.
 _COLUMNS = (('address', 7), ('line', 10), ('product', 20), ('firmware', 11), ('serial number', 0))
@@ -47,20 +47,14 @@ class Scan(Verb):
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add what may be typed."""
         parser.add_argument(
-            '--addresses',
-            type=addresses,
-            default=(),
-            metavar='LIST',
+            '--addresses', type=addresses, default=(), metavar='LIST',
             help='such as 1-10,20 (default: 1-247; classic: 1-94; movitrac: 0-63; canopen: 1-127)',
         )
         add_flag(
-            parser,
-            '--all-settings',
-            'try every baud rate and parity; takes long; not for canopen',
+            parser, '--all-settings', 'try every baud rate and parity; takes long; not for canopen',
         )
         parser.add_argument(
-            '--params',
-            metavar='FILE',
+            '--params', metavar='FILE',
             help='write a parameter file for the driver, with all that was found; - is the '
             'standard output',
         )
@@ -135,14 +129,14 @@ def _write_params(
 ) -> None:
     """Write what the driver needs to start with the drives found, if they speak alike."""
     if len(set(lines.values())) > 1:
-        told = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
+        found_at = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
         keys = {load_family(facts['model']).key(Role.BAUD_RATE) for facts in found.values()}
         how = ', '.join(f'nfo-sinus set {key}=...' for key in sorted(keys - {''}))
         raise CliError(
             listed(
                 'no parameter file was written: one line has one baud rate and format, and the '
                 f'drives have several; set them alike ({how or "at the keypad"})',
-                told,
+                found_at,
             )
         )
     baud_rate, char_format = next(iter(lines.values()))
@@ -175,7 +169,7 @@ def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
 
 
 def _ask(drive: OfflineDrive, silence_retries: int) -> dict[str, str] | None:
-    """Return who answers at an address (DriveError: the port cannot be used)."""
+    """Return what answers at an address (DriveError: the port cannot be used)."""
     try:
         drive.do(lambda: _first_answer(drive, silence_retries))
         identity = drive.identify()
@@ -205,8 +199,8 @@ async def _first_answer(drive: OfflineDrive, silence_retries: int) -> None:
     """
     Have an address answer once.
 
-    After silence it is asked again as often as told: most addresses have nobody. After a damaged
-    answer it always is, for somebody is there.
+    After silence it is asked again so often: most addresses have no drive. After a damaged answer
+    it always is, for there is one.
     """
     damage_retries = _DAMAGE_RETRIES
     status = drive.model.key_of_status
@@ -249,7 +243,7 @@ _HEAD = """\
   ros__parameters:
 """
 _DRIVE = """
-# {who}
+# {named}
 /**/{name}:
   ros__parameters:
     address: {address}
@@ -260,7 +254,7 @@ _IF_OTHER = ('response_timeout', 'retries')
 
 
 def _require_new(name: str, *, force: bool) -> None:
-    """See to it that no file is replaced that somebody may have edited since."""
+    """See to it that no file is replaced that may have been edited since."""
     if name != STANDARD and not force and Path(name).exists():
         raise CliError(f'{name} exists already: choose another name, or say --force to replace it')
 
@@ -288,14 +282,16 @@ def _driver_params(
     # what JSON has is YAML, too
     settings = [f'    {name}: {json.dumps(value)}\n' for name, value in line.items()]
     drives = [
-        _DRIVE.format(who=_who(facts), name=names[address], address=address, model=facts['model'])
+        _DRIVE.format(
+            named=_named(facts), name=names[address], address=address, model=facts['model']
+        )
         for address, facts in sorted(found.items())
     ]
     return ''.join((_HEAD.format(count=count, date=date), *settings, *drives))
 
 
-def _who(facts: Mapping[str, str]) -> str:
+def _named(facts: Mapping[str, str]) -> str:
     """Return what a drive says of itself, fit for a comment."""
-    told = {'': facts['product'], 'firmware ': facts['firmware'], 'serial ': facts['serial number']}
-    text = ', '.join(f'{name}{value}' for name, value in told.items() if value)
+    names = {'product': '', 'firmware': 'firmware ', 'serial number': 'serial '}
+    text = ', '.join(f'{name}{facts[fact]}' for fact, name in names.items() if facts[fact])
     return ''.join(char if char.isprintable() else ' ' for char in text)

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is printed while a motor is commanded; nobody ever waits for a terminal or a reader."""
+"""What is printed while a motor is commanded; nothing ever waits for a terminal or a reader."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Screen:
         self._work_there = threading.Event()
         self._closing = False
         self._thread = threading.Thread(target=self._work, name='screen', daemon=True)
-        #: Nobody can read the output any more.
+        #: The output has no reader any more.
         self.gone = False
 
     def __enter__(self) -> Screen:
@@ -65,7 +65,7 @@ class Screen:
         self._enter(False, text)
 
     def say(self, text: str) -> None:
-        """Say something to a person, on standard error."""
+        """Say something to the operator, on standard error."""
         self._enter(True, f'nfo-sinus: {text}')
 
     def _enter(self, to_error: bool, text: str) -> None:
@@ -106,7 +106,7 @@ def _is_terminal(stream: TextIO | None) -> bool:
 
 
 def _write(stream: TextIO | None, text: str) -> None:
-    """Write past the buffer, for nobody could flush it at the end while a write waits."""
+    """Write past the buffer, for nothing could flush it at the end while a write waits."""
     if stream is None:
         return
     try:

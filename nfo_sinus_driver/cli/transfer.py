@@ -54,7 +54,7 @@ class Dump(Verb):
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add what may be typed."""
         parser.add_argument(
-            'file', nargs='?', default='-', metavar='FILE', help='default: standard output'
+            'file', nargs='?', default='-', metavar='FILE', help='default: standard output',
         )
 
     def main(self, options: argparse.Namespace) -> int:
@@ -66,8 +66,8 @@ class Dump(Verb):
             lost = [key for key in drive.parameters.data if key not in values]
         write_file(options.file, format_file(_header(drive, identity), values, drive.model))
         where = '' if options.file == '-' else f' saved in {options.file}'
-        told = ', '.join(filter(None, (str(drive), str(identity))))
-        remark(f'{len(values)} parameters of {told}{where}')
+        named = ', '.join(filter(None, (str(drive), str(identity))))
+        remark(f'{len(values)} parameters of {named}{where}')
         if lost:
             remark(listed('NOT saved, for the drive has a code that means nothing there:', lost))
         return int(bool(lost))
@@ -85,7 +85,7 @@ class Load(Verb):
         add_allow(parser)
         after = parser.add_mutually_exclusive_group()
         add_flag(
-            after, '--put-back', 'if it fails half-way, put back what was written without asking'
+            after, '--put-back', 'if it fails half-way, put back what was written without asking',
         )
         add_flag(after, '--keep', 'if it fails half-way, leave what was written')
 
@@ -136,7 +136,7 @@ def _header(drive: OfflineDrive, identity: Identity) -> dict[str, str]:
 
 
 def _notes(file: ParameterFile, drive: OfflineDrive, identity: Identity) -> list[str]:
-    """Return what a person should know before a file goes into a drive."""
+    """Return what the operator should know before a file goes into a drive."""
     notes = []
     if file.skipped:
         notes.append(f'left out, for the drive has none such: {", ".join(file.skipped)}')
@@ -303,7 +303,7 @@ class Loading:
 
 @contextlib.contextmanager
 def _signals_noted() -> Iterator[Callable[[], bool]]:
-    """Let signals that end the program wait; what it yields tells whether one came."""
+    """Let signals that end the program wait; what it yields says whether one came."""
     came = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield came.is_set
@@ -341,10 +341,10 @@ class Diff(Verb):
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add what may be typed."""
         parser.add_argument(
-            'files', nargs='*', metavar='FILE', help='with the drive, or two of them'
+            'files', nargs='*', metavar='FILE', help='with the drive, or two of them',
         )
         parser.add_argument(
-            '--against', type=address, metavar='N', help='compare with the drive at this address'
+            '--against', type=address, metavar='N', help='compare with the drive at this address',
         )
 
     def main(self, options: argparse.Namespace) -> int:

@@ -44,15 +44,14 @@ class Tune(Verb):
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add what may be typed."""
         parser.add_argument(
-            'procedure',
-            choices=_PROCEDURES,
+            'procedure', choices=_PROCEDURES,
             help='full or basic tuning, rs: only the stator resistance, calculate: from the motor '
             'plate alone',
         )
         add_yes(parser)
 
     def main(self, options: argparse.Namespace) -> int:
-        """Tune, and tell which parameters have changed."""
+        """Tune, and report which parameters have changed."""
         procedure = _PROCEDURES[options.procedure]
         what = procedure.value
         with Session(options) as session:

@@ -12,7 +12,7 @@ from nfo_sinus_driver.view.picture import Source
 
 
 def is_terminal() -> bool:
-    """Tell whether there is one; what draws the view writes to the standard error."""
+    """Return whether there is one; what draws the view writes to the standard error."""
     return all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr))
 
 
@@ -33,8 +33,8 @@ def why_not() -> str:
 
 
 def show(source: Source) -> None:
-    """Show the view until somebody ends it; ask :func:`why_not` before."""
-    # only here: who does not look needs no textual
+    """Show the view until the operator ends it; ask :func:`why_not` before."""
+    # only here: without the view textual is not needed
     from nfo_sinus_driver.view.app import MonitorApp
 
     MonitorApp(source).run()
