@@ -102,7 +102,6 @@ class _Run:
             drive_timeout=options.drive_timeout,
             setpoint_max=options.setpoint_max,
         )
-        control.show = self._show
         self._shown_at = -math.inf
         self._ends_at = math.inf
 
@@ -188,6 +187,7 @@ class _Run:
         control, drive = self._control, self._drive
         control.wait(drive.connect())
         drive.activate()
+        control.show = self._show
         deadline = time.monotonic() + _LONGEST_STOP
         while True:
             try:

@@ -80,7 +80,6 @@ class _Tuning:
         self._options = options
         self._procedure = procedure
         self._drive = control.command()
-        control.show = self._show
         self._begun = time.monotonic()
         self._shown = ''
         self._shown_at = 0.0
@@ -110,6 +109,7 @@ class _Tuning:
         control, drive = self._control, self._drive
         control.wait(drive.connect())
         drive.activate()
+        control.show = self._show
         future = drive.tune(self._procedure)
         self._begun = time.monotonic()
         try:

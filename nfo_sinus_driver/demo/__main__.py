@@ -103,12 +103,10 @@ def _sequence(bag: Path | None) -> Iterator[DemoSequence]:
 
 def _output_folder() -> Path:
     parser = argparse.ArgumentParser(
-        prog='demo', description='A short ride of a simulated drive, recorded and drawn.'
+        prog='demo', description='A short ride of a simulated drive, recorded and drawn.',
     )
     parser.add_argument(
-        '--output',
-        type=Path,
-        metavar='DIR',
+        '--output', type=Path, metavar='DIR',
         help='where bag (DIR/ride) and plot (DIR/ride.png) go; '
         'demo_output/<date and time> in the current directory if not given',
     )

@@ -87,13 +87,13 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-#: All that DDS has ports for on every system; 0 is everybody's.
+#: All that DDS has ports for on every system; 0 is that of everything else.
 _DOMAINS = range(1, 102)
 
 
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
-    """Have a ROS domain that nobody else has who asks here, and not that of the user."""
+    """Have a ROS domain that no other caller has, and that is not that of the user."""
     users = os.environ.get('ROS_DOMAIN_ID', '')
     for number in random.sample(_DOMAINS, len(_DOMAINS)):
         if str(number) == users:

@@ -27,7 +27,7 @@ import yaml
 
 _EVENT = '/_service_event'
 _STATUS = 'nfo_sinus_msgs/msg/DriveStatus'
-#: What the states of DriveStatus are to someone who watches the motor.
+#: What the states of DriveStatus mean for the motor.
 _PHASE_OF_STATE = {
     'OPERATION_ENABLED': 'running',
     'STOPPING': 'stopping',
@@ -42,7 +42,7 @@ _LEFT, _RIGHT = 0.075, 0.98
 #: A text is made smaller rather than left out.
 _SPAN_SIZES = (13, 12, 11, 10)
 
-# the colours of Okabe and Ito, which people who do not see red or green tell apart
+# the colours of Okabe and Ito, which are distinct without seeing red or green
 _ORANGE = '#E69F00'
 _DARK_ORANGE = '#8F6300'
 _SKY_BLUE = '#56B4E9'
@@ -258,7 +258,7 @@ def _spans(points: list[tuple[float, str]], end: float) -> list[Span]:
         if not changes or what != changes[-1][1]:
             changes.append((time, what))
     ends = [*(time for time, _ in changes[1:]), end]
-    # what is latched may have been published before the first status that was heard
+    # what is latched may have been published before the first status that was received
     return [
         Span(max(begin, 0.0), until, what)
         for (begin, what), until in zip(changes, ends, strict=False)
@@ -275,7 +275,7 @@ def _nanoseconds(stamp: Any) -> int:
 
 def draw(bag: Path, picture: Path, drive: str = '/nfo_sinus') -> None:
     """
-    Draw what a bag tells of a run into a PNG file.
+    Draw what a bag says of a run into a PNG file.
 
     :raises ValueError: there is nothing of the drive in it.
     """
@@ -367,9 +367,9 @@ def _draw_frequency(axes: Axes, run: Recording) -> None:
         if time - last > _SILENCE:
             followed.add(last, math.nan)
             ignored.add(last, math.nan)
-        heard = any(span.begin <= time <= span.end for span in run.enabled)
-        followed.add(time, value if heard else math.nan)
-        ignored.add(time, math.nan if heard else value)
+        enabled = any(span.begin <= time <= span.end for span in run.enabled)
+        followed.add(time, value if enabled else math.nan)
+        ignored.add(time, math.nan if enabled else value)
         last = time
     axes.step(
         followed.times, followed.values, where='post', color=_ORANGE, linewidth=3.2,
@@ -457,8 +457,8 @@ def _name_faults(axes: Axes, run: Recording) -> None:
         axes.annotate(
             span.what, where, (8, 0), va='top', size=18, weight='bold', color=_VERMILION, **offset
         )
-        told = f'fault {span.code}, {span.begin:.1f} s\nmotor released,\nspeed unknown'
-        axes.annotate(told, where, (8, -26), va='top', size=11.5, color=_INK, **offset)
+        text = f'fault {span.code}, {span.begin:.1f} s\nmotor released,\nspeed unknown'
+        axes.annotate(text, where, (8, -26), va='top', size=11.5, color=_INK, **offset)
 
 
 def _at_height(axes: Axes) -> Transform:

@@ -75,7 +75,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def plot(args: Sequence[str] | None = None) -> int:
-    """Draw the ride of a drive that is in a bag; return the exit status."""
+    """Draw the run of a drive that is in a bag; return the exit status."""
     options = _plot_parser().parse_args(args)
     missing = why_missing('rosbags', 'matplotlib')
     if missing:
@@ -113,12 +113,12 @@ def _draw(command: str, bag: Path, drive: str | None, picture: Path) -> int:
 
 @contextlib.contextmanager
 def _recorder(bag: Path, drive: str, arguments: Sequence[str]) -> Iterator[Recorder]:
-    """Record on a thread of its own; nothing is heard any more when the bag is closed."""
+    """Record on a thread of its own; nothing is received any more when the bag is closed."""
     with contextlib.ExitStack() as stack:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
         recorder = stack.enter_context(
-            Recorder(bag, drive, {'drive': drive}, lambda: _tell_heard(drive))
+            Recorder(bag, drive, {'drive': drive}, lambda: _report_heard(drive))
         )
         executor = SingleThreadedExecutor()
         executor.add_node(recorder)
@@ -126,12 +126,12 @@ def _recorder(bag: Path, drive: str, arguments: Sequence[str]) -> Iterator[Recor
         yield recorder
 
 
-def _tell_heard(drive: str) -> None:
+def _report_heard(drive: str) -> None:
     print(f'record: {drive} is heard', flush=True)
 
 
 def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
-    """Wait until the time is over, or somebody ends it."""
+    """Wait until the time is over, or a signal ends it."""
     end = time.monotonic() + seconds
     with contextlib.suppress(KeyboardInterrupt):
         _sleep_until(min(end, time.monotonic() + _PATIENCE))
@@ -146,7 +146,7 @@ def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
     # what was recorded is now closed and drawn, and that must not be cut short
     for number in _ENDING:
         signal.signal(number, signal.SIG_IGN)
-    # the end overtakes messages: nobody tells a subscriber which are yet to come
+    # the end overtakes messages: a subscriber does not know which are yet to come
     time.sleep(_ON_ITS_WAY)
 
 
@@ -158,7 +158,7 @@ def _sleep_until(end: float) -> None:
 
 def _record_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='record', description='Records what a drive does until Ctrl-C, and draws it.'
+        prog='record', description='Records what a drive does until Ctrl-C, and draws it.',
     )
     parser.add_argument(
         'drive', nargs='?', type=_node, default='/nfo_sinus', metavar='DRIVE',
@@ -179,16 +179,14 @@ def _record_parser() -> argparse.ArgumentParser:
 
 def _plot_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='plot', description='Draws what a bag tells of the ride of a drive.'
+        prog='plot', description='Draws what a bag tells of the ride of a drive.',
     )
     parser.add_argument('bag', type=Path, metavar='BAG', help='the folder of the bag')
     parser.add_argument(
         '--drive', type=_node, metavar='DRIVE',
         help='the full name of the drive node; needed if the bag has several',
     )
-    parser.add_argument(
-        '--output', type=Path, metavar='PNG', help='the picture (default: BAG.png)'
-    )
+    parser.add_argument('--output', type=Path, metavar='PNG', help='the picture (default: BAG.png)')
     parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
     return parser
 
