@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import contextlib
 import json
 import math
+import signal
 import sys
 import threading
 from typing import Any
@@ -72,6 +73,25 @@ def _without_nan(facts: Any) -> Any:
     if isinstance(facts, (list, tuple)):
         return [_without_nan(fact) for fact in facts]
     return None if isinstance(facts, float) and math.isnan(facts) else facts
+
+
+@contextlib.contextmanager
+def signals_handled(handler: Callable[[int, Any], Any]) -> Iterator[None]:
+    """
+    Handle the signals that would end this tool, if this is the main thread.
+
+    Whatever was inherited: a shell lets its background jobs ignore Ctrl-C.
+    """
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, former in before.items():
+            signal.signal(number, former)
 
 
 class CliError(Exception):

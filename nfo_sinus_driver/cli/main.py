@@ -6,16 +6,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
-import contextlib
+from collections.abc import Sequence
 import inspect
 import io
 import os
 import signal
 import sys
-import threading
 
-from nfo_sinus_driver.cli.console import CliError, UsageError, put, remark, say
+from nfo_sinus_driver.cli.console import CliError, UsageError, put, remark, say, signals_handled
 from nfo_sinus_driver.cli.monitor import Monitor
 from nfo_sinus_driver.cli.options import DEFAULTS, LINE_AND_DRIVE, Verb, add_flag, add_setting
 from nfo_sinus_driver.cli.read import Errors, Get, Info, List, Set
@@ -76,7 +74,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = parse(sys.argv[1:] if argv is None else argv)
     verb = VERBS[options.verb]
     try:
-        with _signals_that_interrupt():
+        # SIGTERM and SIGHUP end it as Ctrl-C does, so that everything is cleaned up
+        with signals_handled(signal.default_int_handler):
             return verb.main(options)
     except UsageError as error:
         remark(str(error))
@@ -137,22 +136,3 @@ def make_parser() -> argparse.ArgumentParser:
             add_flag(made, '--json', 'print JSON, for a script')
         verb.add_arguments(made)
     return parser
-
-
-@contextlib.contextmanager
-def _signals_that_interrupt() -> Iterator[None]:
-    """
-    Let SIGTERM and SIGHUP end it as Ctrl-C does, so that everything is cleaned up.
-
-    Whatever was inherited: a shell lets its background jobs ignore Ctrl-C.
-    """
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.signal(number, signal.default_int_handler) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -11,7 +11,6 @@ import contextlib
 from dataclasses import dataclass
 from datetime import datetime
 from importlib import metadata
-import signal
 import sys
 import threading
 
@@ -27,6 +26,7 @@ from nfo_sinus_driver.cli.console import (
     put,
     remark,
     say,
+    signals_handled,
 )
 from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, address, command_line
 from nfo_sinus_driver.cli.parameter_file import (
@@ -205,9 +205,6 @@ def _require_standstill(drive: OfflineDrive, data: Mapping[str, bytes]) -> None:
         raise CliError(listed(head, keys))
 
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-
 class Loading:
     """Writes what differs into one drive; the options say what to do when it fails half-way."""
 
@@ -305,15 +302,8 @@ class Loading:
 def _signals_noted() -> Iterator[Callable[[], bool]]:
     """Let signals that end the program wait; what it yields says whether one came."""
     came = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
+    with signals_handled(lambda *_: came.set()):
         yield came.is_set
-        return
-    before = {number: signal.signal(number, lambda *_: came.set()) for number in _SIGNALS}
-    try:
-        yield came.is_set
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 _ABSENT = 'absent'

@@ -15,12 +15,22 @@ import socket
 import subprocess
 import sys
 import tempfile
-from typing import IO
+from typing import IO, Any
 
 _SIMULATOR = (sys.executable, '-m', 'nfo_sinus_driver.simulator')
 _DRIVER = (sys.executable, '-m', 'nfo_sinus_driver.node')
 
 BAUD_RATE = 57600
+
+
+def handle_signals(handler: Any) -> None:
+    """
+    Handle the signals that end a program, whatever was inherited.
+
+    Ignored they are as soon as the driver stops the motor, which must not be cut short.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, handler)
 
 
 class Bench(contextlib.ExitStack):

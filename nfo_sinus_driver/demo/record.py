@@ -28,11 +28,11 @@ from rclpy.signals import SignalHandlerOptions
 import rclpy.utilities
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
+from nfo_sinus_driver.demo.bench import handle_signals
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
 from nfo_sinus_driver.node.executor import spinning
 from nfo_sinus_driver.version import VERSION
 
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 #: When it is time to say that there is no driver, s.
 _PATIENCE = 5.0
 #: How long what was sent before the end may be on its way, s.
@@ -55,8 +55,7 @@ def main(args: Sequence[str] | None = None) -> int:
     if 'rosbags' in missing:
         print(f'record: cannot write a bag: {missing["rosbags"]}', file=sys.stderr)
         return 1
-    for number in _ENDING:
-        signal.signal(number, signal.default_int_handler)
+    handle_signals(signal.default_int_handler)
     try:
         with _recorder(bag, options.drive, given) as recorder:
             print(f'record: {options.drive} goes to {bag}; Ctrl-C ends it', flush=True)
@@ -144,8 +143,7 @@ def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
             )
         _sleep_until(end)
     # what was recorded is now closed and drawn, and that must not be cut short
-    for number in _ENDING:
-        signal.signal(number, signal.SIG_IGN)
+    handle_signals(signal.SIG_IGN)
     # the end overtakes messages: a subscriber does not know which are yet to come
     time.sleep(_ON_ITS_WAY)
 
