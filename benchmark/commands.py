@@ -42,7 +42,7 @@ def measure(count: int) -> Iterator[tuple[str, dict[str, float]]]:
     """Yield the title and the figures of each row, of so many set-points and a tenth of stops."""
     for drives in DRIVES:
         for master in (PEER, DRIVER):
-            where = f'{master}, {_BAUD_RATE} bit/s, {drives} drives'
+            where = f'{master}, {_BAUD_RATE} bit/s, {drives} drive{"s" * (drives != 1)}'
             settings = _SETTINGS if master == DRIVER else {}
             with Rig(master, _BAUD_RATE, drives, **settings) as rig:
                 rig.enable_all()

@@ -4,14 +4,14 @@
 """
 The node that a user would write instead of the driver: rclpy and minimalmodbus.
 
-One node for each drive, on one line; the same five topics, set-points and two services. It knows
-no lost answers, no time-outs and no faults, and checks nothing: it is the least that does the job.
+One node for each drive, on one line; the same five topics, set-points and two services. A timer
+polls; one thread does everything, so that no two requests meet. It knows no lost answers, no
+time-outs and no faults, and checks nothing: it is the least that does the job.
 """
 
 from __future__ import annotations
 
 import argparse
-import threading
 import time
 
 import minimalmodbus
@@ -29,6 +29,7 @@ _MODEL = load_family('sinus_g2')
 #: Control by the bus; run; stop.
 _BUS, _RUN, _STOP = 3, 0x101, 0
 #: s.
+_PERIOD = 0.001
 _TELEMETRY_PERIOD = 0.5
 _MEASURED = {
     'output_current': 'status.i_rms',
@@ -39,29 +40,16 @@ _MEASURED = {
 }
 
 
-class Line:
-    """One port for all drives; whoever has the lock may talk."""
-
-    def __init__(self, port: str, baud_rate: int) -> None:
-        self.lock = threading.Lock()
-        self._port = port
-        self._baud_rate = baud_rate
-
-    def instrument(self, address: int) -> minimalmodbus.Instrument:
-        """Return the drive at an address."""
-        made = minimalmodbus.Instrument(self._port, address)
-        # two stop bits: a pseudo-terminal has no parity, and a character is as long
-        made.serial.baudrate, made.serial.stopbits, made.serial.timeout = self._baud_rate, 2, 0.5
-        return made
-
-
 class Drive(Node):
     """The node of one drive."""
 
-    def __init__(self, name: str, address: int, line: Line) -> None:
+    def __init__(self, name: str, address: int, port: str, baud_rate: int) -> None:
         super().__init__(name)
-        self._line = line
-        self._drive = line.instrument(address)
+        # all of one port share its serial object
+        self._drive = minimalmodbus.Instrument(port, address)
+        serial = self._drive.serial
+        # two stop bits: a pseudo-terminal has no parity, and a character is as long
+        serial.baudrate, serial.stopbits, serial.timeout = baud_rate, 2, 0.5
         self._publish = {
             topic: self.create_publisher(kind, f'~/{topic}', 10) for topic, kind in TOPICS.items()
         }
@@ -70,21 +58,21 @@ class Drive(Node):
         self.create_subscription(Float32, '~/setpoint', self._on_setpoint, 1)
         self.create_service(SetBool, '~/enable', self._on_enable)
         self.create_service(Trigger, '~/stop', self._on_stop)
+        # as often as the line allows
+        self.create_timer(_PERIOD, self._poll)
 
     def _read(self, key: str) -> float:
         place = _MODEL[key].at('modbus')
-        with self._line.lock:
-            words = self._drive.read_registers(place.index, place.codec.size // 2)
+        words = self._drive.read_registers(place.index, place.codec.size // 2)
         # the low word comes first
         data = b''.join(word.to_bytes(2, 'big') for word in words)
         value = _MODEL[key].decode(data, 'modbus')
         return float(value) if isinstance(value, (int, float)) else 0.0
 
     def _write(self, key: str, word: int) -> None:
-        with self._line.lock:
-            self._drive.write_register(_MODEL[key].at('modbus').index, word, functioncode=6)
+        self._drive.write_register(_MODEL[key].at('modbus').index, word, functioncode=6)
 
-    def poll(self) -> None:
+    def _poll(self) -> None:
         """Read the drive once, and publish what it said."""
         stamp = self.get_clock().now().to_msg()
         word = int(self._read('fieldbus.drive_status'))
@@ -110,8 +98,7 @@ class Drive(Node):
     def _write_setpoint(self, value: float) -> None:
         data = _MODEL['status.frq_set'].quantise(value, 'modbus')
         words = [int.from_bytes(data[at : at + 2], 'big') for at in range(0, len(data), 2)]
-        with self._line.lock:
-            self._drive.write_registers(_MODEL['status.frq_set'].at('modbus').index, words)
+        self._drive.write_registers(_MODEL['status.frq_set'].at('modbus').index, words)
 
     def _on_enable(
         self, request: SetBool.Request, response: SetBool.Response
@@ -130,22 +117,17 @@ class Drive(Node):
 
 
 def main() -> None:
-    """Poll all drives in turn, until ended; callbacks have a thread of their own."""
+    """Poll all drives, until ended."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('port')
     parser.add_argument('baud_rate', type=int)
     parser.add_argument('names', nargs='+')
     options = parser.parse_args()
     rclpy.init()
-    line = Line(options.port, options.baud_rate)
-    drives = [Drive(name, number, line) for number, name in enumerate(options.names, start=1)]
     executor = SingleThreadedExecutor()
-    for drive in drives:
-        executor.add_node(drive)
-    threading.Thread(target=executor.spin, daemon=True).start()
-    while True:
-        for drive in drives:
-            drive.poll()
+    for address, name in enumerate(options.names, start=1):
+        executor.add_node(Drive(name, address, options.port, options.baud_rate))
+    executor.spin()
 
 
 if __name__ == '__main__':

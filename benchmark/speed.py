@@ -50,7 +50,8 @@ def measure(seconds: float) -> Iterator[tuple[str, dict[str, float]]]:
                 of_one = figures
             if protocol == 'modbus_rtu':
                 figures['cpu_to_peer'] = figures['cpu_transaction'] / of_one['cpu_transaction']
-            yield f'{master}, {protocol}, {baud_rate} bit/s, {drives} drives', figures
+            number = f'{drives} drive{"s" * (drives != 1)}'
+            yield f'{master}, {protocol}, {baud_rate} bit/s, {number}', figures
 
 
 def _watch(rig: Rig, seconds: float) -> dict[str, float]:
