@@ -299,7 +299,7 @@ class Bus:
             self._refreshing -= 1
 
     @contextlib.contextmanager
-    def introducing(self, unit: int) -> Iterator[None]:
+    def first_reading(self, unit: int) -> Iterator[None]:
         """Have units that only stand leave the line to this one, if it is read the first time."""
         first = unit not in self._introduced
         self._introduced.add(unit)
@@ -311,7 +311,7 @@ class Bus:
             if first:
                 self._being_introduced.discard(unit)
 
-    def introduces_another(self, unit: int) -> bool:
+    def reads_another_first(self, unit: int) -> bool:
         """Tell whether any other unit is read for the first time just now."""
         return bool(self._being_introduced - {unit})
 

@@ -327,7 +327,7 @@ class ControlMethod(abc.ABC):
     coasts: ClassVar[bool] = False
     older: ClassVar[bool] = True
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
-    keeps_control: ClassVar[str] = ''
+    control_retained: ClassVar[str] = ''
     addressing: ClassVar[str] = ''
     plc_time: ClassVar[float] = 0.0
     caution: ClassVar[str] = ''

@@ -132,7 +132,7 @@ def _read(
         drive.identify(thoroughly=False)
 
     async def measure() -> tuple[InverterStatus, Mapping[Role, float]]:
-        status = await drive.state.look(Priority.POLL, once=True)
+        status = await drive.state.read_status(Priority.POLL, once=True)
         values = dict.fromkeys(_VALUES, math.nan)
         for role in _VALUES:
             key = drive.model.key(role)

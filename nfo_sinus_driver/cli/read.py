@@ -314,7 +314,7 @@ class Set(Verb):
                         if barred and not same(exact, values.get(name)):
                             wrong.append(f'{name}: {BARRED}')
                         else:
-                            drive.parameters.admit(name, value)
+                            drive.parameters.validate(name, value)
                     except ParameterError as error:
                         wrong.append(say(error))
             if wrong:

@@ -213,7 +213,7 @@ class _Run:
                 # without --for this is how one ends it
                 wanted = name == 'SIGINT' and options.seconds is None
                 raise Ended(name, 0 if wanted else INTERRUPTED, name)
-            if not drive.armed:
+            if not drive.following:
                 raise Ended(self._why_disabled(), _FAILED)
             if self._control.screen.gone:
                 raise Ended('the output has no reader any more', _FAILED)

@@ -63,8 +63,8 @@ class OfflineDrive(EventListener):
         self._drive = drive = Drive(bus, settings, self)
         self.address = settings.address
         self.model = drive.model
-        self.params = drive.registers
-        self.state = drive.inverter
+        self.params = drive.params
+        self.state = drive.state
         self.parameters = drive.parameters
         self._step: Callable[[], None] = lambda: None
 

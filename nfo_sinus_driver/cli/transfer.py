@@ -171,7 +171,7 @@ def _differing(
                 kept.append(key)
                 continue
             if not options.dry_run:
-                drive.parameters.admit(key, value)
+                drive.parameters.validate(key, value)
         except (ParameterError, ValueError) as error:
             wrong.append(say(error))
         else:

@@ -55,7 +55,7 @@ def _not_told(severity: Severity, report: Report) -> None:
 
 async def carry_out(
     steps: profile.Steps[_T],
-    registers: ParameterAccess,
+    params: ParameterAccess,
     priority: Priority,
     reached: Reached = _not_reached,
     tell: Callable[[Severity, Report], None] = _not_told,
@@ -80,7 +80,7 @@ async def carry_out(
 
     def after_write(condition: _Condition) -> _Condition:
         # behind a PLC a status from before is shown for a while [C117]
-        return lambda seen: seen.at > written_at and condition(seen)
+        return lambda status: status.at > written_at and condition(status)
 
     while True:
         try:
@@ -96,16 +96,16 @@ async def carry_out(
         brought = refusal = None
         try:
             if isinstance(step, profile.Read):
-                registers.require_fitted(step.key)
-                brought = await registers.read(step.key, priority, once=step.once)
+                params.require_fitted(step.key)
+                brought = await params.read(step.key, priority, once=step.once)
             elif isinstance(step, profile.Write) and step.stored:
-                await _store(step, registers, priority, tell)
+                await _store(step, params, priority, tell)
             elif isinstance(step, profile.Write):
-                await registers.write(step, priority)
+                await params.write(step, priority)
             elif isinstance(step, profile.Acknowledge):
-                brought = await registers.acknowledge(step.key, priority)
+                brought = await params.acknowledge(step.key, priority)
             elif isinstance(step, profile.AcknowledgeThenWrite):
-                await registers.acknowledge_and_write(step.key, step.write)
+                await params.acknowledge_and_write(step.key, step.write)
             elif isinstance(step, profile.Hold):
                 brought = await held(after_write(step.condition), step.seconds)
             else:
@@ -113,66 +113,66 @@ async def carry_out(
         except (Refused, NoAnswer, DamagedAnswer) as error:
             if not (onward or isinstance(error, Refused)):
                 raise
-            if not await _stands(step, registers, priority, error):
+            if not await _stands(step, params, priority, error):
                 refusal = Refusal(str(error))
                 refusal.__cause__ = error
         if isinstance(step, profile.Write):
-            written_at = registers.now()
+            written_at = params.now()
 
 
 async def _stands(
-    step: profile.Step, registers: ParameterAccess, priority: Priority, error: LinkError
+    step: profile.Step, params: ParameterAccess, priority: Priority, error: LinkError
 ) -> bool:
     """Tell whether the drive has taken a write that it did not answer, where that can be read."""
     if isinstance(error, Refused) or not isinstance(step, profile.Write):
         return False
-    if registers.model[step.key].access is not Access.READ_WRITE:
+    if params.model[step.key].access is not Access.READ_WRITE:
         return False
-    address, data = registers.target(step)
+    address, data = params.target(step)
     try:
-        return await registers.read_from(address, priority, once=True) == data
+        return await params.read_from(address, priority, once=True) == data
     except LinkError:
         return False
 
 
-async def read_scales(inverter: DriveState) -> None:
+async def read_scales(state: DriveState) -> None:
     """Read the scale of speeds, and report one that is not the one before."""
-    if await inverter.scales.read():
-        inverter.tell(Severity.INFO, Cause.SPEED_SCALE, scale=str(inverter.scales.speed))
+    if await state.scales.read():
+        state.tell(Severity.INFO, Cause.SPEED_SCALE, scale=str(state.scales.speed))
 
 
-async def read_limits(inverter: DriveState, control_mode: str) -> profile.Limits:
+async def read_limits(state: DriveState, control_mode: str) -> profile.Limits:
     """
     Read what a set-point may be, in the unit of a control mode.
 
     :returns: no limits where the drive takes no set-points in that mode.
     """
-    target = inverter.model.profile.setpoints.get(control_mode)
+    target = state.model.profile.setpoints.get(control_mode)
     if target is None:
         return profile.Limits()
-    steps = target.read_limits(inverter.has, older=inverter.settings_need_control)
-    limits = await carry_out(steps, inverter.registers, Priority.SERVICE)
-    if not inverter.registers.is_rescaled(target.key):
+    steps = target.read_limits(state.has, older=state.settings_need_control)
+    limits = await carry_out(steps, state.params, Priority.SERVICE)
+    if not state.params.is_rescaled(target.key):
         return limits
     # with another scale a word may not carry all that the drive takes
-    least, most, _ = inverter.registers.limits(target.key)
+    least, most, _ = state.params.limits(target.key)
     return replace(limits, least=max(limits.least, least), most=min(limits.most, most))
 
 
 async def _store(
     step: profile.Write,
-    registers: ParameterAccess,
+    params: ParameterAccess,
     priority: Priority,
     tell: Callable[[Severity, Report], None],
 ) -> None:
     """Write to a memory that wears out, and only what does not stand there; report it."""
-    address, data = registers.target(step)
-    before = await registers.read_from(address, priority)
+    address, data = params.target(step)
+    before = await params.read_from(address, priority)
     if before == data:
         return
-    await registers.write(step, priority)
-    old, new = registers.value(step.key, before), registers.value(step.key, data)
-    name = registers.model[step.key].name
+    await params.write(step, priority)
+    old, new = params.value(step.key, before), params.value(step.key, data)
+    name = params.model[step.key].name
     tell(Severity.INFO, Report(Cause.STORED, key=step.key, name=name, old=old, new=new))
 
 
@@ -186,14 +186,14 @@ class Commands:
     :raises LinkError: the drive does not answer, so that nobody knows; or it refuses.
     """
 
-    def __init__(self, inverter: DriveState) -> None:
-        method = inverter.model.profile.methods[inverter.settings.method]
-        self._method = method(inverter.settings.reference, inverter.registers.reaches)
-        self._registers = inverter.registers
+    def __init__(self, state: DriveState) -> None:
+        method = state.model.profile.methods[state.settings.method]
+        self._method = method(state.settings.reference, state.params.reaches)
+        self._params = state.params
         #: Why the line has the bus keep control.
-        self._held = inverter.model.profile.holds_control.get(inverter.registers.protocol, '')
-        self._tell = inverter.tell
-        self._wait_until = inverter.wait_until
+        self._held = state.model.profile.holds_control.get(state.params.protocol, '')
+        self._tell = state.tell
+        self._wait_until = state.wait_until
 
     @property
     def coasts(self) -> bool:
@@ -206,14 +206,14 @@ class Commands:
         return self._method.plc_time
 
     @property
-    def keeps_control(self) -> str:
+    def control_retained(self) -> str:
         """Why control may stay with the bus at :meth:`release`; ``''`` where it does not."""
-        return self._method.keeps_control or self._held
+        return self._method.control_retained or self._held
 
     async def kept(self) -> bool:
         """Tell whether control has stayed with the bus; so it is where the drive does not tell."""
         if not self._held:
-            return bool(self.keeps_control)
+            return bool(self.control_retained)
         try:
             return await self.in_control(Priority.SERVICE)
         except LinkError:
@@ -221,57 +221,57 @@ class Commands:
 
     async def in_control(self, priority: Priority) -> bool:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""
-        return await carry_out(self._method.in_control(), self._registers, priority)
+        return await carry_out(self._method.in_control(), self._params, priority)
 
     async def holder(self, priority: Priority) -> Holder:
         """Tell who has control of the drive."""
-        return await carry_out(self._method.holder(), self._registers, priority)
+        return await carry_out(self._method.holder(), self._params, priority)
 
     async def require_startable(self) -> None:
         """See to it that nothing but a fault keeps the motor from being started; only reads."""
-        await carry_out(self._method.require_startable(), self._registers, Priority.SERVICE)
+        await carry_out(self._method.require_startable(), self._params, Priority.SERVICE)
 
     async def take_control(self, reached: Reached) -> None:
         """Put the drive under bus control with no run command standing."""
         steps = self._method.take_control()
-        await carry_out(steps, self._registers, Priority.SERVICE, reached, self._tell)
+        await carry_out(steps, self._params, Priority.SERVICE, reached, self._tell)
 
     async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
         """Write set-point 0 in the unit of a control mode, and read it back."""
-        await carry_out(self._method.zero_setpoint(control_mode), self._registers, priority)
+        await carry_out(self._method.zero_setpoint(control_mode), self._params, priority)
 
     async def run(self, reached: Reached) -> None:
         """Give the run command; once, for nobody knows what has happened before a second one."""
-        await carry_out(self._method.run(), self._registers, Priority.SERVICE, reached)
+        await carry_out(self._method.run(), self._params, Priority.SERVICE, reached)
 
     async def stop(self, control_mode: str) -> None:
         """Take the run command back and write set-point 0, at the head of the bus."""
-        await carry_out(self._method.stop(control_mode), self._registers, Priority.STOP)
+        await carry_out(self._method.stop(control_mode), self._params, Priority.STOP)
 
     async def quick_stop(self, control_mode: str) -> None:
         """Release the motor at once, if the drive has a way; control may be given back by it."""
-        await carry_out(self._method.quick_stop(control_mode), self._registers, Priority.STOP)
+        await carry_out(self._method.quick_stop(control_mode), self._params, Priority.STOP)
 
     async def force_stop(self, control_mode: str) -> bool:
         """Stop by all that is left, at the head of the bus; tell whether the drive took it."""
         steps = self._method.force_stop(control_mode)
-        return await carry_out(steps, self._registers, Priority.STOP, onward=True)
+        return await carry_out(steps, self._params, Priority.STOP, onward=True)
 
     async def release(self) -> None:
         """Give control back."""
-        await carry_out(self._method.release(), self._registers, Priority.SERVICE)
+        await carry_out(self._method.release(), self._params, Priority.SERVICE)
 
     async def remove(self, control_mode: str) -> Removal:
         """Remove run command and set-point while a fault is active, each by itself [C98]."""
         steps = self._method.remove(control_mode)
-        return await carry_out(steps, self._registers, Priority.SERVICE)
+        return await carry_out(steps, self._params, Priority.SERVICE)
 
     async def acknowledge(self, code: int, control_mode: str) -> str:
         """Acknowledge the fault shown, run command and set-point first; return its details."""
-        shown = self._registers.model.status_code(code)
+        shown = self._params.model.status_code(code)
         # with what it takes the motor might go on: it is no stop
         steps = self._method.acknowledge(shown, control_mode)
-        return await carry_out(steps, self._registers, Priority.SERVICE, held=self._hold)
+        return await carry_out(steps, self._params, Priority.SERVICE, held=self._hold)
 
     async def _hold(self, condition: Callable[[InverterStatus], bool], seconds: float) -> bool:
         try:
@@ -288,4 +288,4 @@ class Commands:
         ``require_wanted`` raises then, nothing is written.
         """
         write = self._method.procedures[procedure]
-        await self._registers.write(write, Priority.STOP, require_wanted)
+        await self._params.write(write, Priority.STOP, require_wanted)

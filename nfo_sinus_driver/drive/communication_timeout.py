@@ -20,9 +20,9 @@ class CommunicationTimeout:
     """
 
     def __init__(
-        self, registers: ParameterAccess, model: Family, has: Callable[[str], bool]
+        self, params: ParameterAccess, model: Family, has: Callable[[str], bool]
     ) -> None:
-        self._registers = registers
+        self._params = params
         self._seconds_key = model.key(Role.COMMUNICATION_TIMEOUT)
         self._stop_key = model.key(Role.STOP_AT_TIMEOUT)
         self._has = has
@@ -51,21 +51,21 @@ class CommunicationTimeout:
 
         Where that fails the drive may go on to watch as before, and that is what is known of it.
         """
-        self.watched_by = await self._registers.watch(seconds, Priority.SERVICE)
+        self.watched_by = await self._params.watch(seconds, Priority.SERVICE)
         self.watched_for = seconds if self.watched_by else 0.0
 
     async def read(self) -> None:
         """Read SioTot and AutoStop, where the drive has them."""
         if not self.can_be_set:
             return
-        self.seconds = await self._registers.read_number(self._seconds_key, Priority.SERVICE)
+        self.seconds = await self._params.read_number(self._seconds_key, Priority.SERVICE)
         if not self._stop_key:
             # where nothing can keep it from that, it stops the motor
             self.stops_motor = True
             return
-        data = await self._registers.read_data(self._stop_key, Priority.SERVICE)
+        data = await self._params.read_data(self._stop_key, Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
-        self.stops_motor = data == self._registers.encode(self._stop_key, True)
+        self.stops_motor = data == self._params.encode(self._stop_key, True)
 
     def take(self, keys: Collection[str], values: Mapping[str, Value]) -> bool:
         """

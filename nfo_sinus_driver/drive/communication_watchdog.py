@@ -28,8 +28,8 @@ class CommunicationWatchdog:
     :param commanded: this driver may command the drive, and not only watch it.
     """
 
-    def __init__(self, inverter: DriveState, parameters: Parameters, *, commanded: bool) -> None:
-        self._inverter = inverter
+    def __init__(self, state: DriveState, parameters: Parameters, *, commanded: bool) -> None:
+        self._state = state
         self._parameters = parameters
         self._commanded = commanded
         self._told: Report | None = None
@@ -50,16 +50,16 @@ class CommunicationWatchdog:
         try:
             await self.require_set()
         except DriveError as error:
-            inverter, seen = self._inverter, self._inverter.seen
-            barred = inverter.settings_need_control and seen is not None and not seen.from_bus
-            if not barred and (seen is None or not seen.faulted):
+            state, status = self._state, self._state.status
+            barred = state.settings_need_control and status is not None and not status.from_bus
+            if not barred and (status is None or not status.faulted):
                 raise
-            self._inverter.tell(Severity.WARNING, Cause.OWN_TIMEOUT_LATER, why=error.report)
+            self._state.tell(Severity.WARNING, Cause.OWN_TIMEOUT_LATER, why=error.report)
 
     async def require_set(self) -> None:
         """Set it if that could not be done before: nothing runs without it."""
         if self._due:
-            await self.set_now(self._inverter.settings.drive_timeout)
+            await self.set_now(self._state.settings.drive_timeout)
             self._due = False
 
     async def set_now(self, seconds: float) -> Sequence[Change]:
@@ -68,27 +68,27 @@ class CommunicationWatchdog:
             raise DriveError(Cause.MONITOR_ONLY)
         if not seconds:
             return ()
-        inverter = self._inverter
-        if inverter.plc_time:
-            raise DriveError(Report(Cause.OWN_TIMEOUT_OF_PLC, seconds=inverter.plc_time))
-        await inverter.timeout.watch(seconds)
-        key = inverter.model.key
+        state = self._state
+        if state.plc_time:
+            raise DriveError(Report(Cause.OWN_TIMEOUT_OF_PLC, seconds=state.plc_time))
+        await state.timeout.watch(seconds)
+        key = state.model.key
         wanted: dict[str, Value] = {}
-        if not inverter.timeout.watched_by:
-            if not inverter.timeout.can_be_set:
+        if not state.timeout.watched_by:
+            if not state.timeout.can_be_set:
                 raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
             wanted[key(Role.COMMUNICATION_TIMEOUT)] = seconds
-        if inverter.has(key(Role.STOP_AT_TIMEOUT)):
+        if state.has(key(Role.STOP_AT_TIMEOUT)):
             wanted[key(Role.STOP_AT_TIMEOUT)] = True
         try:
             changes = await self._change(wanted)
         except DriveError as error:
-            faulted = inverter.seen is not None and inverter.seen.faulted
-            if faulted or not inverter.bus.supervised:
+            faulted = state.status is not None and state.status.faulted
+            if faulted or not state.bus.supervised:
                 raise
             # whether a drive has any means at all is nowhere written for such a line [C102]
-            report = inverter.report(Cause.OWN_TIMEOUT_NOT_TAKEN, why=error.report)
-            inverter.tell(Severity.WARNING, report)
+            report = state.report(Cause.OWN_TIMEOUT_NOT_TAKEN, why=error.report)
+            state.tell(Severity.WARNING, report)
             return ()
         for change in changes:
             self._found.setdefault(change.key, change.old)
@@ -102,31 +102,31 @@ class CommunicationWatchdog:
         What somebody else has set meanwhile is left alone. Tells why the drive will have a fault,
         if it will; nothing of that keeps the driver from ending.
         """
-        inverter = self._inverter
+        state = self._state
         await self._end_watch()
-        if not inverter.timeout.can_be_set:
+        if not state.timeout.can_be_set:
             return
         try:
             for key in reversed(self._found):
-                if await inverter.registers.read(key, Priority.SERVICE) == self._set[key]:
+                if await state.params.read(key, Priority.SERVICE) == self._set[key]:
                     await self._change({key: self._found[key]})
-            await inverter.timeout.read()
+            await state.timeout.read()
         except (LinkError, DriveError) as error:
-            self._tell_left(explain_failure(error, inverter))
+            self._tell_left(explain_failure(error, state))
         else:
-            if inverter.timeout.seconds and inverter.timeout.stops_motor:
+            if state.timeout.seconds and state.timeout.stops_motor:
                 self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS))
 
     async def _end_watch(self) -> None:
-        inverter = self._inverter
-        by, seconds = inverter.timeout.watched_by, inverter.timeout.watched_for
+        state = self._state
+        by, seconds = state.timeout.watched_by, state.timeout.watched_for
         if not by:
             return
         try:
-            await inverter.timeout.watch(0.0)
+            await state.timeout.watch(0.0)
         except LinkError as error:
-            why = explain_failure(error, inverter)
-            inverter.tell(Severity.WARNING, Cause.WATCH_LEFT, why=why, by=by, seconds=seconds)
+            why = explain_failure(error, state)
+            state.tell(Severity.WARNING, Cause.WATCH_LEFT, why=why, by=by, seconds=seconds)
 
     async def _change(self, wanted: Mapping[str, Value]) -> Sequence[Change]:
         return await self._parameters.change_now(
@@ -134,9 +134,9 @@ class CommunicationWatchdog:
         )
 
     def _tell_left(self, why: Report) -> None:
-        key = self._inverter.model.key(Role.COMMUNICATION_TIMEOUT)
-        name, timeout = self._inverter.model[key].name, self._inverter.timeout.seconds
-        self._inverter.tell(
+        key = self._state.model.key(Role.COMMUNICATION_TIMEOUT)
+        name, timeout = self._state.model[key].name, self._state.timeout.seconds
+        self._state.tell(
             Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, key=key, name=name, timeout=timeout, why=why
         )
 
@@ -145,22 +145,22 @@ class CommunicationWatchdog:
         complaint = self._complaint() if self._commanded else None
         if complaint is not None and complaint != self._told:
             self._told = complaint
-            self._inverter.tell(Severity.WARNING, complaint)
+            self._state.tell(Severity.WARNING, complaint)
 
     def _complaint(self) -> Report | None:
-        inverter, model = self._inverter, self._inverter.model
-        timeout, margin = inverter.timeout.shortest, DRIVE_TIMEOUT_MARGIN
-        least = inverter.settings.lost_after + margin
-        method = inverter.settings.method_class
+        state, model = self._state, self._state.model
+        timeout, margin = state.timeout.shortest, DRIVE_TIMEOUT_MARGIN
+        least = state.settings.lost_after + margin
+        method = state.settings.method_class
         if method.plc_time:
             caution = method.caution
             return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=caution) if caution else None
-        if not inverter.timeout.can_be_set and not inverter.timeout.watched_by:
-            return inverter.report(Cause.NO_OWN_TIMEOUT)
-        name = inverter.timeout.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
+        if not state.timeout.can_be_set and not state.timeout.watched_by:
+            return state.report(Cause.NO_OWN_TIMEOUT)
+        name = state.timeout.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
         if not timeout:
             return Report(Cause.OWN_TIMEOUT_OFF, name=name)
-        if not inverter.timeout.stops_motor:
+        if not state.timeout.stops_motor:
             stop = model[model.key(Role.STOP_AT_TIMEOUT)].name
             return Report(Cause.OWN_TIMEOUT_STOPS_NOTHING, name=stop)
         if timeout < least - 1e-9:

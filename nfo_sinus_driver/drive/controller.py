@@ -65,9 +65,9 @@ class Controller:
     does not confirm is such an error, too; it is retried until it does.
     """
 
-    def __init__(self, inverter: DriveState, method: Commands, setpoint: Setpoint) -> None:
-        self._bus = inverter.bus
-        self._inverter = inverter
+    def __init__(self, state: DriveState, method: Commands, setpoint: Setpoint) -> None:
+        self._bus = state.bus
+        self._state = state
         #: How the drive is commanded, for a procedure too.
         self.method = method
         self._setpoint = setpoint
@@ -79,9 +79,9 @@ class Controller:
         #: What enables, and who has the drive, while there is one.
         self._enabling: Task | None = None
         self._access: ExclusiveAccess | None = None
-        self._starting = StartSequence(inverter, method)
-        self._sequence = StopSequence(inverter, method, self._happened)
-        self._following = Following(inverter, setpoint)
+        self._starting = StartSequence(state, method)
+        self._sequence = StopSequence(state, method, self._happened)
+        self._following = Following(state, setpoint)
         #: A set-point that the drive did not take: when, and what it answered.
         self._refusal: tuple[float, Report] | None = None
         #: The status that was judged last.
@@ -129,9 +129,9 @@ class Controller:
     @property
     def may_run(self) -> bool:
         """The motor runs by us, or may do so, or at least the bus has control of it."""
-        seen = self._inverter.seen
+        status = self._state.status
         commanded = self.commanded or self.stopping
-        return commanded or seen is None or seen.from_bus or seen.tuning
+        return commanded or status is None or status.from_bus or status.tuning
 
     # --- the table ----------------------------------------------------------------------------
 
@@ -145,7 +145,7 @@ class Controller:
         if self._state is before:
             return
         if before is ControlState.ENABLED:
-            self._setpoint.disarm()
+            self._setpoint.stop_following()
         gone = before is ControlState.ENABLING and self._state is not ControlState.ENABLED
         if gone and self._enabling not in (None, self._bus.current):
             self._bus.cancel(self._enabling)
@@ -162,7 +162,7 @@ class Controller:
             self._happened(ControlEvent.FAULT_BLOCKS)
         elif self.stopping:
             self._happened(ControlEvent.STOP)
-        elif not self._inverter.connected:
+        elif not self._state.connected:
             self._happened(ControlEvent.LOST)
 
     def _stop(self, *, anew: bool = False) -> None:
@@ -203,17 +203,17 @@ class Controller:
             raise DriveError(Cause.MOTOR_ENABLED, what=what)
         if self._state is ControlState.CLOSED:
             raise DriveError(Cause.ENDING)
-        if self.blocked_by_fault and self._inverter.seen is not None:
-            require_no_fault(self._inverter, self._inverter.seen)
+        if self.blocked_by_fault and self._state.status is not None:
+            require_no_fault(self._state, self._state.status)
         raise DriveError(Cause.STOP_NOT_CONFIRMED_YET, what=what)
 
-    def require_newer(self, asked_at: float) -> None:
+    def require_newer(self, requested_at: float) -> None:
         """
         See to it that no stop was confirmed since somebody asked for a motion, s, monotonic.
 
         Whoever asks for one thing and then for a stop may be heard in the other order.
         """
-        if asked_at < self._stopped_at:
+        if requested_at < self._stopped_at:
             raise DriveError(Cause.STOPPED_SINCE_ASKED)
 
     async def _require_enable(self) -> None:
@@ -231,15 +231,15 @@ class Controller:
         if self._state is ControlState.CLOSED:
             raise DriveError(Cause.NOT_ACTIVE)
         if self.blocked_by_fault:
-            seen = await self._inverter.look(Priority.SERVICE)
-            self._explain_refusal(seen)
-            require_no_fault(self._inverter, seen)
+            status = await self._state.read_status(Priority.SERVICE)
+            self._explain_refusal(status)
+            require_no_fault(self._state, status)
         raise DriveError(Cause.STOP_PENDING)
 
     # --- what a person asks for ---------------------------------------------------------------
 
     async def enable(
-        self, prepare: Callable[[], Awaitable[None]], asked_at: float = math.inf
+        self, prepare: Callable[[], Awaitable[None]], requested_at: float = math.inf
     ) -> Report:
         """
         Take control and run at set-point 0, then follow set-points that arrive from now on.
@@ -247,7 +247,7 @@ class Controller:
         :param prepare: does what has to be done before a run command, once the bus has control.
         :param asked_at: when somebody asked for it, s, monotonic.
         """
-        self.require_newer(asked_at)
+        self.require_newer(requested_at)
         if self.enabled:
             return Report(Cause.ENABLED_ALREADY)
         await self._require_enable()
@@ -260,9 +260,9 @@ class Controller:
             raise DriveError(Cause.STOPPED_WHILE_ENABLING) from None
         finally:
             self._enabling = None
-        if self._inverter.settings.follows_setpoints:
+        if self._state.settings.follows_setpoints:
             return Report(Cause.ENABLED)
-        reference = self._inverter.settings.reference
+        reference = self._state.settings.reference
         return Report(Cause.ENABLED_BY_OWN_REFERENCE, reference=reference)
 
     async def _check(self) -> tuple[str, Limits]:
@@ -273,7 +273,7 @@ class Controller:
         """
         try:
             if self._refusal is not None:
-                self._explain_refusal(await self._inverter.look(Priority.SERVICE))
+                self._explain_refusal(await self._state.read_status(Priority.SERVICE))
             return await self._starting.check()
         except Exception as error:
             self._happened(ControlEvent.REFUSED)
@@ -288,7 +288,7 @@ class Controller:
             self._happened(ControlEvent.RUNNING)
             if not self.enabled:
                 raise Cancelled
-            self._setpoint.arm(control_mode, limits)
+            self._setpoint.follow(control_mode, limits)
             self._following.begin()
         except Exception as error:
             # whatever went wrong, a run command may stand by now
@@ -304,23 +304,23 @@ class Controller:
         """
         self._stop()
         await self._sequence.wait_confirmed(patience or None)
-        seen = self._inverter.seen
+        status = self._state.status
         if self.blocked_by_fault:
-            return self._inverter.report(Cause.STOP_BLOCKED)
-        if seen is not None and seen.faulted and not seen.driven:
-            return self._inverter.report(Cause.STOPPED_BY_FAULT)
-        if seen is not None and self._sequence.forced:
+            return self._state.report(Cause.STOP_BLOCKED)
+        if status is not None and status.faulted and not status.driven:
+            return self._state.report(Cause.STOPPED_BY_FAULT)
+        if status is not None and self._sequence.forced:
             # control may have been taken away by that
-            return self._inverter.report(Cause.STOPPING if seen.driven else Cause.STOPPED)
-        if seen is None or not seen.from_bus:
-            return self._no_control(seen)
-        if not seen.driven:
-            return self._inverter.report(Cause.STOPPED)
+            return self._state.report(Cause.STOPPING if status.driven else Cause.STOPPED)
+        if status is None or not status.from_bus:
+            return self._no_control(status)
+        if not status.driven:
+            return self._state.report(Cause.STOPPED)
         try:
-            coasts = await self._inverter.coasts_to_stop()
+            coasts = await self._state.coasts_to_stop()
         except LinkError:
             # the stop is confirmed all the same
-            return self._inverter.report(Cause.STOPPING)
+            return self._state.report(Cause.STOPPING)
         return Report(Cause.COASTING if coasts else Cause.RAMPING)
 
     async def take_control(self, control_mode: str) -> None:
@@ -344,67 +344,67 @@ class Controller:
         with self._stopped_by_itself():
             try:
                 may_run = may_run or await self.method.in_control(Priority.STOP)
-                may_run = may_run or (await self._inverter.look(Priority.LOOK)).tuning
+                may_run = may_run or (await self._state.read_status(Priority.LOOK)).tuning
                 if may_run:
-                    await self.method.quick_stop(self._inverter.control_mode)
+                    await self.method.quick_stop(self._state.control_mode)
                     told_at = self._bus.now()
                     # a PLC whose data stand still goes on showing what was before
-                    await self._inverter.wait_until(
-                        lambda seen: seen.at >= told_at and not seen.driven, Priority.LOOK
+                    await self._state.wait_until(
+                        lambda status: status.at >= told_at and not status.driven, Priority.LOOK
                     )
             except Exception as error:
                 # even after a mistake of ours the motor is not left as it is
                 self._sequence.request()
                 with contextlib.suppress(LinkError):
-                    await self._inverter.look(Priority.LOOK)
-                seen = self._inverter.seen
-                by_fault = seen is not None and seen.faulted and not seen.runs_by_bus
+                    await self._state.read_status(Priority.LOOK)
+                status = self._state.status
+                by_fault = status is not None and status.faulted and not status.runs_by_bus
                 if isinstance(error, Refused) and by_fault:
-                    return self._inverter.report(Cause.STOP_BLOCKED)
+                    return self._state.report(Cause.STOP_BLOCKED)
                 raise DriveError(
-                    self._inverter.report(Cause.QUICK_STOP_UNCONFIRMED, why=report_of(error))
+                    self._state.report(Cause.QUICK_STOP_UNCONFIRMED, why=report_of(error))
                 ) from error
             if not may_run:
-                return self._no_control(self._inverter.seen)
+                return self._no_control(self._state.status)
             self._sequence.request()
             await self._settle()
             return Report(Cause.QUICK_STOPPED)
 
     async def acknowledge(self) -> Report:
         """Acknowledge a fault, run command and set-point first, where the drive lets us."""
-        inverter = self._inverter
-        seen = await inverter.look(Priority.SERVICE)
-        fault = seen.listed
-        if not seen.faulted and fault.kind is Kind.STATUS:
-            return inverter.report(Cause.NOTHING_TO_ACKNOWLEDGE)
+        state = self._state
+        status = await state.read_status(Priority.SERVICE)
+        fault = status.listed
+        if not status.faulted and fault.kind is Kind.STATUS:
+            return state.report(Cause.NOTHING_TO_ACKNOWLEDGE)
         may_run = self.may_run or await self.method.in_control(Priority.SERVICE)
         with self._stopped_by_itself():
-            return await self._acknowledge(seen, may_run=may_run)
+            return await self._acknowledge(status, may_run=may_run)
 
-    async def _acknowledge(self, seen: InverterStatus, *, may_run: bool) -> Report:
-        inverter = self._inverter
-        acknowledged = inverter.describe()
-        if seen.state is State.FAULT_REACTION_ACTIVE:
+    async def _acknowledge(self, status: InverterStatus, *, may_run: bool) -> Report:
+        state = self._state
+        acknowledged = state.describe()
+        if status.state is State.FAULT_REACTION_ACTIVE:
             # what comes before FAULTED acknowledges nothing [M0 table 16]
             with contextlib.suppress(DriveError):
-                await self._inverter.wait_until(
+                await self._state.wait_until(
                     lambda now: now.state is not State.FAULT_REACTION_ACTIVE, Priority.SERVICE
                 )
         try:
-            details = await self.method.acknowledge(seen.code, inverter.control_mode)
+            details = await self.method.acknowledge(status.code, state.control_mode)
         finally:
             # even if no answer came, the drive may be free to run now
             if may_run:
                 self._sequence.request_anew()
         try:
-            await self._inverter.wait_until(
-                lambda now: not now.faulted and now.code != seen.code, Priority.SERVICE, 0.5
+            await self._state.wait_until(
+                lambda now: not now.faulted and now.code != status.code, Priority.SERVICE, 0.5
             )
             await self._settle()
         except DriveError:
-            now = inverter.seen or seen
-            report = inverter.report(Cause.STILL_FAULTED, fault=now.listed)
-            if now.code != seen.code:
+            now = state.status or status
+            report = state.report(Cause.STILL_FAULTED, fault=now.listed)
+            if now.code != status.code:
                 report = Report(Cause.NEXT_FAULT, acknowledged=acknowledged, still=report)
             raise DriveError(report) from None
         if details:
@@ -423,8 +423,8 @@ class Controller:
         """
         # a run command may be on its way, whoever has control at this moment; and where the bus has
         # it, one may stand that an acknowledgement has not come to remove yet
-        seen = self._inverter.seen
-        may_run = self.commanded or self.stopping or (seen is not None and seen.from_bus)
+        status = self._state.status
+        may_run = self.commanded or self.stopping or (status is not None and status.from_bus)
         # nobody enables it while it is waited for that the motor stands
         with self._stopped_by_itself():
             return await self._release(timeout, may_run=may_run)
@@ -435,17 +435,17 @@ class Controller:
             return stopped or Report(Cause.NOT_IN_CONTROL)
         stopped = stopped or await self.stop()
         if self.blocked_by_fault:
-            raise DriveError(self._inverter.report(Cause.RELEASE_BLOCKED))
+            raise DriveError(self._state.report(Cause.RELEASE_BLOCKED))
         try:
-            await self._inverter.wait_until(lambda seen: not seen.driven, Priority.SERVICE, timeout)
+            await self._state.wait_until(lambda status: not status.driven, Priority.SERVICE, timeout)
         except DriveError:
-            await self._inverter.timeout.read()
-            if not self._inverter.timeout.shortest or self.method.keeps_control:
+            await self._state.timeout.read()
+            if not self._state.timeout.shortest or self.method.control_retained:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
             stopped = Report(Cause.COASTED_FOR_TIMEOUT)
         await self.method.release()
         if await self.method.kept():
-            return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.keeps_control)
+            return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.control_retained)
         return Report(Cause.CONTROL_RELEASED, stop=stopped)
 
     async def leave(self, timeout: float) -> None:
@@ -457,7 +457,7 @@ class Controller:
         if not self.method.plc_time or self.blocked_by_fault:
             return
         with contextlib.suppress(DriveError, LinkError):
-            await self._inverter.wait_until(lambda seen: not seen.driven, Priority.LOOK, timeout)
+            await self._state.wait_until(lambda status: not status.driven, Priority.LOOK, timeout)
             await self.method.release()
 
     def close(self) -> None:
@@ -471,14 +471,14 @@ class Controller:
 
     async def secure_found(self) -> None:
         """Make sure that nothing runs under bus control that nobody has enabled since."""
-        inverter, seen = self._inverter, self._inverter.seen
+        state, status = self._state, self._state.status
         if await self.method.in_control(Priority.SERVICE):
-            turns = seen is not None and (seen.runs_by_bus or abs(seen.frequency) > 0)
+            turns = status is not None and (status.runs_by_bus or abs(status.frequency) > 0)
             if turns and not self.stopping:
-                inverter.tell(Severity.WARNING, inverter.report(Cause.FOUND_RUNNING))
+                state.tell(Severity.WARNING, state.report(Cause.FOUND_RUNNING))
             self._stop(anew=True)
-        elif self._lost_in_use and seen is not None and not seen.faulted:
-            inverter.tell(Severity.WARNING, inverter.report(Cause.CONTROL_LOST_WHILE_AWAY))
+        elif self._lost_in_use and status is not None and not status.faulted:
+            state.tell(Severity.WARNING, state.report(Cause.CONTROL_LOST_WHILE_AWAY))
         self._lost_in_use = False
 
     def connected(self) -> None:
@@ -498,33 +498,33 @@ class Controller:
         if self._refusal is not None:
             # no status will come that could tell a better reason
             (_, reason), self._refusal = self._refusal, None
-            self._inverter.tell(Severity.WARNING, Cause.STOPPING_BECAUSE, why=reason)
+            self._state.tell(Severity.WARNING, Cause.STOPPING_BECAUSE, why=reason)
         self._happened(ControlEvent.LOST)
         if self._lost_in_use:
             self._stop()
         return self._lost_in_use
 
-    def alarmed_by(self, seen: InverterStatus) -> bool:
+    def alarmed_by(self, status: InverterStatus) -> bool:
         """Tell whether a status is a reason to stop."""
-        follows = self.enabled and seen.at >= self._since
-        return follows and self._why_stopped(seen) is not None
+        follows = self.enabled and status.at >= self._since
+        return follows and self._why_stopped(status) is not None
 
-    def judge(self, seen: InverterStatus) -> bool:
+    def judge(self, status: InverterStatus) -> bool:
         """Judge what the drive says about itself; true if a person was told of it."""
         self._setpoint.answered()
-        before, self._judged = self._judged, seen
-        if self.blocked_by_fault and not seen.faulted:
+        before, self._judged = self._judged, status
+        if self.blocked_by_fault and not status.faulted:
             self._sequence.request_anew()
-        if self._explain_refusal(seen):
+        if self._explain_refusal(status):
             return True
-        if seen.at < self._since:
+        if status.at < self._since:
             return False
         reason = None
         if self.enabled:
-            reason = self._why_stopped(seen) or self._why_slower(seen, before)
-            if reason is None and self._inverter.settings.follows_setpoints:
+            reason = self._why_stopped(status) or self._why_slower(status, before)
+            if reason is None and self._state.settings.follows_setpoints:
                 reason = self._following.judge()
-        elif not (self.commanded or self.stopping) and seen.keeps_running:
+        elif not (self.commanded or self.stopping) and status.keeps_running:
             reason = Report(Cause.RUNS_UNASKED)
         if reason is not None:
             self._stop()
@@ -536,20 +536,20 @@ class Controller:
         self._stop()
         self._refusal = (self._bus.now(), reason)
 
-    def _explain_refusal(self, seen: InverterStatus) -> bool:
-        if self._refusal is None or seen.at <= self._refusal[0]:
+    def _explain_refusal(self, status: InverterStatus) -> bool:
+        if self._refusal is None or status.at <= self._refusal[0]:
             return False
         # it was told to stop when it refused; a drive with a fault refuses everything
         (_, reason), self._refusal = self._refusal, None
-        self._tell_stopped(explain_fault(self._inverter, seen) if seen.faulted else reason)
+        self._tell_stopped(explain_fault(self._state, status) if status.faulted else reason)
         return True
 
     def _tell_stopped(self, reason: Report) -> None:
-        seen = self._inverter.seen
-        if seen is not None and seen.faulted:
-            self._inverter.tell(Severity.ERROR, Cause.STOPPED_BECAUSE_OF_FAULT, why=reason)
+        status = self._state.status
+        if status is not None and status.faulted:
+            self._state.tell(Severity.ERROR, Cause.STOPPED_BECAUSE_OF_FAULT, why=reason)
         else:
-            self._inverter.tell(Severity.WARNING, Cause.STOPPED_BECAUSE, why=reason)
+            self._state.tell(Severity.WARNING, Cause.STOPPED_BECAUSE, why=reason)
 
     # --- how --------------------------------------------------------------------------------
 
@@ -558,16 +558,16 @@ class Controller:
         with contextlib.suppress(DriveError):
             await self._sequence.wait_confirmed()
 
-    def _why_stopped(self, seen: InverterStatus) -> Report | None:
-        return explain_stop(self._inverter, seen, self._setpoint.control_mode)
+    def _why_stopped(self, status: InverterStatus) -> Report | None:
+        return explain_stop(self._state, status, self._setpoint.control_mode)
 
-    def _why_slower(self, seen: InverterStatus, before: InverterStatus | None) -> Report | None:
+    def _why_slower(self, status: InverterStatus, before: InverterStatus | None) -> Report | None:
         if before is None or before.at < self._since or self._setpoint.control_mode != 'Freque':
             return None
         least = self._setpoint.least_since(before.at, reverse=before.frequency < 0)
-        return explain_fall(self._inverter, before, seen, least)
+        return explain_fall(self._state, before, status, least)
 
-    def _no_control(self, seen: InverterStatus | None) -> Report:
-        if seen is not None and seen.driven:
-            raise DriveError(self._inverter.report(Cause.RUN_BY_OTHERS))
-        return self._inverter.report(Cause.NO_CONTROL)
+    def _no_control(self, status: InverterStatus | None) -> Report:
+        if status is not None and status.driven:
+            raise DriveError(self._state.report(Cause.RUN_BY_OTHERS))
+        return self._state.report(Cause.NO_CONTROL)

@@ -47,11 +47,11 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
     return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error))
 
 
-def explain_failure(error: LinkError | DriveError, inverter: DriveState) -> Report:
+def explain_failure(error: LinkError | DriveError, state: DriveState) -> Report:
     """Return what went wrong with a drive that has answered before."""
     if isinstance(error, DriveError):
         return error.report
-    return explain(error, inverter.settings.address)
+    return explain(error, state.settings.address)
 
 
 def report_of(error: Exception) -> Report:
@@ -63,51 +63,51 @@ def report_of(error: Exception) -> Report:
     return Report(Cause.DRIVER_ERROR, error=repr(error))
 
 
-def explain_fault(inverter: DriveState, seen: InverterStatus) -> Report:
+def explain_fault(state: DriveState, status: InverterStatus) -> Report:
     """Return which fault is active, what it means and what to do about its cause."""
-    return inverter.report(Cause.FAULT, fault=seen.listed)
+    return state.report(Cause.FAULT, fault=status.listed)
 
 
-def require_no_fault(inverter: DriveState, seen: InverterStatus) -> None:
+def require_no_fault(state: DriveState, status: InverterStatus) -> None:
     """Raise a :class:`DriveError` if a fault is active, before the motor is energised."""
-    if seen.faulted:
-        raise DriveError(inverter.report(Cause.FAULT_FORBIDS, fault=seen.listed))
+    if status.faulted:
+        raise DriveError(state.report(Cause.FAULT_FORBIDS, fault=status.listed))
 
 
-def explain_stop(inverter: DriveState, seen: InverterStatus, control_mode: str) -> Report | None:
+def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -> Report | None:
     """Return why the motor no longer follows us, who enabled it in a control mode, if so."""
-    if inverter.control_mode != control_mode:
-        mode, unit = inverter.control_mode, inverter.unit
+    if state.control_mode != control_mode:
+        mode, unit = state.control_mode, state.unit
         return Report(Cause.CONTROL_MODE_CHANGED, mode=mode, unit=unit)
-    if seen.faulted:
-        return explain_fault(inverter, seen)
+    if status.faulted:
+        return explain_fault(state, status)
     cause = None
-    if seen.state is State.NOT_READY_TO_SWITCH_ON:
+    if status.state is State.NOT_READY_TO_SWITCH_ON:
         cause = Cause.DRIVE_STARTING
-    elif not seen.from_bus:
-        cause = _why_control_is_lost(inverter, seen)
-    elif Fact.RUN_INPUT_MISSING in seen.facts:
+    elif not status.from_bus:
+        cause = _why_control_is_lost(state, status)
+    elif Fact.RUN_INPUT_MISSING in status.facts:
         cause = Cause.RUN_INPUT_LOST
-    elif not seen.runs:
+    elif not status.runs:
         cause = Cause.STOPPED_BY_ITSELF
-    return cause and inverter.report(cause)
+    return cause and state.report(cause)
 
 
-def _why_control_is_lost(inverter: DriveState, seen: InverterStatus) -> Cause:
-    if seen.means(Meaning.WITHHELD):
+def _why_control_is_lost(state: DriveState, status: InverterStatus) -> Cause:
+    if status.means(Meaning.WITHHELD):
         return Cause.CONTROL_WITHHELD
-    if seen.means(Meaning.TERMINALS):
+    if status.means(Meaning.TERMINALS):
         return Cause.TERMINALS_IN_CONTROL
-    if seen.means(Meaning.KEYPAD):
+    if status.means(Meaning.KEYPAD):
         return Cause.KEYPAD_IN_CONTROL
-    if seen.runs:
+    if status.runs:
         # the current limit, for one, shows instead of who runs it
         return Cause.OTHERS_IN_CONTROL
-    return Cause.POWER_CYCLED if inverter.was_silent else Cause.CONTROL_LOST
+    return Cause.POWER_CYCLED if state.missed_reply else Cause.CONTROL_LOST
 
 
 def explain_fall(
-    inverter: DriveState, before: InverterStatus, seen: InverterStatus, least: float
+    state: DriveState, before: InverterStatus, status: InverterStatus, least: float
 ) -> Report | None:
     """
     Return why a motor turns slower than it was told to, if it does so after a silence.
@@ -119,18 +119,18 @@ def explain_fall(
     :param least: Hz, the slowest that the drive can have been told to turn since then.
     """
     was = min(abs(before.frequency), least)
-    away = seen.at - before.at
-    if inverter.plc_time:
+    away = status.at - before.at
+    if state.plc_time:
         # the PLC answers all the while, and a drive that is back may catch a motor that coasts
-        silent = away >= _LIFE_STOOD + inverter.usually_apart
+        silent = away >= _LIFE_STOOD + state.usual_interval
         most = min(was - _LEAST_FALL, was * _CAUGHT)
     else:
-        silent, most = inverter.was_silent and away >= _SHORTEST_POWER_OFF, was / 2
+        silent, most = state.missed_reply and away >= _SHORTEST_POWER_OFF, was / 2
     # where the frequency is not read with the status, nothing falls
-    if not (silent and was >= _LEAST_FALL and abs(seen.frequency) < most):
+    if not (silent and was >= _LEAST_FALL and abs(status.frequency) < most):
         return None
-    return inverter.report(
-        Cause.SLOWER_AFTER_SILENCE, before=abs(before.frequency), now=abs(seen.frequency)
+    return state.report(
+        Cause.SLOWER_AFTER_SILENCE, before=abs(before.frequency), now=abs(status.frequency)
     )
 
 
@@ -150,35 +150,35 @@ _AGAIN_AFTER = 10.0
 class Conditions:
     """Tells of alarms, the current limit and sleep of one drive; nothing is stopped by them."""
 
-    def __init__(self, inverter: DriveState) -> None:
-        self._inverter = inverter
+    def __init__(self, state: DriveState) -> None:
+        self._state = state
         #: When each was last there.
         self._seen_at: dict[tuple[Cause, int], float] = {}
         #: An alarm stood when it was last looked at, with a code that is no alarm's.
         self._unnamed = False
 
-    def take(self, seen: InverterStatus) -> None:
+    def take(self, status: InverterStatus) -> None:
         """Tell what has begun."""
-        for severity, report in self._reports(seen):
+        for severity, report in self._reports(status):
             # each alarm by its code
-            name = (report.cause, seen.code if report.cause is Cause.ALARM else 0)
+            name = (report.cause, status.code if report.cause is Cause.ALARM else 0)
             before = self._seen_at.get(name, -math.inf)
-            self._seen_at[name] = seen.at
-            if seen.at - before > _AGAIN_AFTER:
-                self._inverter.tell(severity, report)
-        self._unnamed = seen.kind is Kind.ALARM and not seen.listed.remedy
+            self._seen_at[name] = status.at
+            if status.at - before > _AGAIN_AFTER:
+                self._state.tell(severity, report)
+        self._unnamed = status.kind is Kind.ALARM and not status.listed.remedy
 
-    def _reports(self, seen: InverterStatus) -> Iterator[tuple[Severity, Report]]:
-        by_code = seen.means(Meaning.CURRENT_LIMIT)
-        limited = by_code or Fact.LIMIT_ACTIVE in seen.facts
-        if limited and not seen.faulted:
-            (limit,) = seen.model.codes(Meaning.CURRENT_LIMIT)
-            yield Severity.WARNING, self._inverter.report(Cause.CURRENT_LIMITED, limit=limit)
-        if seen.kind is Kind.ALARM and not by_code:
-            if seen.listed.remedy:
-                yield Severity.WARNING, self._inverter.report(Cause.ALARM, alarm=seen.listed)
+    def _reports(self, status: InverterStatus) -> Iterator[tuple[Severity, Report]]:
+        by_code = status.means(Meaning.CURRENT_LIMIT)
+        limited = by_code or Fact.LIMIT_ACTIVE in status.facts
+        if limited and not status.faulted:
+            (limit,) = status.model.codes(Meaning.CURRENT_LIMIT)
+            yield Severity.WARNING, self._state.report(Cause.CURRENT_LIMITED, limit=limit)
+        if status.kind is Kind.ALARM and not by_code:
+            if status.listed.remedy:
+                yield Severity.WARNING, self._state.report(Cause.ALARM, alarm=status.listed)
             elif self._unnamed and not limited:
                 # once only, it came or went between the two readings
-                yield Severity.WARNING, self._inverter.report(Cause.ALARM_UNNAMED)
-        if Fact.SLEEPING in seen.facts:
-            yield Severity.INFO, self._inverter.report(Cause.ASLEEP)
+                yield Severity.WARNING, self._state.report(Cause.ALARM_UNNAMED)
+        if Fact.SLEEPING in status.facts:
+            yield Severity.INFO, self._state.report(Cause.ASLEEP)

@@ -61,27 +61,27 @@ class Drive:
         settings.require_line(bus.protocol)
         self._bus = bus
         self._unit = settings.address
-        self.inverter = DriveState(bus, settings, listener)
-        self.model, self.registers = self.inverter.model, self.inverter.registers
+        self.state = DriveState(bus, settings, listener)
+        self.model, self.params = self.state.model, self.state.params
         self.setpoint = Setpoint(
-            self.inverter,
+            self.state,
             lambda reason: self._controller.refused(reason) if self._controller else None,
             lambda reply: self._watch.told(reply),
         )
         self._controller: Controller | None = None
         if settings.method != 'monitor':
-            self._controller = Controller(self.inverter, Commands(self.inverter), self.setpoint)
+            self._controller = Controller(self.state, Commands(self.state), self.setpoint)
         self._watch = Poller(
-            self.inverter, self.setpoint, self._controller, lambda: self._connect(patient=False)
+            self.state, self.setpoint, self._controller, lambda: self._connect(patient=False)
         )
-        self._procedures = procedures = Procedures(self.inverter, self._controller)
-        self.parameters = Parameters(self.inverter, procedures, self.run, self._take_parameters)
+        self._procedures = procedures = Procedures(self.state, self._controller)
+        self.parameters = Parameters(self.state, procedures, self.run, self._take_parameters)
         self._watchdog = CommunicationWatchdog(
-            self.inverter, self.parameters, commanded=self._controller is not None
+            self.state, self.parameters, commanded=self._controller is not None
         )
-        self.log = ErrorLog(self.inverter, procedures)
-        self._error_log_monitor = ErrorLogMonitor(self.inverter, self.log)
-        self._tuning = Tuning(self.inverter, self.parameters, procedures)
+        self.log = ErrorLog(self.state, procedures)
+        self._error_log_monitor = ErrorLogMonitor(self.state, self.log)
+        self._tuning = Tuning(self.state, self.parameters, procedures)
         bus.on_restart(self._unit, self._watch.restarted)
         bus.require_sign_of_life(self._unit, settings.lost_after)
         #: What goes on while it is connected, and while it is active.
@@ -93,11 +93,11 @@ class Drive:
     @property
     def settings(self) -> DriveSettings:
         """How the drive is treated; address, model and control method never change."""
-        return self.inverter.settings
+        return self.state.settings
 
     @settings.setter
     def settings(self, settings: DriveSettings) -> None:
-        self.inverter.use(settings)
+        self.state.use(settings)
         self._bus.require_sign_of_life(self._unit, settings.lost_after)
 
     @property
@@ -108,7 +108,7 @@ class Drive:
     @property
     def identity(self) -> Identity | None:
         """Who answered, or ``None`` if nobody did yet."""
-        return self.inverter.identity
+        return self.state.identity
 
     @property
     def heard(self) -> bool:
@@ -116,9 +116,9 @@ class Drive:
         return self._bus.silences.heard_at(self._unit) > -math.inf
 
     @property
-    def armed(self) -> bool:
+    def following(self) -> bool:
         """The motor follows set-points."""
-        return self.setpoint.armed
+        return self.setpoint.following
 
     @property
     def last_error(self) -> LogEntry | None:
@@ -158,7 +158,7 @@ class Drive:
     def line_check(self) -> str:
         """What to look at, in this order, while the drive has never answered."""
         protocol = self._bus.protocol
-        return self.inverter.model.profile.line_check.get(protocol.name, protocol.check)
+        return self.state.model.profile.line_check.get(protocol.name, protocol.check)
 
     def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
         """Run a coroutine on the bus; what goes wrong on the line is explained."""
@@ -167,7 +167,7 @@ class Drive:
             try:
                 return await command()
             except LinkError as error:
-                check = None if self.inverter.identity else self.line_check
+                check = None if self.state.identity else self.line_check
                 raise DriveError(explain(error, self._unit, check=check)) from error
             except Cancelled:
                 raise DriveError(Cause.ENDING) from None
@@ -212,8 +212,8 @@ class Drive:
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
             self._watch.begin()
             self._error_log_monitor.begin()
-        assert self.inverter.identity is not None
-        return self.inverter.identity
+        assert self.state.identity is not None
+        return self.state.identity
 
     @on_bus
     async def require_standing(self) -> None:
@@ -222,12 +222,12 @@ class Drive:
 
         It is looked at anew, for after :meth:`disconnect` it may have been left to its ramp.
         """
-        if self._controller is None or self.inverter.identity is None:
+        if self._controller is None or self.state.identity is None:
             return
-        seen = await self.inverter.look(Priority.SERVICE)
-        if seen.driven and seen.from_bus:
+        status = await self.state.read_status(Priority.SERVICE)
+        if status.driven and status.from_bus:
             method = self.settings.method
-            raise DriveError(self.inverter.report(Cause.OTHER_METHOD_RUNS, method=method))
+            raise DriveError(self.state.report(Cause.OTHER_METHOD_RUNS, method=method))
 
     @on_bus
     async def disconnect(self, timeout: float) -> Report:
@@ -239,7 +239,7 @@ class Drive:
                 return Report(Cause.ONLY_WATCHED)
             answer = await self._controller.release(timeout)
             # whoever has control at this moment: it may come back to the bus by itself
-            if self._controller.method.keeps_control:
+            if self._controller.method.control_retained:
                 await self._watchdog.put_back()
             return answer
         finally:
@@ -268,7 +268,7 @@ class Drive:
         return answer
 
     @on_bus
-    async def enable(self, asked_at: float = math.inf) -> Report:
+    async def enable(self, requested_at: float = math.inf) -> Report:
         """
         Take control and run at set-point 0, then follow set-points that come in.
 
@@ -278,7 +278,7 @@ class Drive:
         self._require_active()
         controller = self._procedures.controller
         self._require_connected()
-        answer = await controller.enable(self._watchdog.require_set, asked_at)
+        answer = await controller.enable(self._watchdog.require_set, requested_at)
         self._watch.wake()
         return answer
 
@@ -302,25 +302,25 @@ class Drive:
     @on_bus
     async def identify(self, *, thoroughly: bool = True) -> Identity:
         """Find out who answers, thoroughly with model and serial number; what runs runs on."""
-        identity = await self.inverter.identify()
-        await self.inverter.scales.read()
-        return await self.inverter.introduce() if thoroughly else identity
+        identity = await self.state.identify()
+        await self.state.scales.read()
+        return await self.state.read_nameplate() if thoroughly else identity
 
     @on_bus
     async def read_status(self) -> InverterStatus:
         """Read the status, connected or not, without acknowledging anything."""
-        return await self.inverter.look(Priority.SERVICE)
+        return await self.state.read_status(Priority.SERVICE)
 
     @on_bus
     async def measure(self, key: str) -> Value:
         """Read one parameter, connected or not."""
-        return await self.registers.read(key, Priority.SERVICE)
+        return await self.params.read(key, Priority.SERVICE)
 
     @on_bus
     async def method_in_charge(self) -> str:
         """Return the control method by which the bus runs it, or would be able to stop it."""
-        steps = self.model.profile.in_charge(self.inverter.seen)
-        return await carry_out(steps, self.registers, Priority.SERVICE)
+        steps = self.model.profile.in_charge(self.state.status)
+        return await carry_out(steps, self.params, Priority.SERVICE)
 
     @on_bus
     async def error_log(self, most: int = 0) -> tuple[LogEntry, ...]:
@@ -345,7 +345,7 @@ class Drive:
         self,
         procedure: Procedure,
         progress: Callable[[Snapshot, float], None] | None = None,
-        asked_at: float = math.inf,
+        requested_at: float = math.inf,
     ) -> Tuned:
         """
         Have the drive measure or calculate its motor; minutes may pass until the result.
@@ -356,11 +356,11 @@ class Drive:
         """
         # as with enable, the motor may turn
         self._require_active()
-        self._procedures.controller.require_newer(asked_at)
+        self._procedures.controller.require_newer(requested_at)
 
-        def tell(seen: InverterStatus, elapsed: float) -> None:
+        def tell(status: InverterStatus, elapsed: float) -> None:
             if progress is not None:
-                progress(take_snapshot(self.inverter, self.setpoint, seen), elapsed)
+                progress(take_snapshot(self.state, self.setpoint, status), elapsed)
 
         return await self._tuning.tune_now(procedure, tell)
 
@@ -377,7 +377,7 @@ class Drive:
     # --- on the bus ---------------------------------------------------------------------------
 
     def _require_connected(self) -> None:
-        if not self.inverter.connected:
+        if not self.state.connected:
             raise DriveError(Cause.NOT_CONNECTED, address=self._unit)
 
     def _require_active(self) -> None:
@@ -391,45 +391,45 @@ class Drive:
             raise DriveError(Cause.ENDING)
 
     async def _connect(self, patient: bool) -> None:
-        inverter = self.inverter
-        self.registers.connected()
+        state = self.state
+        self.params.connected()
         try:
-            await inverter.identify(patient=patient)
+            await state.identify(patient=patient)
         except Refused as error:
             if error.code == Refused.BUSY:
                 raise
             raise DriveError(
-                Cause.OTHER_MODEL, error=str(error), model=inverter.model.name
+                Cause.OTHER_MODEL, error=str(error), model=state.model.name
             ) from error
-        await read_scales(inverter)
-        await inverter.read_control_mode()
-        await inverter.timeout.read()
-        inverter.require_fresh(await inverter.look(Priority.SERVICE))
+        await read_scales(state)
+        await state.read_control_mode()
+        await state.timeout.read()
+        state.require_fresh(await state.read_status(Priority.SERVICE))
         if self._controller is not None:
             await self._controller.secure_found()
             await self._watchdog.prepare()
-        identity = await inverter.introduce()
+        identity = await state.read_nameplate()
         self._watch.connected()
         self.setpoint.connected()
         self.log.connected()
-        inverter.found()
+        state.found()
         if self._controller is not None:
             self._controller.connected()
-        name = '' if identity.model else inverter.model.name
-        if identity.model and not inverter.model.profile.names_itself:
-            title = inverter.model.profile.title
-            inverter.tell(
+        name = '' if identity.model else state.model.name
+        if identity.model and not state.model.profile.names_itself:
+            title = state.model.profile.title
+            state.tell(
                 Severity.WARNING, Cause.UNEXPECTED_IDENTITY, model=identity.model, title=title
             )
         told = ', '.join(part for part in (name, str(identity)) if part)
-        inverter.tell(Severity.INFO, Cause.CONNECTED, drive=told)
-        held = inverter.model.profile.holds_control.get(self.registers.protocol)
+        state.tell(Severity.INFO, Cause.CONNECTED, drive=told)
+        held = state.model.profile.holds_control.get(self.params.protocol)
         if self._controller is None and held:
-            inverter.tell(Severity.WARNING, Cause.HELD_BY_LINE, why=held)
+            state.tell(Severity.WARNING, Cause.HELD_BY_LINE, why=held)
         self._watchdog.warn_if_unfit()
 
     def _set_disconnected(self) -> None:
-        self.inverter.lost()
+        self.state.lost()
         if self._controller is not None:
             self._controller.disconnected()
 
@@ -441,16 +441,16 @@ class Drive:
 
     def _take_parameters(self, keys: Collection[str]) -> None:
         """Take note of parameters that have new values, whoever changed them."""
-        if self.inverter.timeout.take(keys, self.parameters.values):
+        if self.state.timeout.take(keys, self.parameters.values):
             # the drive may have to be kept alive more often from now on
             self._watch.wake()
-        if any(self.inverter.model.key(role) in keys for role in _MODE_ROLES):
+        if any(self.state.model.key(role) in keys for role in _MODE_ROLES):
             self._watch.read_mode_soon()
-        self.inverter.listener.on_parameters(keys)
+        self.state.listener.on_parameters(keys)
 
     def _set_active(self, active: bool) -> None:
         self._bus.cancel(self._telemetry_task)
         if active:
-            telemetry = watch_telemetry(self.inverter, lambda: self._watch.yields)
+            telemetry = watch_telemetry(self.state, lambda: self._watch.yields)
             self._telemetry_task = self._bus.spawn(telemetry)
         self._watch.set_active(active)

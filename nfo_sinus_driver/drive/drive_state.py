@@ -71,7 +71,7 @@ class DriveState:
         #: Who is between stops the drive after so long without a word of ours, s; 0: nobody is.
         self.plc_time = method.plc_time
         #: Its parameters.
-        self.registers = ParameterAccess(
+        self.params = ParameterAccess(
             bus,
             settings.address,
             self.model,
@@ -83,17 +83,17 @@ class DriveState:
         self.listener = listener
         self.connected = False
         #: The last poll was answered; while it was not, nobody else should wait for the drive.
-        self.answering = False
+        self.responsive = False
         #: Called when a request to it failed, whoever asked.
         self._on_missed: Callable[[], None] = lambda: None
         #: It did not answer just before it was last looked at.
-        self.was_silent = False
+        self.missed_reply = False
         #: How many requests nobody had answered when it was last looked at.
         self._unanswered = 0
         self.identity: Identity | None = None
-        self.seen: InverterStatus | None = None
+        self.status: InverterStatus | None = None
         #: How far apart the last statuses were, s, the newest last.
-        self._apart: deque[float] = deque((0.0,), maxlen=4)
+        self._intervals: deque[float] = deque((0.0,), maxlen=4)
         #: Called when a fault comes that did not stand before.
         self._on_fault: Callable[[], None] = lambda: None
         #: The status that first showed the fault that stands, and whether that was soon.
@@ -109,11 +109,11 @@ class DriveState:
         self.unit = ''
         #: Its firmware is of those that do not know every parameter.
         self._older = False
-        self.scales = Scales(self.registers, self.has, settings.scales)
+        self.scales = Scales(self.params, self.has, settings.scales)
         #: What it does by itself when it hears nothing.
-        self.timeout = CommunicationTimeout(self.registers, self.model, self.has)
+        self.timeout = CommunicationTimeout(self.params, self.model, self.has)
 
-    async def look(
+    async def read_status(
         self,
         priority: Priority,
         *,
@@ -135,50 +135,50 @@ class DriveState:
         """
         if not self.has(self.word_key):
             return await self._look_at_code(priority, once)
-        before = self.seen
+        before = self.status
         if told is None:
             word, at = await self._read_int(self.word_key, priority, once)
         else:
             word, at = self.status_word(told.data), told.arrived
-        half = self.told_by_word(word, at)
+        half = self.status_of_word(word, at)
         alarmed = before is not None and word != before.word and alarming(half)
         priority = Priority.LOOK if alarmed else priority
         if self.model.profile.status_word.code is not None:
-            seen = await self._with_control(half, priority, once)
-            return await self._with_frequency(seen, priority, once)
-        held = self.seen
+            status = await self._with_control(half, priority, once)
+            return await self._with_frequency(status, priority, once)
+        held = self.status
         if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
-            seen = replace(held, at=at)
-            if not alarming(seen):
-                return self._saw(seen)
+            status = replace(held, at=at)
+            if not alarming(status):
+                return self._note_status(status)
         code, code_at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, once)
-        seen = replace(half, code=code, code_at=code_at)
+        status = replace(half, code=code, code_at=code_at)
         is_new = before is not None and code != before.code
         news = is_new and not alarmed
         # a fault or an alarm came or went between the two; one that stays so is treated as the
         # other by the drive [C95]
-        kind = seen.listed.kind
+        kind = status.listed.kind
         differs = (
-            is_new and seen.kind is not kind
+            is_new and status.kind is not kind
             if kind is Kind.ALARM
-            else (kind is Kind.FAULT) != seen.faulted
+            else (kind is Kind.FAULT) != status.faulted
         )
-        if news and alarming(replace(seen, word=None)):
+        if news and alarming(replace(status, word=None)):
             differs, priority = True, Priority.LOOK
         if differs:
             word, at = await self._read_int(self.word_key, priority, once)
-            seen = replace(seen, word=word, at=at)
-        return await self._with_frequency(seen, priority, once)
+            status = replace(status, word=word, at=at)
+        return await self._with_frequency(status, priority, once)
 
-    def told_by_word(self, word: int, at: float) -> InverterStatus:
+    def status_of_word(self, word: int, at: float) -> InverterStatus:
         """Return what a status word says alone; what only the rest tells is not known of it."""
         code_of = self.model.profile.status_word.code
         if code_of is None:
             return InverterStatus(at, word, NO_CODE, self.model)
-        seen = InverterStatus(at, word, code_of(word), self.model, code_at=at)
-        return self._with_control_as_before(seen)
+        status = InverterStatus(at, word, code_of(word), self.model, code_at=at)
+        return self._with_control_as_before(status)
 
-    def require_fresh(self, seen: InverterStatus) -> None:
+    def require_fresh(self, status: InverterStatus) -> None:
         """
         See to it that a status is not older than a drive may be silent; a PLC may keep an old one.
 
@@ -186,7 +186,7 @@ class DriveState:
         """
         longest = self.settings.lost_after
         # who looks at low priority waits for its turn, while others see newer ones
-        newest = seen.at if self.seen is None else max(seen.at, self.seen.at)
+        newest = status.at if self.status is None else max(status.at, self.status.at)
         if self.plc_time and self.bus.now() - newest >= longest:
             raise DriveError(Cause.OLD_DATA, seconds=longest)
 
@@ -203,27 +203,27 @@ class DriveState:
         :raises DriveError: it takes longer.
         """
         deadline = self.bus.now() + (TIMEOUT if timeout is None else timeout)
-        while not wanted(await self.look(priority)):
+        while not wanted(await self.read_status(priority)):
             if self.bus.now() > deadline:
                 raise DriveError(self.report(Cause.NOT_CONFIRMED))
             await self.bus.sleep(LOOK_PERIOD)
 
     async def _with_frequency(
-        self, seen: InverterStatus, priority: Priority, once: bool
+        self, status: InverterStatus, priority: Priority, once: bool
     ) -> InverterStatus:
         """Complete a status by the frequency, where its word alone tells no stop, or it is free."""
-        if not (seen.by_frequency or self.model.profile.status_word.frequency_beside):
-            return self._saw(seen)
+        if not (status.by_frequency or self.model.profile.status_word.frequency_beside):
+            return self._note_status(status)
         try:
-            frequency = await self._measure(Role.ACTUAL_FREQUENCY, priority, once, seen)
+            frequency = await self._measure(Role.ACTUAL_FREQUENCY, priority, once, status)
         except Refused:
             frequency = math.nan
         self.polled(Role.ACTUAL_FREQUENCY, frequency)
-        return self._saw(seen.with_frequency(frequency, self.seen))
+        return self._note_status(status.with_frequency(frequency, self.status))
 
     async def _read_int(self, key: str, priority: Priority, once: bool) -> tuple[int, float]:
-        reply = await self.registers.read_reply(key, priority, once=once)
-        return int(self.registers.number(key, reply.data)), reply.arrived
+        reply = await self.params.read_reply(key, priority, once=once)
+        return int(self.params.number(key, reply.data)), reply.arrived
 
     @property
     def word_key(self) -> str:
@@ -232,103 +232,103 @@ class DriveState:
 
     def status_word(self, data: bytes) -> int:
         """Return the status word that bytes mean."""
-        return int(self.registers.number(self.word_key, data))
+        return int(self.params.number(self.word_key, data))
 
     async def _look_at_code(self, priority: Priority, once: bool) -> InverterStatus:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
         code, at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, once)
-        seen = InverterStatus(at, None, code, self.model, code_at=at)
-        return self._saw(await self._with_control(seen, priority, once))
+        status = InverterStatus(at, None, code, self.model, code_at=at)
+        return self._note_status(await self._with_control(status, priority, once))
 
-    def _with_control_as_before(self, seen: InverterStatus) -> InverterStatus:
-        before = self.seen
+    def _with_control_as_before(self, status: InverterStatus) -> InverterStatus:
+        before = self.status
         if before is None:
-            return seen
-        return replace(seen, by_mode=before.by_mode, by_mode_at=before.by_mode_at)
+            return status
+        return replace(status, by_mode=before.by_mode, by_mode_at=before.by_mode_at)
 
     async def _with_control(
-        self, seen: InverterStatus, priority: Priority, once: bool
+        self, status: InverterStatus, priority: Priority, once: bool
     ) -> InverterStatus:
         """
         Complete a status by who has control, where neither its word nor its code tells it.
 
         That the bus has it counts for a while, as long as the code stays what it was.
         """
-        word_tells = seen.word is not None and Fact.NETWORK_CONTROL in seen.valid
-        if word_tells or not seen.means(Meaning.ANONYMOUS):
-            return seen
-        before = self.seen
-        same = before is not None and before.code == seen.code
-        if same and seen.by_mode and seen.at - seen.by_mode_at < _BY_MODE_FOR:
-            return seen
+        word_tells = status.word is not None and Fact.NETWORK_CONTROL in status.valid
+        if word_tells or not status.means(Meaning.ANONYMOUS):
+            return status
+        before = self.status
+        same = before is not None and before.code == status.code
+        if same and status.by_mode and status.at - status.by_mode_at < _BY_MODE_FOR:
+            return status
         source = self.model.key(Role.CONTROL_SOURCE)
-        reply = await self.registers.read_reply(source, priority, once=once)
-        holder = self.model.profile.holders.get(self.registers.value(source, reply.data))
+        reply = await self.params.read_reply(source, priority, once=once)
+        holder = self.model.profile.holders.get(self.params.value(source, reply.data))
         by_bus = holder is Holder.BUS and not await self._operated_locally(priority, once)
-        return replace(seen, by_mode=by_bus, by_mode_at=reply.arrived)
+        return replace(status, by_mode=by_bus, by_mode_at=reply.arrived)
 
     async def _operated_locally(self, priority: Priority, once: bool) -> bool:
         """Tell whether keypad or terminals command, whatever the control source says."""
         key = self.model.key(Role.LOCAL_OPERATION)
-        if not self.registers.reaches(key):
+        if not self.params.reaches(key):
             return False
-        return bool(await self.registers.read(key, priority, once=once))
+        return bool(await self.params.read(key, priority, once=once))
 
-    def _saw(self, seen: InverterStatus) -> InverterStatus:
+    def _note_status(self, status: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later
-        before = self.seen
-        if before is None or seen.at >= before.at:
-            self.seen = seen
-            self._apart.append(seen.at - before.at if before else 0.0)
+        before = self.status
+        if before is None or status.at >= before.at:
+            self.status = status
+            self._intervals.append(status.at - before.at if before else 0.0)
             self._note_fault(before)
-        return seen
+        return status
 
     @property
-    def usually_apart(self) -> float:
+    def usual_interval(self) -> float:
         """How far apart the statuses before the newest were, s."""
-        return max(list(self._apart)[:-1])
+        return max(list(self._intervals)[:-1])
 
     def _note_fault(self, before: InverterStatus | None) -> None:
-        seen = self.seen
-        assert seen is not None
-        if not seen.faulted:
+        status = self.status
+        assert status is not None
+        if not status.faulted:
             self.fault = None
-        elif self.fault is None or self.fault.code != seen.code:
-            self.fault = seen
-            self.fault_is_fresh = before is not None and seen.at - before.at < _SOON
+        elif self.fault is None or self.fault.code != status.code:
+            self.fault = status
+            self.fault_is_fresh = before is not None and status.at - before.at < _SOON
             self._on_fault()
 
     def missed(self) -> None:
         """Take note that a request failed; until it is known why, nobody should wait for it."""
-        self.answering = False
+        self.responsive = False
         self._on_missed()
 
     def answered(self) -> None:
         """Take note that a poll was answered."""
-        self.answering = True
+        self.responsive = True
 
     def unanswered(self) -> None:
         """Take note that a poll was not."""
-        self.answering = False
+        self.responsive = False
 
     def found(self) -> None:
         """Take note that it is connected."""
-        self.connected = self.answering = True
+        self.connected = self.responsive = True
 
     def lost(self) -> None:
         """Take note that it is connected no more."""
         self.connected = False
 
     @property
-    def silent_since_look(self) -> bool:
+    def missed_since_status(self) -> bool:
         """It has not answered something since it was last looked at."""
         # one that is busy, or whose answer was damaged, was there
-        return self.registers.unanswered > self._unanswered
+        return self.params.unanswered > self._unanswered
 
-    def looked_at(self) -> None:
+    def status_read(self) -> None:
         """Take note of whether it did not answer just before it was looked at now."""
-        self.was_silent = self.silent_since_look
-        self._unanswered = self.registers.unanswered
+        self.missed_reply = self.missed_since_status
+        self._unanswered = self.params.unanswered
 
     def on_missed(self, call: Callable[[], None]) -> None:
         """Have something called when a request to it failed, whoever asked."""
@@ -364,20 +364,20 @@ class DriveState:
 
         :raises LinkError: it does not answer, or refuses.
         """
-        return await self._measure(role, priority, True, self.seen)
+        return await self._measure(role, priority, True, self.status)
 
     async def _measure(
-        self, role: Role, priority: Priority, once: bool, seen: InverterStatus | None
+        self, role: Role, priority: Priority, once: bool, status: InverterStatus | None
     ) -> float:
         """Measure; a status tells the direction of what turns, where the value does not."""
         key = self.model.key(role)
         if not key:
             return math.nan
-        data = await self.registers.read_data(key, priority, once=once)
-        value = self.registers.number(key, data)
-        if not self.registers.is_odd(key):
+        data = await self.params.read_data(key, priority, once=once)
+        value = self.params.number(key, data)
+        if not self.params.is_odd(key):
             turns = role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
-            return seen.signed(value) if turns and seen is not None else value
+            return status.signed(value) if turns and status is not None else value
         if key not in self._told_impossible:
             self._told_impossible.add(key)
             unit = self.model[key].unit
@@ -415,12 +415,12 @@ class DriveState:
         """
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if patient else Priority.POLL
-        await self.registers.read(self.model.key_of_status, priority, once=not patient)
+        await self.params.read(self.model.key_of_status, priority, once=not patient)
         dialect = self._dialect
         before, was_older = self.identity, self._older
         self._be_older(dialect is not None and self.settings.classic_dialect == dialect.name)
         firmware_key = self.model.key(Role.FIRMWARE)
-        if self._older or not self.registers.reaches(firmware_key):
+        if self._older or not self.params.reaches(firmware_key):
             self.identity = Identity()
             return self.identity
         if dialect is not None and not await self._may_ask_firmware(dialect):
@@ -437,9 +437,9 @@ class DriveState:
                 self._be_older(was_older)
             return self.identity or Identity()
         try:
-            firmware = await self.registers.read_number(firmware_key, Priority.SERVICE)
+            firmware = await self.params.read_number(firmware_key, Priority.SERVICE)
             motor_key = self.model.key(Role.MOTOR_FIRMWARE)
-            motor = await self.registers.read_number(motor_key, Priority.SERVICE)
+            motor = await self.params.read_number(motor_key, Priority.SERVICE)
         except Refused:
             if dialect is None or self.settings.classic_dialect:
                 raise
@@ -459,7 +459,7 @@ class DriveState:
     @property
     def _dialect(self) -> OlderDialect | None:
         dialect = self.model.profile.older
-        here = dialect is not None and dialect.protocol == self.registers.protocol
+        here = dialect is not None and dialect.protocol == self.params.protocol
         return dialect if here else None
 
     async def _may_ask_firmware(self, dialect: OlderDialect) -> bool:
@@ -472,7 +472,7 @@ class DriveState:
         if self.settings.classic_dialect or (method is not None and not method.older):
             return True
         key = self.model.key(Role.CONTROL_SOURCE)
-        source = await self.registers.read(key, Priority.SERVICE)
+        source = await self.params.read(key, Priority.SERVICE)
         return self.model.profile.holders.get(source) in dialect.harmless
 
     @property
@@ -480,13 +480,13 @@ class DriveState:
         """It takes settings only while the bus has control [C100], or may be of those that do."""
         return self._older
 
-    async def introduce(self) -> Identity:
+    async def read_nameplate(self) -> Identity:
         """Ask for more of who it is; nothing depends on that, for many do not tell [C57]."""
         assert self.identity is not None
-        if self.registers.in_block:
+        if self.params.in_block:
             # a PLC would answer for itself [C118]
             return self.identity
-        told = await self.registers.identify(Priority.SERVICE)
+        told = await self.params.identify(Priority.SERVICE)
         self.identity = replace(
             self.identity,
             vendor=told.vendor,
@@ -504,14 +504,14 @@ class DriveState:
         Where no register tells it ([C58]), it is what the settings expect.
         """
         key = self.model.key(Role.CONTROL_MODE)
-        if self.registers.reaches(key):
-            mode = str(await self.registers.read(key, priority, once=once))
+        if self.params.reaches(key):
+            mode = str(await self.params.read(key, priority, once=once))
         else:
             mode = self.settings.expected_control_mode or 'Freque'
         unit = _UNITS.get(mode, '')
         if mode == 'PI-Reg':
             key = self.model.key(Role.PROCESS_UNIT)
-            unit = str(await self.registers.read(key, priority, once=once))
+            unit = str(await self.params.read(key, priority, once=once))
         # both at once: nobody is told of the one without the other
         self.control_mode, self.unit = mode, unit
         return mode
@@ -519,28 +519,28 @@ class DriveState:
     async def coasts_to_stop(self) -> bool:
         """Tell whether an ordinary stop releases the motor [C97], as far as the drive tells."""
         key = self.model.key(Role.STOP_MODE)
-        if self.registers.reaches(key):
-            return await self.registers.read(key, Priority.STOP) == self.model.profile.releases
-        seen = self.seen
-        told = seen is not None and Fact.STOP_MODE_BRAKE in seen.valid
-        return told and seen is not None and Fact.STOP_MODE_BRAKE not in seen.facts
+        if self.params.reaches(key):
+            return await self.params.read(key, Priority.STOP) == self.model.profile.releases
+        status = self.status
+        told = status is not None and Fact.STOP_MODE_BRAKE in status.valid
+        return told and status is not None and Fact.STOP_MODE_BRAKE not in status.facts
 
     async def read_start_delay(self) -> float:
         """Read how long the drive waits after a run command, s; an hour if it does not tell."""
         key = self.model.key(Role.START_DELAY)
-        if self.registers.reaches(key):
-            return await self.registers.read_number(key, Priority.SERVICE)
+        if self.params.reaches(key):
+            return await self.params.read_number(key, Priority.SERVICE)
         return _LONGEST_START_DELAY
 
     @property
     def kind(self) -> Kind:
         """How grave the inverter status is."""
-        return Kind.STATUS if self.seen is None else self.seen.kind
+        return Kind.STATUS if self.status is None else self.status.kind
 
     @property
     def text(self) -> str:
         """The inverter status as on the display."""
-        return '' if self.seen is None else self.text_of(self.seen.code)
+        return '' if self.status is None else self.text_of(self.status.code)
 
     def text_of(self, code: int) -> str:
         """Return what the display of this firmware says for a code."""
@@ -551,7 +551,7 @@ class DriveState:
 
     def describe(self) -> str:
         """Return code and text of the inverter status; ``''`` before it was read."""
-        return '' if self.seen is None else f'{self.seen.code} {self.text}'
+        return '' if self.status is None else f'{self.status.code} {self.text}'
 
     def report(self, cause: Cause, **values: object) -> Report:
         """Return a report that has the inverter status and the name of the enable input, too."""
@@ -560,7 +560,7 @@ class DriveState:
 
     def has(self, key: str) -> bool:
         """Tell whether the drive has a parameter: its model, this line and its firmware do."""
-        if not self.registers.reaches(key) or (self._older and not self.model[key].older):
+        if not self.params.reaches(key) or (self._older and not self.model[key].older):
             return False
         since = self.model[key].since
         firmware = self.identity.firmware if self.identity else math.nan
@@ -569,7 +569,7 @@ class DriveState:
     def tell(self, severity: Severity, what: Report | Cause, /, **values: object) -> None:
         """Tell the listener; what cannot be told keeps nothing from being done."""
         report = what if isinstance(what, Report) else Report(what, **values)
-        code = None if self.seen is None else self.seen.code
+        code = None if self.status is None else self.status.code
         try:
             self.listener.on_event(Event(severity, report, code))
         except Exception:

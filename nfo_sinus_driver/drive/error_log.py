@@ -46,9 +46,9 @@ class ErrorLog:
     :raises DriveError: a method cannot do it, or the model's log is not documented.
     """
 
-    def __init__(self, inverter: DriveState, procedures: Procedures) -> None:
-        self._inverter = inverter
-        self._registers = inverter.registers
+    def __init__(self, state: DriveState, procedures: Procedures) -> None:
+        self._state = state
+        self._params = state.params
         self._procedures = procedures
         #: From this operating hour on the drive is known to have had power; NaN: not known.
         self.powered_since = math.nan
@@ -60,7 +60,7 @@ class ErrorLog:
     @property
     def documented(self) -> bool:
         """A manual says where it stands."""
-        return self._registers.protocol in self._inverter.model.error_logs
+        return self._params.protocol in self._state.model.error_logs
 
     @property
     def timed(self) -> bool:
@@ -80,13 +80,13 @@ class ErrorLog:
         told: list[str] = []
         for what, key in self.area.readings_of(number):
             try:
-                value = await self._registers.read_number(key, Priority.POLL)
+                value = await self._params.read_number(key, Priority.POLL)
             except (Refused, ValueError):
                 # what cannot be told, such as a temperature below 0, is left out
                 continue
-            told.append(f'{what} {value:g} {self._inverter.model[key].unit}')
+            told.append(f'{what} {value:g} {self._state.model[key].unit}')
         code = self.area.code(entry)
-        text = self.area.unknown(entry) or self._inverter.text_of(code)
+        text = self.area.unknown(entry) or self._state.text_of(code)
         return LogEntry(code, text, readings=tuple(told))
 
     async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
@@ -100,9 +100,9 @@ class ErrorLog:
 
     async def read_time(self, priority: Priority) -> float:
         """Read the operating time, h, which shows whether the drive was off meanwhile."""
-        key = self._inverter.model.key(Role.OPERATING_TIME)
-        reply = await self._registers.read_reply(key, priority, once=priority > Priority.POLL)
-        hours = self._registers.number(key, reply.data)
+        key = self._state.model.key(Role.OPERATING_TIME)
+        reply = await self._params.read_reply(key, priority, once=priority > Priority.POLL)
+        hours = self._params.number(key, reply.data)
         elapsed = (reply.arrived - self._shown_at) / _HOUR
         # what is shown is less than a tick behind what was counted
         if not hours > self.powered_since + elapsed * (1 - _DRIFT) - TICK:
@@ -134,10 +134,10 @@ class ErrorLog:
 
     async def reset_energy_now(self) -> Report:
         """Reset the kWh counter E-Out, from firmware 4.38 on [M0 table 18], and see it at 0."""
-        energy = self._inverter.model.key(Role.ENERGY)
+        energy = self._state.model.key(Role.ENERGY)
         self._procedures.require(Reset.ENERGY)
-        if not self._inverter.has(energy):
-            since, told = self._inverter.model[energy].since, self._inverter.identity
+        if not self._state.has(energy):
+            since, told = self._state.model[energy].since, self._state.identity
             raise DriveError(
                 Cause.ENERGY_RESET_UNKNOWN,
                 what=Reset.ENERGY.value,
@@ -146,9 +146,9 @@ class ErrorLog:
             )
         with self._procedures.begun(Reset.ENERGY) as access:
             async with self._procedures.in_standby(access):
-                before = await self._registers.read_number(energy, Priority.SERVICE)
+                before = await self._params.read_number(energy, Priority.SERVICE)
                 await self._procedures.command(access, Reset.ENERGY)
-                after = await self._registers.read_number(energy, Priority.SERVICE)
+                after = await self._params.read_number(energy, Priority.SERVICE)
                 if after > min(before, _NEARLY_NOTHING):
                     raise DriveError(Cause.ENERGY_NOT_RESET, key=energy, energy=after)
         return Report(Cause.ENERGY_RESET, key=energy, before=before, after=after)
@@ -157,8 +157,8 @@ class ErrorLog:
     def area(self) -> ErrorLogArea:
         """Where it stands."""
         if not self.documented:
-            raise DriveError(Cause.LOG_UNDOCUMENTED, model=self._inverter.model.name)
-        return self._moved or self._inverter.model.error_logs[self._registers.protocol]
+            raise DriveError(Cause.LOG_UNDOCUMENTED, model=self._state.model.name)
+        return self._moved or self._state.model.error_logs[self._params.protocol]
 
     async def _read(self, limit: int, known: int, priority: Priority) -> list[int]:
         """Read the entries down to one that is known, while none comes in."""
@@ -204,14 +204,14 @@ class ErrorLog:
 
     async def _entry_of(self, area: ErrorLogArea, number: int, priority: Priority) -> int:
         # nobody waits for what is read in the background, so it is not asked for again at once
-        data = await self._registers.read_from(
+        data = await self._params.read_from(
             Address(*area.place(number)), priority, once=priority > Priority.POLL
         )
         return area.codec.decode(data)
 
     def _understood(self, entry: int, now: float) -> LogEntry:
         code, then = self.area.code(entry), self.area.hours(entry)
-        clock, age, at, latest = self._inverter.bus.now, math.nan, math.nan, math.nan
+        clock, age, at, latest = self._state.bus.now, math.nan, math.nan, math.nan
         # one tick of doubt, for the drive rounds
         if now > then - TICK:
             age = max(0.0, now - then)
@@ -219,7 +219,7 @@ class ErrorLog:
             # what is in the tick of the first reading may be from before it was switched on
             if then > self.powered_since:
                 at = clock() - age * _HOUR
-        text = self._inverter.text_of(code)
+        text = self._state.text_of(code)
         return LogEntry(code, text, round(then, 1), age, at, latest, now=clock)
 
 
@@ -231,9 +231,9 @@ class ErrorLogMonitor:
     polls, or while the drive was not reached, has left an entry too. Nothing is acknowledged by it.
     """
 
-    def __init__(self, inverter: DriveState, log: ErrorLog) -> None:
-        self._bus = inverter.bus
-        self._inverter = inverter
+    def __init__(self, state: DriveState, log: ErrorLog) -> None:
+        self._bus = state.bus
+        self._state = state
         self._error_log = log
         self._task: Task | None = None
         #: The newest entry, as it was read; ``None`` if there is none.
@@ -255,36 +255,36 @@ class ErrorLogMonitor:
             return
         self._known = None
         self._looked_at = self._told_at = -math.inf
-        self._inverter.on_fault(self._expect)
+        self._state.on_fault(self._expect)
         self._expect()
         self._task = self._bus.spawn(self._watch_for_ever())
 
     def end(self) -> None:
         """Leave the log alone."""
-        self._inverter.on_fault(None)
+        self._state.on_fault(None)
         self._bus.cancel(self._task)
 
     def _expect(self) -> None:
-        self._fault, self._tries = self._inverter.fault, _TRIES
+        self._fault, self._tries = self._state.fault, _TRIES
         self._bus.wake(self._task)
 
     async def _watch_for_ever(self) -> None:
-        inverter = self._inverter
+        state = self._state
         while True:
-            there = inverter.connected and inverter.answering
+            there = state.connected and state.responsive
             if there:
                 try:
-                    await self._look()
+                    await self._read_status()
                 except Refused as error:
                     if error.code != Refused.BUSY:
                         # asked for what it does not have, a Classic drive may stop the motor
-                        inverter.tell(Severity.INFO, Cause.LOG_NOT_WATCHED, error=str(error))
+                        state.tell(Severity.INFO, Cause.LOG_NOT_WATCHED, error=str(error))
                         return
                 except DriveError as error:
                     _log.debug('%s', error)
                 except LinkError:
                     # the poll says so if the drive is lost
-                    inverter.missed()
+                    state.missed()
             await self._bus.sleep(self._pause() if there else _WAIT)
 
     def _pause(self) -> float:
@@ -294,8 +294,8 @@ class ErrorLogMonitor:
         self._fault = None
         return _PERIOD
 
-    async def _look(self) -> None:
-        log, known, began = self._error_log, self._known, self._inverter.bus.now()
+    async def _read_status(self) -> None:
+        log, known, began = self._error_log, self._known, self._state.bus.now()
         news = await log.newer_than(known, Priority.TELEMETRY)
         now = await log.read_time(Priority.TELEMETRY)
         newest = self._known = news[0] if news else known or 0
@@ -310,7 +310,7 @@ class ErrorLogMonitor:
         entries = [self._sighted(entry, began) for entry in log.understood(news, now)]
         self._looked_at = began
         if entries:
-            self._told_at = self._inverter.bus.now()
+            self._told_at = self._state.bus.now()
             self._tell(entries)
 
     def _repeats(self, fault: InverterStatus, newest: int, now: float) -> bool:
@@ -322,7 +322,7 @@ class ErrorLogMonitor:
     def _sighted(self, entry: LogEntry, began: float) -> LogEntry:
         """Return a new entry with the moment when it came, where that was seen."""
         fault = self._fault
-        if fault and fault.code == entry.code and self._inverter.fault_is_fresh:
+        if fault and fault.code == entry.code and self._state.fault_is_fresh:
             return replace(entry, at=fault.at)
         return replace(entry, at=began) if began - self._looked_at < 2 * _PERIOD else entry
 
@@ -334,10 +334,10 @@ class ErrorLogMonitor:
             code, self._fault = self._fault.code, None
         for entry in reversed(entries):
             if entry.code == code:
-                self._inverter.tell(Severity.INFO, Cause.LOG_ENTRY, entry=entry)
+                self._state.tell(Severity.INFO, Cause.LOG_ENTRY, entry=entry)
             else:
-                self._inverter.tell(Severity.WARNING, Cause.LOG_ENTRY_UNSEEN, entry=entry)
+                self._state.tell(Severity.WARNING, Cause.LOG_ENTRY_UNSEEN, entry=entry)
             try:
-                self._inverter.listener.on_log_entry(entry)
+                self._state.listener.on_log_entry(entry)
             except Exception:
                 _log.exception('an entry of the error log could not be told')

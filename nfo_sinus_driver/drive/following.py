@@ -47,8 +47,8 @@ class _Fall:
 class Following:
     """Compares what is measured of one drive with its set-points, from when it is armed on."""
 
-    def __init__(self, inverter: DriveState, setpoint: Setpoint) -> None:
-        self._inverter = inverter
+    def __init__(self, state: DriveState, setpoint: Setpoint) -> None:
+        self._state = state
         self._setpoint = setpoint
         self._at = -math.inf
         #: It told a frequency below 0: it has a sign.
@@ -65,10 +65,10 @@ class Following:
 
     def judge(self) -> Report | None:
         """Return why the motor has to be stopped, for what was measured last; tell what else is."""
-        measured = self._inverter.last_polled(Role.ACTUAL_FREQUENCY)
+        measured = self._state.last_polled(Role.ACTUAL_FREQUENCY)
         role, unit = _COMPARED.get(self._setpoint.control_mode, (None, 1.0))
-        actual = self._inverter.last_polled(role)
-        if measured is NOT_MEASURED or measured.at <= max(self._at, self._setpoint.armed_at):
+        actual = self._state.last_polled(role)
+        if measured is NOT_MEASURED or measured.at <= max(self._at, self._setpoint.following_since):
             return None
         self._at = measured.at
         least, most = self._setpoint.range_since(measured.at - _REACTION)
@@ -81,7 +81,7 @@ class Following:
             cause = Cause.TURNS_BACKWARDS
         elif role is not None:
             self._look_beyond(actual.value, measured.at, max(-least, most), unit)
-        return cause and self._inverter.report(cause, now=frequency)
+        return cause and self._state.report(cause, now=frequency)
 
     def _goes_on(self, frequency: float, at: float) -> bool:
         """Tell whether it does not slow down, although no set-point comes any more."""
@@ -123,9 +123,9 @@ class Following:
         if self._told or not (endless or size > self._beyond.least + margin):
             return
         self._told = True
-        told, name = self._setpoint.commanded, self._inverter.unit
-        report = self._inverter.report(
+        told, name = self._setpoint.commanded, self._state.unit
+        report = self._state.report(
             Cause.FASTER_THAN_SETPOINT, now=value, setpoint=told, unit=name
         )
-        self._inverter.tell(Severity.WARNING, report)
+        self._state.tell(Severity.WARNING, report)
         self._setpoint.write_again()

@@ -88,11 +88,11 @@ def not_changed(key: str, why: Report) -> ParameterError:
 class ParameterWriter:
     """Changes parameters of one drive, on the bus; if not, a ParameterError says why."""
 
-    def __init__(self, inverter: DriveState, procedures: Procedures) -> None:
-        self._inverter = inverter
-        self._registers = inverter.registers
+    def __init__(self, state: DriveState, procedures: Procedures) -> None:
+        self._state = state
+        self._params = state.params
         self._procedures = procedures
-        self._access = WriteAccess(inverter, procedures)
+        self._access = WriteAccess(state, procedures)
 
     async def write(self, wanted: Mapping[str, bytes]) -> tuple[Change, ...]:
         """
@@ -112,7 +112,7 @@ class ParameterWriter:
             except Cancelled:
                 if done:
                     changes = tuple(self.describe(entry) for entry in done)
-                    self._inverter.tell(Severity.WARNING, Cause.ENDED_HALF_WAY, changes=changes)
+                    self._state.tell(Severity.WARNING, Cause.ENDED_HALF_WAY, changes=changes)
                 raise
         return tuple(self.describe(entry) for entry in done)
 
@@ -144,50 +144,50 @@ class ParameterWriter:
         keys = tuple(keys)
         for key in keys:
             self._require_not_enabled(key)
-        stopped = ', '.join(key for key in keys if self._registers.model[key].stopped)
+        stopped = ', '.join(key for key in keys if self._params.model[key].stopped)
         if not stopped:
             return
         try:
-            seen = await self._inverter.look(_SERVICE)
+            status = await self._state.read_status(_SERVICE)
         except LinkError as error:
-            raise not_changed(stopped, explain_failure(error, self._inverter)) from error
-        if seen.driven:
-            raise not_changed(stopped, self._inverter.report(Cause.STANDSTILL_NEEDED))
+            raise not_changed(stopped, explain_failure(error, self._state)) from error
+        if status.driven:
+            raise not_changed(stopped, self._state.report(Cause.STANDSTILL_NEEDED))
 
     def _require_not_enabled(self, key: str) -> None:
         """Refuse what a start depends on while the motor is enabled, be it at set-point 0."""
-        depends = key in self._inverter.model.profile.start_settings
+        depends = key in self._state.model.profile.start_settings
         if depends and self._procedures.commanded:
             raise not_changed(key, Report(Cause.NOT_WHILE_ENABLED))
 
     def describe(self, entry: Written) -> Change:
         """Return what was written as a person reads it."""
-        model = self._registers.model[entry.key]
+        model = self._params.model[entry.key]
         before, after = self.value(entry.key, entry.before), self.value(entry.key, entry.after)
         return Change(entry.key, before, after, model.unit)
 
     def _order(self, key: str) -> tuple[bool, bool]:
         """Sort what a running motor forbids to the front, what may cut the line to the end."""
-        model = self._registers.model
+        model = self._params.model
         return key in model.communication, not model[key].stopped
 
     async def _write_one(self, key: str, data: bytes, allow: Allow) -> Iterable[Written]:
         try:
             # between any two parameters, everybody who polls has a turn
-            before = await self._registers.read_data(key, Priority.POLL)
+            before = await self._params.read_data(key, Priority.POLL)
         except LinkError as error:
-            raise not_changed(key, explain_failure(error, self._inverter)) from error
+            raise not_changed(key, explain_failure(error, self._state)) from error
         if before == data:
             return ()
         try:
             await allow()
         except (LinkError, DriveError) as error:
-            raise not_changed(key, explain_failure(error, self._inverter)) from error
+            raise not_changed(key, explain_failure(error, self._state)) from error
         self._require_not_enabled(key)
         failure = await self._send(key, data)
         kept: bytes | None = None
         try:
-            kept = await self._registers.read_data(key, _SERVICE)
+            kept = await self._params.read_data(key, _SERVICE)
         except LinkError as error:
             failure = failure or error
         if kept == data:
@@ -210,7 +210,7 @@ class ParameterWriter:
     async def _send(self, key: str, data: bytes) -> LinkError | None:
         """Write; return why the drive may not have taken it: reading it back tells."""
         try:
-            await self._registers.write_data(key, data, _SERVICE)
+            await self._params.write_data(key, data, _SERVICE)
         except LinkError as error:
             return error
         return None
@@ -225,14 +225,14 @@ class ParameterWriter:
                 return refused.report
             error = await self._send(key, before)
             try:
-                kept = await self._registers.read_data(key, _SERVICE)
+                kept = await self._params.read_data(key, _SERVICE)
             except Refused as refused:
                 trouble = report_of(refused)
                 continue
             if kept == before:
                 return None
             keeps = Report(Cause.DRIVE_KEEPS, value=self._show(key, kept))
-            trouble = explain_failure(error, self._inverter) if error else keeps
+            trouble = explain_failure(error, self._state) if error else keeps
         return trouble
 
     async def _put_back(
@@ -248,7 +248,7 @@ class ParameterWriter:
                     trouble = await self._restore(entry.key, entry.before, allow)
                 except LinkError as error:
                     # two time-outs are enough for the others on the line
-                    trouble = explain_failure(error, self._inverter)
+                    trouble = explain_failure(error, self._state)
                     silence = Report(Cause.NOT_TRIED_ANY_MORE)
             if trouble is not None:
                 stuck[entry.key] = Report(
@@ -264,12 +264,12 @@ class ParameterWriter:
     def value(self, key: str, data: bytes) -> Value:
         """Return what bytes mean, or the bytes as text where they have no meaning."""
         try:
-            return self._registers.value(key, data)
+            return self._params.value(key, data)
         except ValueError:
             return shown_raw(data)
 
     def _show(self, key: str, data: bytes) -> str:
-        unit = self._registers.model[key].unit
+        unit = self._params.model[key].unit
         return f'{show(self.value(key, data))} {unit}'.rstrip()
 
     async def _why(
@@ -278,26 +278,26 @@ class ParameterWriter:
         if isinstance(error, Refused):
             return await self._refusal(key, data, error)
         if error is not None:
-            return explain_failure(error, self._inverter)
+            return explain_failure(error, self._state)
         assert kept is not None
         value, written = self._show(key, kept), self._show(key, data)
         return Report(Cause.DRIVE_KEEPS_OTHER, value=value, written=written)
 
     async def _refusal(self, key: str, data: bytes, error: Refused) -> Report:
         """Return what the drive said, and what else is known that may be the reason [C87]."""
-        inverter = self._inverter
+        state = self._state
         why = report_of(error)
         if error.code == Refused.ILLEGAL_VALUE:
             value = self._show(key, data)
             why = Report(Cause.VALUE_NOT_ACCEPTED, value=value, behind=error.behind)
         with contextlib.suppress(LinkError):
             # the last poll may have been before the fault
-            await inverter.look(_SERVICE)
-        seen = inverter.seen
-        if seen is not None and seen.driven and self._registers.model[key].stopped:
+            await state.read_status(_SERVICE)
+        status = state.status
+        if status is not None and status.driven and self._params.model[key].stopped:
             return Report(Cause.REFUSED_WHILE_RUNNING, why=why)
-        if seen is not None and seen.faulted:
-            return inverter.report(Cause.REFUSED_WHILE_FAULTED, why=why)
+        if status is not None and status.faulted:
+            return state.report(Cause.REFUSED_WHILE_FAULTED, why=why)
         return why
 
 
@@ -316,8 +316,8 @@ class WriteAccess:
     else takes settings at any time.
     """
 
-    def __init__(self, inverter: DriveState, procedures: Procedures) -> None:
-        self._inverter = inverter
+    def __init__(self, state: DriveState, procedures: Procedures) -> None:
+        self._state = state
         self._procedures = procedures
 
     @contextlib.asynccontextmanager
@@ -328,7 +328,7 @@ class WriteAccess:
 
             async def allow() -> None:
                 nonlocal access
-                if not self._inverter.settings_need_control:
+                if not self._state.settings_need_control:
                     return
                 if await self._procedures.controller.method.in_control(Priority.SERVICE):
                     return
@@ -358,19 +358,19 @@ def followers(model: Family) -> Mapping[str, str]:
     return {key: setting for key, setting in named.items() if key}
 
 
-def why_not(key: str, inverter: DriveState) -> Report | None:
+def write_forbidden(key: str, state: DriveState) -> Report | None:
     """Return why a setting may not be changed, ``None`` if it may."""
-    settings = inverter.settings
+    settings = state.settings
     if settings.method == 'monitor':
         return Report(Cause.MONITOR_ONLY)
-    if inverter.tuning:
+    if state.tuning:
         return Report(Cause.CHANGE_WHILE_TUNING)
-    if key not in inverter.model.communication:
+    if key not in state.model.communication:
         return None
     if not settings.allow_communication_changes:
         return Report(Cause.COMMUNICATION_PROTECTED)
-    firmware = inverter.identity.firmware if inverter.identity else 0.0
-    if firmware < inverter.model.profile.uncertain.get(key, 0.0):
+    firmware = state.identity.firmware if state.identity else 0.0
+    if firmware < state.model.profile.uncertain.get(key, 0.0):
         return Report(Cause.CODES_UNCERTAIN, firmware=firmware)
     return None
 

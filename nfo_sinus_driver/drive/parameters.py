@@ -34,7 +34,7 @@ from nfo_sinus_driver.drive.parameter_writer import (
     followers,
     not_changed,
     show,
-    why_not,
+    write_forbidden,
 )
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.link import LinkError, Refused
@@ -93,22 +93,22 @@ class Parameters:
 
     def __init__(
         self,
-        inverter: DriveState,
+        state: DriveState,
         procedures: Procedures,
         run: Callable[[Callable[[], Coroutine[Any, Any, Any]]], Future[Any]],
         told: Callable[[Collection[str]], None],
     ) -> None:
-        self._bus = inverter.bus
-        self._inverter = inverter
-        self._registers = inverter.registers
+        self._bus = state.bus
+        self._state = state
+        self._params = state.params
         self.run = run
         self._told = told
-        self._writer = ParameterWriter(inverter, procedures)
+        self._writer = ParameterWriter(state, procedures)
         self._keys: tuple[str, ...] = ()
         self._data: dict[str, bytes] = {}
         self._values: dict[str, Value] = {}
-        self._wanted = DesiredConfig(self, inverter)
-        self._turn = Lock(inverter.bus)
+        self._wanted = DesiredConfig(self, state)
+        self._turn = Lock(state.bus)
         #: What is being written, and may be put back yet.
         self._changing: Collection[str] = ()
         self._rounds = 0
@@ -141,7 +141,7 @@ class Parameters:
 
     def describe(self, key: str, before: Value, data: bytes) -> Change:
         """Return the difference between a value and what bytes mean."""
-        unit = self._inverter.model[key].unit
+        unit = self._state.model[key].unit
         return Change(key, before, self._writer.value(key, data), unit)
 
     def exact(self, key: str, value: Value) -> Value:
@@ -150,35 +150,35 @@ class Parameters:
         if known is not None and type(known) is type(value) and known == value:
             # it has it, also where no manual says that it can [C19]
             return known
-        model = self._inverter.model
+        model = self._state.model
         if key not in model or not model[key].is_setting or not self.reaches(key):
             raise ParameterError(key, Report(Cause.NO_SETTING, key=key))
         try:
-            return self._registers.value(key, self._registers.encode(key, value))
+            return self._params.value(key, self._params.encode(key, value))
         except ValueError as error:
             raise ParameterError(key, Report(Cause.NOT_POSSIBLE, why=str(error))) from None
 
     def limits(self, key: str) -> tuple[float, float, float]:
         """Return the least value of a number, the greatest, and the step of the drive."""
-        return self._registers.limits(key)
+        return self._params.limits(key)
 
     def reaches(self, key: str) -> bool:
         """Tell whether a parameter can be reached over this line."""
-        return self._registers.reaches(key)
+        return self._params.reaches(key)
 
     def available(self, only: Collection[str] | None = None) -> list[str]:
         """Return the settings that the drive should have, all or some of them, in their order."""
-        every = [parameter.key for parameter in self._inverter.model.settings]
+        every = [parameter.key for parameter in self._state.model.settings]
         return [
             key
             for key in every
-            if (only is None or key in only) and self.reaches(key) and self._inverter.has(key)
+            if (only is None or key in only) and self.reaches(key) and self._state.has(key)
         ]
 
-    def admit(self, key: str, value: Value) -> Value:
+    def validate(self, key: str, value: Value) -> Value:
         """Return the same of one that may be set; nothing is asked of the drive."""
         exact = self.exact(key, value)
-        reason = why_not(key, self._inverter)
+        reason = write_forbidden(key, self._state)
         if reason is not None and self._values.get(key) != exact:
             raise not_changed(key, reason)
         return exact
@@ -187,14 +187,14 @@ class Parameters:
 
     async def read_now(self, only: Collection[str] | None = None) -> None:
         """Read every setting that the drive has, or only some."""
-        inverter = self._inverter
+        state = self._state
         self._keys = ()
         self._data, self._values = {}, {}
         keys = self.available(only)
         self._unread = self._total = len(keys)
         started = self._bus.now()
         try:
-            with self._bus.introducing(inverter.settings.address):
+            with self._bus.first_reading(state.settings.address):
                 await self._read_first(keys)
         except BaseException:
             self._data, self._values = {}, {}
@@ -204,7 +204,7 @@ class Parameters:
         self._keys = tuple(key for key in keys if key in self._data)
         if keys:
             took = self._bus.now() - started
-            inverter.tell(Severity.INFO, Cause.SETTINGS_READ, progress=self.progress, seconds=took)
+            state.tell(Severity.INFO, Cause.SETTINGS_READ, progress=self.progress, seconds=took)
 
     async def _read_first(self, keys: Sequence[str]) -> None:
         """Read what is not known yet; what is refused again and again is not there."""
@@ -223,7 +223,7 @@ class Parameters:
                 if self._bus.now() > tell_at:
                     pause *= 2
                     tell_at = self._bus.now() + pause
-                    self._inverter.tell(
+                    self._state.tell(
                         Severity.INFO, Cause.SETTINGS_BEING_READ, progress=self.progress
                     )
             refusals = refusals + 1 if len(refused) == len(keys) else 0
@@ -233,15 +233,15 @@ class Parameters:
     def _tell_unreadable(self, refused: Mapping[str, Refused]) -> None:
         cards: list[str] = []
         for key, error in refused.items():
-            if option := self._inverter.model[key].option:
+            if option := self._state.model[key].option:
                 cards.append(option)
             else:
-                self._inverter.tell(
+                self._state.tell(
                     Severity.WARNING, Cause.SETTING_UNREADABLE, key=key, error=str(error)
                 )
         if cards:
             options = ', '.join(dict.fromkeys(cards))
-            self._inverter.tell(
+            self._state.tell(
                 Severity.INFO, Cause.OPTIONS_MISSING, count=len(cards), options=options
             )
 
@@ -252,24 +252,24 @@ class Parameters:
                 await self._watch_round(sharers)
 
     async def _watch_round(self, sharers: Callable[[], int]) -> None:
-        inverter = self._inverter
+        state = self._state
         keys = self._keys
         # without these the drive could hardly be read any more, so one of them in a round will do
-        settings = followers(inverter.model)
+        settings = followers(state.model)
         rare = [key for key in keys if key in settings]
         self._rounds += 1
         skipped = {key for number, key in enumerate(rare) if (number + self._rounds) % len(rare)}
         due = [key for key in keys if key not in skipped and not self._cannot_change(key)]
         started = self._bus.now()
         for number, key in enumerate(due, start=1):
-            if inverter.connected and inverter.answering:
+            if state.connected and state.responsive:
                 try:
                     await self._read(key, once=True)
                 except Refused:
                     pass
                 except LinkError:
                     # the poll says so if the drive is lost
-                    inverter.missed()
+                    state.missed()
             # many drives on a line take their time, so that other things go on, too
             pace = _ROUND * sharers() / len(due)
             await self._bus.sleep(started + number * pace - self._bus.now())
@@ -281,9 +281,9 @@ class Parameters:
 
     def _cannot_change(self, key: str) -> bool:
         """Tell whether a running motor keeps it from being changed, or this firmware has none."""
-        seen = self._inverter.seen
-        barred = self._inverter.model[key].stopped and seen is not None and seen.driven
-        return barred or not self._inverter.has(key)
+        status = self._state.status
+        barred = self._state.model[key].stopped and status is not None and status.driven
+        return barred or not self._state.has(key)
 
     async def change_now(
         self, wanted: Mapping[str, Value], *, guarded: bool = True, told_as: Cause = Cause.CHANGED
@@ -294,18 +294,18 @@ class Parameters:
         :param guarded: false for what the driver sets itself.
         :param told_as: as what each change is reported.
         """
-        take = self.admit if guarded else self.exact
+        take = self.validate if guarded else self.exact
         exact = {key: take(key, value) for key, value in wanted.items()}
         if guarded:
             # what may not be changed was only admitted because the drive has it already
-            exact = {key: value for key, value in exact.items() if not why_not(key, self._inverter)}
+            exact = {key: value for key, value in exact.items() if not write_forbidden(key, self._state)}
         data = {key: self._data_of(key, value) for key, value in exact.items()}
         async with self._alone(data):
             await self._require_standstill(data)
             try:
                 changes = await self._writer.write(data)
             except ParameterError as error:
-                hint = after_change({key: exact[key] for key in error.left}, self._inverter.model)
+                hint = after_change({key: exact[key] for key in error.left}, self._state.model)
                 if hint is None:
                     raise
                 raise error.followed_by(hint) from error
@@ -314,10 +314,10 @@ class Parameters:
             for key in data:
                 self._learn(key, data[key], quiet=key in written)
         for change in changes:
-            self._inverter.tell(Severity.INFO, Report(told_as, change=change))
-        hint = after_change({change.key: change.new for change in changes}, self._inverter.model)
+            self._state.tell(Severity.INFO, Report(told_as, change=change))
+        hint = after_change({change.key: change.new for change in changes}, self._state.model)
         if hint is not None:
-            self._inverter.tell(Severity.WARNING, hint)
+            self._state.tell(Severity.WARNING, hint)
         return changes
 
     async def write_each_now(
@@ -329,7 +329,7 @@ class Parameters:
         :param wrote: told of each on the bus; what it raises ends the writing.
         """
         for key in wanted:
-            reason = why_not(key, self._inverter)
+            reason = write_forbidden(key, self._state)
             if reason is not None:
                 raise not_changed(key, reason)
 
@@ -346,12 +346,12 @@ class Parameters:
         self, keys: Collection[str]
     ) -> AsyncIterator[Callable[[], Awaitable[tuple[Change, ...]]]]:
         """Let the drive change parameters alone; yields what reads which of them it changed."""
-        before = {key: await self._registers.read_data(key, Priority.SERVICE) for key in keys}
+        before = {key: await self._params.read_data(key, Priority.SERVICE) for key in keys}
 
         async def changes() -> tuple[Change, ...]:
             found: list[Change] = []
             for key, old in before.items():
-                data = await self._registers.read_data(key, Priority.SERVICE)
+                data = await self._params.read_data(key, Priority.SERVICE)
                 if key in self._data:
                     self._learn(key, data, quiet=True)
                 if data != old:
@@ -360,7 +360,7 @@ class Parameters:
             return tuple(found)
 
         async with self._alone(keys):
-            with self._inverter.changing_itself():
+            with self._state.changing_itself():
                 yield changes
 
     #: The same for any thread.
@@ -381,7 +381,7 @@ class Parameters:
     def _data_of(self, key: str, value: Value) -> bytes:
         if self._values.get(key) == value:
             return self._data[key]
-        return self._registers.encode(key, value)
+        return self._params.encode(key, value)
 
     async def _require_standstill(self, data: Mapping[str, bytes]) -> None:
         new = [key for key, wanted in data.items() if self._data.get(key) != wanted]
@@ -396,7 +396,7 @@ class Parameters:
     async def refresh(self) -> Report:
         """Read every parameter again; the answer says which have changed."""
         before = self._values
-        keys = [key for key in self._keys if self._inverter.has(key)]
+        keys = [key for key in self._keys if self._state.has(key)]
         for key in keys:
             with contextlib.suppress(Refused):
                 # a person waits for it, so it goes by turns with the polls
@@ -405,7 +405,7 @@ class Parameters:
         return Report(Cause.SETTINGS_REFRESHED, count=len(keys), changed=tuple(changed))
 
     async def _read(self, key: str, *, once: bool, priority: Priority = Priority.REFRESH) -> None:
-        data = await self._registers.read_data(key, priority, once=once)
+        data = await self._params.read_data(key, priority, once=once)
         if key not in self._changing or key not in self._data:
             self._learn(key, data)
 
@@ -418,13 +418,13 @@ class Parameters:
         values = dict(self._values)
         before = values.pop(key, None)
         try:
-            values[key] = self._registers.value(key, data)
+            values[key] = self._params.value(key, data)
         except ValueError as error:
             # and nobody may rely on what it was before
-            self._inverter.tell(Severity.WARNING, Cause.NOT_POSSIBLE, why=str(error))
+            self._state.tell(Severity.WARNING, Cause.NOT_POSSIBLE, why=str(error))
         self._values = values
         if not quiet and before is not None and key in values:
-            self._tell_news(Change(key, before, values[key], self._inverter.model[key].unit))
+            self._tell_news(Change(key, before, values[key], self._state.model[key].unit))
         try:
             self._told((key,))
         except Exception:
@@ -432,15 +432,15 @@ class Parameters:
 
     def _tell_news(self, change: Change) -> None:
         if not self._wanted.tell_drift(change.key):
-            self._inverter.tell(Severity.INFO, Cause.CHANGED_AT_DRIVE, change=change)
+            self._state.tell(Severity.INFO, Cause.CHANGED_AT_DRIVE, change=change)
 
 
 class DesiredConfig:
     """What the settings of one drive shall be; used on the bus, readable from anywhere."""
 
-    def __init__(self, parameters: Parameters, inverter: DriveState) -> None:
+    def __init__(self, parameters: Parameters, state: DriveState) -> None:
         self._parameters = parameters
-        self._inverter = inverter
+        self._state = state
         self._values: dict[str, Value] = {}
 
     @property
@@ -461,7 +461,7 @@ class DesiredConfig:
         """Say that a parameter is not as wanted; false if it is."""
         for drift in self.drift:
             if drift.key == key:
-                self._inverter.tell(Severity.WARNING, _not_as_wanted(drift))
+                self._state.tell(Severity.WARNING, _not_as_wanted(drift))
                 return True
         return False
 
@@ -471,18 +471,18 @@ class DesiredConfig:
 
         What cannot be written is logged, and stays reported as drift.
         """
-        inverter = self._inverter
+        state = self._state
         here = {key: value for key, value in wanted.items() if key in self._parameters.data}
         self._values = {key: self._parameters.exact(key, value) for key, value in here.items()}
         missing = [key for key in wanted if key not in here]
         if missing:
-            inverter.tell(Severity.WARNING, Cause.WANTED_BUT_MISSING, keys=tuple(missing))
+            state.tell(Severity.WARNING, Cause.WANTED_BUT_MISSING, keys=tuple(missing))
         drifts = self.drift
         while drifts:
             refused: list[ParameterError] = []
             for drift in drifts:
                 if not write:
-                    inverter.tell(Severity.WARNING, _not_as_wanted(drift))
+                    state.tell(Severity.WARNING, _not_as_wanted(drift))
                     continue
                 try:
                     await self._parameters.change_now(
@@ -493,7 +493,7 @@ class DesiredConfig:
             if len(refused) == len(drifts):
                 for refusal in refused:
                     why = refusal.report
-                    inverter.tell(Severity.ERROR, Cause.WANTED_BUT_REFUSED, why=why)
+                    state.tell(Severity.ERROR, Cause.WANTED_BUT_REFUSED, why=why)
             # values that bound each other may stand in any order
             drifts = self.drift if write and len(refused) < len(drifts) else ()
 

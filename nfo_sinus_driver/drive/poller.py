@@ -72,15 +72,15 @@ class Poller:
 
     def __init__(
         self,
-        inverter: DriveState,
+        state: DriveState,
         setpoint: Setpoint,
         controller: Controller | None,
         connect: Callable[[], Coroutine[Any, Any, None]],
     ) -> None:
-        self._bus = inverter.bus
-        self._unit = inverter.settings.address
-        self._inverter = inverter
-        self._registers = inverter.registers
+        self._bus = state.bus
+        self._unit = state.settings.address
+        self._state = state
+        self._params = state.params
         self._setpoint = setpoint
         self._controller = controller
         self._connect = connect
@@ -88,7 +88,7 @@ class Poller:
         #: Poll at full rate.
         self.active = False
         #: The newest poll.
-        self.snapshot = take_snapshot(inverter, setpoint, None)
+        self.snapshot = take_snapshot(state, setpoint, None)
         #: Since when every poll failed, although the drive may have answered.
         self._failing_since = math.inf
         #: How often in a row it could not be connected to.
@@ -105,8 +105,8 @@ class Poller:
         #: The newest status that has been judged.
         self._judged: InverterStatus | None = None
         self._told_fault = 0
-        self._conditions = Conditions(inverter)
-        inverter.on_missed(self._look_soon)
+        self._conditions = Conditions(state)
+        state.on_missed(self._look_soon)
 
     @property
     def begun(self) -> bool:
@@ -134,20 +134,20 @@ class Poller:
         once. On a full line that may wait for its turn to read something else, so what may have to
         stop the motor is looked at beside it.
         """
-        inverter, registers = self._inverter, self._registers
-        if self._task is None or not inverter.connected or not reply.data:
+        state, params = self._state, self._params
+        if self._task is None or not state.connected or not reply.data:
             return
-        place = registers.address(inverter.word_key)
+        place = params.address(state.word_key)
         if self._bus.answer(self._task, self._unit, place, reply):
             return
         # what cannot be counts for nothing: the next poll reads it again
-        if not registers.can_be(inverter.word_key, reply.data):
+        if not params.can_be(state.word_key, reply.data):
             return
-        word = inverter.status_word(reply.data)
-        if inverter.seen is None or word == inverter.seen.word:
+        word = state.status_word(reply.data)
+        if state.status is None or word == state.status.word:
             return
         self._told = reply
-        if self._alarming(inverter.told_by_word(word, reply.arrived)):
+        if self._alarming(state.status_of_word(word, reply.arrived)):
             self._look_beside()
         else:
             self.wake()
@@ -155,7 +155,7 @@ class Poller:
     def _look_beside(self) -> None:
         async def look() -> None:
             try:
-                await self._look()
+                await self._read_status()
             except Interrupted as error:
                 # told once only, so that nobody else would find out
                 self._begin_anew(error)
@@ -168,7 +168,7 @@ class Poller:
 
     def restarted(self) -> None:
         """Take note that the drive has started anew: it is lost until it is connected to again."""
-        if self._task is None or not self._inverter.connected:
+        if self._task is None or not self._state.connected:
             return
         self._begin_anew(DriveError(Cause.RESTARTED))
 
@@ -192,7 +192,7 @@ class Poller:
 
     def _look_soon(self) -> None:
         """Find out at once whether a drive is there that did not answer somebody else."""
-        if self._inverter.connected:
+        if self._state.connected:
             self.wake()
 
     def read_mode_soon(self) -> None:
@@ -207,7 +207,7 @@ class Poller:
         self._failures = 0
         self._complaint = None
         self._told = self._judged = None
-        self._inverter.forget_polled()
+        self._state.forget_polled()
 
     async def _poll_for_ever(self) -> None:
         polled_at = -math.inf
@@ -215,12 +215,12 @@ class Poller:
             started = self._bus.now()
             due = started >= polled_at + self._period
             try:
-                if not self._inverter.connected:
+                if not self._state.connected:
                     await self._connect()
                 elif due:
                     await self._poll()
                 else:
-                    await self._look()
+                    await self._read_status()
                 self._failing_since = math.inf
             except (LinkError, DriveError) as error:
                 self._failed(error)
@@ -228,19 +228,19 @@ class Poller:
                 # a drive that is no longer watched must not go on running
                 self._failed(DriveError(Cause.DRIVER_ERROR, error=repr(error)))
             if due:
-                if self._inverter.connected and self.active and polled_at > 0:
+                if self._state.connected and self.active and polled_at > 0:
                     self._bus.recorder.cycle(self._unit, started - polled_at)
                 polled_at = started
             await self._bus.sleep(self._pause(polled_at))
 
     def _pause(self, polled_at: float) -> float:
         """Return how long to wait until the drive is asked again, s."""
-        inverter = self._inverter
-        if not inverter.connected:
+        state = self._state
+        if not state.connected:
             # a drive that stays silent costs its neighbours less and less
             pause = min(_RECONNECT_PERIOD * self._failures, _SLOWEST_RECONNECT)
             heard_at = self._bus.silences.heard_at(self._unit)
-            strikes_in = heard_at + inverter.timeout.seconds - self._bus.now()
+            strikes_in = heard_at + state.timeout.seconds - self._bus.now()
             if strikes_in > 0:
                 pause = min(pause, max(strikes_in - _LAST_CHANCE, _SHORTEST_PAUSE))
             return pause
@@ -248,12 +248,12 @@ class Poller:
         # however seldom somebody wants to read the status, a motor that runs is watched, and so is
         # one whose run command may still stand, for a fault that ends would let it go on
         controller = self._controller
-        watched = controller is not None and (controller.stopping or self._setpoint.armed)
+        watched = controller is not None and (controller.stopping or self._setpoint.following)
         return min(pause, _WATCH_PERIOD) if watched else pause
 
     @property
     def _period(self) -> float:
-        settings = self._inverter.settings
+        settings = self._state.settings
         rate = settings.poll_rate
         if settings.idle_poll_rate and self._is_idle:
             rate = settings.idle_poll_rate
@@ -262,8 +262,8 @@ class Poller:
             period = _INACTIVE_PERIOD
         if self.yields:
             period = max(period, _YIELDING_PERIOD)
-        inverter = self._inverter
-        for patience in (inverter.timeout.seconds, inverter.plc_time):
+        state = self._state
+        for patience in (state.timeout.seconds, state.plc_time):
             if patience:
                 period = min(period, patience * _KEEP_ALIVE_SHARE)
         return period
@@ -271,29 +271,29 @@ class Poller:
     @property
     def yields(self) -> bool:
         """It leaves the line to one whose settings nobody knows yet: that takes many reads."""
-        return self._bus.introduces_another(self._unit) and self._is_idle
+        return self._bus.reads_another_first(self._unit) and self._is_idle
 
     @property
     def _is_idle(self) -> bool:
         """The motor stands, and nobody has begun anything that may change that."""
-        controller, seen = self._controller, self._inverter.seen
+        controller, status = self._controller, self._state.status
         commanded = controller is not None and (controller.commanded or controller.stopping)
-        if commanded or seen is None or seen.driven:
+        if commanded or status is None or status.driven:
             return False
         # a motor that coasts is not driven; what is not measured is NaN, and no greater than 0
-        return not any(abs(value) > 0 for value in (self._inverter.frequency, self._inverter.speed))
+        return not any(abs(value) > 0 for value in (self._state.frequency, self._state.speed))
 
     @property
     def _silent_for_long(self) -> bool:
         """It has answered nobody for so long that it is lost."""
         silent = self._bus.silences.lasts(self._unit, self._bus.now())
-        return silent >= self._inverter.settings.lost_after
+        return silent >= self._state.settings.lost_after
 
     @property
     def _mode_is_due(self) -> bool:
         """The control mode is to be read again; it can only change while the motor stands."""
-        inverter = self._inverter
-        stands = self._setpoint.armed and 0 in (inverter.frequency, inverter.speed)
+        state = self._state
+        stands = self._setpoint.following and 0 in (state.frequency, state.speed)
         period = max(_MODE_PERIOD, _MODE_TURNS * self._turn)
         return stands or self._bus.now() - self._mode_read_at > period
 
@@ -308,24 +308,24 @@ class Poller:
         controller = self._controller
         if controller is not None and controller.changing:
             return 0.0
-        if self._inverter.silent_since_look:
+        if self._state.missed_since_status:
             # it may have been switched off and on
             return 0.0
         return self._slow_period
 
-    def _alarming(self, seen: InverterStatus) -> bool:
+    def _alarming(self, status: InverterStatus) -> bool:
         """Tell whether a status may have to stop the motor."""
-        return self._controller is not None and self._controller.alarmed_by(seen)
+        return self._controller is not None and self._controller.alarmed_by(status)
 
-    async def _look(self) -> InverterStatus:
-        inverter = self._inverter
+    async def _read_status(self) -> InverterStatus:
+        state = self._state
 
         async def look() -> InverterStatus:
             told, self._told = self._told, None
-            if told is not None and inverter.seen and told.arrived <= inverter.seen.at:
+            if told is not None and state.status and told.arrived <= state.status.at:
                 # somebody else has looked since
                 told = None
-            return await inverter.look(
+            return await state.read_status(
                 Priority.POLL,
                 once=True,
                 alarming=self._alarming,
@@ -334,65 +334,65 @@ class Poller:
             )
 
         # both words of a status are of one moment, so they are repeated together
-        seen = await self._insist(look)
-        inverter.require_fresh(seen)
-        if self._judged is not None and seen.at < self._judged.at:
+        status = await self._insist(look)
+        state.require_fresh(status)
+        if self._judged is not None and status.at < self._judged.at:
             # a newer one has been judged beside it
             return self._judged
-        self._judged = seen
-        inverter.looked_at()
-        told = self._controller is not None and self._controller.judge(seen)
-        self._tell_fault(seen, told)
-        self._conditions.take(seen)
-        return seen
+        self._judged = status
+        state.status_read()
+        told = self._controller is not None and self._controller.judge(status)
+        self._tell_fault(status, told)
+        self._conditions.take(status)
+        return status
 
     async def _poll(self) -> None:
-        inverter = self._inverter
+        state = self._state
         last = self.snapshot.actual
-        seen = await self._look()
+        status = await self._read_status()
         if self._mode_is_due:
             self._mode_read_at = self._bus.now()
-            before = inverter.control_mode
-            mode = await self._insist(lambda: inverter.read_control_mode(Priority.POLL, once=True))
+            before = state.control_mode
+            mode = await self._insist(lambda: state.read_control_mode(Priority.POLL, once=True))
             if mode != before and self._controller:
                 # before it is told: a set-point never has the unit of another mode
-                self._controller.judge(seen)
-        actual = _ACTUAL.get(inverter.control_mode)
+                self._controller.judge(status)
+        actual = _ACTUAL.get(state.control_mode)
         steady = True
         if actual is not None:
             now = await self._measure(actual)
             steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
         for role in _BASIC:
-            age = self._bus.now() - inverter.last_polled(role).at
+            age = self._bus.now() - state.last_polled(role).at
             if role is not actual and (age >= self._slow_period or not steady):
                 await self._measure(role)
-        self._publish(seen)
+        self._publish(status)
 
-    def _tell_fault(self, seen: InverterStatus, told: bool) -> None:
+    def _tell_fault(self, status: InverterStatus, told: bool) -> None:
         """Say on change that a fault is active, unless who ended a ride because of it has told."""
-        code = seen.code if seen.faulted else 0
+        code = status.code if status.faulted else 0
         if code and code != self._told_fault and not told:
-            fault = explain_fault(self._inverter, seen)
-            self._inverter.tell(Severity.ERROR, Cause.FAULT_APPEARED, fault=fault)
+            fault = explain_fault(self._state, status)
+            self._state.tell(Severity.ERROR, Cause.FAULT_APPEARED, fault=fault)
         self._told_fault = code
 
     async def _measure(self, role: Role) -> float:
         """Measure a value anew; NaN if it is not to be had from a drive that answers."""
-        inverter = self._inverter
-        seen = inverter.seen
-        if role is Role.ACTUAL_FREQUENCY and seen and not math.isnan(seen.frequency):
+        state = self._state
+        status = state.status
+        if role is Role.ACTUAL_FREQUENCY and status and not math.isnan(status.frequency):
             # it came with the status
-            return inverter.frequency
-        asked_at = self._bus.now()
+            return state.frequency
+        requested_at = self._bus.now()
         value = await self._read_measured(role)
-        inverter.polled(role, value)
-        if role in inverter.model.roles:
-            self._turn = self._bus.now() - asked_at
+        state.polled(role, value)
+        if role in state.model.roles:
+            self._turn = self._bus.now() - requested_at
         return value
 
     async def _read_measured(self, role: Role) -> float:
         try:
-            return await self._insist(lambda: self._inverter.measure(role, Priority.POLL))
+            return await self._insist(lambda: self._state.measure(role, Priority.POLL))
         except (PortError, Interrupted):
             # told once only: the status that is read next would find a drive that somebody stopped
             raise
@@ -417,31 +417,31 @@ class Poller:
             except (PortError, Refused, Interrupted, NoData):
                 raise
             except LinkError:
-                self._inverter.unanswered()
+                self._state.unanswered()
                 now = self._bus.now()
                 failing_since = min(failing_since, now)
-                in_vain = now - failing_since >= self._inverter.settings.lost_after
+                in_vain = now - failing_since >= self._state.settings.lost_after
                 if self._silent_for_long or in_vain:
                     raise
                 self._bus.recorder.retry(self._unit)
             else:
-                self._inverter.answered()
+                self._state.answered()
                 self._setpoint.answered()
                 return answer
 
     def _failed(self, error: LinkError | DriveError) -> None:
-        inverter, now = self._inverter, self._bus.now()
-        inverter.unanswered()
-        if not inverter.connected:
+        state, now = self._state, self._bus.now()
+        state.unanswered()
+        if not state.connected:
             self._failures += 1
             if isinstance(error, DriveError) and error.report != self._complaint:
                 # what keeps the drive from being used is said once
                 self._complaint = error.report
-                inverter.tell(Severity.ERROR, error.report)
+                state.tell(Severity.ERROR, error.report)
             return
         self._failing_since = min(self._failing_since, now)
         # one that answers, but tells no status, cannot be watched either
-        unwatched = now - self._failing_since >= inverter.settings.lost_after
+        unwatched = now - self._failing_since >= state.settings.lost_after
         # and these have been waited out, or cannot be
         at_once = isinstance(error, (PortError, NoData, Interrupted))
         at_once = at_once or _is(error, Cause.OLD_DATA)
@@ -450,29 +450,29 @@ class Poller:
 
     def _lose(self, error: LinkError | DriveError) -> None:
         """Give the drive up until it can be connected to again, and say why."""
-        inverter = self._inverter
+        state = self._state
         self._bus.cancel(self._urgent)
-        inverter.lost()
-        why = explain_failure(error, inverter)
+        state.lost()
+        why = explain_failure(error, state)
         self._bus.recorder.cycle(self._unit, math.nan)
         in_use = self._controller is not None and self._controller.lost()
         cause = Cause.LOST_IN_USE if in_use else Cause.LOST
-        inverter.tell(Severity.ERROR, cause, why=why)
+        state.tell(Severity.ERROR, cause, why=why)
         try:
             self._publish(None)
         except Exception:
             # a mistake of who listens must not end the watch
             _log.exception('the loss of the drive could not be told')
 
-    def _publish(self, seen: InverterStatus | None) -> None:
-        inverter = self._inverter
-        if seen is not None and inverter.seen is not None and inverter.seen.at > seen.at:
+    def _publish(self, status: InverterStatus | None) -> None:
+        state = self._state
+        if status is not None and state.status is not None and state.status.at > status.at:
             # a command has looked since: with it the drive may be enabled, its fault acknowledged
-            seen = inverter.seen
-        frequency, speed = (inverter.last_polled(role) for role in _BASIC)
-        actual = inverter.last_polled(_ACTUAL.get(inverter.control_mode)).value
-        self.snapshot = take_snapshot(inverter, self._setpoint, seen, frequency, speed, actual)
-        inverter.listener.on_snapshot(self.snapshot)
+            status = state.status
+        frequency, speed = (state.last_polled(role) for role in _BASIC)
+        actual = state.last_polled(_ACTUAL.get(state.control_mode)).value
+        self.snapshot = take_snapshot(state, self._setpoint, status, frequency, speed, actual)
+        state.listener.on_snapshot(self.snapshot)
 
 
 def _is(error: Exception, cause: Cause) -> bool:
@@ -480,31 +480,31 @@ def _is(error: Exception, cause: Cause) -> bool:
 
 
 def take_snapshot(
-    inverter: DriveState,
+    state: DriveState,
     setpoint: Setpoint,
-    seen: InverterStatus | None,
+    status: InverterStatus | None,
     frequency: Measured = NOT_MEASURED,
     speed: Measured = NOT_MEASURED,
     actual: float = NAN,
 ) -> Snapshot:
     """Return the snapshot of a poll; without a status while the drive is not connected."""
-    standing = (inverter.connected, setpoint.armed, inverter.settings.method)
-    if seen is None:
-        return Snapshot(inverter.bus.now(), *standing)
-    code = seen.listed
+    standing = (state.connected, setpoint.following, state.settings.method)
+    if status is None:
+        return Snapshot(state.bus.now(), *standing)
+    code = status.listed
     return Snapshot(
-        seen.at,
+        status.at,
         *standing,
-        status=seen,
-        control_mode=inverter.control_mode,
-        unit=inverter.unit,
+        status=status,
+        control_mode=state.control_mode,
+        unit=state.unit,
         setpoint=setpoint.commanded,
         setpoint_age=setpoint.age,
         setpoint_clamped=setpoint.clamped,
-        text=inverter.text_of(seen.code),
+        text=state.text_of(status.code),
         description=code.description,
         remedy=code.remedy,
-        kind=seen.kind,
+        kind=status.kind,
         requires_ack=code.requires_ack,
         frequency=frequency.value,
         frequency_at=frequency.at,

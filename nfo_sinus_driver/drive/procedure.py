@@ -39,9 +39,9 @@ class Procedures:
     :raises DriveError: the drive cannot be had, has no such procedure, or does not confirm.
     """
 
-    def __init__(self, inverter: DriveState, controller: Controller | None) -> None:
-        self._bus = inverter.bus
-        self._inverter = inverter
+    def __init__(self, state: DriveState, controller: Controller | None) -> None:
+        self._bus = state.bus
+        self._state = state
         self._controller = controller
 
     @property
@@ -58,13 +58,13 @@ class Procedures:
 
     def require(self, procedure: Procedure | Reset) -> None:
         """See to it that a procedure may begin."""
-        controller, inverter = self.controller, self._inverter
-        if not inverter.connected:
-            raise DriveError(Cause.NOT_CONNECTED, address=inverter.settings.address)
-        require_known(procedure, inverter.model)
-        profile = inverter.model.profile
+        controller, state = self.controller, self._state
+        if not state.connected:
+            raise DriveError(Cause.NOT_CONNECTED, address=state.settings.address)
+        require_known(procedure, state.model)
+        profile = state.model.profile
         have = profile.methods_with(procedure)
-        if inverter.settings.method not in have:
+        if state.settings.method not in have:
             raise DriveError(
                 Cause.OTHER_METHOD_NEEDED,
                 what=procedure.value,
@@ -123,26 +123,26 @@ class Procedures:
             await self._bus.sleep(_BUSY_PERIOD)
 
     async def _take(self, access: ExclusiveAccess) -> Holder:
-        controller, inverter, what = self.controller, self._inverter, access.what
-        seen = await inverter.look(Priority.SERVICE)
-        require_no_fault(inverter, seen)
+        controller, state, what = self.controller, self._state, access.what
+        status = await state.read_status(Priority.SERVICE)
+        require_no_fault(state, status)
         found = await controller.method.holder(Priority.SERVICE)
         if found is Holder.INHIBITED:
-            name = inverter.model[inverter.model.key(Role.CONTROL_SOURCE)].name
-            raise DriveError(inverter.report(Cause.CONTROL_INHIBITED, what=what, name=name))
-        if seen.driven:
-            raise DriveError(inverter.report(Cause.MOTOR_RUNS, what=what))
+            name = state.model[state.model.key(Role.CONTROL_SOURCE)].name
+            raise DriveError(state.report(Cause.CONTROL_INHIBITED, what=what, name=name))
+        if status.driven:
+            raise DriveError(state.report(Cause.MOTOR_RUNS, what=what))
         if found not in (Holder.NOBODY, Holder.BUS):
-            raise DriveError(inverter.report(Cause.CONTROLLED_LOCALLY, what=what))
+            raise DriveError(state.report(Cause.CONTROLLED_LOCALLY, what=what))
         access.require_wanted()
-        control_mode = inverter.control_mode or await inverter.read_control_mode()
+        control_mode = state.control_mode or await state.read_control_mode()
         await controller.take_control(control_mode)
         deadline = self._bus.now() + drive_state.TIMEOUT
-        while not (await inverter.look(Priority.SERVICE)).standby:
+        while not (await state.read_status(Priority.SERVICE)).standby:
             if self._bus.now() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
                     await self._give_back(found)
-                raise DriveError(inverter.report(Cause.NO_STANDBY, what=what))
+                raise DriveError(state.report(Cause.NO_STANDBY, what=what))
             # no manual says that a drive has forgotten what it was told before
             await controller.method.stop(control_mode)
             await self._bus.sleep(drive_state.LOOK_PERIOD)

@@ -33,11 +33,11 @@ class Scales:
 
     def __init__(
         self,
-        registers: ParameterAccess,
+        params: ParameterAccess,
         has: Callable[[str], bool],
         chosen: Mapping[Role, float],
     ) -> None:
-        self._registers = registers
+        self._params = params
         self._has = has
         self._chosen = {
             role: Fraction(str(value)) / FACTORY[role] for role, value in chosen.items()
@@ -62,14 +62,14 @@ class Scales:
         return self.speed != before
 
     async def _read_speed(self) -> Fraction:
-        model = self._registers.model
+        model = self._params.model
         roles = (Role.SPEED_SCALE_NUMERATOR, Role.SPEED_SCALE_DENOMINATOR)
         keys = [model.key(role) for role in roles]
         if not all(map(self._has, keys)):
             return _ONE
         try:
             above, below = [
-                int(await self._registers.read_number(key, Priority.SERVICE)) for key in keys
+                int(await self._params.read_number(key, Priority.SERVICE)) for key in keys
             ]
         except Refused:
             return _ONE
@@ -77,7 +77,7 @@ class Scales:
         return Fraction(above, below) if above > 0 and below > 0 else _ONE
 
     def _apply(self) -> None:
-        model = self._registers.model
+        model = self._params.model
         scales = {}
         for role, factor in {**self._chosen, Role.ACTUAL_SPEED: self.speed}.items():
             key = model.key(role)
@@ -88,4 +88,4 @@ class Scales:
             for parameter in model.values()
             if parameter.scale in scales
         }
-        self._registers.rescale({**self._dialect, **found})
+        self._params.rescale({**self._dialect, **found})

@@ -58,10 +58,10 @@ class StopSequence:
     """
 
     def __init__(
-        self, inverter: DriveState, method: Commands, report: Callable[[ControlEvent], None]
+        self, state: DriveState, method: Commands, report: Callable[[ControlEvent], None]
     ) -> None:
-        self._bus = inverter.bus
-        self._inverter = inverter
+        self._bus = state.bus
+        self._state = state
         self._method = method
         self._report = report
         #: What removes the run command, while there may be one that nobody wants any more.
@@ -158,7 +158,7 @@ class StopSequence:
             if self.blocked_by_fault:
                 return
             # who waits for a drive that is not there keeps others waiting, and learns no more
-            lost = patience is None and not self._inverter.connected and self._outcome is not None
+            lost = patience is None and not self._state.connected and self._outcome is not None
             if lost or self._bus.now() > deadline:
                 raise DriveError(Cause.STOP_UNCONFIRMED, why=self._unconfirmed)
         if task is not None and task.future.exception() is not None:
@@ -179,11 +179,11 @@ class StopSequence:
                 complain_at = self._bus.now() + pause
                 why = self._unconfirmed
                 if stands:
-                    standing = self._inverter.report(Cause.CANNOT_STOP_BUT_STANDS, why=why)
-                    self._inverter.tell(Severity.WARNING, standing)
+                    standing = self._state.report(Cause.CANNOT_STOP_BUT_STANDS, why=why)
+                    self._state.tell(Severity.WARNING, standing)
                 else:
-                    by = self._inverter.model.profile.enable_input
-                    self._inverter.tell(
+                    by = self._state.model.profile.enable_input
+                    self._state.tell(
                         Severity.ERROR, Cause.CANNOT_STOP, why=why, enable_input=by
                     )
                 stood = stands
@@ -191,35 +191,35 @@ class StopSequence:
         self._task = None
         self._report_end()
         if pause:
-            self._inverter.tell(Severity.INFO, self._inverter.report(Cause.STOP_CONFIRMED_LATE))
+            self._state.tell(Severity.INFO, self._state.report(Cause.STOP_CONFIRMED_LATE))
 
     @property
     def _stands(self) -> bool:
         """The drive has just shown that the motor stands, and no run command."""
-        seen = self._inverter.seen
-        if seen is None or self._bus.now() - seen.at > _RETRY_PERIOD:
+        status = self._state.status
+        if status is None or self._bus.now() - status.at > _RETRY_PERIOD:
             return False
         # a code that is not in the manual shows nothing
-        shows = seen.state is not State.UNKNOWN or seen.standby
-        return shows and not (seen.driven or seen.runs)
+        shows = status.state is not State.UNKNOWN or status.standby
+        return shows and not (status.driven or status.runs)
 
     async def _fault_gone(self) -> None:
         """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
         while self.blocked_by_fault:
             await self._bus.sleep(_RETRY_PERIOD)
-            seen = self._inverter.seen
-            if not self._inverter.connected:
+            status = self._state.status
+            if not self._state.connected:
                 # one that is only being connected to has no polls yet
                 return
-            if seen is not None and not seen.faulted:
-                if seen.runs_by_bus:
-                    started = self._inverter.report(Cause.STARTED_AFTER_FAULT)
-                    self._inverter.tell(Severity.WARNING, started)
+            if status is not None and not status.faulted:
+                if status.runs_by_bus:
+                    started = self._state.report(Cause.STARTED_AFTER_FAULT)
+                    self._state.tell(Severity.WARNING, started)
                 return
 
     async def _rest(self) -> None:
         """Let some time pass before the next attempt, but none after one that nobody heard."""
-        if not self._inverter.connected:
+        if not self._state.connected:
             await self._bus.sleep(_LOST_RETRY_PERIOD)
         elif self._is_lost or self._bus.now() >= self._due:
             # what helps neither at once nor in a while must not keep the line from all others
@@ -232,7 +232,7 @@ class StopSequence:
     @property
     def _is_lost(self) -> bool:
         """The drive has been silent for so long that the next poll gives it up."""
-        settings = self._inverter.settings
+        settings = self._state.settings
         silent = self._bus.silences.lasts(settings.address, self._bus.now())
         return silent >= settings.lost_after
 
@@ -261,7 +261,7 @@ class StopSequence:
             self._report(ControlEvent.STOPPED)
 
     async def _try_once(self) -> _Outcome:
-        control_mode = self._inverter.control_mode
+        control_mode = self._state.control_mode
         reasons = self._reasons
         failure: LinkError | None = None
         try:
@@ -278,88 +278,88 @@ class StopSequence:
             self._unheard += 1
             # among late answers a refusal is not believed, until something else was answered
             if isinstance(error, DamagedAnswer) and self._outcome is _Outcome.UNHEARD:
-                await self._inverter.look(Priority.LOOK, once=True)
+                await self._state.read_status(Priority.LOOK, once=True)
             if self._unheard < _UNHEARD_BEFORE_FORCE:
                 raise
             failure = error
         # one that answers nothing at all ends it here
-        seen = await self._inverter.look(Priority.LOOK, once=True)
+        status = await self._state.read_status(Priority.LOOK, once=True)
         if failure is None:
-            seen = await self._newer(seen, reasons, self._told_at)
-        if isinstance(failure, Refused) and seen.faulted and not seen.runs_by_bus:
+            status = await self._newer(status, reasons, self._told_at)
+        if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
             if await self._method.remove(control_mode) is Removal.COMMAND:
                 return _Outcome.CONFIRMED
             self._unconfirmed = report_of(failure)
             return _Outcome.BLOCKED_BY_FAULT
-        unconfirmed = self._why_not(seen, failure)
-        if unconfirmed is not None and self._needs_force(seen, failure):
+        unconfirmed = self._why_not(status, failure)
+        if unconfirmed is not None and self._needs_force(status, failure):
             unconfirmed = await self._force(control_mode, reasons, unconfirmed)
         if unconfirmed is None:
             return _Outcome.CONFIRMED
         self._unconfirmed = unconfirmed
         return _Outcome.UNCONFIRMED
 
-    def _needs_force(self, seen: InverterStatus, failure: LinkError | None) -> bool:
+    def _needs_force(self, status: InverterStatus, failure: LinkError | None) -> bool:
         """Tell whether an ordinary stop will not do: refused again, ignored, or without effect."""
-        if seen.local:
+        if status.local:
             return False
         if isinstance(failure, Refused):
             # once may have been a moment at which it could not
-            return self._refusals > 1 and (seen.from_bus or seen.driven)
+            return self._refusals > 1 and (status.from_bus or status.driven)
         if failure is not None:
             return True
         shows_at = min(self._told_at + _RAMP_SHOWS_BY, self._force_at)
         # what a PLC has from before says nothing of a motor that may well be ramping down
-        return seen.at > self._told_at and self._bus.now() >= shows_at
+        return status.at > self._told_at and self._bus.now() >= shows_at
 
     async def _force(self, control_mode: str, reasons: int, why: Report) -> Report | None:
         """Stop by all that is left [C126]; return what keeps that from being confirmed."""
         obeyed = await self._method.force_stop(control_mode)
         told_at = self._bus.now()
-        seen = await self._inverter.look(Priority.LOOK, once=True)
+        status = await self._state.read_status(Priority.LOOK, once=True)
         if not obeyed:
             return why
         self._told_at = min(self._told_at, told_at)
-        unconfirmed = self._why_not(await self._newer(seen, reasons, told_at), None)
+        unconfirmed = self._why_not(await self._newer(status, reasons, told_at), None)
         if unconfirmed is None:
             self.forced = True
-            self._inverter.tell(Severity.WARNING, self._inverter.report(Cause.STOP_FORCED, why=why))
+            self._state.tell(Severity.WARNING, self._state.report(Cause.STOP_FORCED, why=why))
         return unconfirmed
 
-    async def _newer(self, seen: InverterStatus, reasons: int, told_at: float) -> InverterStatus:
+    async def _newer(self, status: InverterStatus, reasons: int, told_at: float) -> InverterStatus:
         """
         Look until a status is from after the stop: a PLC shows for a while what was before.
 
         :param reasons: those that the stop was for; with a new one it has to be written again.
         """
         until = self._bus.now() + _RETRY_PERIOD
-        while self._reasons == reasons and seen.at <= told_at:
+        while self._reasons == reasons and status.at <= told_at:
             if self._bus.now() > until:
                 break
             await self._bus.sleep(drive_state.LOOK_PERIOD)
-            seen = await self._inverter.look(Priority.LOOK, once=True)
-        return seen
+            status = await self._state.read_status(Priority.LOOK, once=True)
+        return status
 
-    def _why_not(self, seen: InverterStatus, refusal: LinkError | None) -> Report | None:
+    def _why_not(self, status: InverterStatus, refusal: LinkError | None) -> Report | None:
         """Return what keeps a stop from being confirmed; ``None`` if nothing does."""
-        if seen.tuning and refusal:
-            return self._inverter.report(Cause.TUNING_REFUSES, error=str(refusal))
-        if seen.tuning:
-            return self._inverter.report(Cause.TUNING_ENERGISES)
-        if refusal and not seen.local:
+        if status.tuning and refusal:
+            return self._state.report(Cause.TUNING_REFUSES, error=str(refusal))
+        if status.tuning:
+            return self._state.report(Cause.TUNING_ENERGISES)
+        if refusal and not status.local:
             return report_of(refusal)
-        if refusal is None and seen.at < self._told_at:
+        if refusal is None and status.at < self._told_at:
             # a PLC whose data stand still goes on showing what was before
             return _NO_ANSWER_YET
-        keeps_running = seen.keeps_running_since(self._told_at)
-        return self._inverter.report(Cause.DRIVE_SAYS) if keeps_running else None
+        keeps_running = status.keeps_running_since(self._told_at)
+        return self._state.report(Cause.DRIVE_SAYS) if keeps_running else None
 
 
 class StartSequence:
     """Starts the motor of one drive, or says in a :class:`DriveError` why not; on the bus alone."""
 
-    def __init__(self, inverter: DriveState, method: Commands) -> None:
-        self._inverter = inverter
+    def __init__(self, state: DriveState, method: Commands) -> None:
+        self._state = state
         self._method = method
         #: When the start has to be over, s of the clock of the bus.
         self._deadline = math.inf
@@ -370,20 +370,20 @@ class StartSequence:
 
         :returns: the control mode, and what its set-points may be.
         """
-        inverter = self._inverter
-        seen = await inverter.look(Priority.SERVICE)
-        require_no_fault(inverter, seen)
-        control_mode = await inverter.read_control_mode()
-        expected = inverter.settings.expected_control_mode
+        state = self._state
+        status = await state.read_status(Priority.SERVICE)
+        require_no_fault(state, status)
+        control_mode = await state.read_control_mode()
+        expected = state.settings.expected_control_mode
         if expected and control_mode != expected:
-            key = inverter.model.key(Role.CONTROL_MODE)
+            key = state.model.key(Role.CONTROL_MODE)
             raise DriveError(
                 Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
             )
         await self._method.require_startable()
         # it may have been changed since the drive was connected, at its keypad
-        await read_scales(inverter)
-        return control_mode, await read_limits(inverter, control_mode)
+        await read_scales(state)
+        return control_mode, await read_limits(state, control_mode)
 
     async def start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
         """
@@ -393,42 +393,42 @@ class StartSequence:
         """
         await self.take_control(control_mode)
         await self._await_status(lambda now: now.from_bus)
-        if self._inverter.settings.follows_setpoints:
+        if self._state.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await prepare()
         await self._method.run(self._await_start)
-        run_at = self._inverter.bus.now()
+        run_at = self._state.bus.now()
         # behind a PLC a status from before the run command is shown for a while
         await self._await_start(lambda now: now.runs and now.at > run_at)
 
     async def _await_status(self, wanted: Callable[[InverterStatus], bool]) -> None:
         """Wait for a step that every drive makes soon."""
-        left = self._deadline - self._inverter.bus.now()
-        await self._inverter.wait_until(wanted, timeout=min(left, drive_state.TIMEOUT))
+        left = self._deadline - self._state.bus.now()
+        await self._state.wait_until(wanted, timeout=min(left, drive_state.TIMEOUT))
 
     async def _await_start(self, wanted: Callable[[InverterStatus], bool]) -> None:
         """Wait until the drive has made a step on its way to run."""
-        deadline = min(self._inverter.bus.now() + drive_state.TIMEOUT, self._deadline)
+        deadline = min(self._state.bus.now() + drive_state.TIMEOUT, self._deadline)
         delayed = False
         while True:
-            seen = await self._inverter.look(Priority.SERVICE)
-            if wanted(seen):
+            status = await self._state.read_status(Priority.SERVICE)
+            if wanted(status):
                 return
-            if seen.faulted:
-                raise DriveError(self._inverter.report(Cause.START_FAULTED))
+            if status.faulted:
+                raise DriveError(self._state.report(Cause.START_FAULTED))
             # in standby after the start delay it has forgotten the start, and must not wait for
             # another one
-            if Fact.RUN_INPUT_MISSING in seen.facts or (delayed and seen.standby):
-                raise DriveError(self._inverter.report(Cause.NO_RUN_INPUT))
-            if seen.means(Meaning.START_DELAY) and not delayed:
+            if Fact.RUN_INPUT_MISSING in status.facts or (delayed and status.standby):
+                raise DriveError(self._state.report(Cause.NO_RUN_INPUT))
+            if status.means(Meaning.START_DELAY) and not delayed:
                 delayed = True
-                delay = await self._inverter.read_start_delay()
+                delay = await self._state.read_start_delay()
                 self._deadline += delay
                 deadline += delay
-            if self._inverter.bus.now() > deadline:
-                cause = Cause.NO_RUN_INPUT if seen.standby else Cause.NOT_STARTED
-                raise DriveError(self._inverter.report(cause))
-            await self._inverter.bus.sleep(drive_state.LOOK_PERIOD)
+            if self._state.bus.now() > deadline:
+                cause = Cause.NO_RUN_INPUT if status.standby else Cause.NOT_STARTED
+                raise DriveError(self._state.report(cause))
+            await self._state.bus.sleep(drive_state.LOOK_PERIOD)
 
     async def take_control(self, control_mode: str) -> None:
         """
@@ -437,8 +437,8 @@ class StartSequence:
         The set-point of an earlier session is removed before, where the drive lets us: one that has
         kept its run command, too, would turn the motor at once.
         """
-        self._deadline = self._inverter.bus.now() + _START_TIMEOUT
-        if not self._inverter.settings_need_control:
+        self._deadline = self._state.bus.now() + _START_TIMEOUT
+        if not self._state.settings_need_control:
             with contextlib.suppress(DriveError, Refused):
                 await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await self._method.take_control(self._await_status)

@@ -68,12 +68,12 @@ class Setpoint:
     """
 
     def __init__(
-        self, inverter: DriveState, refused: Callable[[Report], None], told: Callable[[Reply], None]
+        self, state: DriveState, refused: Callable[[Report], None], told: Callable[[Reply], None]
     ) -> None:
-        self._bus = inverter.bus
-        self._unit = inverter.settings.address
-        self._registers = inverter.registers
-        self._inverter = inverter
+        self._bus = state.bus
+        self._unit = state.settings.address
+        self._params = state.params
+        self._state = state
         self._refused = refused
         self._slot = LatestValue(self._make, self._done, told)
         self._combining = _Combining.GIVEN_UP
@@ -87,7 +87,7 @@ class Setpoint:
         #: Encodes a set-point. A program that sends the same one again and again has it encoded
         #: once: that takes longer than all else that is done for it.
         self._encode = functools.lru_cache(maxsize=1)(self._encoded)
-        self._armed_at = math.inf
+        self._following_since = math.inf
         #: What stands in the drive and since when, by where; nothing where that is not known, and
         #: minus infinity where it may be what was written since.
         self._written: dict[Address, tuple[bytes, float]] = {}
@@ -108,18 +108,18 @@ class Setpoint:
         if not math.isfinite(value):
             raise ValueError(f'a set-point of {value} is no number')
         self._request = Request(value, self._bus.now())
-        if self.armed:
+        if self.following:
             self._bus.request(self._slot)
 
     @property
-    def armed(self) -> bool:
+    def following(self) -> bool:
         """The drive follows set-points."""
-        return self._armed_at < math.inf
+        return self._following_since < math.inf
 
     @property
-    def armed_at(self) -> float:
+    def following_since(self) -> float:
         """Since when it does, s of the clock of the bus; infinite while it does not."""
-        return self._armed_at
+        return self._following_since
 
     @property
     def expired(self) -> bool:
@@ -130,14 +130,14 @@ class Setpoint:
     def age(self) -> float:
         """How long ago the newest valid set-point came in, s; NaN if none did since arming."""
         at = self._request.at
-        return self._bus.now() - at if at > self._armed_at else NAN
+        return self._bus.now() - at if at > self._following_since else NAN
 
     def connected(self) -> None:
         """Find out anew whether the drive tells its status with a set-point that it takes."""
-        able = self._registers.writes_and_reads
+        able = self._params.writes_and_reads
         self._combining = _Combining.UNTRIED if able else _Combining.GIVEN_UP
 
-    def arm(self, control_mode: str, limits: Limits) -> None:
+    def follow(self, control_mode: str, limits: Limits) -> None:
         """
         Follow set-points that come in from now on; 0 stands in the drive.
 
@@ -147,16 +147,16 @@ class Setpoint:
         """
         self.control_mode = control_mode
         self._limits = limits
-        follows = self._inverter.settings.follows_setpoints
-        self._target = self._registers.model.profile.setpoints[control_mode] if follows else None
-        self._armed_at = self._bus.now()
+        follows = self._state.settings.follows_setpoints
+        self._target = self._params.model.profile.setpoints[control_mode] if follows else None
+        self._following_since = self._bus.now()
         self._keys, self._written = {}, {}
         self._encode.cache_clear()
         if self._target is not None:
             for step in self._target.writes(0.0):
-                address, data = self._registers.target(step)
+                address, data = self._params.target(step)
                 self._keys[address] = step.key
-                self._written[address] = data, self._armed_at
+                self._written[address] = data, self._following_since
         self.commanded = 0.0 if follows else NAN
         self._had = [(0.0, math.inf)]
         self.clamped = self._clamp_told = False
@@ -167,9 +167,9 @@ class Setpoint:
         if follows:
             self._watch = self._bus.spawn(self._watch_age())
 
-    def disarm(self) -> None:
+    def stop_following(self) -> None:
         """Follow nothing any more."""
-        self._armed_at = math.inf
+        self._following_since = math.inf
         self.commanded = NAN
         self.clamped = False
         if self._watch is not None:
@@ -223,12 +223,12 @@ class Setpoint:
     @property
     def _rewrite_period(self) -> float:
         """After how long an unchanged set-point is written again, s."""
-        timeout = self._inverter.timeout.seconds
+        timeout = self._state.timeout.seconds
         return min(_REWRITE_PERIOD, timeout * _KEEP_ALIVE_SHARE) if timeout else _REWRITE_PERIOD
 
     def _is_old(self, at: float) -> bool:
         """Tell whether a request waited so long for the line that it has expired meanwhile."""
-        timeout = self._inverter.settings.setpoint_timeout
+        timeout = self._state.settings.setpoint_timeout
         return bool(timeout) and self._bus.now() - at > timeout
 
     @property
@@ -241,16 +241,16 @@ class Setpoint:
         """
         limits = self._limits
         own = max(limits.most, -limits.least)
-        return min(own, self._inverter.settings.setpoint_max or limits.nominal)
+        return min(own, self._state.settings.setpoint_max or limits.nominal)
 
     def _counts(self, request: Request) -> bool:
         """Tell whether a request came after the drive was enabled, and is still fresh."""
-        return request.at > self._armed_at and not self._is_old(request.at)
+        return request.at > self._following_since and not self._is_old(request.at)
 
     def _encoded(self, value: float, before: float) -> tuple[tuple[Address, bytes], ...]:
         """Return what is written, and where, for a set-point in place of the one before."""
         assert self._target is not None
-        return tuple(map(self._registers.target, self._target.writes(value, before)))
+        return tuple(map(self._params.target, self._target.writes(value, before)))
 
     def _due(self, request: Request) -> list[tuple[Address, bytes]]:
         """Return what has to be written for a request: else other stands in the drive, or long."""
@@ -277,14 +277,14 @@ class Setpoint:
         self._expired = False
         if self._warned:
             self._warned = False
-            self._inverter.tell(Severity.INFO, Cause.SETPOINTS_AGAIN)
+            self._state.tell(Severity.INFO, Cause.SETPOINTS_AGAIN)
         return limited
 
     def _make(self) -> Transfer | None:
         request = self._request
         if self._target is None or not self._counts(request):
             return None
-        if not self._inverter.answering:
+        if not self._state.responsive:
             self._waits_for_answer = True
             return None
         limited = self._accept(request)
@@ -299,22 +299,22 @@ class Setpoint:
         self._may_have(self._meant({**self._standing, address: data}))
         if self._combining is _Combining.GIVEN_UP or len(due) > 1:
             return self._bus.write(self._unit, address, data, Priority.SETPOINT)
-        status = self._registers.address(self._inverter.word_key)
+        status = self._params.address(self._state.word_key)
         return self._bus.write_and_read(self._unit, address, data, status, Priority.SETPOINT)
 
     def _tell_limited(self, value: float, limited: float) -> None:
-        chosen = self._inverter.settings.setpoint_max
+        chosen = self._state.settings.setpoint_max
         nominal = chosen == 0 and abs(limited) == self._limits.nominal
-        self._inverter.tell(
+        self._state.tell(
             Severity.WARNING,
             Cause.SETPOINT_BEYOND_NOMINAL if nominal else Cause.SETPOINT_LIMITED,
             value=value,
             limited=limited,
-            unit=self._inverter.unit,
+            unit=self._state.unit,
         )
 
     def _done(self, transfer: Transfer, error: LinkError | None) -> None:
-        if not self.armed:
+        if not self.following:
             return
         if error is None:
             assert transfer.data is not None
@@ -350,14 +350,14 @@ class Setpoint:
         """
         # the poll asks at once whether it is there, and has the time that a silent drive may
         # take from its neighbours
-        self._registers.count(error)
+        self._params.count(error)
         self._waits_for_answer = True
         if len(self._keys) > 1 and address in self._written:
             # the motor goes on in its direction, and need not be told to stop first
             self._written[address] = self._written[address][0], -math.inf
         else:
             self._written = {}
-        self._inverter.missed()
+        self._state.missed()
 
     def _gives_up_combining(self, error: LinkError) -> bool:
         """
@@ -396,14 +396,14 @@ class Setpoint:
         if len(standing) < len(self._keys):
             return NAN
         keys = self._keys.items()
-        value = self._registers.value
+        value = self._params.value
         return self._target.value({key: value(key, standing[address]) for address, key in keys})
 
     async def _watch_age(self) -> None:
         try:
             while True:
-                timeout = self._inverter.settings.setpoint_timeout
-                last = max(self._request.at, self._armed_at)
+                timeout = self._state.settings.setpoint_timeout
+                last = max(self._request.at, self._following_since)
                 left = last + timeout - self._bus.now() if timeout else math.inf
                 if left > 0 or self._expired:
                     await self._bus.sleep(min(left, _WATCH_PERIOD) if left > 0 else _WATCH_PERIOD)
@@ -416,10 +416,10 @@ class Setpoint:
     async def _expire(self, timeout: float) -> None:
         assert self._target is not None
         zero = self._target.writes(0.0, self._meant(self._standing))
-        if self._standing != dict(map(self._registers.target, zero)):
+        if self._standing != dict(map(self._params.target, zero)):
             if not self._warned:
                 self._warned = True
-                self._inverter.tell(Severity.WARNING, Cause.SETPOINT_TIMED_OUT, timeout=timeout)
+                self._state.tell(Severity.WARNING, Cause.SETPOINT_TIMED_OUT, timeout=timeout)
             before = self._request
             for step in zero:
                 if self._request is not before:
@@ -427,7 +427,7 @@ class Setpoint:
                     return
                 self._may_have(0.0)
                 try:
-                    await self._registers.write(replace(step, once=True), Priority.STOP)
+                    await self._params.write(replace(step, once=True), Priority.STOP)
                 except LinkError as error:
                     if isinstance(error, Refused) and not self._may_be_busy(error):
                         why = Report(Cause.SETPOINT_REFUSED, value=0.0, error=str(error))
@@ -436,7 +436,7 @@ class Setpoint:
                     # the poll finds out whether the drive is lost; until then this is tried again
                     await self._bus.sleep(_WATCH_PERIOD)
                     return
-                address, data = self._registers.target(step)
+                address, data = self._params.target(step)
                 self._written[address] = data, self._bus.now()
                 self._busy_since = math.inf
             if self._request is before:

@@ -41,7 +41,7 @@ _DENIALS = 3
 _OFF_PERIOD = 0.5
 
 
-async def watch_telemetry(inverter: DriveState, yields: Callable[[], bool]) -> None:
+async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None:
     """
     Measure at ``telemetry_rate`` until cancelled; a value the drive does not have stays NaN.
 
@@ -58,20 +58,20 @@ async def watch_telemetry(inverter: DriveState, yields: Callable[[], bool]) -> N
 
     async def measure(role: Role) -> None:
         # which firmware it has may be known only later
-        if denied[role] >= _DENIALS or not inverter.has(inverter.model.key(role)):
+        if denied[role] >= _DENIALS or not state.has(state.model.key(role)):
             return
         try:
-            values[role] = await inverter.measure(role, Priority.TELEMETRY)
+            values[role] = await state.measure(role, Priority.TELEMETRY)
             denied[role] = 0
         except Refused as error:
             values[role] = NAN
             # over Classic it says so of everything while it tunes
-            denied[role] += error.code in _NONE_SUCH and not inverter.tuning
+            denied[role] += error.code in _NONE_SUCH and not state.tuning
 
     while True:
-        started = inverter.bus.now()
-        rate = inverter.settings.telemetry_rate
-        if rate and inverter.connected and inverter.answering and not yields():
+        started = state.bus.now()
+        rate = state.settings.telemetry_rate
+        if rate and state.connected and state.responsive and not yields():
             try:
                 for role in (*FAST, *due) if first else (*FAST, due[0]):
                     await measure(role)
@@ -79,13 +79,13 @@ async def watch_telemetry(inverter: DriveState, yields: Callable[[], bool]) -> N
                 first = False
                 # these two are polled anyway
                 polled = {
-                    Role.ACTUAL_FREQUENCY: inverter.frequency,
-                    Role.ACTUAL_SPEED: inverter.speed,
+                    Role.ACTUAL_FREQUENCY: state.frequency,
+                    Role.ACTUAL_SPEED: state.speed,
                 }
-                inverter.listener.on_telemetry(Telemetry(inverter.bus.now(), {**values, **polled}))
+                state.listener.on_telemetry(Telemetry(state.bus.now(), {**values, **polled}))
             except LinkError:
                 # the poll says so if the drive is lost
-                inverter.missed()
+                state.missed()
                 values.update(dict.fromkeys(FAST, NAN))
         period = 1 / rate if rate else _OFF_PERIOD
-        await inverter.bus.sleep(period - (inverter.bus.now() - started))
+        await state.bus.sleep(period - (state.bus.now() - started))

@@ -69,9 +69,9 @@ class Tuning:
     """Has one drive tune; used on the bus alone."""
 
     def __init__(
-        self, inverter: DriveState, parameters: Parameters, procedures: Procedures
+        self, state: DriveState, parameters: Parameters, procedures: Procedures
     ) -> None:
-        self._inverter = inverter
+        self._state = state
         self._parameters = parameters
         self._procedures = procedures
 
@@ -88,56 +88,56 @@ class Tuning:
         # from here on a stop is one of the tuning, too
         with self._procedures.begun(procedure) as access:
             await self._require_motor_plate(what)
-            motor = self._inverter.model.group_of(Role.NOMINAL_POWER)
+            motor = self._state.model.group_of(Role.NOMINAL_POWER)
             keys = [key for key in self._parameters.available() if key in motor]
             async with self._parameters.left_to_the_drive(keys) as changes:
                 async with self._procedures.in_standby(access):
-                    self._inverter.tell(Severity.INFO, Cause.TUNING_BEGINS, what=what)
+                    self._state.tell(Severity.INFO, Cause.TUNING_BEGINS, what=what)
                     await self._procedures.command(access, procedure)
                     how = await self._outcome(procedure, access, progress)
                 changed = await changes()
                 if changed and how.cause in _UNDECIDED:
-                    how = self._inverter.report(Cause.TUNED, what=what)
+                    how = self._state.report(Cause.TUNED, what=what)
                 result = Tuned(how.cause is Cause.TUNED, how, changed)
-        self._inverter.tell(Severity.INFO if result.success else Severity.ERROR, result.report)
+        self._state.tell(Severity.INFO if result.success else Severity.ERROR, result.report)
         return result
 
     async def _require_motor_plate(self, what: str) -> None:
         for role in _PLATE:
-            key = self._inverter.model.key(role)
-            if not await self._inverter.registers.read_number(key, Priority.SERVICE) > 0:
+            key = self._state.model.key(role)
+            if not await self._state.params.read_number(key, Priority.SERVICE) > 0:
                 raise DriveError(Cause.TUNING_NEEDS, what=what, key=key)
 
     async def _outcome(
         self, procedure: Procedure, access: ExclusiveAccess, progress: Progress
     ) -> Report:
-        inverter, what = self._inverter, procedure.value
-        started = inverter.bus.now()
+        state, what = self._state, procedure.value
+        started = state.bus.now()
         begun = False
         told_code, told_at = -1, 0.0
         while True:
-            seen = await inverter.look(Priority.POLL)
-            elapsed = inverter.bus.now() - started
-            if seen.code != told_code or elapsed > told_at + _TELL_PERIOD:
-                told_code, told_at = seen.code, elapsed
-                progress(seen, elapsed)
-            if seen.faulted:
-                return inverter.report(Cause.TUNING_FAILED, what=what, fault=seen.listed)
-            if seen.means(Meaning.TUNED):
-                return inverter.report(Cause.TUNED, what=what)
-            if seen.means(Meaning.TUNING):
+            status = await state.read_status(Priority.POLL)
+            elapsed = state.bus.now() - started
+            if status.code != told_code or elapsed > told_at + _TELL_PERIOD:
+                told_code, told_at = status.code, elapsed
+                progress(status, elapsed)
+            if status.faulted:
+                return state.report(Cause.TUNING_FAILED, what=what, fault=status.listed)
+            if status.means(Meaning.TUNED):
+                return state.report(Cause.TUNED, what=what)
+            if status.means(Meaning.TUNING):
                 begun = True
             elif access.aborted:
-                return inverter.report(Cause.TUNING_STOPPED, what=what)
-            elif begun and seen.standby:
+                return state.report(Cause.TUNING_STOPPED, what=what)
+            elif begun and status.standby:
                 # it "returns to 'SioStby' when ready" [M0 table 18], and may show no code [C112]
                 calculated = procedure is Procedure.CALCULATE
                 done = Cause.TUNED if calculated else Cause.TUNING_WITHOUT_RESULT
-                return inverter.report(done, what=what)
+                return state.report(done, what=what)
             elif begun:
-                return inverter.report(Cause.TUNING_CUT_SHORT, what=what)
+                return state.report(Cause.TUNING_CUT_SHORT, what=what)
             elif elapsed > drive_state.TIMEOUT:
-                return inverter.report(Cause.TUNING_DOES_NOT_BEGIN, what=what)
+                return state.report(Cause.TUNING_DOES_NOT_BEGIN, what=what)
             if elapsed > _LONGEST:
-                raise DriveError(inverter.report(Cause.TUNING_ENDLESS, what=what))
-            await self._inverter.bus.sleep(_LOOK_PERIOD)
+                raise DriveError(state.report(Cause.TUNING_ENDLESS, what=what))
+            await self._state.bus.sleep(_LOOK_PERIOD)

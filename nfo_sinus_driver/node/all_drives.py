@@ -84,9 +84,9 @@ class AllDrives:
         return 'a stop for all was broadcast, which releases every motor and nobody confirms'
 
     def _enable(self, given: Callable[[], None]) -> tuple[list[str], list[str]]:
-        asked_at = received_at()
+        requested_at = received_at()
         return self._command(
-            lambda managed: managed.require_active().enable(asked_at), _LONGEST_ENABLE, given
+            lambda managed: managed.require_active().enable(requested_at), _LONGEST_ENABLE, given
         )
 
     def _command(

@@ -257,11 +257,11 @@ class TuningServices:
         self, name: str, procedure: Procedure
     ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            asked_at = received_at()
+            requested_at = received_at()
             tune = _and_log(
                 self._node,
                 name,
-                lambda: self._managed.require_active().tune(procedure, asked_at=asked_at),
+                lambda: self._managed.require_active().tune(procedure, requested_at=requested_at),
             )
             tuned = self._result(lambda: tune().result())
             response.success = tuned.success
@@ -295,8 +295,8 @@ class TuningServices:
     def _on_accepted(self, goal: ServerGoalHandle) -> None:
         goal.execute(functools.partial(self._execute, time.monotonic()))
 
-    def _execute(self, asked_at: float, goal: ServerGoalHandle) -> Tune.Result:
-        tuned = self._result(lambda: self._followed(goal, asked_at))
+    def _execute(self, requested_at: float, goal: ServerGoalHandle) -> Tune.Result:
+        tuned = self._result(lambda: self._followed(goal, requested_at))
         if tuned.success:
             goal.succeed()
         elif goal.is_cancel_requested:
@@ -309,13 +309,13 @@ class TuningServices:
             changed=[str(change) for change in tuned.changes],
         )
 
-    def _followed(self, goal: ServerGoalHandle, asked_at: float) -> Tuned:
+    def _followed(self, goal: ServerGoalHandle, requested_at: float) -> Tuned:
         procedure = _PROCEDURES[goal.request.procedure]
         log_call(self._node, '~/tune/_action/send_goal', procedure.name.lower())
         drive = self._managed.require_active()
         # the bus reports how far it is, and nobody may keep it waiting
         reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()
-        future = drive.tune(procedure, lambda *report: reports.put(report), asked_at)
+        future = drive.tune(procedure, lambda *report: reports.put(report), requested_at)
         cancelling = False
         while True:
             ended = future.done()

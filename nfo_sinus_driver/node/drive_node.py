@@ -233,7 +233,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         """Set parameters for somebody outside, all or none: only so the drive is written to."""
         try:
             coerced = [coerce(parameter, DRIVE_SETTINGS) for parameter in parameter_list]
-            admitted = self._drive_parameters.admit(coerced)
+            admitted = self._drive_parameters.validate(coerced)
         except (ValueError, DriveError) as error:
             reason = self.managed.wording.say(error)
             return SetParametersResult(successful=False, reason=reason)
@@ -279,7 +279,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         # a set-point that goes on arriving would mean another speed
         for name in ('scale', 'unit'):
             now = self.get_parameter(name).value
-            if changed.get(name, now) != now and self.managed.drive.armed:
+            if changed.get(name, now) != now and self.managed.drive.following:
                 raise ValueError(f'{name} can only be changed while the drive is not enabled')
 
     def _try_drive_timeout(self, seconds: float, changes: Sequence[Change]) -> None:

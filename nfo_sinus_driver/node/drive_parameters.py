@@ -90,7 +90,7 @@ class DriveParameters:
 
     # --- to the drive -------------------------------------------------------------------------
 
-    def admit(self, parameters: Iterable[Parameter]) -> list[Parameter]:
+    def validate(self, parameters: Iterable[Parameter]) -> list[Parameter]:
         """Return parameters as the drive will have them, or raise why not; nothing is asked."""
         return [self._admit(parameter) for parameter in parameters]
 
@@ -107,7 +107,7 @@ class DriveParameters:
         if drive is None or unset or parameter.name not in self._declared:
             return parameter
         value = coerce(drive.model[parameter.name], parameter.value)
-        return Parameter(parameter.name, value=drive.parameters.admit(parameter.name, value))
+        return Parameter(parameter.name, value=drive.parameters.validate(parameter.name, value))
 
     @contextlib.contextmanager
     def from_outside(self) -> Iterator[None]:

@@ -37,7 +37,7 @@ from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE
 from nfo_sinus_driver.version import VERSION
-from nfo_sinus_driver.view import show, why_not
+from nfo_sinus_driver.view import show, write_forbidden
 from nfo_sinus_driver.view.picture import (
     Condition,
     DriveView,
@@ -153,7 +153,7 @@ class _Call:
     who: str
     service: str
     future: Future
-    asked_at: float
+    requested_at: float
     told_late: bool = False
 
 
@@ -249,9 +249,9 @@ class GraphSource:
     def stops(self, now: float) -> list[str]:
         """Return what is to be known of stops that are not confirmed, failures first."""
         waiting = [
-            f'{call.service} called {now - call.asked_at:.0f} s ago, not answered yet'
+            f'{call.service} called {now - call.requested_at:.0f} s ago, not answered yet'
             for call in self._calls
-            if now - call.asked_at > _SOON
+            if now - call.requested_at > _SOON
         ]
         return [f'{who}: {why}' for who, why in self._failed.items()] + waiting
 
@@ -349,7 +349,7 @@ class GraphSource:
                 else:
                     self._fail(call.who, f'{call.service}: {answer.message}')
                 continue
-            if not call.told_late and now - call.asked_at > _ANSWER_TIME:
+            if not call.told_late and now - call.requested_at > _ANSWER_TIME:
                 call.told_late = True
                 text = (
                     f'{call.service} has not answered for {_ANSWER_TIME:.0f} s: the stop is NOT '
@@ -425,7 +425,7 @@ def main(args: list[str] | None = None) -> int:
     """Show the view until somebody ends it; return the exit status."""
     given = sys.argv[1:] if args is None else args
     options = _parser().parse_args(rclpy.utilities.remove_ros_args(['', *given])[1:])
-    missing = why_not()
+    missing = write_forbidden()
     if missing:
         print(f'monitor: {missing}', file=sys.stderr)
         return 2

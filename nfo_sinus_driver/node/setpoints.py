@@ -123,7 +123,7 @@ class Setpoints:
         except DriveError as error:
             self._ignore(self._managed.wording.say(error))
             return
-        if self._managed.drive.armed:
+        if self._managed.drive.following:
             self._logged_idle = False
         elif not self._logged_idle:
             self._logged_idle = True

@@ -345,7 +345,7 @@ class Rig:
                 assert stopping, f'{state.name}, and nothing stops it'
             elif state not in (ControlState.PROCEDURE, ControlState.ABORTING, ControlState.CLOSED):
                 assert not stopping, f'{state.name}, and a stop is on its way'
-            assert drive.armed == (state is ControlState.ENABLED)
+            assert drive.following == (state is ControlState.ENABLED)
 
     # --- usual steps ---
 
@@ -383,7 +383,7 @@ class Rig:
         """Nothing turns although set-points keep arriving, until enable is called."""
         self.send(frequency)
         self.pass_time(1.5)
-        assert not self.drive.armed
+        assert not self.drive.following
         assert not self.turns
         self.enable()
         self.pass_time(1.5)
@@ -420,7 +420,7 @@ class Rig:
         return int.from_bytes(data, 'big')
 
     def _places(self, drive: Drive) -> dict[tuple[Any, ...], str]:
-        registers, keys = drive.registers, {}
+        registers, keys = drive.params, {}
         for key in registers.model:
             if registers.reaches(key):
                 for part in self.link.parts(registers.address(key)):

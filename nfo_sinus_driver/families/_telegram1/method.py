@@ -97,7 +97,7 @@ class Telegram1(ControlMethod):
     references = ('fieldbus',)
     addressing = 'telegram1'
     plc_time = 1.0
-    keeps_control = (
+    control_retained = (
         'without STW1 keypad or terminals would have it, by which the motor could start'
     )
     ready: ClassVar[int]

@@ -153,7 +153,7 @@ class FunctionBits(ControlMethod):
     means = 'function bits'
     references = ('fieldbus',)
     coasts = True
-    keeps_control = (
+    control_retained = (
         'P841 stays Remote control, for another value can start the motor; change '
         'serial.control_mode, or P841 at the keypad, to give it to the terminals'
     )

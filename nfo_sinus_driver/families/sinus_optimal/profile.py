@@ -121,7 +121,7 @@ class DriveControl(ControlMethod):
 
     means = 'control word'
     references = ('terminal',)
-    keeps_control = (
+    control_retained = (
         'from the terminals an active RUN input might start the motor; take control at the keypad '
         'to give it to them'
     )

@@ -40,7 +40,7 @@ LONGEST_BREAK = {'rtu': 1.0, 'ascii': 1.0}
 def another_master(rig: Rig, way: str, unit: int, *keys: str) -> None:
     """Let another master ask one drive for parameters in turn, one every 0.1 s."""
     for number, key in enumerate(keys):
-        frame = ENCODE[way](unit, rig.drive.registers.address(key))
+        frame = ENCODE[way](unit, rig.drive.params.address(key))
         rig.line.later(
             rig.clock.now + 0.1 * number,
             lambda frame=frame: rig.line.another_asks(frame, 0.1 * len(keys)),

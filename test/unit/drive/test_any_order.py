@@ -70,7 +70,7 @@ def test_a_set_point_from_before_enable_turns_nothing(machine: type[AnyOrder]) -
     try:
         state.set_once(20.0)
         state.enable(wait=1.0)
-        assert state.rig.drive.armed
+        assert state.rig.drive.following
         assert state.rig.far.motor.frequency == 0
         # nor does one from the ride before
         state.send(20.0, wait=1.0)
@@ -78,7 +78,7 @@ def test_a_set_point_from_before_enable_turns_nothing(machine: type[AnyOrder]) -
         state.send(None, wait=0.1)
         state.stop(wait=2.0)
         state.enable(wait=1.0)
-        assert state.rig.drive.armed
+        assert state.rig.drive.following
         assert state.rig.far.motor.frequency == 0
     finally:
         state.teardown()

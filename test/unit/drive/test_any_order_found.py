@@ -56,7 +56,7 @@ def test_nothing_is_enabled_while_it_is_awaited_that_the_motor_stands() -> None:
         assert 'not active' in rig.answer(rig.drive.enable())
         assert 'left to its ramp' in rig.answer(gone)
         rig.pass_time(5.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         assert not rig.far.motor.driven
 
 
@@ -101,7 +101,7 @@ def test_nothing_runs_without_the_time_out_that_could_not_be_set() -> None:
         rig.spoil('refused', 'serial.sio_tot', 100)
         for _ in range(2):
             assert 'serial.sio_tot' in rig.answer(rig.drive.enable())
-            assert not rig.drive.armed
+            assert not rig.drive.following
         assert RUN not in rig.written('fieldbus.scmd')
         rig.spoil('refused', 'serial.sio_tot', 0)
         rig.enable()
@@ -170,7 +170,7 @@ def test_an_enable_that_comes_with_a_quick_stop_is_refused(machine: type[AnyOrde
         assert 'released' in state.rig.answer(quick_stop)
         for refused in (enable, later):
             assert 'a stop is on its way' in state.rig.answer(refused)
-        assert not state.rig.drive.armed
+        assert not state.rig.drive.following
     finally:
         state.rig.close()
 

@@ -37,7 +37,7 @@ def test_a_command_is_given_again() -> None:
         busy = Busy(rig, 2, MODE, SCMD)
         rig.enable()
         assert busy.said == 4
-        assert rig.drive.armed
+        assert rig.drive.following
         assert rig.written(SCMD).count(0x101) == 1
 
 
@@ -106,7 +106,7 @@ def test_a_set_point_is_written_again() -> None:
         rig.send(10.0)
         rig.pass_time(1.0)
         assert busy.said == 3
-        assert rig.drive.armed and abs(rig.far.motor.frequency - 10.0) < 0.2
+        assert rig.drive.following and abs(rig.far.motor.frequency - 10.0) < 0.2
 
 
 def test_set_point_0_is_written_again_when_no_others_come() -> None:
@@ -115,12 +115,12 @@ def test_set_point_0_is_written_again_when_no_others_come() -> None:
         rig.send(None)
         rig.pass_time(2.0)
         assert rig.notes.said('no set-point for 0.5 s', Severity.WARNING)
-        assert abs(rig.far.motor.frequency) < 0.1 and rig.drive.armed
+        assert abs(rig.far.motor.frequency) < 0.1 and rig.drive.following
         # how long it was busy then does not count any more
         Busy(rig, 1, FREQUENCY)
         rig.send(15.0)
         rig.pass_time(1.0)
-        assert rig.drive.armed and abs(rig.far.motor.frequency - 15.0) < 0.2
+        assert rig.drive.following and abs(rig.far.motor.frequency - 15.0) < 0.2
 
 
 def test_a_drive_that_takes_no_set_point_for_long_is_stopped() -> None:
@@ -128,7 +128,7 @@ def test_a_drive_that_takes_no_set_point_for_long_is_stopped() -> None:
         Busy(rig, ALWAYS, FREQUENCY)
         rig.send(10.0)
         rig.pass_time(3.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         assert rig.notes.said('refused set-point 10: the drive is busy', Severity.WARNING)
         assert not rig.turns
 
@@ -138,11 +138,11 @@ def test_a_status_that_stays_refused_is_a_loss_too() -> None:
     with Rig().turn() as rig:
         Busy(rig, 10, STATUS, written=False)
         rig.pass_time(2.0)
-        assert rig.drive.armed
+        assert rig.drive.following
         Busy(rig, ALWAYS, STATUS, written=False)
         rig.pass_time(5.0)
         assert rig.notes.said('lost: the drive is busy')
-        assert not rig.drive.armed
+        assert not rig.drive.following
 
 
 @pytest.mark.parametrize('wrong', ['busy', 'unheard'])

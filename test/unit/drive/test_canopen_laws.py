@@ -146,7 +146,7 @@ def test_a_drive_that_started_anew_is_disarmed_at_once() -> None:
         rig.turn()
         rig.far.power_cycle()
         rig.pass_time(0.5)
-        assert rig.notes.said('as its boot-up message says') and not rig.drive.armed
+        assert rig.notes.said('as its boot-up message says') and not rig.drive.following
         rig.wait_until(lambda: rig.drive.snapshot.connected)
         rig.assert_only_enable_helps()
 
@@ -167,7 +167,7 @@ def test_of_two_nodes_one_is_silent() -> None:
         rig.fars[2].silence(1000.0)
         before = len(rig.notes.snapshots)
         rig.wait_until(lambda: rig.notes_of[2].said('did not answer'), 8.0)
-        assert rig.drive.armed and len(rig.notes.snapshots) > before + 5
+        assert rig.drive.following and len(rig.notes.snapshots) > before + 5
         assert 'stopp' in rig.answer(rig.drive.stop())
 
 

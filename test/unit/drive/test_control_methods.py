@@ -43,7 +43,7 @@ def test_a_drive_follows_its_own_reference_and_no_set_point(
                 rig.drive.set_setpoint(1.0)
             rig.pass_time(3.0)
             # and none is missed
-            assert rig.drive.armed
+            assert rig.drive.following
             assert abs(rig.far.motor.frequency) > 10
             assert (rig.far.motor.frequency < 0) is reference.endswith('reverse')
             answer = rig.answer(stop())
@@ -81,14 +81,14 @@ def test_a_stop_is_confirmed_in_a_control_mode_that_no_manual_lists(
     with Rig(way) as rig:
         rig.connect()
         rig.enable()
-        inverter = rig.drive.inverter
+        inverter = rig.drive.state
 
         async def read(priority: Priority = Priority.SERVICE, *, once: bool = False) -> str:
             inverter.control_mode = '7'
             return inverter.control_mode
 
         monkeypatch.setattr(inverter, 'read_control_mode', read)
-        rig.wait_until(lambda: not rig.drive.armed)
+        rig.wait_until(lambda: not rig.drive.following)
         assert rig.answer(rig.drive.stop()).startswith('stop')
         assert not rig.drive.stop_unconfirmed
 
@@ -128,7 +128,7 @@ def test_an_optimal_is_enabled_again_after_its_keypad(key: str) -> None:
     with Rig(OPTIMAL_WORD) as rig:
         rig.turn(25.0)
         rig.far.control_unit.press(key)
-        rig.wait_until(lambda: not rig.drive.armed and not rig.drive.stop_unconfirmed)
+        rig.wait_until(lambda: not rig.drive.following and not rig.drive.stop_unconfirmed)
         rig.enable()
 
 

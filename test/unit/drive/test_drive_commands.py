@@ -25,7 +25,7 @@ def test_a_ride() -> None:
         assert rig.answer(rig.drive.enable()) == (
             'enabled; it follows set-points that arrive from now on'
         )
-        assert rig.drive.armed and rig.far.motor.driven
+        assert rig.drive.following and rig.far.motor.driven
         assert rig.answer(rig.drive.enable()) == 'is enabled already'
         for frequency in (20.0, -15.0, 0.0, 7.5):
             rig.send(frequency)
@@ -65,7 +65,7 @@ def test_a_stop_says_what_it_finds() -> None:
 
 def test_a_stop_goes_ahead_of_all_that_waits() -> None:
     with Rig().turn() as rig:
-        status = rig.drive.registers.address('fieldbus.drive_status')
+        status = rig.drive.params.address('fieldbus.drive_status')
         for priority in [one for one in Priority if one is not Priority.STOP] * 20:
             rig.bus.run(neighbour(rig.bus, status, priority))
         rig.pass_time(0.5)
@@ -136,7 +136,7 @@ def test_drive_that_refuses_the_run_command() -> None:
             'refused' if (key, data) == (SCMD, b'\x01\x01') else None
         )
         assert 'exception 4' in rig.answer(rig.drive.enable())
-        assert not rig.drive.armed
+        assert not rig.drive.following
         rig.pass_time(1.0)
         assert not rig.drive.stop_unconfirmed
 
@@ -161,7 +161,7 @@ def test_acknowledge_a_fault_that_ended_a_ride(
         with Rig(way).turn() as rig:
             rig.far.trip(code)
             rig.pass_time(1.0)
-            assert not rig.drive.armed
+            assert not rig.drive.following
             rig.acknowledged = 1
             assert rig.answer(rig.drive.acknowledge()) == f'acknowledged {code} {text}'
             assert rig.far.faults.codes == []
@@ -219,7 +219,7 @@ def test_the_reason_of_a_serial_fault_is_said(way: str) -> None:
     with Rig(way).turn() as rig:
         rig.far.control_unit.serial_error(LineError.TIMEOUT)
         rig.pass_time(1.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         rig.acknowledged = 1
         # there is no SioErr over Modbus, and MODE = Stop clears it where it is obeyed [C9], [C99]
         reason = ' (time-out of the serial communication)' if way == 'classic v5.0' else ''

@@ -42,7 +42,7 @@ def test_connect_says_who_answers_and_writes_nothing() -> None:
         # a second time is no harm
         assert str(rig.result(rig.drive.connect())) == identity
         rig.pass_time(1.0)
-        assert not rig.drive.armed and written(rig) == []
+        assert not rig.drive.following and written(rig) == []
 
 
 def test_an_address_without_a_drive() -> None:
@@ -129,8 +129,8 @@ def test_telemetry_of_older_firmware() -> None:
             Role.ENERGY, Role.TOTAL_ENERGY,
         }
         asked = {key for _, key, _ in rig.asked}
-        assert rig.drive.inverter.model.key(Role.OPERATING_TIME) in asked
-        assert not {rig.drive.inverter.model.key(one) for one in (
+        assert rig.drive.state.model.key(Role.OPERATING_TIME) in asked
+        assert not {rig.drive.state.model.key(one) for one in (
             Role.ENERGY, Role.TOTAL_ENERGY,
         )} & asked
 
@@ -144,7 +144,7 @@ def test_clean_exit(way: str) -> None:
         assert not rig.far.motor.driven
         assert rig.written(MODE) == [Mode.BUS, Mode.STOP]
         assert rig.far.control_unit.mode == Mode.STOP
-        assert not rig.drive.armed and not rig.drive.snapshot.connected
+        assert not rig.drive.following and not rig.drive.snapshot.connected
         # silence from now on, and no fault comes of it
         asked = len(rig.asked)
         rig.pass_time(30.0)

@@ -44,7 +44,7 @@ def test_a_control_mode_that_is_changed_at_the_keypad_ends_a_ride() -> None:
     with Rig() as rig:
         rig.turn()
         rig.far.set_from_keypad('control.mode', 'Speed')
-        rig.wait_until(lambda: not rig.drive.armed, 10.0)
+        rig.wait_until(lambda: not rig.drive.following, 10.0)
         assert rig.notes.said('the control mode was changed to Speed', Severity.WARNING)
         rig.pass_time(1.0)
         assert not rig.far.motor.driven
@@ -55,7 +55,7 @@ def test_a_drive_that_its_terminals_start_after_power_on_is_left_to_them() -> No
         rig.turn()
         rig.far.power_cycle(0.1)
         rig.pass_time(3.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         assert rig.far.control_unit.mode is Mode.EXT and rig.far.motor.driven
 
 
@@ -121,6 +121,6 @@ def test_a_stop_while_the_drive_restarts_is_carried_out_when_it_is_back(exits: b
         stop = rig.drive.disconnect(0.1) if exits else rig.drive.stop()
         assert 'NOT confirmed' in rig.answer(stop)
         rig.pass_time(8.0)
-        assert not rig.drive.stop_unconfirmed and not rig.drive.armed
+        assert not rig.drive.stop_unconfirmed and not rig.drive.following
         assert not rig.far.motor.driven
         assert rig.drive.snapshot.connected is not exits

@@ -15,7 +15,7 @@ from nfo_sinus_driver.catalog import Value
 
 
 def test_the_ends_of_every_setting_go_there_and_back_and_nothing_beyond() -> None:
-    registers = Rig('classic').drive.registers
+    registers = Rig('classic').drive.params
     wrong: list[tuple[str, object]] = []
 
     def there_and_back(key: str, value: Value) -> bytes | None:

@@ -113,11 +113,11 @@ def test_reading_writes_nothing_and_lets_a_motor_run() -> None:
     with Rig().turn() as rig:
         fill(rig, 32)
         assert len(rig.result(rig.drive.error_log())) == 32
-        assert rig.drive.armed and rig.turns
+        assert rig.drive.following and rig.turns
         # what changes something is refused while the motor is enabled
         for command in (rig.drive.erase_error_log, rig.drive.reset_energy):
             assert 'stop it first' in rig.answer(command())
-        assert rig.drive.armed
+        assert rig.drive.following
         assert not {0x800, 0x900} & set(rig.written('fieldbus.scmd'))
 
 
@@ -230,7 +230,7 @@ def test_the_motor_is_stopped_first() -> None:
         rig.pass_time(1.0)
         stops = [(key, data) for _, key, data in rig.asked].index(('fieldbus.scmd', b'\0\0'))
         assert stops < asked(rig).index(LOG)
-        assert not rig.drive.armed and rig.notes.entries
+        assert not rig.drive.following and rig.notes.entries
 
 
 def test_what_is_older_than_the_driver_is_no_news() -> None:
@@ -319,7 +319,7 @@ def test_an_operating_time_that_cannot_be_does_not_end_the_watch(
 ) -> None:
     with Rig(**RARELY).connect() as rig:
         rig.pass_time(3.0)
-        read, hours = rig.link.read, rig.drive.registers.address('status.op_time').index
+        read, hours = rig.link.read, rig.drive.params.address('status.op_time').index
 
         def absurd(unit: int, address: Address) -> Reply:
             reply = read(unit, address)

@@ -87,7 +87,7 @@ def test_every_alarm_of_the_optimal_is_shown_and_reported_and_stops_nothing(way:
             # never as a status, although bit and code are read one after the other
             shown = [one for one in rig.notes.snapshots[before:] if one.status.code == code]
             assert {one.kind for one in shown} == {Kind.ALARM}
-            assert rig.drive.armed
+            assert rig.drive.following
             rig.far.faults.acknowledge()
             rig.wait_until(lambda: rig.notes.snapshot.kind is Kind.STATUS, 5.0)
 
@@ -154,7 +154,7 @@ def test_a_run_command_is_taken_back_before_the_drive_restarts() -> None:
         rig.turn()
         rig.far.trip(OVERLOAD)
         rig.pass_time(0.5)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         assert not rig.far.control_unit.word & 1
         rig.pass_time(3.0)
         assert rig.far.faults.codes == []
@@ -167,7 +167,7 @@ def test_a_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts() 
         rig.turn()
         rig.far.trip(OVERLOAD)
         rig.pass_time(0.5)
-        assert not rig.drive.armed and rig.drive.blocked_by_fault
+        assert not rig.drive.following and rig.drive.blocked_by_fault
         assert rig.far.control_unit.scmd == Scmd.FIELDBUS
         # its 2 s are over, and it runs again by itself
         rig.wait_until(lambda: rig.far.motor.driven, 3.0)
@@ -190,7 +190,7 @@ def test_a_fault_that_is_over_before_a_poll_either_stops_the_ride_or_changes_not
             rig.far.trip(OVERLOAD)
             rig.pass_time(2.0)
             assert not rig.far.faults.codes
-            if not rig.drive.armed:
+            if not rig.drive.following:
                 rig.assert_only_enable_helps()
             assert abs(rig.far.motor.frequency - 20) < 0.5
         assert {entry.code for entry in rig.far.faults.log} == {OVERLOAD}

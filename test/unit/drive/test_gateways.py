@@ -122,7 +122,7 @@ def test_a_gateway_that_closes_after_each_answer_is_used_all_the_same() -> None:
         (remark,) = rig.bus.remarks
         assert 'closes the connection after each answer' in remark and 'settings' in remark
         rig.pass_time(5.0)
-        assert rig.drive.armed and rig.far.motor.frequency > 19
+        assert rig.drive.following and rig.far.motor.frequency > 19
         rig.answer(rig.drive.stop())
         rig.pass_time(1.0)
         assert rig.far.motor.frequency == 0

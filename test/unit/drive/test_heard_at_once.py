@@ -17,7 +17,7 @@ _CHATTER = 'status.frq_act'
 def crowd(rig: Rig) -> None:
     """Let others ask without end, as the polls of a long line do."""
     for _ in range(4):
-        rig.bus.run(neighbour(rig.bus, rig.drive.registers.address(_CHATTER)))
+        rig.bus.run(neighbour(rig.bus, rig.drive.params.address(_CHATTER)))
 
 
 def asked(rig: Rig) -> list[str]:
@@ -72,7 +72,7 @@ def test_a_changed_control_mode_is_answered_before_others_are_asked() -> None:
         begun = len(rig.asked)
         rig.far.set_from_keypad('control.mode', 'Speed')
         rig.wait_until(lambda: _SCMD in asked(rig)[begun:], 5.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         requests = asked(rig)
         assert requests[requests.index(_SCMD, begun) - 1] == 'control.mode'
 

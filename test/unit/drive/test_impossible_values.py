@@ -30,7 +30,7 @@ class Spoiler:
 
     def __init__(self, rig: Rig, role: Role, data: int, times: float = math.inf) -> None:
         self._rig = rig
-        self.key = rig.drive.registers.model.key(role)
+        self.key = rig.drive.params.model.key(role)
         self._data = data
         self.left = times
         self._read = rig.link.read
@@ -66,7 +66,7 @@ def test_one_impossible_value_stops_nothing_and_is_not_published(way: str) -> No
                 assert not spoiler.left
             spoiler.left = 0
         found = rig.notes.snapshots[before:]
-        assert rig.drive.armed
+        assert rig.drive.following
         assert not rig.notes.events
         assert {shown(one) for one in found} <= usual
         assert all(abs(one.frequency) < 50 and abs(one.speed) < 3000 for one in found)
@@ -81,7 +81,7 @@ def test_measured_values_that_stay_impossible_are_nan_and_reported_once(way: str
         before = len(rig.notes.snapshots)
         rig.pass_time(1.0)
         found = rig.notes.snapshots[before:]
-        assert rig.drive.armed
+        assert rig.drive.following
         assert len(found) > 5
         assert all(math.isnan(one.frequency) and math.isnan(one.speed) for one in found)
         warned = [one.text for one in rig.notes.events if one.severity is Severity.WARNING]
@@ -96,7 +96,7 @@ def test_a_code_that_stays_unlisted_is_published_as_it_is() -> None:
         rig.pass_time(1.0)
         assert [snapshot.text for snapshot in rig.notes.snapshots[-3:]] == ['Code 514'] * 3
         # the status word says that it runs all the same
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 def test_a_fault_is_believed_at_once() -> None:
@@ -104,7 +104,7 @@ def test_a_fault_is_believed_at_once() -> None:
         rig.turn()
         rig.asked.clear()
         rig.far.trip(5)
-        rig.wait_until(lambda: not rig.drive.armed)
+        rig.wait_until(lambda: not rig.drive.following)
         status = ('fieldbus.drive_status', 'fieldbus.inv_st')
         assert sum(key in status for _, key, _ in rig.asked) <= 5
 

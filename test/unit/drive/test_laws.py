@@ -68,7 +68,7 @@ def assert_only_enable_helps(rig: Rig) -> None:
     """Nothing turns although set-points arrive, until it is enabled."""
     give_setpoints(rig)
     rig.pass_time(1.5)
-    assert not rig.drive.armed and not rig.turns
+    assert not rig.drive.following and not rig.turns
     rig.enable()
     rig.wait_until(lambda: abs(rig.far.motor.frequency) > 0.5 * _SPEED, 5.0)
 
@@ -97,7 +97,7 @@ def test_2_a_set_point_from_before_enable_is_not_taken_over(way: str) -> None:
         rig.drive.set_setpoint(_SPEED)
         rig.enable()
         rig.pass_time(1.5)
-        assert rig.drive.armed
+        assert rig.drive.following
         assert rig.far.motor.demand == 0 or not rig.far.motor.driven
 
 
@@ -107,7 +107,7 @@ def test_2_without_enable_set_points_turn_nothing(way: str) -> None:
         rig.connect()
         rig.send(_SPEED)
         rig.pass_time(2.0)
-        assert not rig.turns and not rig.drive.armed
+        assert not rig.turns and not rig.drive.following
 
 
 def lose_line(rig: Rig) -> None:
@@ -146,7 +146,7 @@ def restart_driver(rig: Rig) -> None:
 def open_run_input(rig: Rig) -> None:
     """Open the input, and close it before the motor stands."""
     rig.far.set_run_input(False)
-    rig.wait_until(lambda: not rig.drive.armed, 1.0)
+    rig.wait_until(lambda: not rig.drive.following, 1.0)
     rig.far.set_run_input(True)
 
 
@@ -203,7 +203,7 @@ def test_2_after_a_fault_and_its_acknowledgement_nothing_turns(way: str) -> None
         rig.turn()
         rig.far.trip(overload(rig))
         rig.pass_time(1.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         assert rig.notes.snapshot.kind is Kind.FAULT
         rig.acknowledged += 1
         assert 'acknowledged' in rig.answer(rig.drive.acknowledge())
@@ -222,7 +222,7 @@ def test_2_a_stop_ends_an_enable_that_was_asked_for_before(way: str, stop: str) 
         if stop not in ('disconnect', 'exit'):
             give_setpoints(rig)
         rig.pass_time(1.0)
-        assert not rig.turns and not rig.drive.armed
+        assert not rig.turns and not rig.drive.following
 
 
 @every_way
@@ -245,24 +245,24 @@ def test_2_a_stop_at_any_moment_of_an_enable_ends_it(way: str) -> None:
             if not stops:
                 break
             rig.answer(stops[0])
-            assert not rig.drive.armed and not rig.drive.stop_unconfirmed, moment
+            assert not rig.drive.following and not rig.drive.stop_unconfirmed, moment
             rig.pass_time(0.3)
             assert not rig.turns, moment
             rig.drive.activate()
         assert moment >= 2, 'enabling takes more requests than that'
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 @every_way
 def test_2_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(way: str) -> None:
     with Rig(way) as rig:
         rig.turn()
-        asked_at = rig.clock.now
+        requested_at = rig.clock.now
         stops, enable = rig.drive.stop(), rig.drive.enable()
         assert 'a stop is on its way' in rig.answer(enable)
         rig.answer(stops)
         # it was not asked for after the stop, although it arrives there
-        assert 'a stop was confirmed after' in rig.answer(rig.drive.enable(asked_at))
+        assert 'a stop was confirmed after' in rig.answer(rig.drive.enable(requested_at))
         assert_only_enable_helps(rig)
 
 
@@ -279,7 +279,7 @@ def test_3_every_way_out_stops_the_motor(way: str, stop: str) -> None:
         rig.answer(future)
         # ahead of polls and set-points
         assert any(data is not None for _, _, data in rig.asked[begun : begun + 2])
-        assert not rig.turns and not rig.drive.armed and not rig.drive.stop_unconfirmed
+        assert not rig.turns and not rig.drive.following and not rig.drive.stop_unconfirmed
         rig.pass_time(1.0)
         assert not rig.turns
 
@@ -300,7 +300,7 @@ def test_3_a_stop_on_a_dead_line_is_said_and_carried_out_when_it_is_back(
         assert rig.notes.said('emergency stop')
         rig.line.mend()
         rig.wait_until(lambda: not rig.drive.stop_unconfirmed, 10.0)
-        assert not rig.turns and not rig.drive.armed
+        assert not rig.turns and not rig.drive.following
 
 
 @following
@@ -371,7 +371,7 @@ def test_8_a_bad_line_makes_no_false_reading(way: str, trouble: str) -> None:
         found = [one.frequency for one in rig.notes.snapshots[before:]]
         assert len(found) > 10
         assert [one for one in found if abs(one - frequency) > 1.0] == []
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 # --- 9 and 10: the line is kept alive; a motor is not stopped without a reason --------------------
@@ -391,7 +391,7 @@ def test_9_a_drive_that_is_polled_seldom_hears_the_driver_in_time(way: str) -> N
         ]
         # half the time-out of the drive
         assert max(two - one for one, two in itertools.pairwise(sent)) <= 1.0
-        assert rig.drive.armed and not rig.far.faults
+        assert rig.drive.following and not rig.far.faults
         rig.line.mend()
         # a clean exit leaves no fault behind
         rig.answer(rig.drive.disconnect(4.0))
@@ -421,7 +421,7 @@ def test_10_a_few_lost_answers_stop_nothing_and_a_silence_does(way: str) -> None
         for what in ('unheard', 'drop', 'damage', 'double'):
             rig.line.spoil(what)
             rig.pass_time(1.0)
-            assert rig.drive.armed, what
+            assert rig.drive.following, what
         rig.line.state = 'silent'
         rig.pass_time(rig.drive.settings.lost_after + _SOON)
-        assert not rig.drive.armed and not rig.drive.snapshot.connected
+        assert not rig.drive.following and not rig.drive.snapshot.connected

@@ -29,7 +29,7 @@ def waits_for(rig: Rig, key: str) -> bool:
     task = rig.drive._watch._task
     assert task is not None
     awaited = task.awaited
-    return isinstance(awaited, Transfer) and awaited.reads(1, rig.drive.registers.address(key))
+    return isinstance(awaited, Transfer) and awaited.reads(1, rig.drive.params.address(key))
 
 
 def until(rig: Rig, condition: Callable[[], object]) -> None:
@@ -48,7 +48,7 @@ def full_line(way: str, key: str) -> Rig:
     rig.turn()
     rig.send(None)
     for _ in range(NEIGHBOURS):
-        rig.bus.run(neighbour(rig.bus, rig.drive.registers.address(key)))
+        rig.bus.run(neighbour(rig.bus, rig.drive.params.address(key)))
     for _ in range(100):
         rig.bus.step()
     return rig
@@ -61,7 +61,7 @@ def test_a_stop_comes_whatever_the_poll_waits_for(event: str) -> None:
         with full_line('rtu', 'status.u_rms') as rig:
             for _ in range(turns):
                 rig.bus.step()
-            assert rig.drive.armed
+            assert rig.drive.following
             if event == 'fault':
                 rig.far.trip(OVERLOAD)
             elif event == 'keypad':
@@ -76,7 +76,7 @@ def test_a_stop_comes_whatever_the_poll_waits_for(event: str) -> None:
             asked = [(key, data) for _, key, data in rig.asked[begun:]]
             at = asked.index(('status.frq_set', (300).to_bytes(2, 'big')))
             stop = [(INV_ST, None), ('fieldbus.scmd', bytes(2))]
-            if asked[at + 1 : at + 3] != stop or rig.drive.armed:
+            if asked[at + 1 : at + 3] != stop or rig.drive.following:
                 wrong[turns] = asked
     assert not wrong
 
@@ -97,7 +97,7 @@ def test_an_interruption_that_it_meets_is_the_loss_of_the_drive() -> None:
         rig.meet = interrupt
         # it is raised once only, and to whatever asks first
         until(rig, lambda: met)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         rig.pass_time(0.5)
         assert rig.notes.said(Cause.LOST_IN_USE)
         rig.wait_until(lambda: rig.drive.snapshot.connected)
@@ -114,7 +114,7 @@ def test_a_poll_that_pauses_because_the_drive_was_busy_is_not_waited_for() -> No
         rig.line.go_to(rig.clock.now + 0.01)
         begun = len(rig.asked)
         rig.drive.set_setpoint(30.0)
-        until(rig, lambda: not rig.drive.armed)
+        until(rig, lambda: not rig.drive.following)
         assert len(rig.asked) - begun <= 4
 
 
@@ -128,7 +128,7 @@ def test_a_poll_that_it_has_overtaken_says_nothing_about_an_older_status() -> No
             rig.line.go_to(rig.clock.now + 0.02)
             rig.drive.set_setpoint(setpoint)
             rig.bus.step()
-            if not rig.drive.armed:
+            if not rig.drive.following:
                 break
         assert waits_for(rig, 'telegram.actual'), 'an older status is on its way: so this is a test'
         for _ in range(4):

@@ -214,7 +214,7 @@ def test_what_is_stored_is_written_once_and_reported_and_kept() -> None:
 def test_a_time_out_that_always_stops_needs_nothing_else() -> None:
     with Bench(drive_timeout=4.0).connect() as rig:
         assert rig.bolt.registers[PATIENT] == 40
-        assert rig.drive.inverter.timeout.seconds == 4.0 and rig.drive.inverter.timeout.stops_motor
+        assert rig.drive.state.timeout.seconds == 4.0 and rig.drive.state.timeout.stops_motor
         assert not rig.notes.said('time-out of its own')
     with Bench().connect() as rig:
         assert rig.notes.said('no time-out of its own (T BUS is 0)')
@@ -227,7 +227,7 @@ def test_a_set_point_is_limited_to_the_one_direction() -> None:
         rig.pass_time(5.0)
         assert rig.bolt.hertz == 0
         assert rig.notes.said('set-point -5 is limited to 0')
-        assert rig.drive.armed and rig.drive.snapshot.setpoint_clamped
+        assert rig.drive.following and rig.drive.snapshot.setpoint_clamped
 
 
 def test_what_a_drive_cannot_measure_is_its_familys() -> None:

@@ -92,7 +92,7 @@ class Bench(MadeUpRig):
 
     def turn_at(self, frequency: float) -> None:
         """Set this set-point, enabled before if need be."""
-        if not self.drive.armed:
+        if not self.drive.following:
             self.connect()
             self.enable()
         self.drive.set_setpoint(frequency)
@@ -145,7 +145,7 @@ def test_a_ride() -> None:
 
         acme.trip(70)
         rig.pass_time(1.0)
-        assert not rig.drive.armed and acme.registers[WORD] == REMOTE
+        assert not rig.drive.following and acme.registers[WORD] == REMOTE
         assert rig.notes.said('Too hot. Let it cool')
         assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 70 Hot'
         assert acme.hertz == 0
@@ -163,7 +163,7 @@ def test_a_set_point_that_is_not_refreshed_ends_in_both_registers() -> None:
         rig.turn_at(-20.0)
         rig.pass_time(1.0)
         assert (rig.acme.hertz, rig.acme.registers[TURN]) == (0, 0)
-        assert rig.drive.snapshot.setpoint == 0 and rig.drive.armed
+        assert rig.drive.snapshot.setpoint == 0 and rig.drive.following
         rig.drive.set_setpoint(-5.0)
         rig.pass_time(0.1)
         assert -5.0 in rig.acme.followed
@@ -221,7 +221,7 @@ def test_a_refused_part_stops_the_motor() -> None:
         rig.drive.set_setpoint(-35.0)
         rig.pass_time(1.0)
         assert rig.notes.said('it refused set-point -35: not that')
-        assert rig.acme.registers[WORD] == REMOTE and not rig.drive.armed
+        assert rig.acme.registers[WORD] == REMOTE and not rig.drive.following
 
 
 @pytest.fixture
@@ -240,7 +240,7 @@ def test_a_role_that_is_missing_is_a_feature_that_it_lacks(bare: str) -> None:
     with Bench(bare) as rig:
         rig.turn_at(-20.0)
         rig.pass_time(2.0)
-        assert rig.drive.snapshot.connected and rig.drive.armed
+        assert rig.drive.snapshot.connected and rig.drive.following
         assert math.isnan(rig.drive.snapshot.speed) and math.isnan(rig.drive.snapshot.frequency)
         # nothing says that it coasts
         assert rig.result(rig.drive.stop()).cause is not Cause.COASTING

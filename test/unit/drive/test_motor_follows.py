@@ -38,7 +38,7 @@ def test_a_motor_that_does_not_slow_down_after_a_time_out_is_stopped(way: str) -
         rig.pass_time(10.0)
         assert rig.notes.said(Cause.SETPOINT_TIMED_OUT)
         assert rig.notes.said('does not slow down at set-point 0 (20 Hz')
-        assert not rig.drive.armed
+        assert not rig.drive.following
         assert not rig.drive.stop_unconfirmed
         assert not rig.turns
 
@@ -50,7 +50,7 @@ def test_a_motor_that_slows_down_after_a_time_out_is_not_stopped(way: str) -> No
         rig.send(None)
         rig.pass_time(15.0)
         assert rig.far.motor.frequency == pytest.approx(0.0, abs=0.5)
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 def test_the_slowest_ramp_is_not_taken_for_none() -> None:
@@ -61,7 +61,7 @@ def test_the_slowest_ramp_is_not_taken_for_none() -> None:
         rig.send(None)
         rig.pass_time(40.0)
         assert 18 < rig.far.motor.frequency < 19.9
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 def test_a_least_frequency_that_the_keypad_sets_keeps_no_motor_turning() -> None:
@@ -70,7 +70,7 @@ def test_a_least_frequency_that_the_keypad_sets_keeps_no_motor_turning() -> None
         rig.far.set_from_keypad('frequency.f_min_1', 30.0)
         rig.send(None)
         rig.pass_time(12.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         assert rig.far.motor.frequency == 0
 
 
@@ -114,7 +114,7 @@ def test_a_motor_that_another_master_reverses_is_stopped_and_its_direction_shown
         rig.pass_time(3.0)
         assert rig.notes.said(Cause.TURNS_BACKWARDS)
         assert min(shown) < -2.0
-        assert not rig.drive.armed
+        assert not rig.drive.following
         assert not rig.turns
 
 
@@ -128,7 +128,7 @@ def test_a_motor_that_another_master_speeds_up_is_told_and_given_its_set_point(w
         rig.pass_time(2.0)
         assert rig.notes.said(Cause.FASTER_THAN_SETPOINT)
         assert rig.far.motor.frequency == pytest.approx(20.0, abs=0.5)
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 @pytest.mark.parametrize('way', FOLLOWING)
@@ -140,7 +140,7 @@ def test_no_change_of_a_set_point_is_taken_for_another_master(way: str) -> None:
             for pause in (0.3, 2.5):
                 rig.send(abs(value) if forward_only else value)
                 rig.pass_time(pause)
-        assert rig.drive.armed
+        assert rig.drive.following
         assert not rig.notes.said(Cause.FASTER_THAN_SETPOINT)
 
 
@@ -153,7 +153,7 @@ def test_a_motor_that_ramps_through_an_earlier_set_point_is_not_stopped() -> Non
         for value in (30.0, -30.0):
             rig.send(value)
             rig.pass_time(25.0)
-            assert rig.drive.armed
+            assert rig.drive.following
         assert rig.notes.events[-1].severity is not Severity.WARNING
 
 
@@ -174,4 +174,4 @@ def test_a_motor_that_ramps_slowly_through_a_pause_at_0_is_not_stopped(
         rig.send(-first)
         rig.pass_time(3.0)
         assert rig.far.motor.frequency * first > 0
-        assert rig.drive.armed, rig.notes.events
+        assert rig.drive.following, rig.notes.events

@@ -90,7 +90,7 @@ def test_an_enable_is_refused_with_the_reason() -> None:
             rig.send(20.0)
             rig.pass_time(1.0)
             found = (
-                reason in answer, rig.drive.armed, bool(bits(rig) & DIRECTIONS),
+                reason in answer, rig.drive.following, bool(bits(rig) & DIRECTIONS),
                 round(rig.far.memory.number(CONTROL_MODE)),
                 bool(rig.written('serial.control_mode')) and 'P800' not in reason,
             )
@@ -115,7 +115,7 @@ def test_an_enable_is_refused_in_another_operating_mode(
         rig.far.control_unit.hears = lambda *line: True
         rig.connect()
         assert reason in rig.answer(rig.drive.enable())
-        assert not rig.drive.armed
+        assert not rig.drive.following
 
 
 def test_the_last_five_faults_are_shown_newest_first() -> None:
@@ -214,5 +214,5 @@ def test_a_drive_that_answers_late_is_followed_all_the_same() -> None:
     ) as rig:
         rig.turn()
         rig.pass_time(30.0)
-        assert rig.drive.armed and not rig.far.faults
+        assert rig.drive.following and not rig.far.faults
         assert succeeded(rig, rig.drive.stop())

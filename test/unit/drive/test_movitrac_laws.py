@@ -119,7 +119,7 @@ def test_a_stop_at_each_step_of_an_enable(name: str) -> None:
             assert succeeded(rig, begun[0][1]), moment
             rig.send(20.0)
             rig.pass_time(0.3)
-            assert not rig.drive.armed and not bits(rig) & DIRECTIONS and not rig.turns, moment
+            assert not rig.drive.following and not bits(rig) & DIRECTIONS and not rig.turns, moment
             rig.send(None)
             rig.drive.activate()
         # it was stopped at each of the checks, of what takes control and of the run command
@@ -132,7 +132,7 @@ def test_a_stop_at_each_step_of_an_enable(name: str) -> None:
 def trip(rig: Rig) -> None:
     rig.far.trip(OVERCURRENT)
     rig.pass_time(1.0)
-    assert not rig.drive.armed
+    assert not rig.drive.following
     rig.acknowledged += 1
     assert 'acknowledged 101 Overcurrent' in rig.answer(rig.drive.acknowledge())
 
@@ -160,7 +160,7 @@ def press(rig: Rig, key: str) -> None:
     rig.far.control_unit.press('manual')
     rig.far.control_unit.press(key)
     rig.pass_time(1.0)
-    assert not rig.drive.armed
+    assert not rig.drive.following
     assert rig.notes.said(Cause.STOPPED_BECAUSE, Severity.WARNING)
     assert not bits(rig) & DIRECTIONS and rig.far.memory.number(SETPOINT) == 0
     rig.far.control_unit.press('automatic')
@@ -236,7 +236,7 @@ def test_a_short_power_cycle_ends_a_run_in_which_the_frequency_falls(
         rig.far.power_cycle(0.5)
         rig.far.motor.rotor = 0.0
         rig.pass_time(2.0)
-        assert not rig.drive.armed and not rig.turns and rig.drive.snapshot.connected
+        assert not rig.drive.following and not rig.turns and rig.drive.snapshot.connected
         if switch.get('bits_after_power_on') == 'kept':
             assert rig.notes.said(Cause.SLOWER_AFTER_SILENCE, Severity.WARNING)
         assert_only_enable_helps(rig)
@@ -248,7 +248,7 @@ def test_bits_left_behind_by_another_control_mode_turn_nothing(outside: str) -> 
         rig.turn()
         rig.far.set_from_keypad(CONTROL_MODE, 'Standard')
         rig.pass_time(3.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         rig.send(None)
         turned: list[bool] = []
         rig.looked = lambda: turned.append(rig.turns)
@@ -272,7 +272,7 @@ def test_what_takes_the_motor_away_ends_a_run(takes_away: Callable[[Rig], None])
         rig.turn()
         takes_away(rig)
         rig.pass_time(3.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         unit = rig.far.control_unit
         unit.press('automatic')
         unit.switch(42, False)
@@ -299,7 +299,7 @@ def test_a_set_point_that_was_lowered_in_noise_ends_no_run(value: float) -> None
             rig.pass_time(0.7)
             rig.line.mend()
             rig.pass_time(2.0)
-            assert rig.drive.armed, lead
+            assert rig.drive.following, lead
             assert rig.far.motor.frequency == pytest.approx(value, abs=0.1), lead
 
 
@@ -312,7 +312,7 @@ def test_a_set_point_whose_answer_is_lost_ends_no_run() -> None:
                 rig.line.losses = losses
                 rig.send(value)
                 rig.pass_time(1.5)
-            assert rig.drive.armed, losses
+            assert rig.drive.following, losses
 
 
 def test_a_motor_that_is_held_back_for_a_moment_ends_no_run() -> None:
@@ -325,7 +325,7 @@ def test_a_motor_that_is_held_back_for_a_moment_ends_no_run() -> None:
         assert 11 < rig.far.motor.frequency < 19
         rig.line.mend()
         rig.pass_time(3.0)
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 def test_noise_while_the_motor_speeds_up_ends_no_run() -> None:
@@ -337,7 +337,7 @@ def test_noise_while_the_motor_speeds_up_ends_no_run() -> None:
             rig.pass_time(0.7)
             rig.line.mend()
             rig.pass_time(0.2)
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 def test_a_motor_is_reversed_again_and_again() -> None:

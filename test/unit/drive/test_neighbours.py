@@ -94,7 +94,7 @@ def test_neighbours_keep_their_rate_with_a_quarter_of_the_drives_unplugged(
         assert not seen[7] and not seen[8]
         # their stops are not confirmed, and tried on: those that come back are stopped
         for address, drive in rig.drives.items():
-            assert drive.armed == (ride and address < 7)
+            assert drive.following == (ride and address < 7)
             assert drive.stop_unconfirmed == (ride and address >= 7)
         # and each of them is found again
         rig.line.unplug()
@@ -118,14 +118,14 @@ def test_a_stop_of_a_drive_that_is_lost_goes_out_at_once() -> None:
         rig.connect()
         rig.line.unplug(8)
         rig.pass_time(10.0)
-        sent, asked_at = len(rig.line.frames), rig.clock.now
+        sent, requested_at = len(rig.line.frames), rig.clock.now
         stop = rig.drives[8].stop()
         rig.pass_time(0.5)
         stops = [
             one['last'] for one in rig.line.frames[sent:] if one['hex'].startswith('0806')
         ]
         # behind the transaction on the line, which may be one without a response
-        assert stops and stops[0] - asked_at < 0.3
+        assert stops and stops[0] - requested_at < 0.3
         assert 'NOT confirmed' in rig.answer(stop)
 
 
@@ -182,12 +182,12 @@ def test_a_drive_that_runs_is_polled_and_measured_as_always_while_another_is_rea
         assert measured(rig)[1] - before[1] >= 2
         assert seen[2] <= 2
         # a stop is confirmed as always
-        asked_at = rig.clock.now
+        requested_at = rig.clock.now
         stop = rig.drives[1].stop()
         rig.pass_time(0.5)
         assert not reading.done()
         assert 'stop' in rig.answer(stop, 2.0)
-        assert rig.clock.now - asked_at < 1.5
+        assert rig.clock.now - requested_at < 1.5
 
 
 def test_a_drive_is_enabled_as_always_while_another_is_read_for_the_first_time() -> None:

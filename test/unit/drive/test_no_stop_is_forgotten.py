@@ -15,10 +15,10 @@ def test_a_drive_that_is_left_alone_while_it_runs_is_stopped() -> None:
     with Rig() as rig:
         rig.drive.activate()
         connecting = rig.drive.connect(parameters=True)
-        rig.wait_until(lambda: rig.drive.inverter.connected)
+        rig.wait_until(lambda: rig.drive.state.connected)
         # an enable need not wait for the end of the reading
         rig.drive.enable()
-        rig.wait_until(lambda: rig.drive.armed)
+        rig.wait_until(lambda: rig.drive.following)
         rig.send(20.0)
         rig.pass_time(0.2)
         assert rig.far.motor.driven and not connecting.done()
@@ -47,7 +47,7 @@ def test_a_drive_that_is_being_left_is_not_enabled() -> None:
         assert enabled.exception() is not None
         assert 'left to its ramp' in rig.answer(leaving)
         rig.pass_time(10.0)
-        assert not rig.drive.armed and not rig.far.motor.driven
+        assert not rig.drive.following and not rig.far.motor.driven
 
 
 def test_an_attempt_that_fails_at_once_confirms_nothing() -> None:

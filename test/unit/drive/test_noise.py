@@ -83,7 +83,7 @@ def test_a_burst_shorter_than_lost_after_stops_nothing(line: str, length: float)
             drown(rig, length, after=0.1 + 0.0154 * number)
             rig.pass_time(2.0)
             assert not ends(rig)
-            assert rig.drive.armed
+            assert rig.drive.following
             assert not rig.far.faults
 
 
@@ -134,7 +134,7 @@ def test_without_an_answer_it_is_lost_after_the_time_set() -> None:
             # from the first answer that is missing to the end of the request that is under way then
             if not lost_after + 0.2 <= lost_at - begin <= lost_after + 0.45:
                 wrong[lost_after] = lost_at - begin
-            assert not rig.drive.armed
+            assert not rig.drive.following
     assert not wrong
 
 
@@ -179,7 +179,7 @@ def test_one_read_that_never_comes_whole_leaves_no_motor_unwatched(key: str) -> 
         rig.send(20.0)
         rig.far.trip(3)
         rig.pass_time(5.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
 
 
 def test_a_stop_that_is_never_answered_leaves_the_line_to_others_too() -> None:

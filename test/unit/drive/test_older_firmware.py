@@ -79,7 +79,7 @@ class Older(Rig):
         wanted = {f'control.{name}': value for name, value in values.items()}
         self.result(self.drive.parameters.change(wanted))
 
-    def why_not(self) -> str:
+    def write_forbidden(self) -> str:
         """Return why parameters are not changed; nothing may have been written."""
         before = (dict(self.far.writes), self.modes, self.far.motor.driven)
         with pytest.raises(DriveError) as error:
@@ -119,17 +119,17 @@ def test_under_bus_control_settings_are_just_written(rig: Older, turning: bool) 
     rig.change(accel=6.0)
     assert rig.has('accel') == [6.0]
     assert rig.modes == [BUS]
-    assert rig.turns == rig.drive.armed == turning
+    assert rig.turns == rig.drive.following == turning
     assert not rig.flags
 
 
 def test_what_else_has_control_keeps_it(rig: Older) -> None:
     rig.far.set_run_input(False)
     rig.far.control_unit.press('ext')
-    assert 'giving it back to them could start the motor: press STOP' in rig.why_not()
+    assert 'giving it back to them could start the motor: press STOP' in rig.write_forbidden()
     rig.far.set_run_input(True)
     rig.pass_time(0.2)
-    assert 'the motor runs' in rig.why_not()
+    assert 'the motor runs' in rig.write_forbidden()
     rig.far.control_unit.press('stop')
     rig.pass_time(1.0)
     rig.change(accel=6.0)
@@ -141,13 +141,13 @@ def test_not_while_a_fault_is_active_or_others_tune_it(
 ) -> None:
     rig.far.trip(5)
     rig.pass_time(0.2)
-    why = rig.why_not()
+    why = rig.write_forbidden()
     assert '5 Overload' in why and '~/fault_ack' in why
     rig.acknowledged += 1
     rig.result(rig.drive.acknowledge())
     rig.change(accel=5.0)
     monkeypatch.setattr(type(rig.far.control_unit), 'mode', property(lambda _: 0))
-    assert 'MODE is Inhibit' in rig.why_not()
+    assert 'MODE is Inhibit' in rig.write_forbidden()
 
 
 @pytest.mark.parametrize('refused', [False, True])
@@ -376,13 +376,13 @@ def test_a_chopper_and_a_current_limit_are_no_take_over(
     with Rig('classic v5.0').turn() as rig:
         show(rig, monkeypatch, code)
         rig.pass_time(1.0)
-        assert rig.drive.armed and rig.turns, rig.notes.events
+        assert rig.drive.following and rig.turns, rig.notes.events
         status = rig.drive.snapshot.status
         assert status.code == code and status.runs_by_bus and status.driven
         assert Fact.NETWORK_CONTROL | Fact.OPERATION_ENABLED in status.facts
         show(rig, monkeypatch, None)
         rig.pass_time(1.0)
-        assert rig.drive.armed, rig.notes.events
+        assert rig.drive.following, rig.notes.events
 
 
 @pytest.mark.parametrize('press', ['start', 'ext', 'stop'])
@@ -392,10 +392,10 @@ def test_a_take_over_behind_a_current_limit_is_noticed(
     with Rig('classic v5.0').turn() as rig:
         show(rig, monkeypatch, LIMIT)
         rig.pass_time(0.5)
-        assert rig.drive.armed
+        assert rig.drive.following
         rig.far.control_unit.press(press)
         rig.pass_time(2.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         text = 'keypad or terminals have control now and run the motor (27 Cur Limt)'
         assert rig.notes.said(text)
 
@@ -404,7 +404,7 @@ def test_a_motor_that_starts_against_its_current_limit(monkeypatch: pytest.Monke
     with Rig('classic v5.0').connect() as rig:
         show(rig, monkeypatch, LIMIT, driven=True)
         rig.enable()
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 def test_a_stop_is_not_confirmed_by_a_current_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -438,7 +438,7 @@ def test_current_limit_is_no_stop() -> None:
         rig.far.motor.load = 6.0
         rig.pass_time(3.0)
         status = rig.drive.snapshot.status
-        assert rig.drive.snapshot.text == 'Cur Limt' and rig.drive.armed
+        assert rig.drive.snapshot.text == 'Cur Limt' and rig.drive.following
         assert status.runs_by_bus and status.kind is Kind.ALARM
         assert sum('the current limit' in one.text for one in rig.notes.events) == 1
         assert rig.answer(rig.drive.stop()).startswith('stop')
@@ -449,7 +449,7 @@ def test_current_limit_is_no_stop() -> None:
         rig.enable()
         rig.far.control_unit.press('stop')
         rig.pass_time(1.0)
-        assert not rig.drive.armed
+        assert not rig.drive.following
 
 
 def test_counters_have_24_bits_over_classic(monkeypatch: pytest.MonkeyPatch) -> None:

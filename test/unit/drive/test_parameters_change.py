@@ -54,7 +54,7 @@ def on_write(rig: Rig, work: Callable[[str, Value], str | None]) -> None:
     def meet(key: str, data: bytes | None) -> str | None:
         if data is None or key not in rig.far.settings:
             return None
-        return work(key, rig.drive.registers.value(key, data))
+        return work(key, rig.drive.params.value(key, data))
 
     rig.meet = meet
 
@@ -151,7 +151,7 @@ def test_values_that_no_drive_can_have_are_refused(rig: Rig, parameters: Paramet
     ):
         for take in (
             lambda: parameters.exact(key, value),  # noqa: B023
-            lambda: parameters.admit(key, value),  # noqa: B023
+            lambda: parameters.validate(key, value),  # noqa: B023
             lambda: rig.result(parameters.change({RETARD: 9, key: value})),  # noqa: B023
         ):
             with pytest.raises(ParameterError) as error:
@@ -186,7 +186,7 @@ def test_settings_of_the_line_are_guarded(rig: Rig, parameters: Parameters) -> N
         answer = rig.answer(parameters.change({ACCEL: 7, key: value}))
         assert answer.startswith(f'{key}: communication settings are not changed unless allow_')
         with raises(Cause.COMMUNICATION_PROTECTED):
-            parameters.admit(key, value)
+            parameters.validate(key, value)
         assert not rig.far.writes
     # a saved state of the same drive loads all the same
     serial = {key: value for key, value in parameters.values.items() if key.startswith('serial.')}

@@ -75,7 +75,7 @@ class Moody:
             if data is None or fate == 'obey':
                 return None
             if fate != 'ignored':
-                kept = self._rig.drive.registers.value(key, data)
+                kept = self._rig.drive.params.value(key, data)
                 kept = self.values[key][2] if fate == 'keep' else kept
                 self._rig.far.set_from_keypad(key, kept)
             return 'refused' if fate == 'lie' else 'ignored'

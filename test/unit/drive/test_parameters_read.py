@@ -148,7 +148,7 @@ def test_a_drive_that_refuses_every_third_request_is_read(rig: Rig) -> None:
 def test_a_switch_that_is_neither_on_nor_off_has_no_value(rig: Rig) -> None:
     rig.far.memory.put('serial.auto_stop', 2)
     rig.connect(parameters=True)
-    values, timeout = rig.drive.parameters, rig.drive.inverter
+    values, timeout = rig.drive.parameters, rig.drive.state
     assert 'serial.auto_stop' not in values.values
     rig.far.set_from_keypad('serial.auto_stop', True)
     rig.pass_time(ROUND)
@@ -255,7 +255,7 @@ def test_a_listener_that_fails_does_not_end_the_watch(
 def test_the_drives_time_out_reaches_the_keeping_alive() -> None:
     with Rig(allow_communication_changes=True) as rig:
         rig.connect(parameters=True)
-        parameters, inverter = rig.drive.parameters, rig.drive.inverter
+        parameters, inverter = rig.drive.parameters, rig.drive.state
 
         def known() -> tuple[float, bool]:
             return inverter.timeout.seconds, inverter.timeout.stops_motor

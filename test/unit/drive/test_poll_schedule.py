@@ -59,7 +59,7 @@ def fast(parameters: Mapping[str, Any] | None = None) -> Rig:
 def full_line(rig: Rig) -> None:
     """Let as many others be read as a full line has."""
     for _ in range(31):
-        rig.bus.run(neighbour(rig.bus, rig.drive.registers.address(VOLTAGE)))
+        rig.bus.run(neighbour(rig.bus, rig.drive.params.address(VOLTAGE)))
 
 
 def stop(rig: Rig) -> None:

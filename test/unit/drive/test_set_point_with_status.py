@@ -87,7 +87,7 @@ def test_the_optimal_is_never_asked_for_it() -> None:
     with Rig('optimal') as rig:
         rig.turn()
         assert functions(rig) and BOTH not in functions(rig)
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 @pytest.mark.parametrize('code', [Refused.ILLEGAL_FUNCTION, Refused.ILLEGAL_VALUE, 0])
@@ -103,7 +103,7 @@ def test_one_that_does_not_have_the_function_is_given_up_for_the_connection(code
         assert (len(tried), functions(rig).count(BOTH)) == ((1, 0) if code else (0, 1))
         # the plain write follows at once: a poll may have waited longer, and a stop might
         assert not code or (SETPOINT, 200) in asked(rig, tried[0])[:2]
-        assert rig.drive.armed and not rig.notes.events
+        assert rig.drive.following and not rig.notes.events
         assert abs(rig.far.motor.frequency - 20.0) < 0.2
         # and is tried anew after another connection
         rig.link.write_and_read = both  # type: ignore[method-assign]
@@ -125,7 +125,7 @@ def test_a_refused_set_point_stops() -> None:
         refuse_both(rig, Refused.ILLEGAL_VALUE)
         rig.drive.set_setpoint(30.0)
         rig.pass_time(0.3)
-        assert not rig.drive.armed
+        assert not rig.drive.following
         assert rig.notes.said('it refused set-point 30')
         assert not rig.drive.stop_unconfirmed
 
@@ -135,7 +135,7 @@ def test_a_lost_answer_is_looked_after_before_the_next_set_point() -> None:
         rig.line.losses = 1
         rig.drive.set_setpoint(30.0)
         rig.pass_time(0.5)
-        assert rig.drive.armed
+        assert rig.drive.following
         first, again = [n for n, one in enumerate(asked(rig)) if one == (SETPOINT, 300)]
         assert (STATUS, None) in asked(rig)[first:again]
         assert functions(rig)[-2:] == [BOTH, BOTH]
@@ -152,7 +152,7 @@ def test_an_impossible_status_that_comes_with_a_set_point_stops_nothing() -> Non
         server(rig.far).write_and_read = spoil  # type: ignore[method-assign]
         rig.drive.set_setpoint(25.0)
         rig.pass_time(1.5)
-        assert rig.drive.armed
+        assert rig.drive.following
         assert not rig.notes.events
 
 
@@ -169,7 +169,7 @@ def test_a_poll_that_waits_is_spared_what_the_set_point_brought() -> None:
         brought = functions(rig, frames).count(BOTH)
         assert brought > 10
         assert polls < brought / 4
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 @pytest.mark.parametrize(('timeout', 'period'), [(0.0, 5.0), (3.0, 1.0), (20.0, 5.0)])
@@ -180,7 +180,7 @@ def test_an_unchanged_set_point_is_written_no_more_often_than_needed(
         rig.turn()
         begun = len(rig.written(SETPOINT))
         rig.pass_time(20.0)
-        assert rig.drive.armed
+        assert rig.drive.following
         # a program sends it ten times a second
         assert 20 / period * 0.8 <= len(rig.written(SETPOINT)) - begun <= 20 / period + 1
 

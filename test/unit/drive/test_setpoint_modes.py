@@ -199,7 +199,7 @@ def test_mode_that_we_change_has_its_unit_at_once(way: str) -> None:
         # a motor that is enabled is driven, and a drive changes its mode at standstill only
         change = {'control.mode': 'Speed'}
         assert 'control.mode' in rig.answer(rig.drive.parameters.change(change))
-        assert rig.drive.armed
+        assert rig.drive.following
         rig.answer(rig.drive.stop())
         rig.pass_time(1.0)
         frequencies = rig.written('status.frq_set')

@@ -79,7 +79,7 @@ def test_a_speed_that_the_scale_cannot_carry_is_clamped() -> None:
 def test_scales_that_no_bus_tells_are_chosen(way: str) -> None:
     # FrqScl 1/100: a set-point of 20 Hz is 2000 counts, and 200 counts are 2 Hz
     with Rig(way, frequency_scale=0.01) as rig:
-        registers, key = rig.drive.registers, 'status.frq_set'
+        registers, key = rig.drive.params, 'status.frq_set'
         codec = registers.model[key].at(registers.protocol).codec
         assert codec.decode(registers.encode(key, 20.0)) == 2000
         assert registers.value(key, registers.encode(key, 20.0)) == 20.0

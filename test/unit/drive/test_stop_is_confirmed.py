@@ -88,10 +88,10 @@ def test_a_tuning_of_a_driver_before_is_stopped_by_an_exit_too() -> None:
 def test_what_was_asked_for_before_a_stop_was_confirmed_is_refused_after_it() -> None:
     with Rig() as rig:
         rig.turn()
-        stop, asked_at = rig.drive.stop(), rig.clock.now
-        assert succeeds(rig, stop) and rig.clock.now > asked_at
+        stop, requested_at = rig.drive.stop(), rig.clock.now
+        assert succeeds(rig, stop) and rig.clock.now > requested_at
         for command in (
-            rig.drive.enable(asked_at), rig.drive.tune(Procedure.FULL, asked_at=asked_at)
+            rig.drive.enable(requested_at), rig.drive.tune(Procedure.FULL, requested_at=requested_at)
         ):
             assert 'a stop was confirmed after this was asked for' in rig.answer(command)
             assert rig.far.control_unit.scmd == Scmd.STOP
@@ -155,9 +155,9 @@ def test_a_stop_that_the_drive_is_too_busy_for_is_written_again_soon() -> None:
     with Rig() as rig:
         rig.turn()
         rig.spoil('busy', SCMD, 3)
-        asked_at, stop = rig.clock.now, rig.drive.stop()
+        requested_at, stop = rig.clock.now, rig.drive.stop()
         rig.wait_until(lambda: rig.far.control_unit.scmd == Scmd.STOP)
-        assert rig.clock.now - asked_at < 0.15
+        assert rig.clock.now - requested_at < 0.15
         assert succeeds(rig, stop)
 
 
@@ -232,10 +232,10 @@ def test_who_sees_a_drive_disarmed_sees_that_its_stop_is_not_confirmed(way: str)
     with Rig() as rig:
         rig.turn()
         seen = []
-        disarm = rig.drive.setpoint.disarm
+        stop_following = rig.drive.setpoint.stop_following
 
         def note() -> None:
-            disarm()
+            stop_following()
             seen.append(rig.drive.stop_unconfirmed)
 
         with mock.patch.object(rig.drive.setpoint, 'disarm', note):

@@ -102,7 +102,7 @@ def require_stopped(rig: Rig) -> None:
     """It comes to stand, the stop is confirmed, and no run command is left."""
     rig.far.memory.set('control.retard', 0.3)
     rig.pass_time(1.5)
-    assert not rig.drive.armed and not rig.drive.stop_unconfirmed
+    assert not rig.drive.following and not rig.drive.stop_unconfirmed
     assert not rig.far.motor.driven and not unit(rig).word & Control.SWITCH_ON
 
 
@@ -121,7 +121,7 @@ def rows_that_fail(rows: Sequence[tuple[Any, ...]], check: Callable[..., None]) 
 
 
 def stops(rig: Rig, retard: float = 0.3, says: str = 'stopping: it ramps down') -> None:
-    if not rig.drive.armed:
+    if not rig.drive.following:
         turn(rig, retard)
     assert rig.answer(rig.drive.stop()) == says
 
@@ -170,7 +170,7 @@ def has_its_self_test_while_enabled(rig: Rig) -> None:
     turn(rig)
     self_test(rig)
     rig.pass_time(1.0)
-    assert not rig.drive.armed and rig.notes.said('the drive is starting (')
+    assert not rig.drive.following and rig.notes.said('the drive is starting (')
     initialise(rig)
 
 
@@ -257,7 +257,7 @@ def test_table_16_misled(exits: Exits) -> None:
                 assert rig.notes.said(cause), rig.notes.events
                 require_stopped(rig)
             else:
-                assert rig.drive.armed and rig.far.motor.frequency > 19.0
+                assert rig.drive.following and rig.far.motor.frequency > 19.0
             assert set(wanted.split()) <= set(exits), exits
 
         assert not rows_that_fail(MISLED, check)
@@ -326,7 +326,7 @@ def test_table_16_fault(exits: Exits) -> None:
             assert phase(rig) is state
             rig.far.trip(OVERLOAD)
             rig.pass_time(1.0)
-            assert shown(rig) is State.FAULTED and not rig.drive.armed
+            assert shown(rig) is State.FAULTED and not rig.drive.following
             assert sum('fault 5 Overload' in one.text for one in rig.notes.events) == 1
             assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 5 Overload'
             assert {'AF', 'FD'} <= set(exits) and unit(rig).ack_reads == 0

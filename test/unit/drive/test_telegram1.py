@@ -236,7 +236,7 @@ def test_each_drive_has_its_own_block() -> None:
         rig.send(12.0, 2)
         rig.pass_time(2.0)
         assert rig.fars[2].motor.frequency > 11.5
-        assert not rig.fars[1].motor.driven and not rig.drives[1].armed
+        assert not rig.fars[1].motor.driven and not rig.drives[1].following
         assert not telegram_laws.violations(rig.line.frames, 'sinus_h', 2, 20)
 
 

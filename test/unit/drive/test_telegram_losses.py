@@ -133,7 +133,7 @@ def complaint(way: str, exchange: float, levels: bool, loss: str) -> str:
         rig.pass_time(1.0 + rig.drive.settings.lost_after)
         if rig.turns:
             return f'it turns at {rig.far.motor.frequency:.1f} Hz'
-        if rig.drive.armed:
+        if rig.drive.following:
             return 'it is still enabled'
         rig.pass_time(3.0)
         if rig.turns:
@@ -168,7 +168,7 @@ def test_the_first_answer_without_valid_data_ends_the_enable(way: str) -> None:
         rig.turn()
         run = words(rig.line.frames)[-1]
         cut_fieldbus(rig, 0.15)
-        assert not rig.drive.armed and words(rig.line.frames)[-1] != run
+        assert not rig.drive.following and words(rig.line.frames)[-1] != run
         # a PLC is not asked more often while it has none
         before = len(rig.line.frames)
         cut_fieldbus(rig, 5.0)
@@ -232,4 +232,4 @@ def test_a_motor_that_is_loaded_is_not_stopped_although_it_is_looked_at_seldom(w
         rig.far.advance_to = loaded  # type: ignore[method-assign]
         rig.pass_time(3.0)
         assert min(one.frequency for one in rig.notes.snapshots[-8:]) < 19
-        assert rig.drive.armed, rig.notes.events
+        assert rig.drive.following, rig.notes.events

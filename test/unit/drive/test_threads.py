@@ -70,7 +70,7 @@ class Real:
 
     def enable(self) -> None:
         # under load the drive may be slower than the driver waits
-        wait_until(lambda: self.drive.armed or try_to(self.drive.enable))
+        wait_until(lambda: self.drive.following or try_to(self.drive.enable))
 
     def polls(self, count: int) -> None:
         before = len(self.notes.snapshots)
@@ -180,7 +180,7 @@ def test_a_stop_ends_what_others_do_at_the_same_time(real: Real) -> None:
         with meanwhile(lambda: real.drive.set_setpoint(20.0)):
             wait_until(lambda: not real.far.motor.driven)
             real.polls(5)
-            assert not real.drive.armed and not real.far.motor.driven
+            assert not real.drive.following and not real.far.motor.driven
 
 
 def test_after_the_last_stop_no_thread_can_enable(real: Real) -> None:
@@ -193,7 +193,7 @@ def test_after_the_last_stop_no_thread_can_enable(real: Real) -> None:
         real.drive.stop_for_good(PATIENCE).result(PATIENCE)
         wait_until(lambda: not real.far.motor.driven)
         real.polls(10)
-        assert not real.drive.armed and not real.far.motor.driven
+        assert not real.drive.following and not real.far.motor.driven
     assert 'not active' in said(real.drive.enable().exception(PATIENCE))
 
 
@@ -225,5 +225,5 @@ def test_a_port_that_was_unplugged_is_opened_again(real: Real) -> None:
     real.simulator.inject('hangup', 1.0)
     wait_until(lambda: not real.drive.snapshot.connected)
     wait_until(lambda: real.drive.snapshot.connected)
-    assert not real.drive.armed
+    assert not real.drive.following
     real.enable()

@@ -172,7 +172,7 @@ def test_cancelling_stops_it(way: str) -> None:
         # with nothing to cancel, nothing happens: not even to a motor that runs
         rig.enable()
         rig.answer(rig.drive.cancel_tuning())
-        assert rig.drive.armed
+        assert rig.drive.following
 
 
 @pytest.mark.parametrize('out', ['stop', 'quick_stop', 'deactivate', 'disconnect'])
@@ -198,7 +198,7 @@ def test_a_drive_that_is_lost_meanwhile_is_stopped_when_it_is_back() -> None:
         rig.line.mend()
         rig.pass_time(8.0)
         assert rig.far.control_unit.status_code != TUNING
-        assert not rig.drive.stop_unconfirmed and not rig.drive.armed
+        assert not rig.drive.stop_unconfirmed and not rig.drive.following
 
 
 def test_not_two_at_a_time() -> None:
@@ -247,9 +247,9 @@ def test_refused() -> None:
     for lead, text in REFUSED:
         with Rig().connect() as rig:
             lead(rig)
-            before = rig.far.motor.driven, rig.drive.armed
+            before = rig.far.motor.driven, rig.drive.following
             answer = rig.answer(rig.drive.tune(Procedure.FULL))
-            driven = rig.far.motor.driven, rig.drive.armed
+            driven = rig.far.motor.driven, rig.drive.following
             if text not in answer or driven != before or Scmd.FULL_TUNING in rig.written(SCMD):
                 wrong.append(answer)
     assert not wrong

@@ -183,7 +183,7 @@ def test_what_stops_nothing_is_shown_and_reported_once(way: str) -> None:
             texts = [one.text for one in rig.notes.events]
             assert len(texts) == 1, (name, texts)
             assert event.cause in texts[0] and event.remedy in texts[0], texts
-            assert rig.drive.armed and rig.drive.snapshot.enabled
+            assert rig.drive.following and rig.drive.snapshot.enabled
             if name == 'sleep':
                 assert not rig.far.motor.driven
                 rig.far.set_from_keypad('control.f_sleep', 0.0)
@@ -207,7 +207,7 @@ def test_set_points_that_stop_coming_are_reported_and_the_next_is_followed(way: 
             'check what publishes them'
         )
         # this is no stop
-        assert rig.drive.armed
+        assert rig.drive.following
         rig.send(10.0)
         rig.wait_until(lambda: abs(rig.far.motor.frequency - 10) < 0.2, 5.0)
 
@@ -228,7 +228,7 @@ def test_a_fault_that_shows_first_as_a_refused_set_point_is_reported_as_the_faul
         rig.pass_time(1.0)
         (line,) = warnings(rig)
         assert line.startswith('stopped: fault 5 Overload: ')
-        assert not rig.drive.armed
+        assert not rig.drive.following
 
 
 def test_a_drive_that_was_off_for_long_is_reported_lost_and_found_without_control() -> None:
@@ -268,11 +268,11 @@ def test_a_refused_set_point_does_not_end_the_ride_after_it() -> None:
 
         rig.far.write_raw = refuse  # type: ignore[method-assign]
         rig.drive.set_setpoint(30.0)
-        rig.wait_until(lambda: not rig.drive.armed, 5.0)
+        rig.wait_until(lambda: not rig.drive.following, 5.0)
         rig.answer(rig.drive.stop())
         # before the next poll
         rig.enable()
         rig.pass_time(2.0)
-        assert rig.drive.armed
+        assert rig.drive.following
         (line,) = warnings(rig)
         assert 'it refused set-point 30: ' in line

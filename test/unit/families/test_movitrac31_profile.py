@@ -255,7 +255,7 @@ def test_release_removes_the_bits_and_never_writes_p841() -> None:
     cleared = (Write(BITS, 0), None), (Write(SIZE, 0.0), None)
     play(method.release(), (Read(MODE), REMOTE), *cleared)
     play(method.release(), (Read(MODE), STANDARD))
-    assert 'P841' in method.keeps_control
+    assert 'P841' in method.control_retained
 
 
 # --- faults ---------------------------------------------------------------------------------------

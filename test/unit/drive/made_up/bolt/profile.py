@@ -73,7 +73,7 @@ class FunctionBits(ControlMethod):
 
     means = 'function bits'
     references = ('fieldbus',)
-    keeps_control = 'SOURCE is stored; set it to terminals at the keypad'
+    control_retained = 'SOURCE is stored; set it to terminals at the keypad'
 
     def in_control(self) -> Steps[bool]:
         """Tell whether the line has control."""
