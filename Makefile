@@ -80,8 +80,8 @@ fuzz: setup ## spoiled frames through every decoder (FRAMES=1000000 SEED=1 ONLY=
 	@$(WITHOUT_ROS) PYTHONPATH=.:test .venv/without-ros/bin/python -m fuzz \
 		--frames $(or $(FRAMES),1000000) $(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only $(ONLY))
 
-# Not a part of setup: only the comparison needs other masters.
-bench: setup ## measure its speed, and that of others (two hours; BENCH=--quick: 10 minutes)
+# Not a part of setup: only the peer needs it.
+bench: setup ## measure speed, stops and noise, and a peer (two hours; BENCH=--quick: 10 minutes)
 	@env -u PYTHONPATH .venv/bin/python -m pip install --quiet --no-input --no-cache-dir \
 		--disable-pip-version-check --requirement=benchmark/requirements.txt
 	@tools/run python benchmark/run.py $(BENCH)

@@ -45,7 +45,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Line:
-    """How fast a line is: what nobody can beat."""
+    """How fast a line is: the least time that anything takes on it."""
 
     baud_rate: int
     protocol: str = 'modbus_rtu'
@@ -134,7 +134,7 @@ def cycles(frames: Sequence[Frame], line: Line, place: int) -> dict[str, float]:
 
     :param place: the register or the Classic id of the parameter.
 
-    :returns: median and 99th percentile of the time (ms), the limit (ms), median of the ratio.
+    :returns: median and 99th percentile of the time (ms), and the median of time / wire time.
     """
     times, limits = [], []
     for numbers in _begins(frames, line, place).values():
@@ -144,7 +144,6 @@ def cycles(frames: Sequence[Frame], line: Line, place: int) -> dict[str, float]:
     return {
         'time': 1e3 * statistics.median(times),
         'p99': 1e3 * percentile(times, 99),
-        'limit': 1e3 * statistics.median(limits),
         'ratio': statistics.median(a / b for a, b in zip(times, limits, strict=True)),
     }
 
@@ -202,41 +201,6 @@ def written(request: bytes) -> tuple[int, int | None, int]:
     if function == _READ_AND_WRITE:
         return unit, *struct.unpack('>H3xH', request[6:13])
     return unit, None, 0
-
-
-def once(frames: Sequence[Frame]) -> list[Frame]:
-    """Return the transactions that differ, each as it was the first time."""
-    asked: set[bytes] = set()
-    found: list[Frame] = []
-    for request, answer in pairwise(frames):
-        if request.is_request and not answer.is_request and request.data not in asked:
-            asked.add(request.data)
-            found += (request, answer)
-    return found
-
-
-def additions(frames: Sequence[Frame], line: Line) -> dict[str, float]:
-    """
-    Return what master and simulator add to the wire time of a transaction (ms, medians).
-
-    The master's share has in it how long the simulator takes to see that something came.
-    """
-    master, simulator = [], []
-    for before, frame in pairwise(frames):
-        if frame.is_request:
-            master.append(frame.gap - line.gap)
-        elif before.is_request:
-            due = before.last + line.answer_gap + len(frame.data) * line.character
-            simulator.append(frame.last - due)
-    return {
-        'master_adds': 1e3 * statistics.median(master),
-        'simulator_adds': 1e3 * statistics.median(simulator),
-    }
-
-
-def transactions(frames: Sequence[Frame]) -> int:
-    """Return how many requests there are."""
-    return sum(frame.is_request for frame in frames)
 
 
 def longest_transaction(frames: Sequence[Frame], line: Line) -> float:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What the tool says to a person: errors, questions, progress and remarks, columns of text.
+What the tool says to the operator: errors, questions, progress and remarks, columns of text.
 
 Remarks go to standard error, so that the output stays what a script wants.
 """
@@ -10,10 +10,14 @@ Remarks go to standard error, so that the output stays what a script wants.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import contextlib
+import json
+import math
+import signal
 import sys
 import threading
+from typing import Any
 import unicodedata
 
 from tqdm import tqdm
@@ -47,7 +51,7 @@ def progress(what: str, total: int) -> Iterator[Callable[[], None]]:
 
 
 def remark(text: str) -> None:
-    """Say something to a person, above the bar if there is one."""
+    """Say something to the operator, above the bar if there is one."""
     tqdm.write(f'nfo-sinus: {text}', file=sys.stderr)
     sys.stderr.flush()
 
@@ -56,6 +60,38 @@ def put(text: str) -> None:
     """Print a line of output, above the bar if there is one."""
     tqdm.write(text, file=sys.stdout)
     sys.stdout.flush()
+
+
+def as_json(facts: Any, indent: int | None = None) -> str:
+    """Return a JSON document; JSON has no NaN, so that it becomes null."""
+    return json.dumps(_without_nan(facts), ensure_ascii=False, indent=indent)
+
+
+def _without_nan(facts: Any) -> Any:
+    if isinstance(facts, Mapping):
+        return {name: _without_nan(fact) for name, fact in facts.items()}
+    if isinstance(facts, (list, tuple)):
+        return [_without_nan(fact) for fact in facts]
+    return None if isinstance(facts, float) and math.isnan(facts) else facts
+
+
+@contextlib.contextmanager
+def signals_handled(handler: Callable[[int, Any], Any]) -> Iterator[None]:
+    """
+    Handle the signals that would end this tool, if this is the main thread.
+
+    Whatever was inherited: a shell lets its background jobs ignore Ctrl-C.
+    """
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, former in before.items():
+            signal.signal(number, former)
 
 
 class CliError(Exception):
@@ -67,7 +103,7 @@ class UsageError(Exception):
 
 
 class Interrupted(Exception):
-    """A person or the system ended it."""
+    """The operator or the system ended it."""
 
     def __init__(self) -> None:
         super().__init__('interrupted')
@@ -79,7 +115,7 @@ def listed(head: str, lines: Iterable[str]) -> str:
 
 
 def require_yes(options: argparse.Namespace, question: str) -> None:
-    """See to it that a person wants it, by asking or by ``--yes``; else an error."""
+    """See to it that the operator wants it, by asking or by ``--yes``; else an error."""
     if options.yes:
         return
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
@@ -94,23 +130,19 @@ def require_yes(options: argparse.Namespace, question: str) -> None:
 
 def columns(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[str]:
     """Return rows as lines with aligned columns, some of them to the ``right``."""
-    widths = [max(_width(cell) for cell in column) for column in zip(*rows, strict=True)]
-    return [
-        '  '.join(
-            _pad(cell, width, to_right=place in right)
-            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
 
+    def width(text: str) -> int:
+        return sum(not unicodedata.combining(character) for character in text)
 
-def _width(text: str) -> int:
-    return sum(not unicodedata.combining(character) for character in text)
-
-
-def _pad(text: str, width: int, *, to_right: bool) -> str:
-    blank = ' ' * (width - _width(text))
-    return blank + text if to_right else text + blank
+    widths = [max(map(width, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        padded = []
+        for place, cell in enumerate(row):
+            blank = ' ' * (widths[place] - width(cell))
+            padded.append(blank + cell if place in right else cell + blank)
+        lines.append('  '.join(padded).rstrip())
+    return lines
 
 
 _CALLS = Calls(

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Commands one drive, and stops it; signals that would end the tool wait until it may end."""
+"""Commands one drive and stops it; signals that would end the tool wait until it may end."""
 
 from __future__ import annotations
 
@@ -17,37 +17,46 @@ from typing import Any, TypeVar
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.screen import Screen
-from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.cli.session import EventListener, Session
 from nfo_sinus_driver.drive import (
     Cause,
     Drive,
     DriveError,
     Event,
-    LogEntry,
     Report,
     Severity,
-    Snapshot,
     Telemetry,
 )
 from nfo_sinus_driver.signals import SUSPENDING, HeldSignals, signal_name
 
 _T = TypeVar('_T')
 
-#: How often it is looked whether something is done, s.
-_LOOK_PERIOD = 0.02
+INTERRUPTED = 130
 #: Often enough to be brisk; the line is not kept busy for nothing, Hz.
 _POLL_RATE = 20.0
-
-
-#: What connecting says of a drive that has no time-out of its own.
-NO_TIMEOUT = frozenset(
-    (Cause.NO_OWN_TIMEOUT, Cause.OWN_TIMEOUT_OFF, Cause.OWN_TIMEOUT_STOPS_NOTHING)
+#: How often it is looked whether something is done, or whether a motor has stopped, s.
+_LOOK_PERIOD = 0.02
+_STOP_LOOK_PERIOD = 0.05
+#: How long a drive may take for all that a command consists of, s; it gives up earlier by itself.
+_LONGEST = 15.0
+#: How long a stop that is not confirmed is retried, s.
+_LAST_TRIES = 10.0
+#: How long a poll may take, s.
+_LONGEST_POLL = 2.0
+#: How control was released.
+RELEASED = (Cause.CONTROL_RELEASED, Cause.CONTROL_KEPT)
+#: What connecting reports, and what does not matter to a command that starts nothing.
+MUTE = frozenset(
+    (
+        Cause.NO_OWN_TIMEOUT,
+        Cause.OWN_TIMEOUT_OFF,
+        Cause.OWN_TIMEOUT_STOPS_NOTHING,
+        Cause.FOUND_RUNNING,
+        Cause.FAULT_APPEARED,
+    )
 )
-
-
-def spoken(name: str) -> str:
-    """Return a signal as a person knows it."""
-    return {'SIGINT': 'Ctrl-C', 'SIGTSTP': 'Ctrl-Z'}.get(name, name)
+_EMERGENCY = 'use the enable input or the emergency stop if the motor turns'
+_KEYS = {'SIGINT': 'Ctrl-C', 'SIGTSTP': 'Ctrl-Z'}
 
 
 class Ended(Exception):
@@ -58,54 +67,54 @@ class Ended(Exception):
         self.status = status
         self.signal = signal
 
-
-class EventLog:
-    """Hears what a drive has to tell, on the worker of the bus; of some causes nothing is said."""
-
-    def __init__(self, show: Callable[[str], None], mute: Collection[Cause]) -> None:
-        self._show = show
-        self._mute = mute
-        #: What an operator was told.
-        self.told: list[Report] = []
-        #: What was measured last.
-        self.values: dict[Role, float] = {}
-
-    def on_event(self, event: Event) -> None:
-        """Pass on what an operator has to know."""
-        if event.severity is Severity.INFO or event.cause in self._mute:
-            return
-        self.told.append(event.report)
-        self._show(say(event.report))
-
-    def on_snapshot(self, snapshot: Snapshot) -> None:
-        """Nothing: it is looked at when it is shown."""
-
-    def on_telemetry(self, telemetry: Telemetry) -> None:
-        """Take measured values."""
-        self.values = telemetry.values
-
-    def on_parameters(self, keys: Collection[str]) -> None:
-        """Nothing: nobody looks at them."""
-
-    def on_log_entry(self, entry: LogEntry) -> None:
-        """Nothing: what matters of it is told as an event."""
+    @property
+    def key(self) -> str:
+        """The signal as an operator knows it."""
+        return _KEYS.get(self.signal, self.signal)
 
 
-class ControlSession:
-    """The means to command one drive, and ``remote`` to look at it before."""
+class ControlSession(EventListener):
+    """
+    One drive under command.
+
+    :ivar offline: the same drive, read before it is connected.
+    :ivar show: called again and again while something takes its time.
+    :ivar reported: what the operator was informed of, oldest first.
+    :ivar values: what was measured last.
+    :ivar answer: what the drive said to its last stop, or what became of that.
+    """
 
     def __init__(
         self, session: Session, screen: Screen, signals: HeldSignals, mute: Collection[Cause]
     ) -> None:
         self._session = session
         self._signals = signals
+        self._mute = mute
         self.screen = screen
-        self.events = EventLog(screen.say, mute)
-        self.remote: Remote = session.drive()
+        self.offline = session.drive()
+        self.drive: Drive
+        self.show: Callable[[], object] = lambda: None
+        self.reported: list[Report] = []
+        self.values: dict[Role, float] = {}
+        self.answer: Report | None = None
 
-    def drive(self, **settings: Any) -> Drive:
-        """Return the drive to be commanded, with some settings not as usual; nothing is sent."""
-        return self._session.command(self.events, poll_rate=_POLL_RATE, **settings)
+    def command(self, **settings: Any) -> Drive:
+        """Have the drive to be commanded, with some settings not as usual; nothing is sent."""
+        self.drive = self._session.commanded_drive(self, poll_rate=_POLL_RATE, **settings)
+        return self.drive
+
+    def connect_as_controlled(self) -> Drive:
+        """Connect by the control method that the bus has used so far; what runs is stopped so."""
+        method = self.offline.active_control_method()
+        methods = self.offline.model.profile.methods
+        references = methods[method].references
+        # nothing is started, so it matters only that an unusual method leaves the reference alone
+        reference = references[0] if method == next(iter(methods)) else references[-1]
+        drive = self.command(control_method=method, reference=reference)
+        self.finish(drive.connect())
+        return drive
+
+    # --- waiting ------------------------------------------------------------------------------
 
     def signal(self, timeout: float) -> str:
         """Return the name of a signal that shall end it; ``''`` when none came in time, s."""
@@ -115,134 +124,121 @@ class ControlSession:
         name = signal_name(number)
         if number in SUSPENDING:
             self.screen.say(
-                f'{spoken(name)} ignored: a suspended command would leave the motor running'
+                f'{_KEYS.get(name, name)} ignored: a suspended command would leave the motor '
+                'running'
             )
             return ''
         return name
 
-    def wait(self, future: Future[_T], show: Callable[[], object] = lambda: None) -> _T:
+    def pause(self, seconds: float) -> None:
+        """Let some time go by (Ended: a signal came)."""
+        name = self.signal(seconds)
+        if name:
+            raise Ended(name, INTERRUPTED, name)
+
+    def wait(self, future: Future[_T]) -> _T:
         """
-        Return the result of a future; meanwhile ``show`` is called again and again.
+        Return the result of a future.
 
         :raises Ended: a signal came first.
         :raises DriveError: as the future does.
         """
         while not future.done():
-            show()
-            name = self.signal(_LOOK_PERIOD)
-            if name:
-                raise Ended(name, 130, name)
+            self.show()
+            self.pause(_LOOK_PERIOD)
         return future.result()
 
-    def finish(
-        self, future: Future[_T], timeout: float, show: Callable[[], object] = lambda: None
-    ) -> _T:
-        """Return the result of a future, whatever signals come; or a DriveError after so many s."""
-        deadline = time.monotonic() + timeout
+    def finish(self, future: Future[_T]) -> _T:
+        """Return the result of a future, whatever signals come (DriveError: it takes too long)."""
+        deadline = time.monotonic() + _LONGEST
         while not future.done():
-            show()
+            self.show()
             if time.monotonic() > deadline:
-                raise DriveError(Cause.TOO_LATE, timeout=timeout)
+                raise DriveError(Cause.TOO_LATE, timeout=_LONGEST)
             self.signal(_LOOK_PERIOD)
         return future.result()
 
+    def _wait_while(self, condition: Callable[[], bool], timeout: float) -> None:
+        """Wait until a condition no longer holds, a signal comes, or the time is over, s."""
+        deadline = time.monotonic() + timeout
+        while condition() and time.monotonic() < deadline:
+            self.show()
+            if self.signal(_STOP_LOOK_PERIOD):
+                return
 
-@contextlib.contextmanager
-def control_session(
-    options: argparse.Namespace, *, mute: Collection[Cause] = (), live: bool = False
-) -> Iterator[ControlSession]:
-    """Open the line to command a drive; signals are held while the ``with`` block lasts."""
-    live = live and sys.stdout is not None and sys.stdout.isatty()
-    with (
-        HeldSignals() as signals,
-        Screen(live=live) as screen,
-        Session(options, writes=True) as session,
-    ):
-        yield ControlSession(session, screen, signals, mute)
-
-
-#: How long an answer of the drive layer may take, s; it gives up earlier by itself.
-_LONGEST_ANSWER = 10.0
-#: How long a stop that is not confirmed is retried, s.
-_LAST_TRIES = 10.0
-#: The same as the parameter ``shutdown_timeout`` of the driver has, s.
-SHUTDOWN_TIMEOUT = 4.0
-_STOP_LOOK_PERIOD = 0.05
-#: How long a poll may take, s.
-_LONGEST_POLL = 2.0
-
-#: How control was released.
-RELEASED = (Cause.CONTROL_RELEASED, Cause.CONTROL_KEPT)
-
-_EMERGENCY = 'use the enable input or the emergency stop if the motor turns'
-
-
-class Stopping:
-    """Stops one motor, whatever signals come (show: called again and again meanwhile)."""
-
-    def __init__(self, control: ControlSession, drive: Drive, show: Callable[[], object]) -> None:
-        self._session = control
-        self._drive = drive
-        self._show = show
-        #: What the drive answered, or what became of its stop.
-        self.answer: Report | None = None
+    # --- stopping -----------------------------------------------------------------------------
 
     def stop(self, *, quick: bool = False) -> bool:
-        """Stop it; true when the drive has confirmed it. It says loudly when it has not."""
-        show, drive = self._session.screen.say, self._drive
+        """Stop the motor; true when the drive has confirmed it, else the operator is warned."""
         try:
-            self.answer = self._finish(drive.quick_stop() if quick else drive.stop())
+            self.answer = self.finish(self.drive.quick_stop() if quick else self.drive.stop())
         except DriveError as error:
             self.answer = error.report
-            show(f'{say(error)}: {_EMERGENCY}')
+            self.screen.say(f'{say(error)}: {_EMERGENCY}')
             return self.confirmed_late()
         return True
 
+    def confirmed_late(self) -> bool:
+        """Let a stop be retried for a while; true when the drive has confirmed it."""
+        self._wait_while(lambda: self.drive.stop_unconfirmed, _LAST_TRIES)
+        if self.drive.stop_unconfirmed:
+            self.screen.say(
+                'ending WITHOUT a confirmed stop, the motor may still run: use the enable input or '
+                'the emergency stop; nfo-sinus stop tries again'
+            )
+            return False
+        snapshot = self.drive.snapshot
+        status = f'{snapshot.status.code} {snapshot.text}' if snapshot.status is not None else ''
+        self.answer = Report(Cause.STOP_CONFIRMED_LATE, status=status)
+        self.screen.say(say(self.answer))
+        return True
+
     def give_back(self, patience: float = math.inf) -> bool:
-        """Wait until the motor stands, or for so many s, and give control back; false if not."""
+        """Wait until the motor stands, or for so many s, and release control; false if not."""
         begun = time.monotonic()
-        while self._may_turn(begun) and time.monotonic() < begun + patience:
-            self._show()
-            if self._session.signal(_STOP_LOOK_PERIOD):
-                break
+
+        def may_turn() -> bool:
+            snapshot = self.drive.snapshot
+            if snapshot.at < begun:
+                # no poll yet; if none comes, there is nothing to wait for
+                return time.monotonic() < begun + _LONGEST_POLL
+            return snapshot.status is not None and snapshot.status.driven
+
+        self._wait_while(may_turn, patience)
         try:
-            # what is still on its ramp has had its time
-            patience = 0.0 if self._may_turn(begun) else 1.0
-            released = self._finish(self._drive.disconnect(patience))
+            # a motor that is still on its ramp has had its time
+            released = self.finish(self.drive.disconnect(0.0 if may_turn() else 1.0))
         except DriveError as error:
-            self._session.screen.say(f'control was not released: {say(error)}')
+            self.screen.say(f'control was not released: {say(error)}')
             return False
         if released.cause in (*RELEASED, Cause.LEFT_TO_RAMP):
             self.answer = released
         return True
 
-    def _may_turn(self, since: float) -> bool:
-        """Tell whether the drive drives the motor, for all that is known since then."""
-        seen = self._drive.snapshot
-        if seen.at < since:
-            # no poll yet; if none comes, there is nothing to wait for
-            return time.monotonic() < since + _LONGEST_POLL
-        return seen.status is not None and seen.status.driven
+    # --- as a listener, on the worker of the bus ----------------------------------------------
 
-    def confirmed_late(self) -> bool:
-        """Let a stop be retried for a while; true when the drive has confirmed it."""
-        show, drive = self._session.screen.say, self._drive
-        deadline = time.monotonic() + _LAST_TRIES
-        while drive.stop_unconfirmed and time.monotonic() < deadline:
-            self._show()
-            if self._session.signal(_STOP_LOOK_PERIOD):
-                break
-        if drive.stop_unconfirmed:
-            show(
-                'ending WITHOUT a confirmed stop, the motor may still run: use the enable input or '
-                'the emergency stop; nfo-sinus stop tries again'
-            )
-            return False
-        seen = drive.snapshot
-        status = f'{seen.status.code} {seen.text}' if seen.status is not None else ''
-        self.answer = Report(Cause.STOP_CONFIRMED_LATE, status=status)
-        show(say(self.answer))
-        return True
+    def on_event(self, event: Event) -> None:
+        """Report what an operator has to know."""
+        if event.severity is Severity.INFO or event.cause in self._mute:
+            return
+        self.reported.append(event.report)
+        self.screen.say(say(event.report))
 
-    def _finish(self, future: Future[Report]) -> Report:
-        return self._session.finish(future, _LONGEST_ANSWER, self._show)
+    def on_telemetry(self, telemetry: Telemetry) -> None:
+        """Take measured values."""
+        self.values = telemetry.values
+
+
+@contextlib.contextmanager
+def control_session(
+    options: argparse.Namespace, *, mute: Collection[Cause] = MUTE, live: bool = False
+) -> Iterator[ControlSession]:
+    """Open the line to command a drive; signals are held while the ``with`` block lasts."""
+    live = live and sys.stdout is not None and sys.stdout.isatty()
+    with (
+        # before any other thread is there
+        HeldSignals() as signals,
+        Screen(live=live) as screen,
+        Session(options, writes=True) as session,
+    ):
+        yield ControlSession(session, screen, signals, mute)

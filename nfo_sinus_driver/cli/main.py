@@ -6,56 +6,63 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
-import contextlib
+from collections.abc import Sequence
+import inspect
 import io
 import os
 import signal
 import sys
-import threading
 
-from nfo_sinus_driver.cli.console import CliError, UsageError, put, remark, say
-from nfo_sinus_driver.cli.monitor import monitor
-from nfo_sinus_driver.cli.options import parse
-from nfo_sinus_driver.cli.read import errors, get, info, list_, set_
-from nfo_sinus_driver.cli.run import ack, run, stop
-from nfo_sinus_driver.cli.scan import scan
-from nfo_sinus_driver.cli.transfer import diff, dump, load
-from nfo_sinus_driver.cli.tune import tune
+from nfo_sinus_driver.cli.console import CliError, UsageError, put, remark, say, signals_handled
+from nfo_sinus_driver.cli.monitor import Monitor
+from nfo_sinus_driver.cli.options import DEFAULTS, LINE_AND_DRIVE, Verb, add_flag, add_setting
+from nfo_sinus_driver.cli.read import Errors, Get, Info, List, Set
+from nfo_sinus_driver.cli.run import Run
+from nfo_sinus_driver.cli.scan import Scan
+from nfo_sinus_driver.cli.stop import Ack, Stop
+from nfo_sinus_driver.cli.transfer import Diff, Dump, Load
+from nfo_sinus_driver.cli.tune import Tune
 from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.version import VERSION
 
-
-def completion(options: argparse.Namespace) -> int:
-    """Print what makes a shell complete what is typed."""
-    from argcomplete.shell_integration import shellcode
-
-    put(shellcode(['nfo-sinus'], shell=options.shell))
-    return 0
-
-
-VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
-    'scan': scan,
-    'info': info,
-    'list': list_,
-    'get': get,
-    'set': set_,
-    'dump': dump,
-    'load': load,
-    'diff': diff,
-    'errors': errors,
-    'monitor': monitor,
-    'ack': ack,
-    'run': run,
-    'stop': stop,
-    'tune': tune,
-    'completion': completion,
-}
-
-_FAILED = 1
 _USAGE = 2
-#: Of diff, whose 1 means that there are differences.
-_DIFF_FAILED = 2
 _INTERRUPTED = 130
+_EPILOG = """
+Options may stand before and after the verb; "nfo-sinus VERB --help" lists those of a verb.
+Reading never changes anything in a drive, and a motor that runs runs on.
+"""
+
+
+class Completion(Verb):
+    """Print what makes a shell complete what is typed."""
+
+    json = False
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Take the shell."""
+        parser.add_argument(
+            'shell', nargs='?', choices=('bash', 'zsh'), default='bash',
+            help='type: source <(nfo-sinus completion bash), or put it into ~/.bashrc '
+            '(default: bash)',
+        )
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Print it."""
+        from argcomplete.shell_integration import shellcode
+
+        put(shellcode(['nfo-sinus'], shell=options.shell))
+        return 0
+
+
+#: The verbs by name, in the order of the help.
+VERBS: dict[str, Verb] = {
+    type(verb).__name__.lower(): verb
+    for verb in (
+        Scan(), Info(), List(), Get(), Set(), Dump(), Load(), Diff(), Errors(), Monitor(),
+        Completion(), Ack(), Run(), Stop(), Tune(),
+    )
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -65,39 +72,67 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='replace')
     options = parse(sys.argv[1:] if argv is None else argv)
-    failed = _DIFF_FAILED if options.verb == 'diff' else _FAILED
+    verb = VERBS[options.verb]
     try:
-        with _signals_that_interrupt():
-            return VERBS[options.verb](options)
+        # SIGTERM and SIGHUP end it as Ctrl-C does, so that everything is cleaned up
+        with signals_handled(signal.default_int_handler):
+            return verb.main(options)
     except UsageError as error:
         remark(str(error))
         return _USAGE
     except (CliError, DriveError) as error:
         remark(say(error))
-        return failed
+        return verb.failed
     except BrokenPipeError:
-        # who read the output has gone, and Python would complain of it once more at the end
+        # the reader of the output has gone, and Python would complain once more at the end
         with open(os.devnull, 'w', encoding='utf-8') as nowhere:
             os.dup2(nowhere.fileno(), sys.stdout.fileno())
-        return failed
+        return verb.failed
     except KeyboardInterrupt:
         return _INTERRUPTED
 
 
-@contextlib.contextmanager
-def _signals_that_interrupt() -> Iterator[None]:
-    """
-    Let SIGTERM and SIGHUP end it as Ctrl-C does, so that everything is cleaned up.
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return what was typed, complete with defaults; leave the program if it makes no sense."""
+    parser = make_parser()
+    if '_ARGCOMPLETE' in os.environ:
+        # a shell asks how a line may go on; loaded for that alone
+        import argcomplete
 
-    Whatever was inherited: a shell lets its background jobs ignore Ctrl-C.
-    """
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.signal(number, signal.default_int_handler) for number in numbers}
+        argcomplete.autocomplete(parser)
+    options = parser.parse_args(arguments)
+    VERBS[options.verb].complete(options)
+    for name, default in DEFAULTS.items():
+        if not hasattr(options, name):
+            setattr(options, name, default)
+    others = (*getattr(options, 'addresses', ()), getattr(options, 'against', None))
     try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for address in (options.address, *others):
+            if address is not None:
+                PROTOCOLS[options.protocol].require_unit(address)
+    except ValueError as error:
+        parser.error(str(error))
+    return options
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command."""
+    # without a default the one behind the verb does not overrule the one in front of it
+    common = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
+    group = common.add_argument_group('line and drive, as the parameters of the driver')
+    for name in LINE_AND_DRIVE:
+        add_setting(group, name, f'--{name.replace("_", "-")}')
+    parser = argparse.ArgumentParser(
+        prog='nfo-sinus', description='Looks after frequency inverters on a serial line.',
+        epilog=_EPILOG, parents=[common],
+    )
+    parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
+    verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True, title='verbs')
+    for name, verb in VERBS.items():
+        text = inspect.getdoc(verb) or ''
+        short = text[:1].lower() + text[1:].removesuffix('.')
+        made = verbs.add_parser(name, help=short, description=text, parents=[common])
+        if verb.json:
+            add_flag(made, '--json', 'print JSON, for a script')
+        verb.add_arguments(made)
+    return parser

@@ -1,110 +1,216 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The verb ``monitor``: what drives and line do, again and again; it only reads."""
+"""The verb ``monitor``: drives and line, again and again, as lines or as a view; it only reads."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+import dataclasses
 from datetime import datetime
 import importlib.util
 import itertools
-import json
 import math
 import os
+import queue
 import shutil
 import sys
+import threading
 import time
+from typing import Any
 
-from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.cli.console import UsageError, put, remark, say
-from nfo_sinus_driver.cli.live import live
-from nfo_sinus_driver.cli.measure import VALUES, as_facts, measure, statistics_table
-from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.bus import Priority, Statistics
+from nfo_sinus_driver.catalog import Kind, Role, State
+from nfo_sinus_driver.cli.console import UsageError, as_json, put, remark, say
+from nfo_sinus_driver.cli.options import Verb, add_flag, addresses, period
+from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, InverterStatus
-from nfo_sinus_driver.link import PortError
-from nfo_sinus_driver.view import terminal
+from nfo_sinus_driver.link import PortError, Refused
+from nfo_sinus_driver.view import is_terminal, show, why_not
+from nfo_sinus_driver.view.picture import (
+    Condition,
+    DriveView,
+    Level,
+    LineView,
+    Measured,
+    Note,
+    Picture,
+    line_view,
+)
 
+#: What is measured: its name, as in the messages of the driver, its width and its decimals.
+_VALUES = {
+    Role.ACTUAL_FREQUENCY: ('frequency', 6, 1),
+    Role.ACTUAL_SPEED: ('speed', 5, 0),
+    Role.OUTPUT_CURRENT: ('output_current', 6, 2),
+    Role.OUTPUT_VOLTAGE: ('output_voltage', 4, 0),
+    Role.OUTPUT_POWER: ('output_power', 5, 0),
+    Role.ACTUAL_TORQUE: ('torque', 4, 0),
+    Role.DC_LINK_VOLTAGE: ('dc_link_voltage', 4, 0),
+}
+#: The figures of the line: what stands above, and the width.
+_COLUMNS = (
+    ('', 7),
+    ('used', 5),
+    ('cycle', 8),
+    ('min', 7),
+    ('median', 7),
+    ('p99', 7),
+    ('max', 7),
+    ('requests', 8),
+    ('no answer', 9),
+    ('damaged', 7),
+    ('refused', 7),
+    ('repeated', 8),
+)
 _CLEAR_LINE = '\r\x1b[K'
-
-
 #: The view of the running driver: only there ROS is known.
 _ROS_VIEW = 'nfo_sinus_driver.node.monitor'
+#: How long the present reading may take at the end, s.
+_LAST_READING = 2.0
+_CONDITIONS = {Kind.FAULT: Condition.FAULT, Kind.ALARM: Condition.ALARM}
+_RUNS = (State.OPERATION_ENABLED, State.STOPPING, State.QUICK_STOP)
 
 
-def monitor(options: argparse.Namespace) -> int:
-    """Show what the drives do until somebody ends it, and then how the line was doing."""
-    if options.ros:
-        if importlib.util.find_spec('rclpy') is None:
-            raise UsageError('--ros needs ROS 2: source /opt/ros/jazzy/setup.bash first')
-        if options.json or options.lines or options.count or options.addresses:
-            raise UsageError('--ros shows the drives of running drivers, with no other option')
-        os.execv(sys.executable, [sys.executable, '-m', _ROS_VIEW])
-    if terminal.is_terminal() and not (options.json or options.lines or options.count):
-        why_not = terminal.why_not()
-        if not why_not:
-            return live(options)
-        remark(f'{why_not}. What it would show comes line by line')
-    return _by_lines(options)
+class Monitor(Verb):
+    """Show what the drive does, until q or Ctrl-C; then how the line was doing."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            '--period', type=period, default=0.5, metavar='SECONDS',
+            help='from one line to the next (default: 0.5)',
+        )
+        parser.add_argument('--count', type=int, metavar='TIMES', help='end after so many')
+        add_flag(
+            parser, '--lines',
+            'a line each time, where a terminal would show the view; so does --count',
+        )
+        add_flag(
+            parser, '--ros',
+            'show the drives of running drivers, on the graph of ROS, instead of a line',
+        )
+        parser.add_argument(
+            '--addresses', type=addresses, default=(), metavar='LIST',
+            help='several drives of the line, such as 1-10,20 (default: that of --address)',
+        )
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Show it until the operator ends it, and then how the line was doing."""
+        if options.ros:
+            if importlib.util.find_spec('rclpy') is None:
+                raise UsageError('--ros needs ROS 2: source /opt/ros/jazzy/setup.bash first')
+            if options.json or options.lines or options.count or options.addresses:
+                raise UsageError('--ros shows the drives of running drivers, with no other option')
+            os.execv(sys.executable, [sys.executable, '-m', _ROS_VIEW])
+        view = is_terminal() and not (options.json or options.lines or options.count)
+        missing = why_not() if view else ''
+        if missing:
+            remark(f'{missing}. What it would show comes line by line')
+        numbers = options.addresses or (options.address,)
+        with Session(options) as session:
+            drives = [session.drive(number) for number in numbers]
+            if len(drives) == 1:
+                # of several, the one that is missing has a line that says so
+                drives[0].identify(thoroughly=False)
+            if view and not missing:
+                status = _show_view(options, session, drives)
+            else:
+                status = _show_lines(options, session, drives)
+            if not options.json:
+                for line in _statistics_table(session, numbers):
+                    print(line, file=sys.stderr)
+        return status
 
 
-def _by_lines(options: argparse.Namespace) -> int:
-    addresses = options.addresses or (options.address,)
-    one_line = sys.stdout.isatty() and not options.json and len(addresses) == 1
+def _read(
+    session: Session, drive: OfflineDrive
+) -> tuple[InverterStatus, Mapping[Role, float]]:
+    """Read the status of a drive and what it measures; NaN for what it has not got."""
+    if drive.state.identity is None:
+        drive.identify(thoroughly=False)
+
+    async def measure() -> tuple[InverterStatus, Mapping[Role, float]]:
+        status = await drive.state.read_status(Priority.POLL, once=True)
+        values = dict.fromkeys(_VALUES, math.nan)
+        for role in _VALUES:
+            key = drive.model.key(role)
+            if not drive.params.reaches(key):
+                continue
+            try:
+                values[role] = await drive.params.read_number(key, Priority.POLL, once=True)
+            except Refused:
+                # it has none
+                continue
+        return status, values
+
+    found = drive.do(measure)
+    session.polled(drive.address)
+    return found
+
+
+def _by_name(values: Mapping[Role, float]) -> dict[str, float]:
+    return {name: values[role] for role, (name, _, _) in _VALUES.items()}
+
+
+# --- as lines ---------------------------------------------------------------------------------
+
+
+def _show_lines(
+    options: argparse.Namespace, session: Session, drives: Sequence[OfflineDrive]
+) -> int:
+    one_line = sys.stdout.isatty() and not options.json and len(drives) == 1
     answered = False
-    with Session(options) as session:
-        drives = [session.drive(address) for address in addresses]
-        if len(drives) == 1:
-            # with others beside it the missing one has a line that says so
-            drives[0].identify(thoroughly=False)
-        try:
-            for turn in itertools.count(1):
-                started = time.monotonic()
-                shown = [_show(drive, session, options, one_line=one_line) for drive in drives]
-                answered = all(shown)
-                if turn == options.count:
-                    break
-                time.sleep(max(0.0, started + options.period - time.monotonic()))
-        except KeyboardInterrupt:
-            # this is how one ends it
-            answered = True
-        finally:
-            if one_line:
-                print()
-        if not options.json:
-            for line in statistics_table(session, addresses):
-                print(line, file=sys.stderr)
+    try:
+        for turn in itertools.count(1):
+            started = time.monotonic()
+            shown = [_show_line(drive, session, options, one_line=one_line) for drive in drives]
+            answered = all(shown)
+            if turn == options.count:
+                break
+            time.sleep(max(0.0, started + options.period - time.monotonic()))
+    except KeyboardInterrupt:
+        # this is how one ends it
+        answered = True
+    finally:
+        if one_line:
+            print()
     return int(not answered)
 
 
-def _show(
-    drive: Remote, session: Session, options: argparse.Namespace, *, one_line: bool
+def _show_line(
+    drive: OfflineDrive, session: Session, options: argparse.Namespace, *, one_line: bool
 ) -> bool:
     """Print one line; return whether the drive answered."""
     now = datetime.now().astimezone()
+    facts: dict[str, object] = {'connected': False}
+    answered = False
     try:
-        if drive.state.identity is None:
-            drive.identify(thoroughly=False)
-        seen, values = drive.do(lambda: measure(drive))
+        status, values = _read(session, drive)
     except DriveError as error:
         if isinstance(error.__cause__, PortError):
             raise
-        facts: dict[str, object] = {'connected': False}
         text = say(error)
-        answered = False
     else:
-        session.polled(drive.address)
-        facts = _facts(drive, seen, values)
-        text = _line(drive, values)
         answered = True
+        facts = {
+            'connected': True,
+            'code': status.code,
+            'text': drive.state.text,
+            'kind': drive.state.kind.value,
+            'state': status.state.name,
+            **_by_name(values),
+        }
+        text = _line(drive, values)
     if options.json:
-        told = as_facts(session.statistics(drive.address))
-        whole = {'time': now.isoformat(), 'address': drive.address, **facts, 'statistics': told}
-        put(json.dumps(whole, ensure_ascii=False))
+        # the names are those of BusStatistics
+        figures = dataclasses.asdict(session.statistics(drive.address))
+        whole = {'time': now.isoformat(), 'address': drive.address, **facts, 'statistics': figures}
+        put(as_json(whole))
         return answered
-    who = f'{drive.address:>3}  ' if options.addresses else ''
-    text = f'{now:%H:%M:%S}  {who}{text}'
+    address = f'{drive.address:>3}  ' if options.addresses else ''
+    text = f'{now:%H:%M:%S}  {address}{text}'
     if one_line:
         width = shutil.get_terminal_size().columns - 1
         print(f'{_CLEAR_LINE}{text[:width]}', end='', flush=True)
@@ -113,26 +219,153 @@ def _show(
     return answered
 
 
-def _facts(drive: Remote, seen: InverterStatus, values: Mapping[Role, float]) -> dict[str, object]:
-    measured = {
-        name: None if math.isnan(values[role]) else values[role]
-        for role, (name, _, _) in VALUES.items()
-    }
-    return {
-        'connected': True,
-        'code': seen.code,
-        'text': drive.state.text,
-        'kind': drive.state.kind.value,
-        'state': seen.state.name,
-        **measured,
-    }
-
-
-def _line(drive: Remote, values: Mapping[Role, float]) -> str:
+def _line(drive: OfflineDrive, values: Mapping[Role, float]) -> str:
     cells = [f'{drive.state.describe():<18}']
-    for role, (_, width, decimals) in VALUES.items():
+    for role, (_, width, decimals) in _VALUES.items():
         value, key = values[role], drive.model.key(role)
         number = '-' if math.isnan(value) else f'{value:.{decimals}f}'
         unit = drive.model[key].unit if key in drive.model else ''
         cells.append(f'{number:>{width}} {unit}')
     return '  '.join(cells)
+
+
+def _statistics_table(session: Session, numbers: Sequence[int]) -> list[str]:
+    """Return the lines of a table: the line, and each drive; round trips and cycle in ms."""
+    rows = [('line', session.statistics())]
+    if len(numbers) > 1:
+        rows += [(f'drive {number}', session.statistics(number)) for number in numbers]
+    cells = [[name for name, _ in _COLUMNS], *(_figures(*row) for row in rows)]
+    widths = [width for _, width in _COLUMNS]
+    return [
+        '  '.join(
+            f'{cell:>{width}}' if place else f'{cell:<{width}}'
+            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        for row in cells
+    ]
+
+
+def _figures(name: str, of: Statistics) -> list[str]:
+    times = (
+        of.cycle_time, of.round_trip_min, of.round_trip_median, of.round_trip_p99,
+        of.round_trip_max,
+    )
+    counts = (of.transactions, of.timeouts, of.damaged, of.refused, of.retries)
+    shown = ['-' if math.isnan(one) else f'{1000 * one:.1f}' for one in times]
+    return [name, f'{100 * of.utilisation:.0f} %', *shown, *map(str, counts)]
+
+
+# --- as a view --------------------------------------------------------------------------------
+
+
+def _show_view(
+    options: argparse.Namespace, session: Session, drives: Sequence[OfflineDrive]
+) -> int:
+    source = LineSource(options, session, drives)
+    try:
+        show(source)
+    finally:
+        source.close()
+    return 0
+
+
+class LineSource:
+    """What drives on a line say, read again and again by a thread of its own."""
+
+    advice = ''
+    only_looks = 'only looks: nfo-sinus stop stops'
+
+    def __init__(
+        self, options: argparse.Namespace, session: Session, drives: Sequence[OfflineDrive]
+    ) -> None:
+        self.title: str = options.port
+        self._period: float = options.period
+        self._session = session
+        self._drives = drives
+        #: What was read of each drive, and when (s of ``time.monotonic``).
+        self._views: dict[int, tuple[DriveView, float]] = {}
+        for drive in drives:
+            self._set(drive, Condition.SILENT, 'being asked')
+        self._line: LineView | None = None
+        self._logged: dict[int, str] = {}
+        self._notes: queue.SimpleQueue[Note] = queue.SimpleQueue()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._work, name='reader', daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Read no more."""
+        self._closing.set()
+        self._thread.join(_LAST_READING)
+
+    def look(self) -> Picture:
+        """Return what was read last."""
+        notes = [self._notes.get() for _ in range(self._notes.qsize())]
+        now = time.monotonic()
+        views = [dataclasses.replace(view, age=now - at) for view, at in self._views.values()]
+        return Picture(views, [self._line] if self._line else [], notes)
+
+    def stop(self, name: str) -> None:
+        """Ignore it: this view only looks."""
+
+    def stop_all(self) -> None:
+        """Ignore it: this view only looks."""
+
+    # --- on the thread that reads -------------------------------------------------------------
+
+    def _work(self) -> None:
+        try:
+            self._read_all()
+        except Exception as error:
+            # what stands there would be taken for what is so
+            for drive in self._drives:
+                self._log(drive, Level.ERROR, f'error in the view, nothing is read: {error!r}')
+                self._set(drive, Condition.SILENT, 'not read any more')
+
+    def _read_all(self) -> None:
+        started = time.monotonic()
+        for turn in itertools.count(1):
+            for drive in self._drives:
+                if self._closing.is_set():
+                    return
+                self._update(drive)
+            self._line = line_view('line', self._session.statistics())
+            self._closing.wait(max(0.0, started + turn * self._period - time.monotonic()))
+            # a line that is slower than that is read without a pause, and catches up with nothing
+            started = max(started, time.monotonic() - turn * self._period)
+
+    def _update(self, drive: OfflineDrive) -> None:
+        try:
+            status, values = _read(self._session, drive)
+        except DriveError as error:
+            self._log(drive, Level.ERROR, say(error))
+            self._set(drive, Condition.SILENT, 'not connected')
+            return
+        shown, named = drive.state.describe(), _by_name(values)
+        grave = status.kind is not Kind.STATUS
+        self._log(drive, Level.WARNING if grave else Level.INFO, shown)
+        runs = status.runs or status.tuning or status.state in _RUNS or abs(named['frequency']) > 0
+        usual = Condition.RUNS if runs else Condition.STANDS
+        self._set(
+            drive, _CONDITIONS.get(status.kind, usual), shown,
+            cause=status.listed.description if grave else '', remedy=status.listed.remedy,
+            requires_ack=status.listed.requires_ack, unit='Hz', actual=named['frequency'],
+            measured=Measured(**named),
+            line=line_view(_name(drive), self._session.statistics(drive.address)),
+        )
+
+    def _set(
+        self, drive: OfflineDrive, condition: Condition, status: str, **more: Any
+    ) -> None:
+        view = DriveView(_name(drive), condition, status, **more)
+        self._views[drive.address] = view, time.monotonic()
+
+    def _log(self, drive: OfflineDrive, level: Level, text: str) -> None:
+        """Put it into the log, if it is not what the last line about this drive says."""
+        if self._logged.get(drive.address) != text:
+            self._logged[drive.address] = text
+            self._notes.put(Note(time.time(), level, _name(drive), text))
+
+
+def _name(drive: OfflineDrive) -> str:
+    return f'drive {drive.address}'

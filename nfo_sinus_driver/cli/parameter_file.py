@@ -4,7 +4,7 @@
 """
 Parameter files, which ``dump`` writes, ``load`` and ``diff`` read; names and values as typed.
 
-They are ROS parameter files at the same time. In front stands a header in comments, which tells
+They are ROS parameter files at the same time. In front stands a header in comments, which says
 whose parameters these are; a file without one, such as ``ros2 param dump`` writes, is read too.
 """
 
@@ -173,7 +173,7 @@ def _flatten(tree: Any, file: str) -> dict[str, Any]:
 
 
 def _split(parameters: Mapping[str, Any]) -> tuple[dict[str, Value], list[str]]:
-    """Tell the parameters of the drive, which have a group, from those of the node."""
+    """Separate the parameters of the drive, which have a group, from those of the node."""
     own = [name for name in parameters if '.' not in name or name.startswith(_ROS_OWN)]
     drive = {name: value for name, value in parameters.items() if name not in own}
     strange = [name for name, value in drive.items() if not isinstance(value, Value)]
@@ -214,14 +214,14 @@ def shown(value: Value | None, unit: str) -> str:
 
 
 def same(one: Value | None, other: Value | None) -> bool:
-    """Tell whether two values are the same; 5 is 5.0, but on is not 1."""
+    """Return whether two values are the same; 5 is 5.0, but on is not 1."""
     if isinstance(one, bool) or isinstance(other, bool):
         return one is other
     return one == other
 
 
 def is_barred(key: str, model: Family, options: argparse.Namespace) -> bool:
-    """Tell whether a setting must not be changed without being asked for by an option."""
+    """Return whether a setting must not be changed without being asked for by an option."""
     return key in model.communication and not options.allow_communication_changes
 
 
@@ -278,5 +278,5 @@ def _did_you_mean(name: str, known: list[str]) -> str:
 
 
 def _bare(name: str) -> str:
-    """Return a name without its group, and as people write it who know the manual's names."""
+    """Return a name without its group, as it is written by those who know the manual."""
     return name.rpartition('.')[2].lower().replace('-', '').replace('_', '')

@@ -8,13 +8,13 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-import json
 import math
 
-from nfo_sinus_driver.catalog import Parameter, Role, Value
+from nfo_sinus_driver.catalog import Parameter, Role, Value, example_setting
 from nfo_sinus_driver.cli.console import (
     CliError,
     UsageError,
+    as_json,
     columns,
     listed,
     progress,
@@ -22,7 +22,8 @@ from nfo_sinus_driver.cli.console import (
     require_yes,
     say,
 )
-from nfo_sinus_driver.cli.control_session import NO_TIMEOUT, control_session
+from nfo_sinus_driver.cli.control_session import control_session
+from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, add_yes, change, count
 from nfo_sinus_driver.cli.parameter_file import (
     BARRED,
     is_barred,
@@ -33,8 +34,8 @@ from nfo_sinus_driver.cli.parameter_file import (
     same,
     shown,
 )
-from nfo_sinus_driver.cli.session import Remote, Session
-from nfo_sinus_driver.drive import Cause, DriveError, LogEntry
+from nfo_sinus_driver.cli.session import OfflineDrive, Session
+from nfo_sinus_driver.drive import DriveError, LogEntry
 from nfo_sinus_driver.drive.parameter_writer import ParameterError
 from nfo_sinus_driver.link import Refused
 
@@ -48,110 +49,147 @@ _NAMEPLATE = (
 _COUNTERS = {Role.OPERATING_TIME: 'operating time', Role.RUNNING_TIME: 'running time'}
 
 
-def info(options: argparse.Namespace) -> int:
+class Info(Verb):
     """Show who the drive is and how it is doing."""
-    with Session(options) as session:
-        drive = session.drive()
-        identity = drive.identify()
-        seen = drive.look()
-        mode = _measure_roles(drive, [Role.CONTROL_MODE])
-        nameplate = _measure_roles(drive, _NAMEPLATE)
-        hours = _measure_roles(drive, _COUNTERS)
-        facts = {
-            'address': str(drive.address),
-            'port': options.port,
-            'model': drive.model.name,
-            'product': identity.model,
-            'vendor': identity.vendor,
-            'firmware': identity.versions,
-            'serial number': identity.serial,
-            'status': f'{drive.state.describe()} ({seen.listed.description})',
-            'state': seen.state.name.lower().replace('_', ' '),
-            'control mode': ''.join(mode.values()),
-            'motor': ', '.join(nameplate.values()),
-            **{_COUNTERS[role]: text for role, text in hours.items()},
-        }
-    if options.json:
-        put(json.dumps(facts, ensure_ascii=False, indent=2))
-    else:
-        for line in columns([(name, fact or '-') for name, fact in facts.items()]):
-            put(line)
-    return 0
 
-
-def list_(options: argparse.Namespace) -> int:
-    """Show all settings of the drive, or one group."""
-    with Session(options) as session:
-        drive = session.drive()
-        if options.group is None:
-            wanted = {parameter.key: parameter for parameter in drive.model.settings}
+    def main(self, options: argparse.Namespace) -> int:
+        """Show who the drive is and how it is doing."""
+        with Session(options) as session:
+            drive = session.drive()
+            identity = drive.identify()
+            status = drive.read_status()
+            mode = _measure_roles(drive, [Role.CONTROL_MODE])
+            nameplate = _measure_roles(drive, _NAMEPLATE)
+            hours = _measure_roles(drive, _COUNTERS)
+            facts = {
+                'address': str(drive.address),
+                'port': options.port,
+                'model': drive.model.name,
+                'product': identity.model,
+                'vendor': identity.vendor,
+                'firmware': identity.versions,
+                'serial number': identity.serial,
+                'status': f'{drive.state.describe()} ({status.listed.description})',
+                'state': status.state.name.lower().replace('_', ' '),
+                'control mode': ''.join(mode.values()),
+                'motor': ', '.join(nameplate.values()),
+                **{_COUNTERS[role]: text for role, text in hours.items()},
+            }
+        if options.json:
+            put(as_json(facts, indent=2))
         else:
-            wanted = _of_group(drive, options.group)
-        values = _read(drive, wanted)
-    wanted = {key: parameter for key, parameter in wanted.items() if key in values}
-    if options.json:
-        put(as_json(wanted, values))
+            for line in columns([(name, fact or '-') for name, fact in facts.items()]):
+                put(line)
         return 0
-    rows = [
-        (f'  {key}', shown(values[key], parameter.unit), parameter.description)
-        for key, parameter in wanted.items()
-    ]
-    group = ''
-    for line, parameter in zip(columns(rows) if rows else (), wanted.values(), strict=True):
-        if parameter.group != group:
-            put(f'{chr(10) if group else ""}{parameter.group}')
-            group = parameter.group
-        put(line)
-    return 0
 
 
-def get(options: argparse.Namespace) -> int:
-    """Show some parameters."""
-    with Session(options) as session:
-        drive = session.drive()
-        known = readable(drive.model)
-        require_names(options.names, known, drive.model.name)
-        wanted = {name: known[name] for name in options.names}
-        values = _read(drive, wanted)
-    require_names(options.names, values, str(drive))
-    if options.json:
-        put(as_json(wanted, values))
-        return 0
-    for line in columns([(key, shown(values[key], wanted[key].unit)) for key in wanted]):
-        put(line)
-    return 0
+class List(Verb):
+    """Show all settings of the drive."""
 
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            '--group', metavar='GROUP',
+            help='only this one, such as Motor; Status are the measured values',
+        )
 
-def errors(options: argparse.Namespace) -> int:
-    """Show the error log, or erase it."""
-    with Session(options) as session:
-        drive = session.drive()
-        drive.identify(thoroughly=False)
-        entries = drive.error_log(0 if options.erase else options.count)
-        if options.erase and drive.look().driven:
-            raise CliError(f'the motor runs ({drive.state.describe()}): stop it first')
-    rows = [_as_row(entry) for entry in entries]
-    if options.erase:
-        for line in _as_lines(entries) if not options.json else ():
+    def main(self, options: argparse.Namespace) -> int:
+        """Show all settings of the drive, or one group."""
+        with Session(options) as session:
+            drive = session.drive()
+            if options.group is None:
+                wanted = {parameter.key: parameter for parameter in drive.model.settings}
+            else:
+                wanted = _of_group(drive, options.group)
+            values = _read(drive, wanted)
+        wanted = {key: parameter for key, parameter in wanted.items() if key in values}
+        if options.json:
+            _put_values(wanted, values)
+            return 0
+        rows = [
+            (f'  {key}', shown(values[key], parameter.unit), parameter.description)
+            for key, parameter in wanted.items()
+        ]
+        group = ''
+        for line, parameter in zip(columns(rows) if rows else (), wanted.values(), strict=True):
+            if parameter.group != group:
+                put(f'{chr(10) if group else ""}{parameter.group}')
+                group = parameter.group
             put(line)
-        return erase(options, entries, rows)
-    if options.json:
-        put(json.dumps(rows, ensure_ascii=False, indent=2))
         return 0
-    for line in _as_lines(entries):
-        put(line)
-    if not entries:
-        put('the error log is empty')
-    return 0
+
+
+class Get(Verb):
+    """Show some parameters."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        setting, _ = example_setting()
+        parser.add_argument('names', nargs='+', metavar='NAME', help=f'such as {setting}')
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Show some parameters."""
+        with Session(options) as session:
+            drive = session.drive()
+            known = readable(drive.model)
+            require_names(options.names, known, drive.model.name)
+            wanted = {name: known[name] for name in options.names}
+            values = _read(drive, wanted)
+        require_names(options.names, values, str(drive))
+        if options.json:
+            _put_values(wanted, values)
+            return 0
+        for line in columns([(key, shown(values[key], wanted[key].unit)) for key in wanted]):
+            put(line)
+        return 0
+
+
+class Errors(Verb):
+    """Show the error log, newest entry first."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            '--count', type=count, default=0, metavar='TIMES',
+            help='at most so many entries; more than 32 where a drive has them (default: 0, which '
+            'is all, or 32)',
+        )
+        add_yes(parser)
+        add_flag(parser, '--erase', 'erase it, after it was shown')
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Show the error log, or erase it."""
+        with Session(options) as session:
+            drive = session.drive()
+            drive.identify(thoroughly=False)
+            entries = drive.error_log(0 if options.erase else options.count)
+            if options.erase and drive.read_status().driven:
+                raise CliError(f'the motor runs ({drive.state.describe()}): stop it first')
+        rows = [_as_row(entry) for entry in entries]
+        if options.erase:
+            for line in _as_lines(entries) if not options.json else ():
+                put(line)
+            return _erase(options, entries, rows)
+        if options.json:
+            put(as_json(rows, indent=2))
+            return 0
+        for line in _as_lines(entries):
+            put(line)
+        if not entries:
+            put('the error log is empty')
+        return 0
 
 
 def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
+    def hours(value: float, unit: str) -> str:
+        return '-' if math.isnan(value) else f'{value:.1f} {unit}'
+
     rows = [
         (
-            '-' if math.isnan(entry.operating_time) else f'{entry.operating_time:.1f} h',
+            hours(entry.operating_time, 'h'),
             str(entry.code),
             entry.full_text,
-            _ago(entry.age),
+            hours(entry.age, 'operating hours ago'),
             entry.wall_time,
         )
         for entry in entries
@@ -163,28 +201,19 @@ def _as_row(entry: LogEntry) -> dict[str, object]:
     return {
         'code': entry.code,
         'text': entry.full_text,
-        # JSON has no NaN
-        'operating_time': _known(entry.operating_time),
-        'age': _known(entry.age),
+        'operating_time': round(entry.operating_time, 1),
+        'age': round(entry.age, 1),
         'time': entry.wall_time,
     }
 
 
-def _known(number: float) -> float | None:
-    return None if math.isnan(number) else round(number, 1)
-
-
-def _ago(hours: float) -> str:
-    return '-' if math.isnan(hours) else f'{hours:.1f} operating hours ago'
-
-
-def as_json(wanted: Mapping[str, Parameter], values: Mapping[str, Value]) -> str:
-    """Return parameters with their units, for a script."""
+def _put_values(wanted: Mapping[str, Parameter], values: Mapping[str, Value]) -> None:
+    """Print parameters with their units, for a script."""
     shown_ = {key: {'value': values[key], 'unit': wanted[key].unit} for key in wanted}
-    return json.dumps(shown_, ensure_ascii=False, indent=2)
+    put(as_json(shown_, indent=2))
 
 
-def _of_group(drive: Remote, name: str) -> dict[str, Parameter]:
+def _of_group(drive: OfflineDrive, name: str) -> dict[str, Parameter]:
     every = (*drive.model.settings, *measured(drive.model))
     found = {
         parameter.key: parameter
@@ -197,7 +226,7 @@ def _of_group(drive: Remote, name: str) -> dict[str, Parameter]:
     return found
 
 
-def _read(drive: Remote, wanted: Mapping[str, Parameter]) -> Mapping[str, Value]:
+def _read(drive: OfflineDrive, wanted: Mapping[str, Parameter]) -> Mapping[str, Value]:
     """Return the values of settings and measured values, without those that the drive lacks."""
     drive.identify(thoroughly=False)
     settings = [key for key, parameter in wanted.items() if parameter.is_setting]
@@ -207,7 +236,7 @@ def _read(drive: Remote, wanted: Mapping[str, Parameter]) -> Mapping[str, Value]
     return values
 
 
-def _measure_roles(drive: Remote, roles: Iterable[Role]) -> dict[Role, str]:
+def _measure_roles(drive: OfflineDrive, roles: Iterable[Role]) -> dict[Role, str]:
     keys = {role: drive.model.key(role) for role in roles}
     found = _measure(drive, filter(drive.params.reaches, keys.values()))
     return {
@@ -215,7 +244,7 @@ def _measure_roles(drive: Remote, roles: Iterable[Role]) -> dict[Role, str]:
     }
 
 
-def _measure(drive: Remote, keys: Iterable[str]) -> dict[str, Value]:
+def _measure(drive: OfflineDrive, keys: Iterable[str]) -> dict[str, Value]:
     keys = list(keys)
     found = {}
     with progress(f'reading {drive}', len(keys)) as step:
@@ -230,65 +259,75 @@ def _measure(drive: Remote, keys: Iterable[str]) -> dict[str, Value]:
     return found
 
 
-_MUTE = {*NO_TIMEOUT, Cause.FAULT_APPEARED}
-_LONGEST = 15.0
-
-
-def erase(options: argparse.Namespace, entries: Sequence[LogEntry], rows: object) -> int:
+def _erase(options: argparse.Namespace, entries: Sequence[LogEntry], rows: object) -> int:
     """Erase the error log, whose entries are ``rows`` for a script; see that it is empty."""
     count = '1 entry' if len(entries) == 1 else f'{len(entries)} entries'
     if entries:
         require_yes(options, f'Erase the error log ({count}) of address {options.address}?')
-        with control_session(options, mute=_MUTE) as control:
-            drive = control.drive()
-            control.finish(drive.connect(), _LONGEST)
-            control.finish(drive.erase_error_log(), _LONGEST)
+        with control_session(options) as control:
+            drive = control.command()
+            control.finish(drive.connect())
+            control.finish(drive.erase_error_log())
     if options.json:
-        put(json.dumps({'erased': rows}, ensure_ascii=False, indent=2))
+        put(as_json({'erased': rows}, indent=2))
     else:
         put(f'erased: {count}' if entries else 'the error log is empty already')
     return 0
 
 
-def set_(options: argparse.Namespace) -> int:
+class Set(Verb):
     """Change parameters, all of them or none."""
-    times = Counter(name for name, _ in options.changes)
-    twice = [name for name, count in times.items() if count > 1]
-    if twice:
-        raise UsageError(f'{", ".join(twice)} is given twice')
-    with Session(options, writes=True) as session:
-        drive = session.drive()
-        settings = {parameter.key: parameter for parameter in drive.model.settings}
-        require_names(times, settings, drive.model.name, ', nothing was written')
-        wanted, wrong = {}, []
-        for name, text in options.changes:
-            try:
-                wanted[name] = parse_value(settings[name], text)
-            except ValueError as error:
-                wrong.append(str(error))
-        if not wrong:
-            drive.identify(thoroughly=False)
-            values = drive.read(wanted)
-            require_names(wanted, values, str(drive), ', nothing was written')
-            for name, value in wanted.items():
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        setting, value = example_setting()
+        parser.add_argument(
+            'changes', nargs='+', type=change, metavar='NAME=VALUE',
+            help=f'such as {setting}={value:g}',
+        )
+        add_allow(parser)
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Change parameters, all of them or none."""
+        times = Counter(name for name, _ in options.changes)
+        twice = [name for name, count in times.items() if count > 1]
+        if twice:
+            raise UsageError(f'{", ".join(twice)} is given twice')
+        with Session(options, writes=True) as session:
+            drive = session.drive()
+            settings = {parameter.key: parameter for parameter in drive.model.settings}
+            require_names(times, settings, drive.model.name, ', nothing was written')
+            wanted, wrong = {}, []
+            for name, text in options.changes:
                 try:
-                    exact = drive.parameters.exact(name, value)
-                    barred = is_barred(name, drive.model, options)
-                    if barred and not same(exact, values.get(name)):
-                        wrong.append(f'{name}: {BARRED}')
-                    else:
-                        drive.parameters.validate(name, value)
-                except ParameterError as error:
-                    wrong.append(say(error))
-        if wrong:
-            raise CliError(listed('nothing was written:', wrong))
-        changes = drive.parameters.change(wanted).result()
-        values = drive.parameters.values
-    if options.json:
-        put(as_json({name: settings[name] for name in wanted}, values))
+                    wanted[name] = parse_value(settings[name], text)
+                except ValueError as error:
+                    wrong.append(str(error))
+            if not wrong:
+                drive.identify(thoroughly=False)
+                values = drive.read(wanted)
+                require_names(wanted, values, str(drive), ', nothing was written')
+                for name, value in wanted.items():
+                    try:
+                        exact = drive.parameters.exact(name, value)
+                        barred = is_barred(name, drive.model, options)
+                        if barred and not same(exact, values.get(name)):
+                            wrong.append(f'{name}: {BARRED}')
+                        else:
+                            drive.parameters.validate(name, value)
+                    except ParameterError as error:
+                        wrong.append(say(error))
+            if wrong:
+                raise CliError(listed('nothing was written:', wrong))
+            changes = drive.parameters.change(wanted).result()
+            values = drive.parameters.values
+        if options.json:
+            _put_values({name: settings[name] for name in wanted}, values)
+            return 0
+        changed = {one.key: one for one in changes}
+        for name in wanted:
+            as_it_was = f'{name}: {shown(values[name], settings[name].unit)}, as it was'
+            put(str(changed.get(name, as_it_was)))
         return 0
-    changed = {change.key: change for change in changes}
-    for name in wanted:
-        as_it_was = f'{name}: {shown(values[name], settings[name].unit)}, as it was'
-        put(str(changed.get(name, as_it_was)))
-    return 0
+
+

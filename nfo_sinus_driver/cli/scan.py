@@ -1,12 +1,12 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The verb ``scan``: who answers on the line, and the parameter file of a driver for them."""
+"""The verb ``scan``: what answers on the line, and the parameter file of a driver for them."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 import copy
 from datetime import datetime
 import json
@@ -14,61 +14,112 @@ from pathlib import Path
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role, load_family
-from nfo_sinus_driver.cli.console import CliError, UsageError, listed, progress, put, remark, say
-from nfo_sinus_driver.cli.options import DEFAULTS
+from nfo_sinus_driver.cli.console import (
+    CliError,
+    UsageError,
+    as_json,
+    listed,
+    progress,
+    put,
+    remark,
+    say,
+)
+from nfo_sinus_driver.cli.options import DEFAULTS, OF_SCAN, Verb, add_flag, addresses
 from nfo_sinus_driver.cli.parameter_file import STANDARD, write_file
-from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.link import PROTOCOLS, DamagedAnswer, NoAnswer, PortError, Refused
-from nfo_sinus_driver.link.interface import BAUD_RATES, NeverSilent
+from nfo_sinus_driver.link.interface import NeverSilent
 
 #: Parity and stop bits that are tried [M0 §6.2.2].
 _PARITIES = ('E1', 'O1', 'N2')
 _LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
-#: How often who gave a damaged answer is asked again.
+#: How often an address that gave a damaged answer is asked again.
 _DAMAGE_RETRIES = 2
 #: The columns and their widths.
 _COLUMNS = (('address', 7), ('line', 10), ('product', 20), ('firmware', 11), ('serial number', 0))
 
 
-def scan(options: argparse.Namespace) -> int:
+class Scan(Verb):
     """Find out who answers on the line."""
-    assert set(_LIKELIEST) == set(BAUD_RATES)
-    if options.params:
-        require_new(options.params, force=options.force)
-    # a parameter file on the standard output is alone there
-    show = remark if options.params == STANDARD else put
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            '--addresses', type=addresses, default=(), metavar='LIST',
+            help='such as 1-10,20 (default: 1-247; classic: 1-94; movitrac: 0-63; canopen: 1-127)',
+        )
+        add_flag(
+            parser, '--all-settings', 'try every baud rate and parity; takes long; not for canopen',
+        )
+        parser.add_argument(
+            '--params', metavar='FILE',
+            help='write a parameter file for the driver, with all that was found; - is the '
+            'standard output',
+        )
+        add_flag(parser, '--force', 'let --params replace a file')
+
+    def complete(self, options: argparse.Namespace) -> None:
+        """Ask every address, and briefly; ``--retries`` is for silent addresses, too."""
+        options.silence_retries = getattr(options, 'retries', OF_SCAN['retries'])
+        if not hasattr(options, 'response_timeout'):
+            options.response_timeout = OF_SCAN['response_timeout']
+        if not options.addresses:
+            protocol = PROTOCOLS[getattr(options, 'protocol', DEFAULTS['protocol'])]
+            alone = protocol.point_to_point
+            options.addresses = tuple(unit for unit in protocol.units if unit != alone)
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Find out who answers on the line."""
+        if options.params:
+            _require_new(options.params, force=options.force)
+        # a parameter file on the standard output is alone there
+        show = remark if options.params == STANDARD else put
+        found: dict[int, dict[str, str]] = {}
+        lines_of: dict[int, tuple[int, str]] = {}
+        for address, line, facts in _find(options):
+            if not options.json:
+                if not found:
+                    show(_row({name: name for name, _ in _COLUMNS}))
+                show(_row({'address': f'{address:>7}', **facts}))
+            found[address], lines_of[address] = facts, line
+        if options.json:
+            drives = [{'address': address, **facts} for address, facts in sorted(found.items())]
+            show(as_json(drives, indent=2))
+        if not found:
+            protocol = PROTOCOLS[options.protocol]
+            others = '' if protocol.rates_disturb else (
+                ' (--all-settings tries all that the protocol can have), A and B of the wires'
+            )
+            raise CliError(f'no response: check in this order: {protocol.check}{others}')
+        if options.params:
+            _write_params(options, found, lines_of)
+        return 0
+
+
+_Found = tuple[int, tuple[int, str], dict[str, str]]
+
+
+def _find(options: argparse.Namespace) -> Iterator[_Found]:
+    """Yield each drive that answers, once: its address, its line, and what it says of itself."""
     lines = _lines(options)
-    found: dict[int, dict[str, str]] = {}
-    lines_of: dict[int, tuple[int, str]] = {}
-    with progress('scanning', len(lines) * len(options.addresses)) as step:
+    left = list(options.addresses)
+    with progress('scanning', len(lines) * len(left)) as step:
         for baud_rate, char_format in lines:
+            for _ in range(len(options.addresses) - len(left)):
+                step()
             line = copy.copy(options)
             line.baud_rate, line.char_format = baud_rate, char_format
-            asked = [address for address in options.addresses if address not in found]
-            for _ in range(len(options.addresses) - len(asked)):
-                step()
-            for address, facts in _who_answers(line, asked, step):
-                facts['line'] = f'{baud_rate} {char_format}'.rstrip() if baud_rate else 'gateway'
-                if not found and not options.json:
-                    show(_row({name: name for name, _ in _COLUMNS}))
-                found[address] = facts
-                lines_of[address] = line.baud_rate, line.char_format
-                if not options.json:
-                    show(_row({'address': f'{address:>7}', **facts}))
-    if options.json:
-        drives = [{'address': address, **facts} for address, facts in sorted(found.items())]
-        show(json.dumps(drives, ensure_ascii=False, indent=2))
-    if not found:
-        protocol = PROTOCOLS[options.protocol]
-        others = '' if protocol.rates_disturb else (
-            ' (--all-settings tries all that the protocol can have), A and B of the wires'
-        )
-        raise CliError(f'no response: check in this order: {protocol.check}{others}')
-    if options.params:
-        _write_params(options, found, lines_of)
-    return 0
+            with Session(line) as session:
+                for address in tuple(left):
+                    facts = _ask(session.drive(address), options.silence_retries)
+                    step()
+                    if facts is not None:
+                        named = f'{baud_rate} {char_format}'.rstrip()
+                        facts['line'] = named if baud_rate else 'gateway'
+                        left.remove(address)
+                        yield address, (baud_rate, char_format), facts
 
 
 def _write_params(
@@ -78,18 +129,18 @@ def _write_params(
 ) -> None:
     """Write what the driver needs to start with the drives found, if they speak alike."""
     if len(set(lines.values())) > 1:
-        told = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
+        found_at = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
         keys = {load_family(facts['model']).key(Role.BAUD_RATE) for facts in found.values()}
         how = ', '.join(f'nfo-sinus set {key}=...' for key in sorted(keys - {''}))
         raise CliError(
             listed(
                 'no parameter file was written: one line has one baud rate and format, and the '
                 f'drives have several; set them alike ({how or "at the keypad"})',
-                told,
+                found_at,
             )
         )
     baud_rate, char_format = next(iter(lines.values()))
-    write_file(options.params, driver_params(options, baud_rate, char_format, found))
+    write_file(options.params, _driver_params(options, baud_rate, char_format, found))
     if options.params != STANDARD:
         remark(
             f'saved in {options.params}; start the driver with it: ros2 run nfo_sinus_driver '
@@ -111,26 +162,14 @@ def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
         return [(0, '')]
     if options.all_settings:
         usual = [format_ for format_ in protocol.char_formats if format_[1:] in _PARITIES]
-        rates = [rate for rate in _LIKELIEST if rate in protocol.baud_rates]
+        rates = sorted(protocol.baud_rates, key=_LIKELIEST.index)
         formats = usual or protocol.char_formats
         return [(baud_rate, format_) for baud_rate in rates for format_ in formats]
     return [(options.baud_rate or protocol.baud_rate, options.char_format or protocol.char_format)]
 
 
-def _who_answers(
-    options: argparse.Namespace, addresses: Sequence[int], step: Callable[[], None]
-) -> Iterator[tuple[int, dict[str, str]]]:
-    """Ask one address after the other, as one line is set."""
-    with Session(options) as session:
-        for address in addresses:
-            facts = _ask(session.drive(address), options.silence_retries)
-            step()
-            if facts is not None:
-                yield address, facts
-
-
-def _ask(drive: Remote, silence_retries: int) -> dict[str, str] | None:
-    """Return who answers at an address (DriveError: the port cannot be used)."""
+def _ask(drive: OfflineDrive, silence_retries: int) -> dict[str, str] | None:
+    """Return what answers at an address (DriveError: the port cannot be used)."""
     try:
         drive.do(lambda: _first_answer(drive, silence_retries))
         identity = drive.identify()
@@ -156,12 +195,12 @@ def _ask(drive: Remote, silence_retries: int) -> dict[str, str] | None:
     }
 
 
-async def _first_answer(drive: Remote, silence_retries: int) -> None:
+async def _first_answer(drive: OfflineDrive, silence_retries: int) -> None:
     """
     Have an address answer once.
 
-    After silence it is asked again as often as told: most addresses have nobody. After a damaged
-    answer it always is, for somebody is there.
+    After silence it is asked again so often: most addresses have no drive. After a damaged answer
+    it always is, for there is one.
     """
     damage_retries = _DAMAGE_RETRIES
     status = drive.model.key_of_status
@@ -204,7 +243,7 @@ _HEAD = """\
   ros__parameters:
 """
 _DRIVE = """
-# {who}
+# {named}
 /**/{name}:
   ros__parameters:
     address: {address}
@@ -214,13 +253,13 @@ _DRIVE = """
 _IF_OTHER = ('response_timeout', 'retries')
 
 
-def require_new(name: str, *, force: bool) -> None:
-    """See to it that no file is replaced that somebody may have edited since."""
+def _require_new(name: str, *, force: bool) -> None:
+    """See to it that no file is replaced that may have been edited since."""
     if name != STANDARD and not force and Path(name).exists():
         raise CliError(f'{name} exists already: choose another name, or say --force to replace it')
 
 
-def driver_params(
+def _driver_params(
     options: argparse.Namespace,
     baud_rate: int,
     char_format: str,
@@ -243,14 +282,16 @@ def driver_params(
     # what JSON has is YAML, too
     settings = [f'    {name}: {json.dumps(value)}\n' for name, value in line.items()]
     drives = [
-        _DRIVE.format(who=_who(facts), name=names[address], address=address, model=facts['model'])
+        _DRIVE.format(
+            named=_named(facts), name=names[address], address=address, model=facts['model']
+        )
         for address, facts in sorted(found.items())
     ]
     return ''.join((_HEAD.format(count=count, date=date), *settings, *drives))
 
 
-def _who(facts: Mapping[str, str]) -> str:
+def _named(facts: Mapping[str, str]) -> str:
     """Return what a drive says of itself, fit for a comment."""
-    told = {'': facts['product'], 'firmware ': facts['firmware'], 'serial ': facts['serial number']}
-    text = ', '.join(f'{name}{value}' for name, value in told.items() if value)
+    names = {'product': '', 'firmware': 'firmware ', 'serial number': 'serial '}
+    text = ', '.join(f'{name}{facts[fact]}' for fact, name in names.items() if facts[fact])
     return ''.join(char if char.isprintable() else ' ' for char in text)

@@ -1,14 +1,13 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is printed while a motor is commanded; nobody ever waits for a terminal or a reader."""
+"""What is printed while a motor is commanded; nothing ever waits for a terminal or a reader."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
 from datetime import datetime
-import json
 import math
 import os
 import shutil
@@ -41,7 +40,7 @@ class Screen:
         self._work_there = threading.Event()
         self._closing = False
         self._thread = threading.Thread(target=self._work, name='screen', daemon=True)
-        #: Nobody can read the output any more.
+        #: The output has no reader any more.
         self.gone = False
 
     def __enter__(self) -> Screen:
@@ -66,7 +65,7 @@ class Screen:
         self._enter(False, text)
 
     def say(self, text: str) -> None:
-        """Say something to a person, on standard error."""
+        """Say something to the operator, on standard error."""
         self._enter(True, f'nfo-sinus: {text}')
 
     def _enter(self, to_error: bool, text: str) -> None:
@@ -107,7 +106,7 @@ def _is_terminal(stream: TextIO | None) -> bool:
 
 
 def _write(stream: TextIO | None, text: str) -> None:
-    """Write past the buffer, for nobody could flush it at the end while a write waits."""
+    """Write past the buffer, for nothing could flush it at the end while a write waits."""
     if stream is None:
         return
     try:
@@ -129,17 +128,17 @@ _VALUES = {
 }
 
 
-def as_line(seen: Snapshot, values: Mapping[Role, float], more: str = '') -> str:
+def as_line(snapshot: Snapshot, values: Mapping[Role, float], more: str = '') -> str:
     """Return what a drive does, with what was measured and more, in one line."""
     when = f'{datetime.now().astimezone():%H:%M:%S}'
     cells = [when, more] if more else [when]
-    if seen.status is None:
+    if snapshot.status is None:
         return '  '.join((*cells, 'not connected'))
-    cells.append(f'{f"{seen.status.code} {seen.text}":<11}')
-    cells.append(f'set {_number(seen.setpoint, 1):>5} {seen.unit}')
-    if seen.control_mode in ('Torque', 'PI-Reg'):
-        cells.append(f'actual {_number(seen.actual, 1):>5} {seen.unit}')
-    cells += [f'{_number(seen.frequency, 1):>5} Hz', f'{_number(seen.speed, 0):>5} rpm']
+    cells.append(f'{f"{snapshot.status.code} {snapshot.text}":<11}')
+    cells.append(f'set {_number(snapshot.setpoint, 1):>5} {snapshot.unit}')
+    if snapshot.control_mode in ('Torque', 'PI-Reg'):
+        cells.append(f'actual {_number(snapshot.actual, 1):>5} {snapshot.unit}')
+    cells += [f'{_number(snapshot.frequency, 1):>5} Hz', f'{_number(snapshot.speed, 0):>5} rpm']
     cells += [
         f'{_number(values.get(role, math.nan), decimals):>4} {unit}'
         for role, (_, unit, decimals) in _VALUES.items()
@@ -147,36 +146,25 @@ def as_line(seen: Snapshot, values: Mapping[Role, float], more: str = '') -> str
     return '  '.join(cells)
 
 
-def as_json(seen: Snapshot, values: Mapping[Role, float]) -> str:
-    """Return the same as a JSON document of one line; the names are those of the messages."""
+def as_facts(snapshot: Snapshot, values: Mapping[Role, float]) -> dict[str, object]:
+    """Return the same for a script; the names are those of the messages."""
     facts: dict[str, object] = {
         'time': datetime.now().astimezone().isoformat(),
-        'connected': seen.connected,
-        'enabled': seen.enabled,
+        'connected': snapshot.connected,
+        'enabled': snapshot.enabled,
     }
-    if seen.status is not None:
+    if snapshot.status is not None:
         facts |= {
-            'code': seen.status.code,
-            'text': seen.text,
-            'kind': seen.kind.value,
-            'state': seen.status.state.name,
-            'control_mode': seen.control_mode,
-            'unit': seen.unit,
-            'setpoint': _known(seen.setpoint),
-            'actual': _known(seen.actual),
-            'frequency': _known(seen.frequency),
-            'speed': _known(seen.speed),
+            'code': snapshot.status.code,
+            'text': snapshot.text,
+            'kind': snapshot.kind.value,
+            'state': snapshot.status.state.name,
         }
-        facts |= {
-            name: _known(values.get(role, math.nan)) for role, (name, _, _) in _VALUES.items()
-        }
-    return json.dumps(facts, ensure_ascii=False)
+        names = ('control_mode', 'unit', 'setpoint', 'actual', 'frequency', 'speed')
+        facts |= {name: getattr(snapshot, name) for name in names}
+        facts |= {name: values.get(role, math.nan) for role, (name, _, _) in _VALUES.items()}
+    return facts
 
 
 def _number(value: float, decimals: int) -> str:
     return '-' if math.isnan(value) else f'{value:.{decimals}f}'
-
-
-def _known(value: float) -> float | None:
-    # JSON has no NaN
-    return None if math.isnan(value) else value

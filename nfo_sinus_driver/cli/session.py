@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One line, open, and the drives on it: read by this tool, and written only when told to."""
+"""The line, open, and the drives on it; a drive is only read unless it is to be written."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import time
 from typing import Any, TypeVar
 
 from nfo_sinus_driver.bus import Bus, Statistics
-from nfo_sinus_driver.catalog import Family, Value
+from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.cli.console import CliError, UsageError, progress, remark, say
 from nfo_sinus_driver.drive import (
     Cause,
@@ -23,30 +23,46 @@ from nfo_sinus_driver.drive import (
     Identity,
     InverterStatus,
     Listener,
+    LogEntry,
     Report,
     Severity,
     Snapshot,
     Telemetry,
 )
 from nfo_sinus_driver.drive.settings import MONITOR
-from nfo_sinus_driver.drive.snapshot import LogEntry
 from nfo_sinus_driver.link import BusSettings, Refused
 
 _T = TypeVar('_T')
 
 
-class Remote:
-    """
-    One drive at the other end of the line.
+class EventListener:
+    """Listens to the events of a drive, and to no more of what it has to report."""
 
-    It is never connected to as the driver does, which takes a run command back: a drive that runs
-    runs on. What takes time raises :class:`DriveError` when it fails.
+    def on_snapshot(self, snapshot: Snapshot) -> None:
+        """Ignore the result of a poll."""
+
+    def on_telemetry(self, telemetry: Telemetry) -> None:
+        """Ignore measured values."""
+
+    def on_parameters(self, keys: Collection[str]) -> None:
+        """Ignore new values of settings."""
+
+    def on_log_entry(self, entry: LogEntry) -> None:
+        """Ignore new entries of the error log; those that matter are events, too."""
+
+
+class OfflineDrive(EventListener):
+    """
+    A drive that is read, and its settings written, without the connection that commands it.
+
+    Connecting removes a run command; this does not, so that a motor that runs runs on. What takes
+    time raises :class:`DriveError` when it fails.
     """
 
     def __init__(self, bus: Bus, settings: DriveSettings) -> None:
         self._drive = drive = Drive(bus, settings, self)
         self.address = settings.address
-        self.model: Family = drive.model
+        self.model = drive.model
         self.params = drive.params
         self.state = drive.state
         self.parameters = drive.parameters
@@ -60,7 +76,7 @@ class Remote:
         return self._drive.run(command).result()
 
     def identify(self, *, thoroughly: bool = True) -> Identity:
-        """Find out who answers, thoroughly with model and serial number."""
+        """Find out what answers, thoroughly with model and serial number."""
         try:
             return self._drive.identify(thoroughly=thoroughly).result()
         except DriveError as error:
@@ -70,7 +86,7 @@ class Remote:
             other = Report(Cause.NOT_THE_MODEL, drive=str(self), model=model, why=why)
             raise DriveError(other) from error.__cause__
 
-    def look(self) -> InverterStatus:
+    def read_status(self) -> InverterStatus:
         """Read the status, without acknowledging anything."""
         return self._drive.read_status().result()
 
@@ -87,7 +103,7 @@ class Remote:
         """Read the error log, newest entry first; at most so many entries, 0: all."""
         return self.do(lambda: self._drive.log.read_now(most))
 
-    def method_in_charge(self) -> str:
+    def active_control_method(self) -> str:
         """Return the control method by which the bus runs it, or would be able to stop it."""
         return self._drive.method_in_charge().result()
 
@@ -95,26 +111,15 @@ class Remote:
         """Read one value."""
         return self._drive.measure(key).result()
 
-    # --- what the layers below have to tell ---------------------------------------------------
-
     def on_event(self, event: Event) -> None:
-        """Pass on what an operator has to know."""
+        """Report what an operator has to know."""
         if event.severity is not Severity.INFO:
             remark(say(event.report))
-
-    def on_snapshot(self, snapshot: Snapshot) -> None:
-        """Nothing: nobody polls."""
-
-    def on_telemetry(self, telemetry: Telemetry) -> None:
-        """Nothing: nobody polls."""
 
     def on_parameters(self, keys: Collection[str]) -> None:
         """Count those that were read."""
         for _ in keys:
             self._step()
-
-    def on_log_entry(self, entry: LogEntry) -> None:
-        """Nothing: nobody watches the log."""
 
 
 class Session:
@@ -145,11 +150,17 @@ class Session:
     def __exit__(self, *_: object) -> None:
         self._bus.close()
 
-    def drive(self, address: int | None = None) -> Remote:
+    def drive(self, address: int | None = None) -> OfflineDrive:
         """Return the drive at an address, or at the one that the options name; nothing is sent."""
-        if address is None:
-            address = self._options.address
-        return Remote(self._bus, self._settings(address))
+        given = self._options.address if address is None else address
+        return OfflineDrive(self._bus, self._settings(given))
+
+    def commanded_drive(self, listener: Listener, **settings: Any) -> Drive:
+        """Return the drive that the options name, to be commanded; nothing is sent."""
+        try:
+            return Drive(self._bus, self._settings(self._options.address, **settings), listener)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
 
     def polled(self, address: int) -> None:
         """Take note that one round of reading a drive is over."""
@@ -166,13 +177,6 @@ class Session:
             return self._bus.statistics(address)
 
         return self._bus.run(ask()).result()
-
-    def command(self, listener: Listener, **settings: Any) -> Drive:
-        """Return the drive that the options name as the driver has it; nothing is sent."""
-        try:
-            return Drive(self._bus, self._settings(self._options.address, **settings), listener)
-        except ValueError as error:
-            raise UsageError(str(error)) from None
 
     def _settings(self, address: int, **others: Any) -> DriveSettings:
         options = self._options

@@ -11,8 +11,6 @@ import contextlib
 from dataclasses import dataclass
 from datetime import datetime
 from importlib import metadata
-import json
-import signal
 import sys
 import threading
 
@@ -21,14 +19,16 @@ from nfo_sinus_driver.cli.console import (
     CliError,
     Interrupted,
     UsageError,
+    as_json,
     columns,
     listed,
     progress,
     put,
     remark,
     say,
+    signals_handled,
 )
-from nfo_sinus_driver.cli.options import command_line
+from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, address, command_line
 from nfo_sinus_driver.cli.parameter_file import (
     ParameterFile,
     format_file,
@@ -39,60 +39,87 @@ from nfo_sinus_driver.cli.parameter_file import (
     shown,
     write_file,
 )
-from nfo_sinus_driver.cli.session import Remote, Session
+from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, Identity
 from nfo_sinus_driver.drive.parameter_writer import Change, ParameterError, shown_raw
 
 _NOTHING = ', nothing was written'
 
 
-def dump(options: argparse.Namespace) -> int:
+class Dump(Verb):
     """Save all settings of the drive."""
-    with Session(options) as session:
-        drive = session.drive()
-        identity = drive.identify()
-        values = drive.read()
-        lost = [key for key in drive.parameters.data if key not in values]
-    write_file(options.file, format_file(_header(drive, identity), values, drive.model))
-    where = '' if options.file == '-' else f' saved in {options.file}'
-    told = ', '.join(filter(None, (str(drive), str(identity))))
-    remark(f'{len(values)} parameters of {told}{where}')
-    if lost:
-        remark(listed('NOT saved, for the drive has a code that means nothing there:', lost))
-    return int(bool(lost))
+
+    json = False
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            'file', nargs='?', default='-', metavar='FILE', help='default: standard output',
+        )
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Save all settings of the drive."""
+        with Session(options) as session:
+            drive = session.drive()
+            identity = drive.identify()
+            values = drive.read()
+            lost = [key for key in drive.parameters.data if key not in values]
+        write_file(options.file, format_file(_header(drive, identity), values, drive.model))
+        where = '' if options.file == '-' else f' saved in {options.file}'
+        named = ', '.join(filter(None, (str(drive), str(identity))))
+        remark(f'{len(values)} parameters of {named}{where}')
+        if lost:
+            remark(listed('NOT saved, for the drive has a code that means nothing there:', lost))
+        return int(bool(lost))
 
 
-def load(options: argparse.Namespace) -> int:
+class Load(Verb):
     """Put saved settings into the drive; only what differs is written."""
-    file = read_file(options.file)
-    # what another model has is refused before anything is asked of the drive
-    settings = {parameter.key for parameter in load_family(options.model).settings}
-    require_names(file.values, settings, options.model, _NOTHING)
-    with Session(options, writes=not options.dry_run) as session:
-        drive = session.drive()
-        identity = drive.identify()
-        for note in _notes(file, drive, identity):
-            remark(note)
-        values = drive.read(file.values)
-        require_names(file.values, drive.parameters.data, str(drive), _NOTHING)
-        data = _differing(file, drive, options)
-        for key in data:
-            new = drive.params.value(key, data[key])
-            put(str(Change(key, _old(drive, values, key), new, drive.model[key].unit)))
-        count = 'one parameter' if len(data) == 1 else f'{len(data)} parameters'
-        if not data:
-            remark(f'nothing to write: {drive} has all of it already')
-            return 0
-        _require_standstill(drive, data)
-        if options.dry_run:
-            remark(f'a dry run: {count} would be written, nothing was')
-            return 0
-        Loading(drive, data, options).run()
-    remark(f'{count} written and read back')
-    return 0
+
+    json = False
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument('file', metavar='FILE', help='- is the standard input')
+        add_flag(parser, '--dry-run', 'only show what would change; write nothing')
+        add_allow(parser)
+        after = parser.add_mutually_exclusive_group()
+        add_flag(
+            after, '--put-back', 'if it fails half-way, put back what was written without asking',
+        )
+        add_flag(after, '--keep', 'if it fails half-way, leave what was written')
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Put saved settings into the drive; only what differs is written."""
+        file = read_file(options.file)
+        # what another model has is refused before anything is asked of the drive
+        settings = {parameter.key for parameter in load_family(options.model).settings}
+        require_names(file.values, settings, options.model, _NOTHING)
+        with Session(options, writes=not options.dry_run) as session:
+            drive = session.drive()
+            identity = drive.identify()
+            for note in _notes(file, drive, identity):
+                remark(note)
+            values = drive.read(file.values)
+            require_names(file.values, drive.parameters.data, str(drive), _NOTHING)
+            data = _differing(file, drive, options)
+            for key in data:
+                new = drive.params.value(key, data[key])
+                put(str(Change(key, _old(drive, values, key), new, drive.model[key].unit)))
+            count = 'one parameter' if len(data) == 1 else f'{len(data)} parameters'
+            if not data:
+                remark(f'nothing to write: {drive} has all of it already')
+                return 0
+            _require_standstill(drive, data)
+            if options.dry_run:
+                remark(f'a dry run: {count} would be written, nothing was')
+                return 0
+            Loading(drive, data, options).run()
+        remark(f'{count} written and read back')
+        return 0
 
 
-def _header(drive: Remote, identity: Identity) -> dict[str, str]:
+def _header(drive: OfflineDrive, identity: Identity) -> dict[str, str]:
     try:
         version = metadata.version('nfo_sinus_driver')
     except metadata.PackageNotFoundError:
@@ -108,8 +135,8 @@ def _header(drive: Remote, identity: Identity) -> dict[str, str]:
     }
 
 
-def _notes(file: ParameterFile, drive: Remote, identity: Identity) -> list[str]:
-    """Return what a person should know before a file goes into a drive."""
+def _notes(file: ParameterFile, drive: OfflineDrive, identity: Identity) -> list[str]:
+    """Return what the operator should know before a file goes into a drive."""
     notes = []
     if file.skipped:
         notes.append(f'left out, for the drive has none such: {", ".join(file.skipped)}')
@@ -127,7 +154,9 @@ def _notes(file: ParameterFile, drive: Remote, identity: Identity) -> list[str]:
     return notes
 
 
-def _differing(file: ParameterFile, drive: Remote, options: argparse.Namespace) -> dict[str, bytes]:
+def _differing(
+    file: ParameterFile, drive: OfflineDrive, options: argparse.Namespace
+) -> dict[str, bytes]:
     """Return what has to be written; all that cannot be is listed in a CliError."""
     found: dict[str, bytes] = {}
     wrong, kept = [], []
@@ -154,7 +183,7 @@ def _differing(file: ParameterFile, drive: Remote, options: argparse.Namespace) 
     return found
 
 
-def _left_as_it_is(file: ParameterFile, drive: Remote, keys: list[str]) -> str:
+def _left_as_it_is(file: ParameterFile, drive: OfflineDrive, keys: list[str]) -> str:
     lines = [
         f'{key}: {shown(drive.parameters.values.get(key), "")}, not {shown(file.values[key], "")}'
         for key in keys
@@ -163,27 +192,24 @@ def _left_as_it_is(file: ParameterFile, drive: Remote, keys: list[str]) -> str:
     return listed(head, lines)
 
 
-def _old(drive: Remote, values: Mapping[str, Value], key: str) -> Value:
+def _old(drive: OfflineDrive, values: Mapping[str, Value], key: str) -> Value:
     """Return what the drive has, as bytes where they mean nothing."""
     return values.get(key, shown_raw(drive.parameters.data[key]))
 
 
-def _require_standstill(drive: Remote, data: Mapping[str, bytes]) -> None:
+def _require_standstill(drive: OfflineDrive, data: Mapping[str, bytes]) -> None:
     """See to it that what only a standing motor allows is not tried while it runs."""
     keys = [key for key in data if drive.model[key].stopped]
-    if keys and drive.look().driven:
+    if keys and drive.read_status().driven:
         head = f'the motor runs ({drive.state.describe()}), and these need it stopped{_NOTHING}:'
         raise CliError(listed(head, keys))
-
-
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Loading:
     """Writes what differs into one drive; the options say what to do when it fails half-way."""
 
     def __init__(
-        self, drive: Remote, data: Mapping[str, bytes], options: argparse.Namespace
+        self, drive: OfflineDrive, data: Mapping[str, bytes], options: argparse.Namespace
     ) -> None:
         self._drive = drive
         self._data = data
@@ -274,17 +300,10 @@ class Loading:
 
 @contextlib.contextmanager
 def _signals_noted() -> Iterator[Callable[[], bool]]:
-    """Let signals that end the program wait; what it yields tells whether one came."""
+    """Let signals that end the program wait; what it yields says whether one came."""
     came = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
+    with signals_handled(lambda *_: came.set()):
         yield came.is_set
-        return
-    before = {number: signal.signal(number, lambda *_: came.set()) for number in _SIGNALS}
-    try:
-        yield came.is_set
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 _ABSENT = 'absent'
@@ -303,29 +322,45 @@ class _Side:
     address: str = ''
 
 
-def diff(options: argparse.Namespace) -> int:
-    """Compare; 1 if there are differences, as diff(1) does."""
-    left, right = _sides(options)
-    differing = [
-        key
-        for key in (*left.values, *(key for key in right.values if key not in left.values))
-        if not same(left.values.get(key), right.values.get(key))
-    ]
-    model = load_family(options.model)
-    own = model.key(Role.BUS_ADDRESS)
-    if own in differing and left.address != right.address and left.address and right.address:
-        # two drives on one line cannot have the same
-        differing.remove(own)
-    if options.json:
-        table = {
-            key: {'left': left.values.get(key), 'right': right.values.get(key)} for key in differing
-        }
-        put(json.dumps(table, ensure_ascii=False, indent=2))
-    elif differing:
-        rows = [(key, _cell(left, key, model), _cell(right, key, model)) for key in differing]
-        for line in columns([('', left.name, right.name), *rows]):
-            put(line)
-    return int(bool(differing))
+class Diff(Verb):
+    """Compare a drive with a file, two files, or two drives."""
+
+    #: 1 is: there are differences.
+    failed = 2
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            'files', nargs='*', metavar='FILE', help='with the drive, or two of them',
+        )
+        parser.add_argument(
+            '--against', type=address, metavar='N', help='compare with the drive at this address',
+        )
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Compare; 1 if there are differences, as diff(1) does."""
+        left, right = _sides(options)
+        differing = [
+            key
+            for key in (*left.values, *(key for key in right.values if key not in left.values))
+            if not same(left.values.get(key), right.values.get(key))
+        ]
+        model = load_family(options.model)
+        own = model.key(Role.BUS_ADDRESS)
+        if own in differing and left.address != right.address and left.address and right.address:
+            # two drives on one line cannot have the same
+            differing.remove(own)
+        if options.json:
+            sides = {'left': left.values, 'right': right.values}
+            table = {
+                key: {side: values.get(key) for side, values in sides.items()} for key in differing
+            }
+            put(as_json(table, indent=2))
+        elif differing:
+            rows = [(key, _cell(left, key, model), _cell(right, key, model)) for key in differing]
+            for line in columns([('', left.name, right.name), *rows]):
+                put(line)
+        return int(bool(differing))
 
 
 def _sides(options: argparse.Namespace) -> tuple[_Side, _Side]:
@@ -357,7 +392,7 @@ def _side(file: ParameterFile) -> _Side:
     return _Side(file.name, file.values, file.header.get('address', ''))
 
 
-def _read(drive: Remote) -> _Side:
+def _read(drive: OfflineDrive) -> _Side:
     drive.identify(thoroughly=False)
     return _Side(f'address {drive.address}', drive.read(), str(drive.address))
 

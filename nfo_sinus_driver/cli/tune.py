@@ -6,33 +6,29 @@
 from __future__ import annotations
 
 import argparse
-import json
 import time
 
-from nfo_sinus_driver.cli.console import CliError, require_yes, say
+from nfo_sinus_driver.cli.console import CliError, as_json, require_yes, say
 from nfo_sinus_driver.cli.control_session import (
-    NO_TIMEOUT,
+    INTERRUPTED,
+    MUTE,
     ControlSession,
     Ended,
-    Stopping,
     control_session,
-    spoken,
 )
+from nfo_sinus_driver.cli.options import Verb, add_yes
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.drive import Cause, DriveError, Procedure, Report, Tuned
 from nfo_sinus_driver.drive.procedure import require_known
 
-PROCEDURES = {
+_PROCEDURES = {
     'full': Procedure.FULL,
     'basic': Procedure.BASIC,
     'rs': Procedure.STATOR_RESISTANCE,
     'calculate': Procedure.CALCULATE,
 }
-#: How long connecting may take, and a cancelled tuning until it has ended, s.
-_LONGEST = 15.0
 _STATUS_PERIOD = 0.2
-_INTERRUPTED = 130
-#: What is told as the result.
+#: What is reported as the result, and not as an event.
 _OUTCOMES = (
     Cause.TUNING_CHANGED,
     Cause.TUNING_FAILED,
@@ -42,26 +38,36 @@ _OUTCOMES = (
 )
 
 
-def tune(options: argparse.Namespace) -> int:
-    """Tune, and tell which parameters have changed."""
-    procedure = PROCEDURES[options.procedure]
-    what = procedure.value
-    with Session(options) as session:
-        drive = session.drive()
-        drive.identify(thoroughly=False)
-        require_known(procedure, drive.model)
-        if drive.look().driven:
-            raise CliError(f'{what}: the motor runs ({drive.state.describe()}): stop it first')
-    require_yes(options, f'{what[0].upper()}{what[1:]}: {_warning(procedure)} Go on?')
-    mute = {*NO_TIMEOUT, Cause.FAULT_APPEARED, *_OUTCOMES}
-    with control_session(options, mute=mute, live=not options.json) as control:
-        return _Tuning(control, options, procedure).go()
+class Tune(Verb):
+    """Have the drive measure or calculate its motor."""
 
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            'procedure', choices=_PROCEDURES,
+            help='full or basic tuning, rs: only the stator resistance, calculate: from the motor '
+            'plate alone',
+        )
+        add_yes(parser)
 
-def _warning(procedure: Procedure) -> str:
-    if procedure is Procedure.CALCULATE:
-        return 'the drive changes its motor parameters.'
-    return 'the motor is energised and may turn, for minutes.'
+    def main(self, options: argparse.Namespace) -> int:
+        """Tune, and report which parameters have changed."""
+        procedure = _PROCEDURES[options.procedure]
+        what = procedure.value
+        with Session(options) as session:
+            drive = session.drive()
+            drive.identify(thoroughly=False)
+            require_known(procedure, drive.model)
+            if drive.read_status().driven:
+                raise CliError(f'{what}: the motor runs ({drive.state.describe()}): stop it first')
+        effect = (
+            'the drive changes its motor parameters.'
+            if procedure is Procedure.CALCULATE
+            else 'the motor is energised and may turn, for minutes.'
+        )
+        require_yes(options, f'{what[0].upper()}{what[1:]}: {effect} Go on?')
+        with control_session(options, mute={*MUTE, *_OUTCOMES}, live=not options.json) as control:
+            return _Tuning(control, options, procedure).run()
 
 
 class _Tuning:
@@ -70,19 +76,19 @@ class _Tuning:
     def __init__(
         self, control: ControlSession, options: argparse.Namespace, procedure: Procedure
     ) -> None:
-        self._session = control
+        self._control = control
         self._options = options
         self._procedure = procedure
-        self._drive = control.drive()
+        self._drive = control.command()
         self._begun = time.monotonic()
         self._shown = ''
         self._shown_at = 0.0
 
-    def go(self) -> int:
+    def run(self) -> int:
         """Tune; return the exit status."""
-        screen, status = self._session.screen, 1
+        control, status = self._control, 1
         try:
-            tuned, status = self._tuned()
+            tuned, status = self._tune()
         except Ended as end:
             how = Report(Cause.INTERRUPTED, signal=str(end))
             tuned, status = Tuned(False, how, ()), end.status
@@ -90,10 +96,32 @@ class _Tuning:
             tuned = Tuned(False, error.report, ())
         text = say(tuned.how)
         if self._drive.stop_unconfirmed and not self._drive.blocked_by_fault:
-            # a fault keeps it still; else nobody tries on when this command has ended
-            screen.say(text)
-            Stopping(self._session, self._drive, self._show).confirmed_late()
+            # a fault keeps it still; else nothing retries when this command has ended
+            control.screen.say(text)
+            control.confirmed_late()
             status = status or 1
+        self._put(tuned, text)
+        control.screen.say(text)
+        return status
+
+    def _tune(self) -> tuple[Tuned, int]:
+        """Return how it ended, and the exit status."""
+        control, drive = self._control, self._drive
+        control.wait(drive.connect())
+        drive.activate()
+        control.show = self._show
+        future = drive.tune(self._procedure)
+        self._begun = time.monotonic()
+        try:
+            tuned = control.wait(future)
+        except Ended as end:
+            control.screen.say(f'{end.key}: stopping it')
+            control.finish(drive.cancel_tuning())
+            return control.finish(future), INTERRUPTED
+        return tuned, int(not tuned.success)
+
+    def _put(self, tuned: Tuned, text: str) -> None:
+        screen = self._control.screen
         if self._options.json:
             facts = {
                 'success': tuned.success,
@@ -104,36 +132,19 @@ class _Tuning:
                     for one in tuned.changes
                 ],
             }
-            screen.put(json.dumps(facts, ensure_ascii=False))
-        else:
-            for change in tuned.changes:
-                screen.put(str(change))
-            if tuned.success and not tuned.changes:
-                screen.put('no parameter has changed')
-        screen.say(text)
-        return status
-
-    def _tuned(self) -> tuple[Tuned, int]:
-        """Return how it ended, and the exit status."""
-        control, drive = self._session, self._drive
-        control.wait(drive.connect())
-        drive.activate()
-        future = drive.tune(self._procedure)
-        self._begun = time.monotonic()
-        try:
-            tuned = control.wait(future, self._show)
-        except Ended as end:
-            control.screen.say(f'{spoken(str(end))}: stopping it')
-            control.finish(drive.cancel_tuning(), _LONGEST)
-            return control.finish(future, _LONGEST, self._show), _INTERRUPTED
-        return tuned, int(not tuned.success)
+            screen.put(as_json(facts))
+            return
+        for change in tuned.changes:
+            screen.put(str(change))
+        if tuned.success and not tuned.changes:
+            screen.put('no parameter has changed')
 
     def _show(self) -> None:
-        seen = self._drive.snapshot
-        if seen.status is None:
+        snapshot = self._drive.snapshot
+        if snapshot.status is None:
             return
-        screen, now = self._session.screen, time.monotonic()
-        stage = f'{seen.status.code} {seen.text}'
+        screen, now = self._control.screen, time.monotonic()
+        stage = f'{snapshot.status.code} {snapshot.text}'
         line = f'{self._procedure.value}  {stage}  {now - self._begun:.0f} s'
         if screen.live and now > self._shown_at + _STATUS_PERIOD:
             self._shown_at = now

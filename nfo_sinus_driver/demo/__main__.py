@@ -24,7 +24,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from nfo_sinus_driver.demo.bench import Bench, own_domain
+from nfo_sinus_driver.demo.bench import Bench, handle_signals, own_domain
 from nfo_sinus_driver.demo.record import why_missing
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
 from nfo_sinus_driver.demo.sequence import HEADING, PATIENCE, DemoSequence, StepError
@@ -32,16 +32,13 @@ from nfo_sinus_driver.node.executor import spinning
 
 #: More often than by default, for a smooth curve.
 _DRIVER_SETTINGS = ('-p', 'telemetry_rate:=5.0')
-#: What ends it before it is done, whatever was inherited.
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _INTERRUPTED = 130
 _REMARKS = {'title': 'Forward, backward, a fault, and on again', 'drive': 'simulated drive'}
 
 
 def main() -> int:
     """Start everything, go through the sequence, end everything, and draw."""
-    for number in _ENDING:
-        signal.signal(number, signal.default_int_handler)
+    handle_signals(signal.default_int_handler)
     folder = _output_folder()
     missing = why_missing('rosbags', 'matplotlib')
     bag = None if 'rosbags' in missing else folder / 'ride'
@@ -66,19 +63,17 @@ def main() -> int:
             print(f'FAILED: {error}', file=sys.stderr)
             return 1
         except KeyboardInterrupt:
-            # the driver now stops the motor, and that must not be cut short
-            for number in _ENDING:
-                signal.signal(number, signal.SIG_IGN)
+            handle_signals(signal.SIG_IGN)
             print('ended before the ride was done', file=sys.stderr)
             return _INTERRUPTED
     print('The ride is done: every step happened.')
     if bag:
         print(f'Its bag: {bag}; {replay_warning("/nfo_sinus")}')
     if not missing:
-        from nfo_sinus_driver.demo import plot
+        from nfo_sinus_driver.demo.picture import draw
 
         picture = folder / 'ride.png'
-        plot.draw(bag, picture)
+        draw(bag, picture)
         print(f'Its picture: {picture}')
     return 0
 
@@ -103,12 +98,10 @@ def _sequence(bag: Path | None) -> Iterator[DemoSequence]:
 
 def _output_folder() -> Path:
     parser = argparse.ArgumentParser(
-        prog='demo', description='A short ride of a simulated drive, recorded and drawn.'
+        prog='demo', description='A short ride of a simulated drive, recorded and drawn.',
     )
     parser.add_argument(
-        '--output',
-        type=Path,
-        metavar='DIR',
+        '--output', type=Path, metavar='DIR',
         help='where bag (DIR/ride) and plot (DIR/ride.png) go; '
         'demo_output/<date and time> in the current directory if not given',
     )

@@ -15,12 +15,22 @@ import socket
 import subprocess
 import sys
 import tempfile
-from typing import IO
+from typing import IO, Any
 
 _SIMULATOR = (sys.executable, '-m', 'nfo_sinus_driver.simulator')
 _DRIVER = (sys.executable, '-m', 'nfo_sinus_driver.node')
 
 BAUD_RATE = 57600
+
+
+def handle_signals(handler: Any) -> None:
+    """
+    Handle the signals that end a program, whatever was inherited.
+
+    Ignored they are as soon as the driver stops the motor, which must not be cut short.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, handler)
 
 
 class Bench(contextlib.ExitStack):
@@ -87,13 +97,13 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-#: All that DDS has ports for on every system; 0 is everybody's.
+#: All that DDS has ports for on every system; 0 is that of everything else.
 _DOMAINS = range(1, 102)
 
 
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
-    """Have a ROS domain that nobody else has who asks here, and not that of the user."""
+    """Have a ROS domain that no other caller has, and that is not that of the user."""
     users = os.environ.get('ROS_DOMAIN_ID', '')
     for number in random.sample(_DOMAINS, len(_DOMAINS)):
         if str(number) == users:

@@ -28,11 +28,11 @@ from rclpy.signals import SignalHandlerOptions
 import rclpy.utilities
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
+from nfo_sinus_driver.demo.bench import handle_signals
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
 from nfo_sinus_driver.node.executor import spinning
 from nfo_sinus_driver.version import VERSION
 
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 #: When it is time to say that there is no driver, s.
 _PATIENCE = 5.0
 #: How long what was sent before the end may be on its way, s.
@@ -55,8 +55,7 @@ def main(args: Sequence[str] | None = None) -> int:
     if 'rosbags' in missing:
         print(f'record: cannot write a bag: {missing["rosbags"]}', file=sys.stderr)
         return 1
-    for number in _ENDING:
-        signal.signal(number, signal.default_int_handler)
+    handle_signals(signal.default_int_handler)
     try:
         with _recorder(bag, options.drive, given) as recorder:
             print(f'record: {options.drive} goes to {bag}; Ctrl-C ends it', flush=True)
@@ -75,7 +74,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def plot(args: Sequence[str] | None = None) -> int:
-    """Draw the ride of a drive that is in a bag; return the exit status."""
+    """Draw the run of a drive that is in a bag; return the exit status."""
     options = _plot_parser().parse_args(args)
     missing = why_missing('rosbags', 'matplotlib')
     if missing:
@@ -100,10 +99,10 @@ def _draw(command: str, bag: Path, drive: str | None, picture: Path) -> int:
     # here and not above: a recorder has use for neither library before
     from rosbags.highlevel import AnyReaderError
 
-    from nfo_sinus_driver.demo import bag as bags, plot as plots
+    from nfo_sinus_driver.demo.picture import draw, only_drive
 
     try:
-        plots.draw(bag, picture, drive or bags.only_drive(bag))
+        draw(bag, picture, drive or only_drive(bag))
     except (AnyReaderError, OSError, ValueError) as error:
         print(f'{command}: cannot draw {bag}: {error}', file=sys.stderr)
         return 1
@@ -113,12 +112,12 @@ def _draw(command: str, bag: Path, drive: str | None, picture: Path) -> int:
 
 @contextlib.contextmanager
 def _recorder(bag: Path, drive: str, arguments: Sequence[str]) -> Iterator[Recorder]:
-    """Record on a thread of its own; nothing is heard any more when the bag is closed."""
+    """Record on a thread of its own; nothing is received any more when the bag is closed."""
     with contextlib.ExitStack() as stack:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
         recorder = stack.enter_context(
-            Recorder(bag, drive, {'drive': drive}, lambda: _tell_heard(drive))
+            Recorder(bag, drive, {'drive': drive}, lambda: _report_heard(drive))
         )
         executor = SingleThreadedExecutor()
         executor.add_node(recorder)
@@ -126,12 +125,12 @@ def _recorder(bag: Path, drive: str, arguments: Sequence[str]) -> Iterator[Recor
         yield recorder
 
 
-def _tell_heard(drive: str) -> None:
+def _report_heard(drive: str) -> None:
     print(f'record: {drive} is heard', flush=True)
 
 
 def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
-    """Wait until the time is over, or somebody ends it."""
+    """Wait until the time is over, or a signal ends it."""
     end = time.monotonic() + seconds
     with contextlib.suppress(KeyboardInterrupt):
         _sleep_until(min(end, time.monotonic() + _PATIENCE))
@@ -144,9 +143,8 @@ def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
             )
         _sleep_until(end)
     # what was recorded is now closed and drawn, and that must not be cut short
-    for number in _ENDING:
-        signal.signal(number, signal.SIG_IGN)
-    # the end overtakes messages: nobody tells a subscriber which are yet to come
+    handle_signals(signal.SIG_IGN)
+    # the end overtakes messages: a subscriber does not know which are yet to come
     time.sleep(_ON_ITS_WAY)
 
 
@@ -158,7 +156,7 @@ def _sleep_until(end: float) -> None:
 
 def _record_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='record', description='Records what a drive does until Ctrl-C, and draws it.'
+        prog='record', description='Records what a drive does until Ctrl-C, and draws it.',
     )
     parser.add_argument(
         'drive', nargs='?', type=_node, default='/nfo_sinus', metavar='DRIVE',
@@ -179,16 +177,14 @@ def _record_parser() -> argparse.ArgumentParser:
 
 def _plot_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='plot', description='Draws what a bag tells of the ride of a drive.'
+        prog='plot', description='Draws what a bag tells of the ride of a drive.',
     )
     parser.add_argument('bag', type=Path, metavar='BAG', help='the folder of the bag')
     parser.add_argument(
         '--drive', type=_node, metavar='DRIVE',
         help='the full name of the drive node; needed if the bag has several',
     )
-    parser.add_argument(
-        '--output', type=Path, metavar='PNG', help='the picture (default: BAG.png)'
-    )
+    parser.add_argument('--output', type=Path, metavar='PNG', help='the picture (default: BAG.png)')
     parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
     return parser
 

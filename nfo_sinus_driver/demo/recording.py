@@ -69,9 +69,9 @@ class RecordingError(Exception):
 
 class Recorder(Node):
     """
-    Writes what it hears into a bag, which is whole once the context is left.
+    Writes what it receives into a bag, which is whole once the context is left.
 
-    By then nothing may be heard any more.
+    By then nothing may be received any more.
 
     :param folder: the bag, a folder that does not exist.
     :param drive: the full name of the drive node.
@@ -109,7 +109,7 @@ class Recorder(Node):
 
     @property
     def hears_drive(self) -> bool:
-        """The drive has told its status."""
+        """The status of the drive has been received."""
         return self._heard is None
 
     def __enter__(self) -> Recorder:
@@ -121,7 +121,7 @@ class Recorder(Node):
         except OSError as error:
             self._error = self._error or error
         self.destroy_node()
-        # a run that failed has more to tell than its bag
+        # a run that failed has more to report than its bag
         if cause[0] is None:
             self._judge()
 
@@ -145,7 +145,7 @@ class Recorder(Node):
 
         def write(data: bytes, info: dict[str, Any]) -> None:
             nonlocal latest
-            # some middlewares do not tell when a message came; and the system's clock may be set
+            # some middlewares do not say when a message came; and the system's clock may be set
             # back, but a bag's must not
             latest = max(latest, info.get('received_timestamp') or time.time_ns())
             self._write(connection, latest, data)
@@ -167,7 +167,7 @@ class Recorder(Node):
             self._writer.write(connection, stamp, data)
             self._count += 1
         except OSError as error:
-            # the run goes on, for it must come to its stop; the end tells
+            # the run goes on, for it must come to its stop; the end reports it
             self._error = error
 
 

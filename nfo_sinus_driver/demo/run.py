@@ -9,9 +9,8 @@ import shutil
 import signal
 import sys
 
-from nfo_sinus_driver.demo.bench import Bench
+from nfo_sinus_driver.demo.bench import Bench, handle_signals
 
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _WITH_ROS2 = """
 The driver is up. In another terminal (`. tools/env.sh`, or your own Jazzy), try:
 
@@ -39,8 +38,7 @@ Ctrl-C stops the motor and ends both.
 
 def main() -> int:
     """Run both until one of them ends or a signal comes; then the driver is ended first."""
-    for number in _ENDING:
-        signal.signal(number, signal.default_int_handler)
+    handle_signals(signal.default_int_handler)
     with Bench() as bench:
         try:
             print(bench.start_simulator(), flush=True)
@@ -49,9 +47,7 @@ def main() -> int:
             print(text % bench.port, flush=True)
             return bench.wait()
         except KeyboardInterrupt:
-            # the driver now stops the motor, and that must not be cut short
-            for number in _ENDING:
-                signal.signal(number, signal.SIG_IGN)
+            handle_signals(signal.SIG_IGN)
             return 0
 
 

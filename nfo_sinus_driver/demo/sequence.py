@@ -70,7 +70,7 @@ class DemoSequence(Node):
         self._triggers = {
             name: self.create_client(Trigger, f'{drive}/{name}') for name in ('stop', 'fault_ack')
         }
-        # what is asked and answered is told, so that it can be recorded
+        # requests and responses are published, so that they can be recorded
         for client in (self._enable_client, *self._triggers.values()):
             client.configure_introspection(
                 self.get_clock(), RELIABLE, ServiceIntrospectionState.CONTENTS
@@ -105,7 +105,7 @@ class DemoSequence(Node):
         self._wait_for('a released motor', near(0.0))
         self._watch_for(_COASTS_FOR, 'a released motor', near(0.0))
         self._trigger('fault_ack')
-        # nobody has control then, so nothing turns
+        # control is released then, so nothing turns
         self._wait_for('no fault', lambda: self._inv_st and self._inv_st.kind == InvSt.STATUS)
         self._say('set-points keep coming, and nothing turns until it is enabled again')
         self._watch_for(_STANDS_FOR, 'standstill', near(0.0))
@@ -119,12 +119,12 @@ class DemoSequence(Node):
         self._trigger('stop')
         self._wait_for('standby', lambda: self._inv_st and self._inv_st.code == _BUS_STANDBY)
         self._setpoint = None
-        # of what is told, the state may be newer than the frequency
+        # of what is published, the state may be newer than the frequency
         self._wait_for('standstill', near(0.0))
         self._watch_for(_STANDS_FOR, 'standstill', near(0.0))
 
     def _wait_for(self, what: str, condition: Callable[[], object]) -> None:
-        """Print what is seen until a condition holds (StepError: it does not)."""
+        """Print what is measured until a condition holds (StepError: it does not)."""
         deadline = time.monotonic() + PATIENCE
         while not condition():
             if time.monotonic() > deadline:
@@ -135,7 +135,7 @@ class DemoSequence(Node):
 
     def _watch_for(self, seconds: float, what: str, condition: Callable[[], object]) -> None:
         """
-        Print what is seen for some time, in which a condition must hold.
+        Print what is measured for some time, in which a condition must hold.
 
         :raises StepError: it does not.
         """
@@ -219,5 +219,5 @@ class DemoSequence(Node):
         self._current = message.output_current
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        # a bus tells its port as the hardware it is about
+        # a bus reports its port as its hardware
         self._ports.update(status.hardware_id for status in message.status)

@@ -37,7 +37,7 @@ from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE
 from nfo_sinus_driver.version import VERSION
-from nfo_sinus_driver.view import terminal
+from nfo_sinus_driver.view import show, why_not
 from nfo_sinus_driver.view.picture import (
     Condition,
     DriveView,
@@ -425,16 +425,16 @@ def main(args: list[str] | None = None) -> int:
     """Show the view until the operator ends it; return the exit status."""
     given = sys.argv[1:] if args is None else args
     options = _parser().parse_args(rclpy.utilities.remove_ros_args(['', *given])[1:])
-    write_forbidden = terminal.write_forbidden()
-    if write_forbidden:
-        print(f'monitor: {write_forbidden}', file=sys.stderr)
+    missing = why_not()
+    if missing:
+        print(f'monitor: {missing}', file=sys.stderr)
         return 2
     # what ROS prints would be printed across the view
     logging = ['--ros-args', '--disable-stdout-logs', '--']
     rclpy.init(args=[*given, *logging], signal_handler_options=SignalHandlerOptions.NO)
     source = GraphSource(get_default_context(), options.namespaces)
     try:
-        terminal.show(source)
+        show(source)
     finally:
         left = source.stops(time.monotonic())
         source.close()

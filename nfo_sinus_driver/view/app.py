@@ -35,7 +35,6 @@ from nfo_sinus_driver.view.picture import (
     Picture,
     Source,
 )
-from nfo_sinus_driver.view.plot import plot, span
 
 #: How often it is looked, s.
 _PERIOD = 0.25
@@ -48,7 +47,7 @@ _PLOT_HEIGHT = 3
 #: What is older is shown as old, s.
 _FRESH = 4.0
 
-#: What stands before a status, so that nobody depends on colours, and its style.
+#: What stands before a status, so that colours are not needed, and its style.
 _MARKS = {
     Condition.GONE: ('·', 'dim'),
     Condition.SILENT: ('?', 'bold magenta'),
@@ -81,7 +80,7 @@ _MOST_DECIMALS = 4
 
 
 def _in_unit(value: float, unit: str, width: int = 1000) -> str:
-    """Return a value in a unit that may be a person's own, without it where it does not fit."""
+    """Return a value in a unit that may be the operator's own, without it where it does not fit."""
     decimals = 1
     if unit not in _COARSE and math.isfinite(value) and value:
         decimals = min(_MOST_DECIMALS, max(0, 2 - math.floor(math.log10(abs(value)))))
@@ -126,7 +125,7 @@ def natural(name: str) -> list[tuple[int, int, str]]:
 
 class MonitorApp(App[None]):
     """
-    Shows what a source tells, four times a second, until somebody ends it.
+    Shows what a source reports, four times a second, until the operator ends it.
 
     :param source: asked by the thread that draws.
     """
@@ -233,7 +232,7 @@ class MonitorApp(App[None]):
         self._look()
 
     def action_next_trouble(self) -> None:
-        """Choose the next drive that needs a person."""
+        """Choose the next drive that needs attention."""
         table, drives = self._table, {drive.name: drive for drive in self._picture.drives}
         for step in range(1, len(self._rows) + 1):
             row = (table.cursor_row + step) % len(self._rows)
@@ -288,7 +287,7 @@ class MonitorApp(App[None]):
             head.append(f'  {self._source.only_looks}', 'dim')
         head.append(f'  {self._source.title}', 'dim')
         for line in sorted(picture.lines, key=lambda line: -(line.timeouts + line.damaged)):
-            head.append(f'\n{line.name}: {_told(line)}', 'dim')
+            head.append(f'\n{line.name}: {_figures(line)}', 'dim')
         return head
 
     def _show_table(self, drives: Iterable[DriveView]) -> None:
@@ -306,9 +305,9 @@ class MonitorApp(App[None]):
                 table.move_cursor(row=names.index(chosen.name))
         for drive in shown:
             for heading, width, cell, right in _COLUMNS:
-                # nothing that a drive or a person has named is markup
-                told = cell(drive)
-                text = told if isinstance(told, Text) else Text(told, no_wrap=True)
+                # nothing that a drive or an operator has named is markup
+                content = cell(drive)
+                text = content if isinstance(content, Text) else Text(content, no_wrap=True)
                 if right:
                     text.align('right', width)
                 shown_text = text.plain, str(text.style)
@@ -323,15 +322,15 @@ class MonitorApp(App[None]):
 
     def _show_drive(self) -> None:
         drive = self._chosen()
-        told, plots, line = (self.query_one(name, Static) for name in ('#drive', '#plots', '#line'))
+        full, plots, line = (self.query_one(name, Static) for name in ('#drive', '#plots', '#line'))
         if drive is None:
-            told.update(Text('' if self._picture.drives else self._source.advice))
+            full.update(Text('' if self._picture.drives else self._source.advice))
             plots.update('')
             line.update('')
             return
-        text = _in_full(drive, told.size.width)
-        told.update(Text('\n').join(text))
-        line.update('' if drive.line is None else Text(f'line: {_told(drive.line)}', 'dim'))
+        text = _in_full(drive, full.size.width)
+        full.update(Text('\n').join(text))
+        line.update('' if drive.line is None else Text(f'line: {_figures(drive.line)}', 'dim'))
         # what the text leaves, the line of figures in two rows
         free = self.query_one('#full').content_size.height - len(text) - 2
         plots.update(Text('\n').join(self._plots(drive, free)))
@@ -365,7 +364,7 @@ class MonitorApp(App[None]):
 
 
 def _in_full(drive: DriveView, width: int) -> list[Text]:
-    """Return who the drive is, how it is, why, what to do, and what is measured."""
+    """Return which drive it is, how it is, why, what to do, and what is measured."""
     _, style = _MARKS[drive.condition]
     first = Text.assemble((drive.name, 'bold'), '  ', _status(drive))
     if drive.age > _FRESH:
@@ -391,7 +390,7 @@ def _in_full(drive: DriveView, width: int) -> list[Text]:
         ('DC link ', measured.dc_link_voltage, 0, 'V'),
         ('motor ', measured.motor_temperature, 0, '%'),
     )
-    told = [
+    values = [
         *(
             f'{name} {_in_unit(value, drive.unit)}'
             for name, value in (('set', drive.setpoint), ('actual', drive.actual))
@@ -403,13 +402,13 @@ def _in_full(drive: DriveView, width: int) -> list[Text]:
             if not math.isnan(value)
         ),
     ]
-    told = [cell.replace(' ', '\N{NO-BREAK SPACE}') for cell in told]
+    values = [cell.replace(' ', '\N{NO-BREAK SPACE}') for cell in values]
     # only where a value ends
-    lines += map(Text, textwrap.wrap('  '.join(told), max(width, 20)))
+    lines += map(Text, textwrap.wrap('  '.join(values), max(width, 20)))
     return lines
 
 
-def _told(line: LineView) -> str:
+def _figures(line: LineView) -> str:
     """Return how a line is doing, the worst first."""
     parts = [
         f'{count} {what}'
@@ -446,3 +445,50 @@ def _line_of(note: Note) -> Text:
     when = _when(note.at)
     style = _LEVELS[note.level]
     return Text.assemble((when, 'dim'), ' ', (note.who, 'bold'), ' ', (note.text, style))
+
+
+# --- the running plot, made of text ---------------------------------------------------------------
+
+#: An eighth of a character's height each.
+_EIGHTHS = ' ▁▂▃▄▅▆▇█'
+
+
+def span(values: Sequence[float], least: float = 0.0) -> tuple[float, float]:
+    """
+    Return where the axis begins and ends: zero is always on it.
+
+    :param least: how much the axis shows at least, so that noise is not drawn as an event.
+    """
+    known = [value for value in values if math.isfinite(value)]
+    low, high = min((0.0, *known)), max((0.0, *known))
+    if high - low < least:
+        high = low + least if high > 0 or low == 0 else high
+        low = low if high > 0 else high - least
+    return low, high
+
+
+def plot(
+    values: Sequence[float], width: int, height: int, axis: tuple[float, float]
+) -> list[str]:
+    """
+    Return columns from the bottom of the axis up to each value, newest at the right, as lines.
+
+    :param values: oldest first; NaN leaves a gap. More than ``width`` are cut off at the left.
+    """
+    low, high = axis
+    size = high - low
+    shown = list(values)[-width:] if width else []
+    # without a size there is but the value zero
+    heights = [_height((value - low) / (size or 1.0), height) for value in shown]
+    blank = ' ' * (width - len(shown))
+    return [
+        blank + ''.join(_EIGHTHS[min(8, max(0, eighths - 8 * row))] for eighths in heights)
+        for row in reversed(range(height))
+    ]
+
+
+def _height(share: float, height: int) -> int:
+    """Return how many eighths of a character a share of the axis is; a value has one at least."""
+    if not math.isfinite(share):
+        return 0
+    return max(1, min(8 * height, round(share * 8 * height)))

@@ -17,7 +17,7 @@ NAN = math.nan
 class Condition(Enum):
     """How a drive is, in one word; the first that is true counts."""
 
-    #: Nobody tells of it any more: its driver has ended, or the graph is torn.
+    #: Nothing is reported of it any more: its driver has ended, or the graph is torn.
     GONE = 'gone'
     #: The drive does not answer.
     SILENT = 'silent'
@@ -61,7 +61,7 @@ class LineView:
 
 
 def line_view(name: str, figures: object) -> LineView:
-    """Return what statistics tell, whose fields have the names of those of BusStatistics."""
+    """Return what statistics say, whose fields have the names of those of BusStatistics."""
     names = [one.name for one in fields(LineView) if one.name != 'name']
     return LineView(name, **{one: getattr(figures, one) for one in names})
 
@@ -75,7 +75,7 @@ class DriveView:
     :ivar status: code and text, as on the display.
     :ivar cause: what the status means, where there is more to say than its text.
     :ivar remedy: what to do about it.
-    :ivar age: s since somebody told of it.
+    :ivar age: s since it was last reported.
     :ivar line: how the line does with this drive; None: not known.
     """
 
@@ -104,7 +104,7 @@ class Level(Enum):
 
 @dataclass(frozen=True)
 class Note:
-    """A line of the log: when (s of ``time.time``, NaN: nobody knows), who, what."""
+    """A line of the log: when (s of ``time.time``, NaN: unknown), who, what."""
 
     at: float
     level: Level
@@ -141,7 +141,7 @@ class Source(Protocol):
         """Return what is so now."""
 
     def stop(self, name: str) -> None:
-        """Ask that a drive be stopped; a note tells what came of it."""
+        """Ask that a drive be stopped; a note reports what came of it."""
 
     def stop_all(self) -> None:
-        """Ask that all be stopped; a note tells what came of it."""
+        """Ask that all be stopped; a note reports what came of it."""

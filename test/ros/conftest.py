@@ -11,7 +11,7 @@ from pathlib import Path
 
 from bench import Bench
 import pytest
-from ways import DEFAULT, EACH_KIND, USUAL, WAYS, Way, write_forbidden
+from ways import DEFAULT, EACH_KIND, USUAL, WAYS, Way, why_not
 
 from nfo_sinus_driver.demo.bench import own_domain
 
@@ -66,7 +66,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         missing = [
             reason
             for marker in item.iter_markers('needs')
-            if (reason := write_forbidden(WAYS[callspec.params['way']], marker.args))
+            if (reason := why_not(WAYS[callspec.params['way']], marker.args))
         ]
         for reason in missing:
             item.add_marker(pytest.mark.skip(reason=reason))

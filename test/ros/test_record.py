@@ -17,7 +17,7 @@ from types import SimpleNamespace
 from bench import Bench, Process, wait_until
 from ways import needs
 
-from nfo_sinus_driver.demo import bag as bags
+from nfo_sinus_driver.demo import picture
 from nfo_sinus_driver.demo.recording import topics_of
 
 _RECORD = (sys.executable, '-m', 'nfo_sinus_driver.demo.record')
@@ -72,11 +72,11 @@ def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     recorder.signal(signal.SIGINT, thread=recorder.pid)
     recorder.signal(signal.SIGCONT)
     assert recorder.wait() == 0, recorder.text
-    bag, picture = folder / 'ride', folder / 'ride.png'
-    assert f'the bag is {bag}' in recorder.text and f'the picture is {picture}' in recorder.text
+    bag, drawn = folder / 'ride', folder / 'ride.png'
+    assert f'the bag is {bag}' in recorder.text and f'the picture is {drawn}' in recorder.text
     assert 'Traceback' not in recorder.text
     assert recorder.text.count('is heard') == 1
-    assert _is_picture(picture)
+    assert _is_picture(drawn)
     # `ros2 bag play` of it must not command the drive: what the driver obeys is named
     obeyed = client.node.get_subscriber_names_and_types_by_node('infeed', '/line1')
     excluded = re.search(r'--exclude-topics (\S+)`', recorder.text)
@@ -85,7 +85,7 @@ def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     assert {excluded.group(1)} == recorded & {name for name, _ in obeyed}
     assert 'another ROS_DOMAIN_ID' in recorder.text
 
-    ride = bags.read(bag, bags.only_drive(bag))
+    ride = picture.read(bag, picture.only_drive(bag))
     assert max(ride.actual.values) > 19 and abs(ride.actual.values[-1]) < 0.1
     assert set(ride.setpoint.values) == {20.0, 7.0} and ride.unit == 'Hz'
     assert len(ride.enabled) == 1 and 'running' in {span.what for span in ride.phases}
@@ -141,5 +141,5 @@ def test_who_a_drive_is_is_told_by_its_own_diagnostics() -> None:
         return SimpleNamespace(status=[SimpleNamespace(name=name, values=pairs)])
 
     arrays = [told('line1/outfeed: drive', 'A1'), told('line1/infeed: drive', 'B2')]
-    assert bags._identity(arrays, _DRIVE) == ['serial B2', 'firmware 4.38']
-    assert bags._identity(arrays, '/infeed') == []
+    assert picture._identity(arrays, _DRIVE) == ['serial B2', 'firmware 4.38']
+    assert picture._identity(arrays, '/infeed') == []

@@ -250,7 +250,7 @@ def needs(*features: str) -> pytest.MarkDecorator:
     return pytest.mark.needs(*features)
 
 
-def write_forbidden(way: Way, features: tuple[str, ...]) -> str:
+def why_not(way: Way, features: tuple[str, ...]) -> str:
     """Return why a test with a mark is not run over a way; ``''``: it is."""
     missing = [feature for feature in features if feature not in way.features]
     return f'not over {way.name}: {WITHOUT[missing[0]]}' if missing else ''

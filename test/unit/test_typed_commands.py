@@ -19,8 +19,7 @@ import sys
 import pytest
 from support.typed import Typed, typed
 
-from nfo_sinus_driver.cli.main import main
-from nfo_sinus_driver.cli.options import parse
+from nfo_sinus_driver.cli.main import main, parse
 
 _CLI = 'import sys; from nfo_sinus_driver.cli.main import main; sys.exit(main())'
 _SIMULATOR = 'nfo_sinus_driver.simulator'

@@ -12,8 +12,8 @@ import re
 
 import pytest
 
-from nfo_sinus_driver.cli import options
-from nfo_sinus_driver.cli.main import VERBS
+from nfo_sinus_driver.cli.main import VERBS, make_parser
+from nfo_sinus_driver.cli.options import DEFAULTS
 
 PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'command_line.md'
 
@@ -28,7 +28,7 @@ def rows() -> Iterator[tuple[str, str]]:
 
 def verb_parsers() -> dict[str, argparse.ArgumentParser]:
     """The parsers of the verbs, by name."""
-    for action in options._parser()._actions:
+    for action in make_parser()._actions:
         if isinstance(action, argparse._SubParsersAction):
             return dict(action.choices)
     raise AssertionError('there are no verbs')
@@ -56,7 +56,7 @@ def test_every_option_stands_in_the_page(verb: str) -> None:
             assert option in ('-h', '--help') or option in written
 
 
-@pytest.mark.parametrize(('name', 'default'), options.DEFAULTS.items())
+@pytest.mark.parametrize(('name', 'default'), DEFAULTS.items())
 def test_every_default_stands_in_the_page(name: str, default: object) -> None:
     option = f'--{name.replace("_", "-")}'
     row = next(line for span, line in rows() if span.split()[0] == option)

@@ -21,8 +21,7 @@ import yaml
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import scan
 from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.main import main
-from nfo_sinus_driver.cli.options import parse
+from nfo_sinus_driver.cli.main import main, parse
 
 Nfo = Callable[..., Done]
 G2 = load_family('sinus_g2')

@@ -79,7 +79,7 @@ class Older(Rig):
         wanted = {f'control.{name}': value for name, value in values.items()}
         self.result(self.drive.parameters.change(wanted))
 
-    def write_forbidden(self) -> str:
+    def why_not(self) -> str:
         """Return why parameters are not changed; nothing may have been written."""
         before = (dict(self.far.writes), self.modes, self.far.motor.driven)
         with pytest.raises(DriveError) as error:
@@ -126,10 +126,10 @@ def test_under_bus_control_settings_are_just_written(rig: Older, turning: bool) 
 def test_what_else_has_control_keeps_it(rig: Older) -> None:
     rig.far.set_run_input(False)
     rig.far.control_unit.press('ext')
-    assert 'giving it back to them could start the motor: press STOP' in rig.write_forbidden()
+    assert 'giving it back to them could start the motor: press STOP' in rig.why_not()
     rig.far.set_run_input(True)
     rig.pass_time(0.2)
-    assert 'the motor runs' in rig.write_forbidden()
+    assert 'the motor runs' in rig.why_not()
     rig.far.control_unit.press('stop')
     rig.pass_time(1.0)
     rig.change(accel=6.0)
@@ -141,13 +141,13 @@ def test_not_while_a_fault_is_active_or_others_tune_it(
 ) -> None:
     rig.far.trip(5)
     rig.pass_time(0.2)
-    why = rig.write_forbidden()
+    why = rig.why_not()
     assert '5 Overload' in why and '~/fault_ack' in why
     rig.acknowledged += 1
     rig.result(rig.drive.acknowledge())
     rig.change(accel=5.0)
     monkeypatch.setattr(type(rig.far.control_unit), 'mode', property(lambda _: 0))
-    assert 'MODE is Inhibit' in rig.write_forbidden()
+    assert 'MODE is Inhibit' in rig.why_not()
 
 
 @pytest.mark.parametrize('refused', [False, True])

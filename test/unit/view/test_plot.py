@@ -9,7 +9,7 @@ import math
 
 from hypothesis import given, strategies as st
 
-from nfo_sinus_driver.view.plot import plot, span
+from nfo_sinus_driver.view.app import plot, span
 
 _VALUES = st.lists(st.floats(-1e6, 1e6) | st.just(math.nan), max_size=100)
 

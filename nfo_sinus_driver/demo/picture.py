@@ -1,12 +1,17 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Draws a recorded run: what was asked, what the motor did, and what the drive said to it."""
+"""Draws a recorded run: reads it back from its bag as curves and spans; needs no ROS."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+import dataclasses
+from dataclasses import dataclass, field
+from datetime import datetime
 import math
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 from matplotlib.artist import Artist
@@ -17,9 +22,19 @@ from matplotlib.patches import Patch
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Transform, blended_transform_factory
+from rosbags.highlevel import AnyReader
+import yaml
 
-from nfo_sinus_driver.demo.bag import Curve, Recording, Span, read
-
+_EVENT = '/_service_event'
+_STATUS = 'nfo_sinus_msgs/msg/DriveStatus'
+#: What the states of DriveStatus mean for the motor.
+_PHASE_OF_STATE = {
+    'OPERATION_ENABLED': 'running',
+    'STOPPING': 'stopping',
+    'QUICK_STOP': 'stopping',
+    'FAULT_REACTION_ACTIVE': 'fault',
+    'FAULTED': 'fault',
+}
 #: The picture, inches and dots per inch: 1600 x 1000.
 _SIZE = (16.0, 10.0)
 _DPI = 100
@@ -27,7 +42,7 @@ _LEFT, _RIGHT = 0.075, 0.98
 #: A text is made smaller rather than left out.
 _SPAN_SIZES = (13, 12, 11, 10)
 
-# the colours of Okabe and Ito, which people who do not see red or green tell apart
+# the colours of Okabe and Ito, which are distinct without seeing red or green
 _ORANGE = '#E69F00'
 _DARK_ORANGE = '#8F6300'
 _SKY_BLUE = '#56B4E9'
@@ -65,9 +80,202 @@ _QUANTITIES = {'Hz': 'frequency', 'rpm': 'speed', '%': 'torque', 'm/s': 'speed'}
 _SILENCE = 0.5
 
 
+# --- what the bag says ------------------------------------------------------------------------
+
+
+@dataclass
+class Curve:
+    """Values over time, s since the run began."""
+
+    times: list[float] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+
+    def add(self, time: float, value: float) -> None:
+        """Append a point."""
+        self.times.append(time)
+        self.values.append(value)
+
+
+@dataclass(frozen=True)
+class Span:
+    """Something that held for a while, s since the run began; a fault has a code."""
+
+    begin: float
+    end: float
+    what: str
+    code: int = 0
+
+
+@dataclass(frozen=True)
+class Recording:
+    """
+    What a bag says of a run.
+
+    :ivar began: when the drive was connected; times are counted from there, s.
+    :ivar source: the bag, its messages and its topics.
+    :ivar unit: of the set-point and of what follows it.
+    :ivar identity: model, serial number and firmware, as far as the drive reports them.
+    :ivar phases: what the motor did: standby, running, stopping or fault.
+    :ivar texts: what the drive's display said.
+    :ivar faults: of the texts, those that name a fault.
+    :ivar enabled: when the driver followed set-points.
+    :ivar calls: which services were called, and when.
+    """
+
+    began: datetime
+    length: float
+    remarks: dict[str, str]
+    source: str
+    unit: str
+    identity: list[str]
+    setpoint: Curve
+    actual: Curve
+    speed: Curve
+    current: Curve
+    phases: list[Span]
+    texts: list[Span]
+    faults: list[Span]
+    enabled: list[Span]
+    calls: list[tuple[float, str]]
+
+
+def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
+    """Read the run of a drive from a bag; a ValueError if it was never connected."""
+    messages: dict[str, list[tuple[int, Any]]] = {}
+    with AnyReader([folder]) as reader:
+        for connection, stamp, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            messages.setdefault(connection.topic, []).append((stamp, message))
+    connected = [m for _, m in messages.get(f'{drive}/status', ()) if m.connected]
+    if not connected:
+        raise ValueError(f'{drive} was never connected')
+    start = _nanoseconds(connected[0].header.stamp)
+
+    def since(nanoseconds: int) -> float:
+        return (nanoseconds - start) / 1e9
+
+    def measured(topic: str) -> list[tuple[float, Any]]:
+        """Messages by the time that they carry themselves."""
+        found = messages.get(f'{drive}/{topic}', ())
+        return [(since(_nanoseconds(m.header.stamp)), m) for _, m in found]
+
+    def received(topic: str) -> Curve:
+        found = messages.get(f'{drive}/{topic}', ())
+        return Curve([since(stamp) for stamp, _ in found], [m.data for _, m in found])
+
+    length = since(_nanoseconds(connected[-1].header.stamp))
+    statuses = [(time, status) for time, status in measured('status') if status.connected]
+    currents = measured('telemetry')
+    texts = measured('inv_st')
+    shown = _spans([(time, m.text) for time, m in texts], length)
+    # a fault is named a moment before the drive's state is one
+    faults = {m.text: m.code for _, m in texts if m.kind == m.FAULT}
+    described = yaml.safe_load((folder / 'metadata.yaml').read_text())
+    return Recording(
+        began=datetime.fromtimestamp(start / 1e9),
+        length=length,
+        remarks=dict(described['rosbag2_bagfile_information'].get('custom_data') or {}),
+        source=f'{folder.name}: {sum(map(len, messages.values()))} messages on '
+        f'{len(messages)} topics',
+        unit=next((m.unit for m in reversed(connected) if m.unit), 'Hz'),
+        identity=_identity((m for _, m in messages.get('/diagnostics', ())), drive),
+        setpoint=received('setpoint'),
+        actual=Curve([time for time, _ in statuses], [m.actual for _, m in statuses]),
+        speed=received('actual_speed'),
+        current=Curve([time for time, _ in currents], [m.output_current for _, m in currents]),
+        phases=_spans([(time, _phase(m)) for time, m in statuses], length),
+        texts=shown,
+        faults=[
+            dataclasses.replace(span, code=faults[span.what])
+            for span in shown
+            if span.what in faults
+        ],
+        enabled=[
+            span
+            for span in _spans([(time, 'enabled' * m.enabled) for time, m in statuses], length)
+            if span.what
+        ],
+        calls=sorted(_calls(messages, drive, since)),
+    )
+
+
+def only_drive(folder: Path) -> str:
+    """Return the name of the drive that is in a bag; a ValueError if there is none, or several."""
+    if not (folder / 'metadata.yaml').is_file():
+        raise ValueError('it is no bag: a folder with a metadata.yaml is one')
+    with AnyReader([folder]) as reader:
+        drives = sorted(
+            connection.topic.removesuffix('/status')
+            for connection in reader.connections
+            if connection.msgtype == _STATUS and connection.topic.endswith('/status')
+        )
+    if len(drives) == 1:
+        return drives[0]
+    if drives:
+        raise ValueError(f'it has several drives: choose one by --drive: {", ".join(drives)}')
+    raise ValueError('it has no drive: no topic ~/status was recorded')
+
+
+def _calls(
+    messages: dict[str, list[tuple[int, Any]]], drive: str, since: Callable[[int], float]
+) -> Iterable[tuple[float, str]]:
+    for topic, events in messages.items():
+        if topic.startswith(drive) and topic.endswith(_EVENT):
+            name = topic.removesuffix(_EVENT).rpartition('/')[2]
+            for _, event in events:
+                if event.info.event_type == event.info.REQUEST_SENT:
+                    off = not getattr(event.request[0], 'data', True)
+                    yield since(_nanoseconds(event.info.stamp)), f'{name} off' if off else name
+
+
+def _identity(arrays: Iterable[Any], drive: str) -> list[str]:
+    """Return what diagnostics report of the identity of the drive."""
+    mine = f'{drive.lstrip("/")}: drive'
+    for array in arrays:
+        for status in array.status:
+            values = {pair.key: pair.value for pair in status.values}
+            if status.name == mine and values.get('firmware'):
+                named = {
+                    '': values.get('model', ''),
+                    'serial ': values.get('serial number', ''),
+                    'firmware ': values['firmware'],
+                }
+                return [name + value for name, value in named.items() if value]
+    return []
+
+
+def _phase(status: Any) -> str:
+    for name, phase in _PHASE_OF_STATE.items():
+        if status.state == getattr(status, name):
+            return phase
+    return 'standby'
+
+
+def _spans(points: list[tuple[float, str]], end: float) -> list[Span]:
+    """Join equal neighbours to spans that follow each other up to the end."""
+    changes: list[tuple[float, str]] = []
+    for time, what in points:
+        if not changes or what != changes[-1][1]:
+            changes.append((time, what))
+    ends = [*(time for time, _ in changes[1:]), end]
+    # what is latched may have been published before the first status that was received
+    return [
+        Span(max(begin, 0.0), until, what)
+        for (begin, what), until in zip(changes, ends, strict=False)
+        if until > 0
+    ]
+
+
+def _nanoseconds(stamp: Any) -> int:
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
+
+
+# --- the picture ------------------------------------------------------------------------------
+
+
 def draw(bag: Path, picture: Path, drive: str = '/nfo_sinus') -> None:
     """
-    Draw what a bag tells of a run into a PNG file.
+    Draw what a bag says of a run into a PNG file.
 
     :raises ValueError: there is nothing of the drive in it.
     """
@@ -159,9 +367,9 @@ def _draw_frequency(axes: Axes, run: Recording) -> None:
         if time - last > _SILENCE:
             followed.add(last, math.nan)
             ignored.add(last, math.nan)
-        heard = any(span.begin <= time <= span.end for span in run.enabled)
-        followed.add(time, value if heard else math.nan)
-        ignored.add(time, math.nan if heard else value)
+        enabled = any(span.begin <= time <= span.end for span in run.enabled)
+        followed.add(time, value if enabled else math.nan)
+        ignored.add(time, math.nan if enabled else value)
         last = time
     axes.step(
         followed.times, followed.values, where='post', color=_ORANGE, linewidth=3.2,
@@ -249,8 +457,8 @@ def _name_faults(axes: Axes, run: Recording) -> None:
         axes.annotate(
             span.what, where, (8, 0), va='top', size=18, weight='bold', color=_VERMILION, **offset
         )
-        told = f'fault {span.code}, {span.begin:.1f} s\nmotor released,\nspeed unknown'
-        axes.annotate(told, where, (8, -26), va='top', size=11.5, color=_INK, **offset)
+        text = f'fault {span.code}, {span.begin:.1f} s\nmotor released,\nspeed unknown'
+        axes.annotate(text, where, (8, -26), va='top', size=11.5, color=_INK, **offset)
 
 
 def _at_height(axes: Axes) -> Transform:
