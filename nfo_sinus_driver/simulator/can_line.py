@@ -15,12 +15,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import enum
 import itertools
-from typing import Protocol
 
 from nfo_sinus_driver.simulator import can_frames
 from nfo_sinus_driver.simulator.can_frames import Frame
 from nfo_sinus_driver.simulator.canopen import ANSWERS, Server
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.lawicel import Adapter
 from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.line_faults import LineFaults, Reply
 from nfo_sinus_driver.simulator.ports import Port
@@ -28,28 +28,6 @@ from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.wire import Wire
 
 _NAME = 'canopen'
-
-
-class Adapter(Protocol):
-    """What stands between a port and the bus."""
-
-    #: Bytes that nobody has sent can come out of its port.
-    is_serial: bool
-
-    def restart(self) -> None:
-        """Be as after it was plugged in."""
-
-    def take(self, data: bytes) -> Iterator[bytes | Frame]:
-        """Take bytes from the port; give what it answers, and the frames that it sends."""
-
-    def tried(self, frame: Frame, *, sent: bool) -> bytes:
-        """Take note that a frame could be sent, or could not; return what it answers."""
-
-    def on_bus(self, rate: int) -> bool:
-        """Tell whether it takes part in a bus with this bit rate."""
-
-    def told(self, frame: Frame, now: float) -> bytes:
-        """Return what it says on the port of a frame from the bus."""
 
 
 class _Else(enum.Enum):
@@ -244,9 +222,8 @@ class CanLine(Wire):
         if dead:
             return
         if sender is not _Else.MASTER and self._carries(end):
-            noise = self._adapter.is_serial and 'noise' in waiting.note
-            told = self._adapter.told(frame, end)
-            self.port.send((self.faults.noise() if noise else b'') + told)
+            noise = self.faults.noise() if 'noise' in waiting.note else b''
+            self.port.send(noise + self._adapter.told(frame, end))
         for node in self._nodes():
             if node is not sender:
                 self._arrive(node, frame, end)

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, NamedTuple
 
 from nfo_sinus_driver.catalog import Parameter
 from nfo_sinus_driver.simulator.faults import Faults
@@ -21,14 +22,52 @@ from nfo_sinus_driver.simulator.motor import Counters, Motor, Nameplate
 from nfo_sinus_driver.simulator.timing import Timing
 
 
+def choice(usual: str, *others: str, text: str) -> str:
+    """Return a field of a :class:`Variant`: what it can be, and what that decides."""
+    found: str = field(default=usual, metadata={'choices': (usual, *others), 'text': text})
+    return found
+
+
+class Option(NamedTuple):
+    """One field of a variant; the first of its choices is the usual one."""
+
+    name: str
+    text: str
+    choices: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """
+    How a drive is fitted out, and what it does where the manuals leave it open.
+
+    Each field of a family's is a :func:`choice`, and an option of the command line.
+
+    :raises ValueError: a field cannot be that.
+    """
+
+    def __post_init__(self) -> None:
+        for name, _, choices in self.options():
+            if getattr(self, name) not in choices:
+                raise ValueError(f'{name}: choose one of {", ".join(filter(None, choices))}')
+
+    @classmethod
+    def options(cls) -> tuple[Option, ...]:
+        """Return what can be chosen."""
+        return tuple(
+            Option(one.name, one.metadata['text'], one.metadata['choices']) for one in fields(cls)
+        )
+
+
 class ControlUnit(abc.ABC):
     """
     Takes the commands of a drive and turns them into orders to the motor.
 
-    A family has to say what it writes, shows and does (the abstract ones); the rest has a default
-    that does for a plain drive. Parameters go by their keys, as raw numbers of the memory.
+    A family has to say what it does (the abstract ones); the rest has a default that does for a
+    plain drive. Parameters go by their keys, as raw numbers of the memory.
 
     :param address: of the drive on its line.
+    :param variant: how this one is.
     :param faults: those of this family; by default plain ones.
 
     :ivar run_input: the digital input that allows a run; set it at any time.
@@ -40,8 +79,11 @@ class ControlUnit(abc.ABC):
     #: What a factory reset leaves as it is: without them it would not hear the line any more.
     line_settings: ClassVar[frozenset[str]] = frozenset()
 
-    def __init__(self, memory: Memory, address: int, faults: Faults | None = None) -> None:
+    def __init__(
+        self, memory: Memory, address: int, variant: Variant, faults: Faults | None = None
+    ) -> None:
         self.memory = memory
+        self.variant = variant
         self.faults = Faults(memory.model) if faults is None else faults
         self.motor = Motor(self.nameplate())
         self.counters = Counters()
@@ -51,18 +93,18 @@ class ControlUnit(abc.ABC):
 
     # ---- what it takes and shows ----
 
-    @abc.abstractmethod
     def write(self, key: str, raw: int) -> bool:
         """Carry out a write of a command, or refuse it; ``False`` if it is none: it is stored."""
+        return False
 
-    @abc.abstractmethod
     def show(self, key: str) -> int | None:
         """Return the raw number of what is not stored, or measured its own way; else ``None``."""
+        return None
 
     @property
-    @abc.abstractmethod
     def status_code(self) -> int:
-        """The inverter status, without acknowledging anything."""
+        """The inverter status, without acknowledging anything; here the fault, else 0."""
+        return self.faults.shown
 
     def read(self, key: str) -> int | None:
         """Return what reading has an effect for, having it; else ``None``."""

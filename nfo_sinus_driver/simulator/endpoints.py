@@ -14,18 +14,15 @@ from dataclasses import dataclass
 
 from nfo_sinus_driver.simulator.can_line import CanLine
 from nfo_sinus_driver.simulator.canopen import NODES
-from nfo_sinus_driver.simulator.classic import Classic
-from nfo_sinus_driver.simulator.classic_frames import BROADCAST
+from nfo_sinus_driver.simulator.classic import BROADCAST, Classic
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.lawicel import BIT_RATES, Adapter
 from nfo_sinus_driver.simulator.line import Line, Trace
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii, ModbusRtu, ModbusTcp, ThroughPlc
-from nfo_sinus_driver.simulator.movitrac import Movitrac
-from nfo_sinus_driver.simulator.movitrac_frames import ADDRESSES
+from nfo_sinus_driver.simulator.movitrac import ADDRESSES, Movitrac
 from nfo_sinus_driver.simulator.plc import TELEGRAM
 from nfo_sinus_driver.simulator.ports import Port, PtyPort, TcpPort
 from nfo_sinus_driver.simulator.protocol import Protocol, Station
-from nfo_sinus_driver.simulator.socketcan import CanInterface, CanPort, is_interface
 from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.wire import Wire
 
@@ -72,8 +69,7 @@ class Endpoint:
     :ivar protocol: the name of its protocol.
     :ivar timing: speed and format; of :class:`ModbusTcp` those of the line behind the gateway, of
         a CAN bus the bit rate alone.
-    :ivar link: a symbolic link to its pseudo-terminal, if it has one; of a CAN bus also the name of
-        an interface.
+    :ivar link: a symbolic link to its pseudo-terminal, if it has one.
     :ivar tcp: its TCP port, if it has one.
     """
 
@@ -110,9 +106,6 @@ class Endpoint:
 
     def open(self) -> Port:
         """Return its port (PortError: it cannot be had)."""
-        if self._is_interface:
-            assert self.link is not None
-            return CanPort(self.link)
         return PtyPort(self.link) if self.tcp is None else TcpPort(self.tcp)
 
     def wire(
@@ -137,7 +130,7 @@ class Endpoint:
         if self._is_can:
             return CanLine(
                 port,
-                CanInterface() if self._is_interface else Adapter(),
+                Adapter(),
                 drives,
                 self.timing,
                 paced=paced,
@@ -161,10 +154,6 @@ class Endpoint:
     @property
     def _is_can(self) -> bool:
         return self.protocol == CanLine.name
-
-    @property
-    def _is_interface(self) -> bool:
-        return self._is_can and self.tcp is None and is_interface(self.link)
 
     def check(self, address: int) -> None:
         """Look whether an address is one of the protocol (ValueError: it is not)."""

@@ -5,7 +5,7 @@
 The drive families that can be simulated, each by the name of its folder.
 
 ``families/<name>/`` has its tables, and ``simulator/<name>/family.py`` what a simulated drive of it
-does, as ``FAMILY``. Nobody imports such a folder: :func:`load` finds it by its name.
+does, as ``FAMILY``. No file imports such a folder: :func:`load` finds it by its name.
 """
 
 from __future__ import annotations
@@ -15,32 +15,14 @@ from dataclasses import dataclass, field
 import functools
 import importlib
 import importlib.util
-from typing import Any
 
 from nfo_sinus_driver.catalog import Family, Value, families, load_family
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator import modbus
-from nfo_sinus_driver.simulator.control_unit import ControlUnit
+from nfo_sinus_driver.simulator.control_unit import ControlUnit, Option, Variant
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.injections import VERBS, Verb
+from nfo_sinus_driver.simulator.injections import Injection, Injections, injections_of
 from nfo_sinus_driver.simulator.memory import Memory
-
-
-@dataclass(frozen=True)
-class Option:
-    """
-    Something of a drive that can be chosen; a switch where it has no choices.
-
-    :ivar name: the keyword argument of the control unit; with dashes, that of the command line.
-    """
-
-    name: str
-    help: str
-    choices: tuple[str, ...] = ()
-
-
-def _nothing_beside(model: Family) -> Family:
-    return model
 
 
 @dataclass(frozen=True)
@@ -48,22 +30,27 @@ class SimulatedFamily:
     """
     What the folder of a family says of itself.
 
-    :ivar control_unit: makes what decides in a drive, of the memory, the address and the options.
+    :ivar control_unit: makes what decides in a drive, of the memory, the address and the variant.
+    :ivar variant: what can be chosen of a drive.
     :ivar factory: what leaves the factory otherwise than at the least value, in engineering units.
     :ivar machine: adds to the tables what a drive of this family keeps beside.
     :ivar servers: makes what answers the requests to a drive, by the protocols of the tables.
-    :ivar options: what can be chosen of a drive beyond what all have.
-    :ivar verbs: what can be made to happen to it, likewise.
+    :ivar injections: what can be made to happen to it.
     """
 
     control_unit: Callable[..., ControlUnit]
+    variant: type[Variant] = Variant
     factory: Mapping[str, Value] = field(default_factory=dict)
-    machine: Callable[[Family], Family] = _nothing_beside
+    machine: Callable[[Family], Family] = lambda model: model
     servers: Mapping[str, Callable[[SimulatedDrive], object]] = field(
         default_factory=lambda: {'modbus': modbus.Server}
     )
-    options: tuple[Option, ...] = ()
-    verbs: Mapping[str, Verb] = field(default_factory=dict)
+    injections: type[Injections] = Injections
+
+    @property
+    def options(self) -> tuple[Option, ...]:
+        """What can be chosen of a drive."""
+        return self.variant.options()
 
 
 def simulated() -> tuple[str, ...]:
@@ -96,14 +83,14 @@ def simulated_drive(
     run_input: bool = True,
     boot_time: float = 2.0,
     serial_number: str | None = None,
-    **options: Any,
+    **options: str | None,
 ) -> SimulatedDrive:
     """
     Return a drive of a family.
 
     :param address: its address on the line.
     :param settings: parameters other than factory, in engineering units, by key.
-    :param options: what can be chosen of this family.
+    :param options: what can be chosen of this family; ``None``: the usual.
     :raises ValueError: an unknown model, parameter or option, or a value that is not possible.
     """
     family = load(model)
@@ -111,10 +98,11 @@ def simulated_drive(
     for option in options:
         if option not in known:
             raise ValueError(f'{model} has no option {option}')
+    chosen = {name: value for name, value in options.items() if value is not None}
     memory = Memory(machine_of(model), family.factory, settings or {})
     return SimulatedDrive(
         load_family(model),
-        family.control_unit(memory, address, **options),
+        family.control_unit(memory, address, family.variant(**chosen)),
         family.servers,
         run_input=run_input,
         boot_time=boot_time,
@@ -122,20 +110,31 @@ def simulated_drive(
     )
 
 
-def verbs_of(name: str) -> Mapping[str, Verb]:
-    """Return what can be made to happen to the drives of a family, and to their line."""
-    return {**VERBS, **load(name).verbs}
-
-
-def every_verb() -> Mapping[str, Verb]:
+def every_injection() -> Mapping[str, Injection]:
     """Return what can be made to happen to a drive of any family."""
-    found: dict[str, Verb] = {}
-    for name in simulated():
-        for verb, what in verbs_of(name).items():
-            found[verb] = found[verb].joined(what) if verb in found else what
+    found: dict[str, Injection] = {}
+    for model in simulated():
+        for name, one in injections_of(load(model).injections).items():
+            found[name] = found[name].joined(one) if name in found else one
     return found
 
 
-def every_option() -> Mapping[str, Option]:
-    """Return what can be chosen of a drive of any family, by name."""
-    return {option.name: option for name in simulated() for option in load(name).options}
+def every_option() -> Mapping[str, tuple[str, tuple[str, ...]]]:
+    """Return what can be chosen of a drive of any family by name: a text, and the choices."""
+    found: dict[str, Option] = {}
+    usual: dict[str, dict[str, str]] = {}
+    for model in simulated():
+        for option in load(model).options:
+            found.setdefault(option.name, option)
+            usual.setdefault(option.name, {})[option.choices[0]] = model
+    return {
+        name: (f'{option.text}{_usual(usual[name])}', tuple(filter(None, option.choices)))
+        for name, option in found.items()
+    }
+
+
+def _usual(usual: Mapping[str, str]) -> str:
+    """Return what is chosen by default, by the families where they differ."""
+    if len(usual) == 1:
+        return f' (default: {next(iter(usual))})' if '' not in usual else ''
+    return f' (default: {", ".join(f"{what} of {model}" for what, model in usual.items())})'

@@ -4,7 +4,8 @@
 """
 What can be made to happen to a running simulator, by ``simulator inject`` and by tests.
 
-Here is what can happen to a drive of any family and to its line; a family may have more.
+Each public method of :class:`Injections` is one injection. Its name, its type hints and its
+docstring are the command line and the control channel. A family may have more.
 """
 
 from __future__ import annotations
@@ -12,16 +13,197 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import difflib
-from typing import Any
+import inspect
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 from nfo_sinus_driver.catalog import Family, Value
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.line_faults import ANSWER_FAULTS
 from nfo_sinus_driver.simulator.plc import Channel, Plc
 from nfo_sinus_driver.simulator.wire import Wire
 
-#: Stands for an argument that must be given.
-_REQUIRED: Any = object()
+Seconds = Annotated[float, 'for how many seconds']
+Switch = Annotated[Literal['on', 'off'], 'on or off']
+Times = Annotated[int, 'how many answers']
+#: One of the faults of the next answers.
+What = Annotated[Literal['noise', 'damage', 'delay', 'drop', 'double'], 'what happens to them']
+
+
+class Injections:
+    """
+    What can be made to happen to a drive of any family, and to its line.
+
+    :param address: the drive; ``None``: the only one, or, for what happens to answers, any.
+    :param now: the time (s).
+    """
+
+    def __init__(
+        self,
+        line: Wire,
+        drives: Mapping[int, SimulatedDrive],
+        plc: Plc | None,
+        address: int | None,
+        now: float,
+    ) -> None:
+        self._line = line
+        self._drives = drives
+        self._plc = plc
+        self._address = address
+        self._now = now
+
+    # ---- to a drive ----
+
+    def fault(
+        self,
+        code: Annotated[int, 'status code of the fault, such as 5'],
+        standing: Annotated[bool, 'its cause lasts until ack-cause-gone'] = False,
+    ) -> None:
+        """Let a fault happen: the motor coasts until it is acknowledged."""
+        self._drive.trip(code, cause_present=standing)
+
+    def ack_cause_gone(self) -> None:
+        """Take away the causes of all faults, so that they can be acknowledged."""
+        self._drive.faults.end_causes()
+
+    def run(self, state: Switch) -> None:
+        """Switch the digital input RUN."""
+        self._drive.set_run_input(state == 'on')
+
+    def set(
+        self,
+        key: Annotated[str, 'its name, as in the table of parameters'],
+        value: Annotated[Value, 'in its own unit, such as 7'],
+    ) -> None:
+        """Change a parameter at the keypad."""
+        drive = self._drive
+        drive.set_from_keypad(key, parse_setting(drive.memory.model, key, value))
+
+    def factory_reset(self) -> None:
+        """Give the parameters their factory values, but those of the line."""
+        self._drive.factory_reset()
+
+    def load(
+        self, share: Annotated[float, 'torque at nominal speed, 1 is the nominal torque']
+    ) -> None:
+        """Change the load of the motor."""
+        self._drive.motor.load = share
+
+    def power_cycle(
+        self,
+        seconds: Annotated[
+            float | None, 'how long it is silent (default: its boot time, 2 s)'
+        ] = None,
+    ) -> None:
+        """Take the mains away and give them back."""
+        self._drive.power_cycle(seconds)
+
+    def silence(self, seconds: Seconds) -> None:
+        """Let the drive neither hear nor answer."""
+        self._drive.silence(seconds)
+
+    # ---- to the line ----
+
+    def line_dead(self, seconds: Seconds) -> None:
+        """Let the line carry nothing, either way."""
+        self._line.faults.dead_until = self._now + seconds
+
+    def hangup(self, seconds: Seconds = 1.0) -> None:
+        """Let the port disappear and come back, like a USB adapter that is pulled out."""
+        self._line.hang_up(self._now + seconds)
+
+    def noise(self, times: Times = 1) -> None:
+        """Put noise before the next answers."""
+        self._line.faults.add('noise', times, self._address)
+
+    def damage(self, times: Times = 1) -> None:
+        """Flip a bit in the next answers."""
+        self._line.faults.add('damage', times, self._address)
+
+    def delay(self, times: Times = 1, seconds: Annotated[float, 'how late'] = 0.5) -> None:
+        """Send the next answers late."""
+        self._line.faults.add('delay', times, self._address, seconds)
+
+    def drop(self, times: Times = 1) -> None:
+        """Lose the next answers; the requests are carried out."""
+        self._line.faults.add('drop', times, self._address)
+
+    def double(self, times: Times = 1) -> None:
+        """Send the next answers twice."""
+        self._line.faults.add('double', times, self._address)
+
+    def noise_rate(
+        self,
+        what: What,
+        share: Annotated[float, 'of all answers, such as 0.03; 0 ends it'],
+        seed: Annotated[int | None, 'a number, for the same answers in every run'] = None,
+        seconds: Annotated[float, 'how late they come, for delay'] = 0.5,
+    ) -> None:
+        """Spoil a share of all answers by chance, until heal."""
+        self._line.faults.set_rate(what, share, seed, seconds)
+
+    def burst(
+        self,
+        seconds: Annotated[float, 'how long; 0 ends it'],
+        period: Annotated[float, 'from one to the next (s)'] = 5.0,
+    ) -> None:
+        """Let the line carry nothing for a while again and again, until heal."""
+        self._line.faults.set_bursts(seconds, period, self._now)
+
+    def traffic(
+        self, rate: Annotated[float, 'how many a second, such as 1000; 0 ends it']
+    ) -> None:
+        """On a CAN bus: let others send frames that no node here takes."""
+        self._line.set_traffic(rate, self._now)
+
+    def heal(self) -> None:
+        """End all faults of the line."""
+        self._line.faults.heal()
+
+    # ---- to a PLC, and the fieldbus behind it ----
+
+    def fieldbus_cut(self, seconds: Seconds) -> None:
+        """Let no telegram pass between the PLC and the drive."""
+        self._channel.cut_until = self._now + seconds
+
+    def plc_restart(self, seconds: Seconds) -> None:
+        """Let the PLC be off, and begin anew with its registers 0."""
+        self._the_plc.restart(self._now + seconds)
+
+    def plc_stop(self, seconds: Seconds) -> None:
+        """Let the PLC's program and fieldbus stand; its registers are still answered."""
+        self._the_plc.stopped_until = self._now + seconds
+
+    def release(self, state: Switch) -> None:
+        """Let the PLC release the drive to ROS, or not."""
+        self._channel.released = state == 'on'
+
+    # ---- what they work on ----
+
+    @property
+    def _drive(self) -> SimulatedDrive:
+        return the_drive(self._drives, self._address)
+
+    @property
+    def _the_plc(self) -> Plc:
+        if self._plc is None:
+            raise ValueError('there is no PLC: it is there with --protocol telegram1')
+        return self._plc
+
+    @property
+    def _channel(self) -> Channel:
+        plc, drive = self._the_plc, self._drive
+        return next(one for one in plc.channels.values() if one.drive is drive)
+
+
+def the_drive(drives: Mapping[int, SimulatedDrive], address: int | None) -> SimulatedDrive:
+    """Return the drive at an address, without one the only one (ValueError: which?)."""
+    known = ', '.join(map(str, drives))
+    if address is None:
+        if len(drives) > 1:
+            raise ValueError(f'say which drive, with --address: {known}')
+        return next(iter(drives.values()))
+    if address not in drives:
+        raise ValueError(f'no drive has address {address}, only {known}')
+    return drives[address]
 
 
 def parse_setting(model: Family, key: str, text: Value) -> Value:
@@ -44,92 +226,71 @@ def parse_setting(model: Family, key: str, text: Value) -> Value:
         raise ValueError(f'{key}: {text!r} is not a number') from None
 
 
+# ---- from a method to its arguments ----
+
+
 @dataclass(frozen=True)
 class Argument:
-    """One argument of a verb; optional where it has a default."""
+    """
+    One argument of an injection; optional where it has a default.
+
+    :ivar type: what makes its value; ``None``: it stays as it is.
+    """
 
     name: str
-    type: Callable[[Any], Any]
+    type: Callable[[Any], Any] | None
     help: str
-    default: Any = _REQUIRED
-    choices: Sequence[str] | None = None
+    default: Any
+    choices: tuple[str, ...]
 
     @property
     def required(self) -> bool:
         """Whether it must be given."""
-        return self.default is _REQUIRED
-
-    def joined(self, other: Argument) -> Argument:
-        """Return an argument that has the choices of both."""
-        both = dict.fromkeys([*(self.choices or ()), *(other.choices or ())])
-        return replace(self, choices=tuple(both) or None)
+        return self.default is inspect.Parameter.empty
 
     def convert(self, value: Any) -> Any:
         """Return the value in its right type (ValueError: it cannot be that)."""
-        if value is None and not self.required:
-            return None
+        if isinstance(value, bool) and self.choices:
+            value = 'on' if value else 'off'
         try:
-            converted = self.type(value)
+            if self.type is not None and value != self.default:
+                value = self.type(value)
         except (TypeError, ValueError):
             raise ValueError(f'{self.name}: {value!r} is not right: {self.help}') from None
-        if self.choices is not None and converted not in self.choices:
+        if self.choices and value not in self.choices:
             raise ValueError(f'{self.name}: choose one of {", ".join(self.choices)}')
-        return converted
+        return value
 
 
 @dataclass(frozen=True)
-class Target:
-    """What a verb works on; ``drive`` is ``None`` when it concerns any drive of the line."""
+class Injection:
+    """
+    One injection, as its method says.
 
-    line: Wire
-    drive: SimulatedDrive | None
-    now: float
-    plc: Plc | None = None
-
-    @property
-    def one(self) -> SimulatedDrive:
-        """The drive of a verb that needs one."""
-        assert self.drive is not None
-        return self.drive
-
-    @property
-    def channel(self) -> Channel:
-        """The drive as the PLC has it (ValueError: there is none)."""
-        for channel in self.the_plc.channels.values():
-            if channel.drive is self.drive:
-                return channel
-        raise ValueError('the drive is not on a fieldbus')
-
-    @property
-    def the_plc(self) -> Plc:
-        """The PLC before the drives (ValueError: there is none)."""
-        if self.plc is None:
-            raise ValueError('there is no PLC: it is there with --protocol telegram1')
-        return self.plc
-
-    @property
-    def address(self) -> int | None:
-        """The address of the drive, ``None`` for any."""
-        return None if self.drive is None else self.drive.address
-
-
-@dataclass(frozen=True)
-class Verb:
-    """Something that can be made to happen."""
+    :ivar help: what happens.
+    """
 
     help: str
-    act: Callable[[Target, dict[str, Any]], None]
-    arguments: tuple[Argument, ...] = ()
-    #: Whether it happens to one drive; otherwise to the line, or to every drive on it.
-    to_drive: bool = True
+    arguments: tuple[Argument, ...]
 
-    def joined(self, other: Verb) -> Verb:
-        """Return a verb that takes what two of the same name take, each in its own family."""
-        if other is self:
+    @classmethod
+    def of(cls, method: Callable[..., None]) -> Injection:
+        """Return what the signature and the docstring of a method say."""
+        hints = get_type_hints(method, include_extras=True)
+        named = list(inspect.signature(method).parameters.values())[1:]
+        text = ' '.join((inspect.getdoc(method) or '').split('\n\n')[0].split()).rstrip('.')
+        arguments = tuple(_argument(hints[one.name], one) for one in named)
+        return cls(text[:1].lower() + text[1:], arguments)
+
+    def joined(self, other: Injection) -> Injection:
+        """Return one that takes what two of the same name take, each in its own family."""
+        if other == self:
             return self
-        pairs = zip(self.arguments, other.arguments, strict=True)
-        arguments = tuple(one.joined(two) for one, two in pairs)
-        return replace(self, help=f'{self.help}; or {other.help}', arguments=arguments)
+        arguments = tuple(
+            replace(one, choices=tuple(dict.fromkeys(one.choices + two.choices)))
+            for one, two in zip(self.arguments, other.arguments, strict=True)
+        )
+        return Injection(f'{self.help}; or {other.help}', arguments)
 
     def bind(self, values: Sequence[Any], named: Mapping[str, Any]) -> dict[str, Any]:
         """Return the arguments by name, converted and complete, or a ValueError."""
@@ -137,181 +298,32 @@ class Verb:
         if len(values) > len(names):
             raise ValueError(f'takes at most {len(names)} arguments: {", ".join(names)}')
         given = {**dict(zip(names, values, strict=False)), **named}
-        unknown = set(given) - set(names)
-        if unknown:
+        if unknown := set(given) - set(names):
             raise ValueError(f'has no argument {", ".join(sorted(unknown))}')
-        bound = {}
         for argument in self.arguments:
             if argument.name not in given and argument.required:
                 raise ValueError(f'needs {argument.name}: {argument.help}')
-            bound[argument.name] = argument.convert(given.get(argument.name, argument.default))
-        return bound
+        return {
+            one.name: one.convert(given.get(one.name, one.default)) for one in self.arguments
+        }
 
 
-def _switch(value: object) -> str:
-    """Take ``on`` and ``off`` as they are, and True and False for them."""
-    if isinstance(value, bool):
-        return 'on' if value else 'off'
-    return str(value)
+def injections_of(kind: type[Injections]) -> dict[str, Injection]:
+    """Return the injections of a class by their names on the command line."""
+    methods = inspect.getmembers(kind, inspect.isfunction)
+    return {
+        name.replace('_', '-'): Injection.of(method)
+        for name, method in methods
+        if not name.startswith('_')
+    }
 
 
-def _as_is(value: object) -> object:
-    return value
-
-
-def _set(target: Target, given: dict[str, Any]) -> None:
-    drive = target.one
-    value = parse_setting(drive.memory.model, given['key'], given['value'])
-    drive.set_from_keypad(given['key'], value)
-
-
-def _line_dead(target: Target, given: dict[str, Any]) -> None:
-    target.line.faults.dead_until = target.now + given['seconds']
-
-
-def _load(target: Target, given: dict[str, Any]) -> None:
-    target.one.motor.load = given['share']
-
-
-def _answers(what: str, help_text: str, *more: Argument) -> Verb:
-    """Return a verb that spoils the next answers."""
-
-    def act(target: Target, given: dict[str, Any]) -> None:
-        target.line.faults.add(what, given['times'], target.address, given.get('seconds', 0.0))
-
-    times = Argument('times', int, 'how many answers', 1)
-    return Verb(help_text, act, (times, *more), to_drive=False)
-
-
-def _noise_rate(target: Target, given: dict[str, Any]) -> None:
-    target.line.faults.set_rate(given['what'], given['share'], given['seed'], given['seconds'])
-
-
-def _burst(target: Target, given: dict[str, Any]) -> None:
-    target.line.faults.set_bursts(given['seconds'], given['period'], target.now)
-
-
-def _fieldbus_cut(target: Target, given: dict[str, Any]) -> None:
-    target.channel.cut_until = target.now + given['seconds']
-
-
-def _plc_restart(target: Target, given: dict[str, Any]) -> None:
-    target.the_plc.restart(target.now + given['seconds'])
-
-
-def _plc_stop(target: Target, given: dict[str, Any]) -> None:
-    target.the_plc.stopped_until = target.now + given['seconds']
-
-
-def _release(target: Target, given: dict[str, Any]) -> None:
-    target.channel.released = given['state'] == 'on'
-
-
-_SECONDS = Argument('seconds', float, 'for how many seconds')
-
-VERBS: Mapping[str, Verb] = {
-    'fault': Verb(
-        'let a fault happen: the motor coasts until it is acknowledged',
-        lambda target, given: target.one.trip(given['code'], cause_present=given['standing']),
-        (
-            Argument('code', int, 'status code of the fault, such as 5'),
-            Argument('standing', bool, 'its cause lasts until ack-cause-gone', False),
-        ),
-    ),
-    'ack-cause-gone': Verb(
-        'take away the causes of all faults, so that they can be acknowledged',
-        lambda target, _: target.one.end_fault_causes(),
-    ),
-    'run': Verb(
-        'switch the digital input RUN',
-        lambda target, given: target.one.set_run_input(given['state'] == 'on'),
-        (Argument('state', _switch, 'on or off', choices=('on', 'off')),),
-    ),
-    'set': Verb(
-        'change a parameter at the keypad',
-        _set,
-        (
-            Argument('key', str, 'its name, as in the table of parameters'),
-            Argument('value', _as_is, 'in its own unit, such as 7'),
-        ),
-    ),
-    'factory-reset': Verb(
-        'give the parameters their factory values, but those of the line',
-        lambda target, _: target.one.factory_reset(),
-    ),
-    'load': Verb(
-        'change the load of the motor',
-        _load,
-        (Argument('share', float, 'torque at nominal speed, 1 is the nominal torque'),),
-    ),
-    'power-cycle': Verb(
-        'take the mains away and give them back',
-        lambda target, given: target.one.power_cycle(given['seconds']),
-        (Argument('seconds', float, 'how long it is silent (default: its boot time, 2 s)', None),),
-    ),
-    'silence': Verb(
-        'let the drive neither hear nor answer',
-        lambda target, given: target.one.silence(given['seconds']),
-        (_SECONDS,),
-    ),
-    'line-dead': Verb('let the line carry nothing, either way', _line_dead, (_SECONDS,), False),
-    'hangup': Verb(
-        'let the port disappear and come back, like a USB adapter that is pulled out',
-        lambda target, given: target.line.hang_up(target.now + given['seconds']),
-        (Argument('seconds', float, 'for how many seconds', 1.0),),
-        to_drive=False,
-    ),
-    'noise': _answers('noise', 'put noise before the next answers'),
-    'damage': _answers('damage', 'flip a bit in the next answers'),
-    'delay': _answers(
-        'delay', 'send the next answers late', Argument('seconds', float, 'how late', 0.5)
-    ),
-    'drop': _answers('drop', 'lose the next answers; the requests are carried out'),
-    'double': _answers('double', 'send the next answers twice'),
-    'noise-rate': Verb(
-        'spoil a share of all answers by chance, until heal',
-        _noise_rate,
-        (
-            Argument('what', str, ', '.join(ANSWER_FAULTS), choices=ANSWER_FAULTS),
-            Argument('share', float, 'of all answers, such as 0.03; 0 ends it'),
-            Argument('seed', int, 'a number, for the same answers in every run', None),
-            Argument('seconds', float, 'how late they come, for delay', 0.5),
-        ),
-        to_drive=False,
-    ),
-    'burst': Verb(
-        'let the line carry nothing for a while again and again, until heal',
-        _burst,
-        (
-            Argument('seconds', float, 'how long; 0 ends it'),
-            Argument('period', float, 'from one to the next (s)', 5.0),
-        ),
-        to_drive=False,
-    ),
-    'fieldbus-cut': Verb(
-        'let no telegram pass between the PLC and the drive', _fieldbus_cut, (_SECONDS,)
-    ),
-    'plc-restart': Verb(
-        'let the PLC be off, and begin anew with its registers 0', _plc_restart, (_SECONDS,)
-    ),
-    'plc-stop': Verb(
-        'let the program of the PLC stand, and its fieldbus; its registers are still answered',
-        _plc_stop,
-        (_SECONDS,),
-        to_drive=False,
-    ),
-    'release': Verb(
-        'let the PLC release the drive to ROS, or not',
-        _release,
-        (Argument('state', _switch, 'on or off', choices=('on', 'off')),),
-    ),
-    'traffic': Verb(
-        'on a CAN bus: let others send frames that are for nobody here',
-        lambda target, given: target.line.set_traffic(given['rate'], target.now),
-        (Argument('rate', float, 'how many a second, such as 1000; 0 ends it'),),
-        to_drive=False,
-    ),
-    'heal': Verb(
-        'end all faults of the line', lambda target, _: target.line.faults.heal(), to_drive=False
-    ),
-}
+def _argument(hint: Any, parameter: inspect.Parameter) -> Argument:
+    type_, text = get_args(hint)
+    choices = get_args(type_) if get_origin(type_) is Literal else ()
+    optional = [one for one in get_args(type_) if one is not type(None)]
+    if choices:
+        type_ = str
+    elif optional:
+        type_ = optional[0] if len(optional) == 1 else None
+    return Argument(parameter.name, type_, text, parameter.default, choices)

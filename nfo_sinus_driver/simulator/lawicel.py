@@ -42,8 +42,6 @@ class Adapter:
     :ivar is_open: the channel is open.
     """
 
-    is_serial = True
-
     def __init__(self, version: str = '1013', serial: str = 'NF01') -> None:
         self._version = version
         self._serial = serial

@@ -17,7 +17,12 @@ from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator.control import Client, ControlError, control_path
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, PROTOCOLS
-from nfo_sinus_driver.simulator.family import every_option, every_verb, machine_of, simulated
+from nfo_sinus_driver.simulator.family import (
+    every_injection,
+    every_option,
+    machine_of,
+    simulated,
+)
 from nfo_sinus_driver.simulator.injections import Argument, parse_setting
 from nfo_sinus_driver.simulator.plc import PlcSetting
 from nfo_sinus_driver.simulator.ports import PortError
@@ -49,8 +54,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         del arguments[arguments.index(_ROS_ARGS) :]
     if arguments[:1] == ['inject']:
         return inject(arguments[1:])
-    parser = _parser()
+    parser = _parser(with_experts='--help-all' in arguments)
     options = parser.parse_args(arguments)
+    if options.help_all:
+        parser.print_help()
+        return 0
     with _signals_that_quit():
         try:
             simulator = _simulator(options)
@@ -178,7 +186,8 @@ def _span(text: str) -> tuple[float, float]:
     return _seconds(low), _seconds(high if colon else low)
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
+    """Return the parser; its help shows what the manuals leave open only ``with_experts``."""
     parser = argparse.ArgumentParser(
         prog='simulator',
         description='Simulates whole drives on a pseudo-terminal or TCP port.',
@@ -195,8 +204,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar='N',
         help='address of a drive, as its protocol has them; once for each drive (default: 1)',
     )
-    add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal; of '
-        'canopen also a CAN interface, such as can0')
+    add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal')
     add('--tcp', type=_tcp, metavar='PORT', help='serve a TCP port of 127.0.0.1 (0: any free one)')
     add(
         '--also',
@@ -327,12 +335,10 @@ def _parser() -> argparse.ArgumentParser:
         default=None,
         help='the PLC does not release the drives to ROS',
     )
-    for name, option in every_option().items():
-        flag = f'--{name.replace("_", "-")}'
-        if option.choices:
-            add(flag, choices=option.choices, help=option.help)
-        else:
-            add(flag, action='store_true', default=None, help=option.help)
+    add('--help-all', action='store_true', help='show what can be chosen of a drive, too')
+    for name, (text, choices) in every_option().items():
+        shown = text if with_experts else argparse.SUPPRESS
+        add(f'--{name.replace("_", "-")}', choices=choices, help=shown)
     return parser
 
 
@@ -362,7 +368,7 @@ def inject(argv: Sequence[str]) -> int:
                 state = client.state(options.address) if one else client.states()
                 print(json.dumps(state, indent=2, ensure_ascii=False))
             else:
-                names = [argument.name for argument in every_verb()[options.verb].arguments]
+                names = [argument.name for argument in every_injection()[options.verb].arguments]
                 given = {name: getattr(options, name) for name in names}
                 client.inject(options.verb, address=options.address, **given)
     except ControlError as error:
@@ -388,7 +394,7 @@ def _inject_parser() -> argparse.ArgumentParser:
         help='the drive; needed where there are several and it happens to one',
     )
     verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True)
-    for name, verb in every_verb().items():
+    for name, verb in every_injection().items():
         sub = verbs.add_parser(name, help=verb.help, description=verb.help)
         for argument in verb.arguments:
             _add(sub, argument)
@@ -407,5 +413,5 @@ def _add(parser: argparse.ArgumentParser, argument: Argument) -> None:
         help=argument.help,
         nargs=None if argument.required else '?',
         default=None if argument.required else argument.default,
-        choices=argument.choices,
+        choices=argument.choices or None,
     )

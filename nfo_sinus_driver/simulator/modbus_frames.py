@@ -13,7 +13,7 @@ from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.memory import GatewayReason
 from nfo_sinus_driver.simulator.modbus import is_write, server
-from nfo_sinus_driver.simulator.protocol import OnSerialLine, Request, Station
+from nfo_sinus_driver.simulator.protocol import Protocol, Request, Station
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: Everybody obeys a write to this address and nobody answers.
@@ -38,7 +38,7 @@ _MBAP = 6
 _MOST_IN_TCP = 254
 
 
-class _InFrames(OnSerialLine, abc.ABC):
+class _InFrames(Protocol):
     """What RTU and ASCII have in common: an address, a PDU, and silence where nobody answers."""
 
     @staticmethod
@@ -137,7 +137,7 @@ class ModbusAscii(_InFrames):
         return pymodbus_compat.ascii_frame(address, pdu)
 
 
-class ModbusTcp:
+class ModbusTcp(Protocol):
     """
     Modbus TCP as of a gateway, behind which the drives are on an RTU line.
 

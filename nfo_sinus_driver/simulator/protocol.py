@@ -1,13 +1,14 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a line has to know about a protocol."""
+"""What a line has to know about a protocol, and about who is at the line."""
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol as Interface
+from typing import ClassVar, Protocol as Interface
 
 from nfo_sinus_driver.simulator.line_faults import Reply
 from nfo_sinus_driver.simulator.timing import Timing
@@ -57,47 +58,47 @@ class Station(Interface):
         """Catch up with the caller's clock (s); the first call only sets the clock."""
 
 
-class Protocol(Interface):
-    """How frames look, whom they concern and what comes back."""
+class Protocol(abc.ABC):
+    """How frames look, whom they concern and what comes back; by default as on a plain wire."""
 
-    name: str
+    name: ClassVar[str]
     #: The protocol that the drives themselves speak: the one behind a gateway.
-    spoken: str
+    spoken: ClassVar[str]
     #: Bytes go over a serial line, not through a gateway.
-    serial: bool
+    serial: ClassVar[bool] = True
+    #: The silence after which what is no whole frame is given up (s).
+    pause: ClassVar[float] = 1.0
 
     def gap(self, timing: Timing) -> float:
-        """The silence that a drive keeps between two frames (s)."""
+        """The silence that a drive keeps between two frames (s): none where a byte begins one."""
+        return 0.0
 
     def patience(self, timing: Timing) -> float:
         """The silence after which what is no whole frame is given up (s)."""
+        return self.pause
 
+    @staticmethod
+    @abc.abstractmethod
+    def unwrap(frame: bytes) -> Request | None:
+        """Return what the bytes say; ``None`` when they say nothing."""
+
+    @abc.abstractmethod
     def cut(self, buffer: bytes) -> int:
-        """How many bytes at the beginning belong together; 0 while only silence can tell."""
+        """Return how many bytes at the beginning belong together; 0 while more must come."""
 
-    def unwrap(self, frame: bytes) -> Request | None:
-        """What the bytes say; ``None`` when they say nothing to anybody."""
-
-    def concerns(self, station: Station, request: Request) -> bool:
+    @staticmethod
+    def concerns(station: Station, request: Request) -> bool:
         """Whether the station is meant, alone or with others."""
+        return request.address == station.address
 
+    @abc.abstractmethod
     def answer(self, station: Station, request: Request) -> bytes:
         """Let the station carry out a request; return its answer's frame, perhaps none."""
 
     def instead(self, request: Request, there: bool) -> Reply | None:
         """
-        What comes when no answer of a station does: a gateway has something to say, a wire has not.
+        Return what comes when no answer of a station does: a gateway's; on a wire, silence.
 
         :param there: there is such a station, though it keeps silent.
         """
-
-
-class OnSerialLine:
-    """What all protocols on a wire have in common: silence where nobody answers."""
-
-    serial = True
-
-    @staticmethod
-    def instead(request: Request, there: bool) -> Reply | None:
-        """Nothing: on a wire, silence is silence."""
         return None

@@ -19,8 +19,8 @@ from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator.control import ControlServer, control_path, somebody_listens
 from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, endpoint, parse_endpoint
-from nfo_sinus_driver.simulator.family import simulated_drive, verbs_of
-from nfo_sinus_driver.simulator.injections import Target
+from nfo_sinus_driver.simulator.family import load, simulated_drive
+from nfo_sinus_driver.simulator.injections import injections_of, the_drive
 from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
 from nfo_sinus_driver.simulator.ports import PortError
@@ -39,8 +39,7 @@ class Simulator:
     :param addresses: one drive for each.
     :param model: the drive family, by the name of its folder.
     :param protocol: one of :data:`~nfo_sinus_driver.simulator.endpoints.PROTOCOLS`.
-    :param link: a symbolic link to the pseudo-terminal; without it, only the device. On CANopen
-        also the name of a CAN interface, such as ``can0``.
+    :param link: a symbolic link to the pseudo-terminal; without it, only the device.
     :param tcp: serve this TCP port of 127.0.0.1 instead (0: any free one).
     :param baud: of the line and of the drives; by default the protocol's.
     :param char_format: likewise.
@@ -129,7 +128,8 @@ class Simulator:
             for drive in self.drives.values():
                 drive.control_unit.set_to([(one.spoken, one.timing) for one in endpoints])
         stations = list(self.drives.values()) if self.plc is None else self.plc.units
-        self._verbs = verbs_of(model)
+        self._kind = load(model).injections
+        self._injections = injections_of(self._kind)
         self.lock = threading.RLock()
         self.control: str | None = None
         self.failure: Exception | None = None
@@ -212,7 +212,7 @@ class Simulator:
     def state(self, address: int | None = None) -> dict[str, Any]:
         """Return the state of a drive as it is now; without an address, of the only one."""
         with self.lock:
-            drive = self._drive(address)
+            drive = the_drive(self.drives, address)
             self._catch_up(drive, time.monotonic())
             if self.plc is None:
                 return describe(drive)
@@ -226,21 +226,20 @@ class Simulator:
     def inject(
         self, what: str, *values: object, address: int | None = None, **arguments: object
     ) -> None:
-        """Let something happen: see :func:`~nfo_sinus_driver.simulator.family.verbs_of`."""
-        if what not in self._verbs:
-            raise ValueError(f'unknown injection {what!r}: choose one of {", ".join(self._verbs)}')
-        verb = self._verbs[what]
+        """Let something happen: see :class:`~nfo_sinus_driver.simulator.injections.Injections`."""
+        if what not in self._injections:
+            known = ', '.join(self._injections)
+            raise ValueError(f'unknown injection {what!r}: choose one of {known}')
         try:
-            bound = verb.bind(values, arguments)
+            bound = self._injections[what].bind(values, arguments)
         except ValueError as error:
             raise ValueError(f'{what} {error}') from None
         with self.lock:
             now = time.monotonic()
-            drive = None
-            if verb.to_drive or address is not None:
-                drive = self._drive(address)
-                self._catch_up(drive, now)
-            verb.act(Target(self.line, drive, now, self.plc), bound)
+            if address is not None or len(self.drives) == 1:
+                self._catch_up(the_drive(self.drives, address), now)
+            target = self._kind(self.line, self.drives, self.plc, address, now)
+            getattr(target, what.replace('-', '_'))(**bound)
             if self._thread is not None:
                 os.write(self._wake_write, b'.')
 
@@ -251,16 +250,6 @@ class Simulator:
 
     def _catch_up(self, drive: SimulatedDrive, now: float) -> None:
         (self.plc or drive).advance_to(now)
-
-    def _drive(self, address: int | None) -> SimulatedDrive:
-        known = ', '.join(str(number) for number in self.drives)
-        if address is None:
-            if len(self.drives) > 1:
-                raise ValueError(f'say which drive, with --address: {known}')
-            return next(iter(self.drives.values()))
-        if address not in self.drives:
-            raise ValueError(f'no drive has address {address}, only {known}')
-        return self.drives[address]
 
     def _control(self, verb: str, arguments: dict[str, Any]) -> Any:
         if verb == 'state':

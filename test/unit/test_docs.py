@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 import pytest
 
 from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
+from nfo_sinus_driver.simulator.family import every_injection, every_option
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'nfo_sinus_driver'
@@ -82,21 +83,17 @@ def launch_arguments(source: str) -> set[str]:
     return names | keys_of(source, 'OVERRIDES')
 
 
-def of_simulator(injections: str, main: str) -> set[str]:
+def of_simulator(main: str) -> set[str]:
     """The options of the simulator, and the verbs and switches of ``simulator inject``."""
     verbs = [call.args[0] for call in calls(main, 'add_parser')]
-    switches = [
-        call.args[0]
-        for call in calls(injections, 'Argument')
-        if isinstance(call.args[1], ast.Name) and call.args[1].id == 'bool'
-    ]
-    return {
-        *(text for call in calls(main, 'add', 'add_argument') for text in texts(call)
-          if re.fullmatch('--[a-z-]+', text)),
-        *keys_of(injections, 'VERBS'),
-        *(verb.value for verb in verbs if isinstance(verb, ast.Constant)),
-        *(f'--{name.value}' for name in switches if isinstance(name, ast.Constant)),
-    }
+    found = {verb.value for verb in verbs if isinstance(verb, ast.Constant)}
+    for call in calls(main, 'add', 'add_argument'):
+        found |= {text for text in texts(call) if re.fullmatch('--[a-z-]+', text)}
+    found |= {f'--{name.replace("_", "-")}' for name in every_option()}
+    for name, injection in every_injection().items():
+        found.add(name)
+        found |= {f'--{one.name}' for one in injection.arguments if one.type is bool}
+    return found
 
 
 def make_targets() -> set[str]:
@@ -208,7 +205,7 @@ def test_launch_file_is_documented(path: Path) -> None:
 
 def test_simulator_and_make_targets_are_documented() -> None:
     folder = PACKAGE / 'simulator'
-    names = of_simulator(read(folder / 'injections.py'), read(folder / 'main.py'))
+    names = of_simulator(read(folder / 'main.py'))
     assert {'--link', '--paced', '--standing', 'fault', 'power-cycle', 'state'} <= names
     # a name of older versions
     assert names - documented(read(SIMULATOR)) == {'--baud'}

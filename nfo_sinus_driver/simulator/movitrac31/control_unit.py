@@ -4,7 +4,7 @@
 """
 How a MOVITRAC 31.. is commanded, what it does, and what it says of it [M4 §4].
 
-Where the manual leaves it open, its :class:`Variant` says.
+Where the manual leaves it open, its :class:`MovitracVariant` says.
 """
 
 from __future__ import annotations
@@ -16,33 +16,36 @@ from typing import Any
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.motor import Nameplate
-from nfo_sinus_driver.simulator.movitrac import Nack
-from nfo_sinus_driver.simulator.movitrac31.codes import (
-    EXTERNAL_FAULT,
-    FAULTS,
-    PC_TIMEOUT,
-    Bit,
-    Flag,
-    Input,
-    Mode,
-    Number,
-    Output,
-)
+from nfo_sinus_driver.simulator.movitrac import Nack, ReturnCode
 from nfo_sinus_driver.simulator.movitrac31.commands import (
     FUNCTION_BITS,
     KEYS,
     MANUAL,
     SETPOINT,
     Commands,
+    Sequence,
 )
-from nfo_sinus_driver.simulator.movitrac31.displays import AMBIENT, DISPLAYS, heat_sink, readings
-from nfo_sinus_driver.simulator.movitrac31.eeprom import Eeprom
-from nfo_sinus_driver.simulator.movitrac31.fault_memory import FaultMemory, MovitracFaults
-from nfo_sinus_driver.simulator.movitrac31.option_cards import places
-from nfo_sinus_driver.simulator.movitrac31.sequence import Sequence
-from nfo_sinus_driver.simulator.movitrac31.terminals import ENABLE, Terminals
-from nfo_sinus_driver.simulator.movitrac31.variant import Variant
-from nfo_sinus_driver.simulator.movitrac_frames import ReturnCode
+from nfo_sinus_driver.simulator.movitrac31.parameters import (
+    AMBIENT,
+    CARDS,
+    DISPLAYS,
+    ENABLE,
+    EXTERNAL_FAULT,
+    FAULTS,
+    PC_TIMEOUT,
+    Bit,
+    Eeprom,
+    FaultMemory,
+    Flag,
+    Input,
+    Mode,
+    MovitracFaults,
+    MovitracVariant,
+    Number,
+    Output,
+    Terminals,
+    heat_sink,
+)
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: How its line is set, which nothing changes [M4 §2.3.3].
@@ -70,10 +73,8 @@ class MovitracControlUnit(ControlUnit):
     """
     Takes what terminals, line and keypad want.
 
-    :param chosen: fields of :class:`Variant`.
-    :raises ValueError: one of these cannot be that.
+    :raises ValueError: the address is given as a setting.
 
-    :ivar variant: how it is fitted out, and what it does where the manual leaves it open.
     :ivar terminals: the binary terminals.
     :ivar eeprom: what is saved.
     :ivar ambient: the temperature around the drive (°C); set it at any time.
@@ -83,19 +84,19 @@ class MovitracControlUnit(ControlUnit):
     line_settings = frozenset({_ADDRESS, _RESPONSE_TIME})
 
     faults: MovitracFaults
+    variant: MovitracVariant
 
-    def __init__(self, memory: Memory, address: int, **chosen: str) -> None:
+    def __init__(self, memory: Memory, address: int, variant: MovitracVariant) -> None:
         if _ADDRESS in memory.given:
             raise ValueError(f'{_ADDRESS} is given with --address')
         memory.set(_ADDRESS, address)
-        self.variant = Variant(**chosen)
-        self.terminals = Terminals(memory, self.variant.option_card)
+        self.terminals = Terminals(memory, variant.option_card)
         self.eeprom = Eeprom(memory)
         self.ambient = AMBIENT
         self.factory_left = 0.0
-        self._commands = Commands(memory, self.terminals, self.variant.enable_bit)
+        self._commands = Commands(memory, self.terminals, variant.enable_bit)
         self._parameters = self._commands.now.parameters
-        super().__init__(memory, address, MovitracFaults(memory.model))
+        super().__init__(memory, address, variant, MovitracFaults(memory.model))
         self._fault_memory = FaultMemory()
         self._sequence = Sequence(self.motor)
         self._clockwise = True
@@ -113,11 +114,6 @@ class MovitracControlUnit(ControlUnit):
         return round(self.memory.number(_ADDRESS))
 
     @property
-    def any_address(self) -> bool:
-        """Whether it answers whatever address it is asked by."""
-        return self.variant.interface == 'rs232'
-
-    @property
     def response_time(self) -> float:
         """How long it waits before it answers (s), P843."""
         return _MILLI * self.memory.number(_RESPONSE_TIME)
@@ -131,7 +127,7 @@ class MovitracControlUnit(ControlUnit):
 
     def hears(self, protocol: str, timing: Timing) -> bool:
         """Whether it hears a master: not in master-slave operation on RS-485 [M4 §2.3.2]."""
-        return self.any_address or not self.memory.raw(_MASTER_SLAVE)
+        return self.variant.interface == 'rs232' or not self.memory.raw(_MASTER_SLAVE)
 
     def heard(self) -> None:
         """Take note of a valid frame: the cause of a PC time-out is gone."""
@@ -242,14 +238,12 @@ class MovitracControlUnit(ControlUnit):
         new = code not in self.faults.codes
         super().trip(code, cause_present=cause_present)
         if new:
-            self._fault_memory.add(
-                {
-                    '': 100 * (code - FAULTS),
-                    **readings(self.motor, self.ambient),
-                    'inverter_status': self.status_word,
-                    'terminal_status': self._terminal_word,
-                }
-            )
+            words = {
+                '': 100 * (code - FAULTS),
+                'inverter_status': self.status_word,
+                'terminal_status': self._terminal_word,
+            }
+            self._fault_memory.add(self.motor, self.ambient, words)
         if self.variant.bits_in_fault == 'cleared':
             self.memory.put(FUNCTION_BITS, 0)
 
@@ -347,7 +341,7 @@ class MovitracControlUnit(ControlUnit):
         if key == 'status.terminals':
             return self._terminal_word
         if key == 'status.options':
-            x20, x21 = places(self.variant.option_card)
+            x20, x21 = CARDS[self.variant.option_card]
             return x20 << 16 | x21 << 8
         if key == 'status.manual_control_word':
             return _KEY_BITS[self._commands.key] if self._commands.manual else 0
@@ -376,7 +370,7 @@ class MovitracControlUnit(ControlUnit):
     def status_word(self) -> int:
         """Index 284: fault, status, option cards and flags, a byte each."""
         fault = self.faults.shown - FAULTS if self.faults else 0
-        x20, x21 = places(self.variant.option_card)
+        x20, x21 = CARDS[self.variant.option_card]
         flags = Flag.VOLTAGE_SIGNAL
         flags |= Flag.SECOND_SET if self._second_set else Flag(0)
         flags |= Flag.CW if self._clockwise else Flag(0)
@@ -420,7 +414,7 @@ class MovitracControlUnit(ControlUnit):
             'inv_st': self.status_code,
             'inv_st_text': self.memory.model.status_code(self.status_code).text,
             'status_word': self.status_word,
-            'phase': self._sequence.phase.value,
+            'phase': self._sequence.phase.name.lower(),
             'function_bits': self.memory.raw(FUNCTION_BITS),
             'setpoint': self.memory.get(SETPOINT),
             'enable': command.enable,

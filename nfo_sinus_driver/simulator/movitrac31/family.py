@@ -1,24 +1,38 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the simulator has to know of a MOVITRAC 31.."""
+"""
+What the simulator has to know of a MOVITRAC 31..: its tables, its serial side, what happens to it.
+
+Of what is wrong with a request its serial side tells the first thing that it comes to ([M4 §2.1.2],
+[M4 §3]).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Literal
 
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
 from nfo_sinus_driver.catalog.codec import Bcd, codec_of
+from nfo_sinus_driver.simulator import movitrac
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Argument, Target, Verb
-from nfo_sinus_driver.simulator.movitrac31.commands import KEYS
+from nfo_sinus_driver.simulator.injections import Injections
+from nfo_sinus_driver.simulator.movitrac import Nack, ReturnCode
+from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS, SETPOINT
 from nfo_sinus_driver.simulator.movitrac31.control_unit import MovitracControlUnit
-from nfo_sinus_driver.simulator.movitrac31.server import Server
-from nfo_sinus_driver.simulator.movitrac31.variant import OPTIONS
+from nfo_sinus_driver.simulator.movitrac31.parameters import MovitracVariant, broken
 
 _PROTOCOL = 'movitrac'
+_LOCK = 'special.parameter_lock'
+#: What the parameter lock leaves alone: itself, and what is no parameter.
+_NEVER_LOCKED = frozenset({_LOCK, FUNCTION_BITS, SETPOINT})
+#: What only the keypad can switch on: "On only with FBG 31".
+_KEYPAD_ONLY = 'special.user_menu'
+#: The first half-byte of a negative number [C70].
+_NEGATIVE = 0xF
 #: What [M4 §4] lets a master write though the tables do not: they say what a driver may.
 _WRITTEN = frozenset(
     {
@@ -81,59 +95,139 @@ def _machine(model: Family) -> Family:
     A drive has negative numbers and writes all that [M4 §4] says; of the line's own codec, which
     has no sign [C70], only the server knows.
     """
-    return replace(model, parameters={key: _own(key, model[key]) for key in model})
+    own = {}
+    for key, parameter in model.items():
+        address = parameter.at(_PROTOCOL)
+        negative = parameter.minimum is not None and parameter.minimum < 0
+        # the fault memory prints no ranges
+        negative = negative or key.endswith('heat_sink_temperature')
+        if negative and isinstance(address.codec, Bcd):
+            address = replace(address, codec=codec_of('sint32_be'))
+        access = Access.READ_WRITE if key in _WRITTEN else parameter.access
+        own[key] = replace(parameter, access=access, addresses={_PROTOCOL: address})
+    return replace(model, parameters=own)
 
 
-def _own(key: str, parameter: Parameter) -> Parameter:
-    address = parameter.at(_PROTOCOL)
-    negative = parameter.minimum is not None and parameter.minimum < 0
-    # the fault memory prints no ranges
-    negative = negative or key.endswith('heat_sink_temperature')
-    if negative and isinstance(address.codec, Bcd):
-        address = replace(address, codec=codec_of('sint32_be'))
-    access = Access.READ_WRITE if key in _WRITTEN else parameter.access
-    return replace(parameter, access=access, addresses={_PROTOCOL: address})
+class Server(movitrac.Server):
+    """The serial side of one MOVITRAC 31.., by the index of its parameters."""
+
+    def __init__(self, drive: SimulatedDrive) -> None:
+        assert isinstance(drive.control_unit, MovitracControlUnit)
+        self._drive = drive
+        self._unit = drive.control_unit
+        self._memory = drive.memory
+        self.any_address = self._unit.variant.interface == 'rs232'
+        self._by_index = {one.at(_PROTOCOL).index: one for one in drive.memory.model.values()}
+
+    def enquiry(self, index: int) -> bytes:
+        """Return the bytes of a parameter; a negative number has a sign in place of a digit."""
+        parameter = self._find(index)
+        raw = self._drive.read_raw(parameter.key)
+        table = self._drive.model[parameter.key].at(_PROTOCOL).number
+        if not isinstance(table, Bcd) or raw >= 0:
+            return table.encode(raw)
+        data = table.encode(-raw)
+        return bytes([_NEGATIVE << 4 | data[0]]) + data[1:]
+
+    def select(self, index: int, value: bytes) -> None:
+        """Set a parameter."""
+        parameter = self._find(index)
+        key = parameter.key
+        if len(value) != parameter.at(_PROTOCOL).codec.size:
+            raise Nack(ReturnCode.ILLEGAL_MESSAGE, f'{key} does not have {len(value)} bytes')
+        if parameter.access is not Access.READ_WRITE:
+            raise Nack(ReturnCode.READ_ONLY, f'{key} cannot be written')
+        if self._unit.factory_left:
+            raise Nack(ReturnCode.FACTORY_SETTING_RUNNING, 'the factory setting is running')
+        if self._memory.raw(_LOCK) and key not in _NEVER_LOCKED:
+            raise Nack(ReturnCode.LOCKED, 'the parameters are locked')
+        raw = self._number(parameter, value)
+        self._check(parameter, raw)
+        self._drive.write_raw(key, raw)
+        if self._unit.factory_left:
+            raise Nack(ReturnCode.FACTORY_SETTING_STARTED, 'the factory setting begins')
+        if self._unit.eeprom.lacks(key):
+            raise Nack(ReturnCode.VOLATILE, f'{key} is lost when power is off')
+
+    def _find(self, index: int) -> Parameter:
+        parameter = self._by_index.get(index)
+        if parameter is None:
+            raise Nack(ReturnCode.ILLEGAL_INDEX, f'there is no index {index}')
+        # the cards of which it needs one, as the tables name them; empty: none
+        cards = parameter.option.split(' or ')
+        if parameter.option and self._unit.variant.option_card.upper() not in cards:
+            raise Nack(ReturnCode.OPTION_MISSING, f'{parameter.key} needs {parameter.option}')
+        return parameter
+
+    def _number(self, parameter: Parameter, value: bytes) -> int:
+        """Return the raw number of bytes (Nack: they mean none)."""
+        table = self._drive.model[parameter.key].at(_PROTOCOL).number
+        codec = parameter.at(_PROTOCOL).number
+        negative = codec.signed and isinstance(table, Bcd) and value[0] >> 4 == _NEGATIVE
+        try:
+            size = table.decode(bytes([value[0] & 0x0F]) + value[1:] if negative else value)
+        except ValueError as error:
+            raise Nack(ReturnCode.INVALID_VALUE, str(error)) from None
+        return -size if negative else size
+
+    def _check(self, parameter: Parameter, raw: int) -> None:
+        """Look whether a parameter can have a raw number."""
+        key = parameter.key
+        value = raw * parameter.factor(_PROTOCOL)
+        codes = list(parameter.labels)
+        low = min(codes) if codes else parameter.minimum
+        high = max(codes) if codes else parameter.maximum
+        if high is not None and value > high:
+            raise Nack(ReturnCode.TOO_LARGE, f'{key} cannot be so large')
+        if low is not None and value < low:
+            raise Nack(ReturnCode.TOO_SMALL, f'{key} cannot be so small')
+        if not (value in codes if codes else parameter.on_step(float(value))):
+            raise Nack(ReturnCode.INVALID_VALUE, f'{key} has no such value in between')
+        if key == _KEYPAD_ONLY and not raw and self._memory.raw(key):
+            raise Nack(ReturnCode.NOT_BY_THIS_INTERFACE, f'{key} is switched on by the keypad')
+        if code := broken(self._memory, key, raw):
+            raise Nack(code, f'{key} does not go with the other settings')
 
 
-def _unit(target: Target) -> MovitracControlUnit:
-    unit = target.one.control_unit
-    assert isinstance(unit, MovitracControlUnit)
-    return unit
+class MovitracInjections(Injections):
+    """What else can be made to happen to a MOVITRAC 31..; ValueError: there is no such terminal."""
 
+    def terminal(
+        self,
+        number: Annotated[int, 'of the terminal, such as 41'],
+        state: Annotated[Literal['closed', 'open'], 'closed or open'],
+    ) -> None:
+        """Close or open a binary input."""
+        self._unit.switch(number, state == 'closed')
 
-def _ambient(target: Target, given: dict[str, Any]) -> None:
-    _unit(target).ambient = given['temperature']
+    def keypad(
+        self,
+        key: Annotated[
+            Literal['manual', 'automatic', 'reset', 'cw', 'ccw', 'stop'], 'the key'
+        ],
+    ) -> None:
+        """
+        Press a key: manual and automatic choose who commands, cw, ccw and stop count in manual
+        operation; reset.
+        """
+        self._unit.press(key)
 
+    def ambient(self, temperature: Annotated[float, 'in °C, such as -15']) -> None:
+        """Change the temperature around the drive."""
+        self._unit.ambient = temperature
 
-def _terminal(target: Target, given: dict[str, Any]) -> None:
-    _unit(target).switch(given['number'], given['state'] == 'closed')
+    @property
+    def _unit(self) -> MovitracControlUnit:
+        unit = self._drive.control_unit
+        assert isinstance(unit, MovitracControlUnit)
+        return unit
 
 
 FAMILY = SimulatedFamily(
     control_unit=MovitracControlUnit,
+    variant=MovitracVariant,
     factory=_FACTORY,
     machine=_machine,
     servers={_PROTOCOL: Server},
-    options=OPTIONS,
-    verbs={
-        'terminal': Verb(
-            'close or open a binary input',
-            _terminal,
-            (
-                Argument('number', int, 'of the terminal, such as 41'),
-                Argument('state', str, 'closed or open', choices=('closed', 'open')),
-            ),
-        ),
-        'keypad': Verb(
-            'press a key: manual and automatic choose who commands, cw, ccw and stop count in '
-            'manual operation; reset',
-            lambda target, given: _unit(target).press(given['key']),
-            (Argument('key', str, 'the key', choices=('manual', 'automatic', 'reset', *KEYS)),),
-        ),
-        'ambient': Verb(
-            'change the temperature around the drive',
-            _ambient,
-            (Argument('temperature', float, 'in °C, such as -15'),),
-        ),
-    },
+    injections=MovitracInjections,
 )

@@ -15,19 +15,18 @@ from __future__ import annotations
 import abc
 from collections.abc import Collection, Iterator, Mapping, Sequence
 import contextlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import enum
 from typing import Any, ClassVar
 
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.simulator.classic_frames import LineError
-from nfo_sinus_driver.simulator.control_unit import ControlUnit
+from nfo_sinus_driver.simulator.classic import LineError
+from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused
-from nfo_sinus_driver.simulator.modbus import KNOWN, TREATMENTS
+from nfo_sinus_driver.simulator.modbus import TREATMENTS
 from nfo_sinus_driver.simulator.motor import Nameplate
 from nfo_sinus_driver.simulator.sinus.serial_side import (
     LINE_SETTINGS,
-    REFUSALS,
     LineRules,
     SerialSide,
     SinusFaults,
@@ -100,21 +99,69 @@ FACTORY: Mapping[str, Value] = {
 }
 
 
+KEEPS, DROPS = 'keeps', 'drops'
+ALL, SCMD, NOTHING = 'all', 'scmd', 'nothing'
+TAKEN, REFUSED = 'taken', 'refused'
+CODE, STANDBY = 'code', 'standby'
+EDGES, LEVELS = 'edges', 'levels'
+
+
+@dataclass(frozen=True)
+class SinusVariant(Variant):
+    """
+    One way to read the manuals; by default a G2 that follows [M0 table 16].
+
+    :ivar newer_functions: how Modbus functions are treated that older firmware does not have.
+    :ivar run_command_in_fault: what becomes of a run command by a fault [C98]. ``keeps``: it
+        stands, and the motor starts by itself when the fault is over. ``drops``: an acknowledgement
+        ends it, also one that was given meanwhile, so a run needs a new one [M0 table 16]. A fault
+        that the drive ends by itself starts the motor again in either case: that is what RstDly and
+        ErrCnt are for. So do the terminals, whose RUN stands. With DriveControl the G2's state
+        machine decides.
+    :ivar refuses_in_fault: what is refused while a fault is active [C98], in whatever protocol:
+        ``all`` but DriveControl and MODE = Stop in a serial fault, the run command (``scmd``), or
+        ``nothing``.
+        Classic refuses all whatever this says [M0 §6.1.5].
+    :ivar stop_in_tuning: whether SCMD = Stop is ``taken`` while MODE is Inhibit, and ends the
+        tuning, or ``refused`` until it is over [C101].
+    :ivar tuning_ends_in: what is shown after a tuning: a ``code`` of success, or plain ``standby``
+        [C112].
+    :ivar commands: how commands count that stand in telegram 1: when a bit rises, or as long as it
+        stands.
+    """
+
+    newer_functions: str = choice(
+        *TREATMENTS,
+        text='how drives treat functions 17, 23 and 43, which older ones do not have',
+    )
+    run_command_in_fault: str = choice(
+        DROPS, KEEPS, text='what an acknowledged fault does to a run command'
+    )
+    refuses_in_fault: str = choice(
+        NOTHING, ALL, SCMD, text='what is refused while a fault is active; on Classic always all'
+    )
+    stop_in_tuning: str = choice(
+        TAKEN, REFUSED, text='whether SCMD = Stop ends a tuning, or is refused until it is over'
+    )
+    tuning_ends_in: str = choice(
+        CODE, STANDBY, text='what a tuning that succeeds ends in: a code of success, or standby'
+    )
+    commands: str = choice(
+        EDGES,
+        LEVELS,
+        text='on telegram 1: a command counts when its bit rises, or as long as it stands',
+    )
+
+
 class SinusControlUnit(ControlUnit):
     """
     Takes the commands of a Sinus.
-
-    :param lenient: a Classic message that is refused is no serial fault.
-    :param newer_functions: how Modbus functions are treated that older firmware does not have.
-    :param left_open: fields of :class:`Variant` that are not the family's usual.
-    :raises ValueError: one of these cannot be that.
 
     :ivar source: who commands.
     :ivar scmd: the run command that stands, or Stop. It stands through a lost RUN input, so the
         motor starts by itself when that is over; through a fault as ``variant`` says.
     :ivar by_fieldbus: the bus that commands is a fieldbus, to the older firmware [C3].
     :ivar fieldbus: the telegrams of a fieldbus module, where it has one.
-    :ivar variant: what it does where the manuals leave it open.
     :ivar ack_reads: how often 02A4h or E00E8 was read, which acknowledges.
     :ivar sio_err_reads: how often SioErr was read, which clears it and Sio Fail.
     :ivar mode_ext_writes: how often MODE = 2 was written, which may start the motor.
@@ -124,32 +171,20 @@ class SinusControlUnit(ControlUnit):
     setpoint_of: ClassVar[Mapping[int, str]]
     #: InvSt while the start is delayed.
     delayed: ClassVar[int]
-    #: What drives of this family do unless told otherwise.
-    usual: ClassVar[Variant]
     #: The run command of this family, and the codes that it takes.
     run_command: ClassVar[str]
     run_codes: ClassVar[Collection[int]]
     line_settings = LINE_SETTINGS
 
     faults: SinusFaults
+    variant: SinusVariant
     scmd: int
 
     def __init__(
-        self,
-        memory: Memory,
-        address: int,
-        faults: SinusFaults,
-        *,
-        lenient: bool = False,
-        newer_functions: str = KNOWN,
-        **left_open: str,
+        self, memory: Memory, address: int, variant: SinusVariant, faults: SinusFaults
     ) -> None:
-        super().__init__(memory, address, faults)
-        if newer_functions not in TREATMENTS:
-            raise ValueError(f'newer_functions: choose one of {", ".join(TREATMENTS)}')
+        super().__init__(memory, address, variant, faults)
         memory.set('serial.address', address)
-        self.newer_functions = newer_functions
-        self.variant = replace(self.usual, **left_open)
         self.serial = SerialSide(memory, self.line_rules)
         self.source = Source.STOP
         self.scmd = _STOP
@@ -159,7 +194,6 @@ class SinusControlUnit(ControlUnit):
         self.mode_ext_writes = 0
         self.fieldbus = FieldbusWatch()
         self._telegram: int | None = None
-        self._lenient = lenient
         #: Seconds of RunDly left; None while nobody wants to run.
         self._delay_left: float | None = None
 
@@ -370,8 +404,7 @@ class SinusControlUnit(ControlUnit):
         That another fault blocks the drive is no fault of its own.
         """
         self.faults.sio_err |= what
-        harmless = REFUSALS if self._lenient else LineError.BLOCKED
-        if self.bus_controls and what & ~harmless:
+        if self.bus_controls and what & ~LineError.BLOCKED:
             self.trip(self.faults.line_lost)
             self.settle()
 
@@ -514,49 +547,3 @@ class SinusControlUnit(ControlUnit):
             'sio_err_reads': self.sio_err_reads,
             'mode_ext_writes': self.mode_ext_writes,
         }
-
-
-KEEPS, DROPS = 'keeps', 'drops'
-ALL, SCMD, NOTHING = 'all', 'scmd', 'nothing'
-TAKEN, REFUSED = 'taken', 'refused'
-CODE, STANDBY = 'code', 'standby'
-#: What each of them can be, what the G2 does by default last.
-CHOICES: Mapping[str, tuple[str, ...]] = {
-    'run_command_in_fault': (KEEPS, DROPS),
-    'refuses_in_fault': (ALL, SCMD, NOTHING),
-    'stop_in_tuning': (REFUSED, TAKEN),
-    'tuning_ends_in': (CODE, STANDBY),
-}
-
-
-@dataclass(frozen=True)
-class Variant:
-    """
-    One way to read the manuals; by default a G2 that follows [M0 table 16].
-
-    :ivar run_command_in_fault: what becomes of a run command by a fault [C98]. ``keeps``: it
-        stands, and the motor starts by itself when the fault is over. ``drops``: an acknowledgement
-        ends it, also one that was given meanwhile, so a run needs a new one [M0 table 16]. A fault
-        that the drive ends by itself starts the motor again in either case: that is what RstDly and
-        ErrCnt are for. So do the terminals, whose RUN stands. With DriveControl the G2's state
-        machine decides.
-    :ivar refuses_in_fault: what is refused while a fault is active [C98], in whatever protocol:
-        ``all`` but DriveControl and MODE = Stop in a serial fault, the run command (``scmd``), or
-        ``nothing``.
-        Classic refuses all whatever this says [M0 §6.1.5].
-    :ivar stop_in_tuning: whether SCMD = Stop is ``taken`` while MODE is Inhibit, and ends the
-        tuning, or ``refused`` until it is over [C101].
-    :ivar tuning_ends_in: what is shown after a tuning: a ``code`` of success, or plain ``standby``
-        [C112].
-    :raises ValueError: one of them cannot be that.
-    """
-
-    run_command_in_fault: str = DROPS
-    refuses_in_fault: str = NOTHING
-    stop_in_tuning: str = TAKEN
-    tuning_ends_in: str = CODE
-
-    def __post_init__(self) -> None:
-        for name, choices in CHOICES.items():
-            if getattr(self, name) not in choices:
-                raise ValueError(f'{name}: choose one of {", ".join(choices)}')

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from nfo_sinus_driver.catalog import Family, Meaning
-from nfo_sinus_driver.simulator.classic_frames import LineError
+from nfo_sinus_driver.simulator.classic import LineError
 from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.timing import Timing
@@ -135,18 +135,6 @@ class SerialSide:
     def timed_out(self) -> bool:
         """Whether the silence has lasted longer than SioTot."""
         return self.watches and self._unheard >= self._memory.number('serial.sio_tot')
-
-
-#: The flags of messages that were understood and are not carried out.
-REFUSALS = (
-    LineError.BLOCKED
-    | LineError.PREFIX
-    | LineError.NOT_PERMITTED
-    | LineError.UNKNOWN
-    | LineError.UNREADABLE
-    | LineError.UNWRITABLE
-    | LineError.OUT_OF_RANGE
-)
 
 
 class SinusFaults(Faults):

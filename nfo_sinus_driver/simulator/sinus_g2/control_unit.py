@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from nfo_sinus_driver.catalog import Meaning, Parameter, Value
 from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd, Status
@@ -24,23 +24,23 @@ from nfo_sinus_driver.simulator.sinus.control_unit import (
     TERMINAL_SHARE,
     SinusControlUnit,
     Source,
-    Variant,
 )
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules, SinusFaults
-from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import NAMES as CANOPEN_OPTIONS, CanopenShape
-from nfo_sinus_driver.simulator.sinus_g2.firmware import firmware_of
-from nfo_sinus_driver.simulator.sinus_g2.self_restart import SelfRestart
+from nfo_sinus_driver.simulator.sinus_g2.firmware import G2Variant, firmware_of
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import (
+    FAILURES,
+    PROCEDURES,
     RELEASED,
     RUN_COMMANDS,
     RUNNING,
     STANDBY,
     Conditions,
     Phase,
+    SelfRestart,
     StateMachine,
+    Tuning,
     local_share,
 )
-from nfo_sinus_driver.simulator.sinus_g2.tuning import FAILURES, PROCEDURES, Tuning
 
 #: What leaves the factory beside what all have.
 FACTORY: Mapping[str, Value] = {
@@ -88,11 +88,6 @@ _SOURCES: Mapping[int, Source] = {
 }
 #: What hands control to the bus.
 _COMMANDS = frozenset({'fieldbus.mode', 'fieldbus.drive_control'})
-#: Telegram 1: which words it has, and how commands count that stand in it: when a bit rises, or as
-#: long as it stands.
-PROFIDRIVE, DRIVECONTROL = 'profidrive', 'drivecontrol'
-EDGES, LEVELS = 'edges', 'levels'
-TELEGRAM_CHOICES = {'telegram_words': (PROFIDRIVE, DRIVECONTROL), 'commands': (EDGES, LEVELS)}
 #: The states that the state machine leaves by itself.
 _PASSING = frozenset(
     {
@@ -120,13 +115,9 @@ class G2ControlUnit(SinusControlUnit):
     """
     Runs the motor of a G2, and tunes it.
 
-    :param dialect: the manual that describes its firmware; by default as SWVer says.
-    :param options: those of every Sinus, of :class:`CanopenShape`, and :data:`TELEGRAM_CHOICES`.
-    :raises ValueError: there is no such manual, or SWVer was given and is of another firmware; or
-        an option cannot be that.
+    :raises ValueError: SWVer was given and is of another firmware than the variant's.
 
     :ivar firmware: what its firmware does its own way.
-    :ivar canopen: how it is on CANopen.
     :ivar self_restart: ends faults by itself.
     :ivar tuning: the procedure that is going on.
     """
@@ -140,25 +131,15 @@ class G2ControlUnit(SinusControlUnit):
     }
     setpoints = frozenset(setpoint_of.values())
     delayed = 25
-    usual = Variant()
     run_command = 'fieldbus.scmd'
     run_codes = frozenset(Scmd)
 
-    def __init__(
-        self, memory: Memory, address: int, *, dialect: str | None = None, **options: Any
-    ) -> None:
-        self.firmware = firmware_of(memory, dialect)
+    variant: G2Variant
+
+    def __init__(self, memory: Memory, address: int, variant: G2Variant) -> None:
+        self.firmware = firmware_of(memory, variant.dialect)
         faults = SinusFaults(memory.model, log_size=self.firmware.log_size)
-        shape = {name: options.pop(name) for name in CANOPEN_OPTIONS & options.keys()}
-        self.canopen = CanopenShape(**shape)
-        #: What is chosen of telegram 1.
-        self.telegram = {
-            name: options.pop(name, choices[0]) for name, choices in TELEGRAM_CHOICES.items()
-        }
-        for name, choices in TELEGRAM_CHOICES.items():
-            if self.telegram[name] not in choices:
-                raise ValueError(f'{name}: choose one of {", ".join(choices)}')
-        super().__init__(memory, address, faults, **options)
+        super().__init__(memory, address, variant, faults)
         #: The module of CANopen holds it in bus mode.
         self._is_held = False
         self.self_restart = SelfRestart(memory, faults)

@@ -1,7 +1,11 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the firmware before 4.28, the one of [M2], does otherwise than that of [M0]."""
+"""
+Which G2 it is: what the manuals leave open of it, and what its firmware does.
+
+The firmware before 4.28 is that of [M2]; [M0] describes the newer one.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +13,94 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from nfo_sinus_driver.simulator.canopen import Profile301
+from nfo_sinus_driver.simulator.control_unit import choice
 from nfo_sinus_driver.simulator.memory import Memory
+from nfo_sinus_driver.simulator.sinus.control_unit import SinusVariant
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
 
+BARE, MINIMAL, FULL = 'bare', 'minimal', 'full'
+TABLE, NARROW, WIDE = 'table', 'narrow', 'wide'
+FROM_ONE, FROM_ZERO = 'from_one', 'from_zero'
+BY_SHAPE, NONE, HEARTBEAT, GUARDING, BOTH = 'by_shape', 'none', 'heartbeat', 'guarding', 'both'
+PRINTED, SHIFTED = '2F7C', '4F7D'
+HELD, FREE = 'held', 'free'
 SW_VER = 'fieldbus.sw_ver'
 #: Its codes of SiProt [C5].
 _OLD_FORMAT_CODES = {'7E1': 0, '8N1': 1}
+#: The words of telegram 1.
+PROFIDRIVE, DRIVECONTROL = 'profidrive', 'drivecontrol'
+
+
+@dataclass(frozen=True)
+class G2Variant(SinusVariant):
+    """
+    One way to read the manuals, and the chapter on CANopen ([M0 §6.4], [C102]).
+
+    :ivar dialect: the manual that describes its firmware; ``''``: as SWVer says.
+    :ivar telegram_words: which words telegram 1 has.
+    :ivar canopen_profile: what there is of the communication profile, which the manual leaves
+        "TBD". ``full``: identity, texts, heartbeats, guarding; ``minimal``: device type, error
+        register, vendor and the heartbeat that a node sends; ``bare``: no object at all. A node
+        tells its boot-up and obeys network management in any case.
+    :ivar canopen_watch: what it watches a master by: its heartbeat (1016h), guarding (100Ch,
+        100Dh), ``both`` or ``none``; ``by_shape``: both where the profile is full, else none.
+    :ivar canopen_types: how many bytes values have, which the manual does not print: those of the
+        ``table``; ``narrow``: enumerations have one; ``wide``: everything has four.
+    :ivar canopen_sub_indices: the elements of arrays count ``from_one``, and sub-index 0 tells how
+        many there are; or ``from_zero``, as on PROFIBUS.
+    :ivar canopen_error_log: where the error log stands: at the index that is printed, at the one
+        that its parameters' numbers give [C2], or nowhere.
+    :ivar canopen_bus_mode: bus mode is ``held`` as soon as there is communication [M0 §6.4]; or the
+        drive is ``free`` to leave it, as on other buses.
+    """
+
+    dialect: str = choice(
+        '',
+        '2.03',
+        '5.0',
+        text='the manual that describes the Classic protocol of the drives (default: as their '
+        'firmware, fieldbus.sw_ver, says)',
+    )
+    telegram_words: str = choice(
+        PROFIDRIVE,
+        DRIVECONTROL,
+        text='on telegram 1: the words are those of PROFIdrive, or DriveControl and DriveStatus',
+    )
+    canopen_profile: str = choice(
+        FULL, MINIMAL, BARE, text='on CANopen: how much of the communication profile there is'
+    )
+    canopen_watch: str = choice(
+        BY_SHAPE,
+        NONE,
+        HEARTBEAT,
+        GUARDING,
+        BOTH,
+        text='on CANopen: what a master can be watched by',
+    )
+    canopen_types: str = choice(TABLE, NARROW, WIDE, text='on CANopen: how many bytes values have')
+    canopen_sub_indices: str = choice(
+        FROM_ONE, FROM_ZERO, text='on CANopen: how the elements of arrays are numbered'
+    )
+    canopen_error_log: str = choice(
+        PRINTED, SHIFTED, NONE, text='on CANopen: where the error log stands'
+    )
+    canopen_bus_mode: str = choice(
+        HELD, FREE, text='on CANopen: whether the module holds the drive in bus mode'
+    )
+
+    @property
+    def profile(self) -> Profile301:
+        """What the node has of the communication profile."""
+        watch = self.canopen_watch
+        if watch == BY_SHAPE:
+            watch = BOTH if self.canopen_profile == FULL else NONE
+        return Profile301(
+            mandatory=self.canopen_profile != BARE,
+            optional=self.canopen_profile == FULL,
+            consumes_heartbeats=watch in (HEARTBEAT, BOTH),
+            guards=watch in (GUARDING, BOTH),
+        )
 
 
 @dataclass(frozen=True)
@@ -104,21 +190,18 @@ OLD = Firmware(
     },
 )
 #: By the manual that describes them.
-DIALECTS: Mapping[str, Firmware] = {firmware.manual: firmware for firmware in (NEW, OLD)}
+_DIALECTS: Mapping[str, Firmware] = {firmware.manual: firmware for firmware in (NEW, OLD)}
 #: The first firmware that [M0] describes.
 _FIRST_NEW = Fraction('4.28')
 
 
-def firmware_of(memory: Memory, dialect: str | None = None) -> Firmware:
+def firmware_of(memory: Memory, dialect: str) -> Firmware:
     """Return which of the two a drive has, by its SWVer, or by the manual that describes it."""
-    if dialect is not None:
-        if dialect not in DIALECTS:
-            raise ValueError(f'unknown dialect {dialect!r}: choose one of {", ".join(DIALECTS)}')
-        if SW_VER not in memory.given:
-            memory.set(SW_VER, DIALECTS[dialect].sw_ver)
+    if dialect and SW_VER not in memory.given:
+        memory.set(SW_VER, _DIALECTS[dialect].sw_ver)
     version = memory.version
     assert version is not None
     firmware = OLD if version < _FIRST_NEW else NEW
-    if dialect not in (None, firmware.manual):
+    if dialect not in ('', firmware.manual):
         raise ValueError(f'dialect {dialect} is not that of firmware {float(version)}')
     return firmware

@@ -2,19 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The generic state machine of the drive [M0 §7.1, tables 14 to 16].
+What a G2 goes through: its state machine, tuning, and the restart after a fault by itself.
 
-Every way of control ends here: DriveControl reaches it directly, MODE and SCMD and the terminals
-are translated to control words for it [M0 §7].
+Every way of control ends in the generic state machine [M0 §7.1, tables 14 to 16]: DriveControl
+reaches it directly, MODE and SCMD and the terminals are translated to control words for it [M0 §7].
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 import enum
+import math
 
 from nfo_sinus_driver.families.sinus_g2.words import Control, Scmd, Status
+from nfo_sinus_driver.simulator.faults import Faults
+from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
 
 #: Without both of these the power is off, or a quick stop is wanted [M0 table 14].
@@ -237,3 +241,130 @@ def local_share(code: int, fixed: Mapping[int, float]) -> float:
     if number == 0:
         return sign * _ANALOG_SHARE
     return sign * fixed.get(number, _FIXED_SHARES[number - 1])
+
+
+# ---- tuning ----
+
+
+@dataclass(frozen=True)
+class Procedure:
+    """
+    What one SCMD of tuning does: the drive measures its motor, or calculates it [M0 table 18].
+
+    No manual tells how.
+
+    :ivar seconds: how long it takes; real drives take minutes.
+    :ivar measures: the power stage works meanwhile, so RUN must be active.
+    :ivar done: InvSt when it is finished [M0 table 19]; that of the full tuning is also that of the
+        basic one, which has none of its own.
+    :ivar finds: the parameters that it changes.
+    """
+
+    seconds: float
+    measures: bool
+    done: int
+    finds: tuple[str, ...]
+
+
+_MODEL = ('motor.r_rot', 'motor.l_main', 'motor.sigma', 'motor.i_magn')
+PROCEDURES: Mapping[int, Procedure] = {
+    Scmd.FULL_TUNING: Procedure(4.0, True, 45, ('motor.r_stat', *_MODEL)),
+    Scmd.BASIC_TUNING: Procedure(2.0, True, 45, ('motor.r_stat', 'motor.sigma')),
+    Scmd.RS_MEASURE: Procedure(1.0, True, 46, ('motor.r_stat',)),
+    Scmd.PAR_CALC: Procedure(0.3, False, 47, _MODEL),
+}
+#: What InvSt says when one has failed: calculation overflow, measurement fault.
+FAILURES = frozenset({16, 17})
+
+
+@dataclass
+class Tuning:
+    """One procedure that is going on."""
+
+    procedure: Procedure
+    left: float
+
+    @classmethod
+    def begun(cls, scmd: int) -> Tuning:
+        """Return the one that a command starts."""
+        procedure = PROCEDURES[scmd]
+        return cls(procedure, procedure.seconds)
+
+    def store(self, memory: Memory) -> None:
+        """Put what was found into the memory: a motor of the usual proportions."""
+        impedance = memory.number('motor.u_nom') / math.sqrt(3) / memory.number('motor.i_nom')
+        reactance = 2 * math.pi * memory.number('motor.f_nom')
+        found = {
+            'motor.r_stat': round(0.055 * impedance, 2),
+            'motor.r_rot': round(0.045 * impedance, 2),
+            'motor.l_main': round(1.7 * impedance / reactance, 4),
+            'motor.sigma': 0.075,
+            'motor.i_magn': round(0.5 * memory.number('motor.i_nom'), 2),
+        }
+        for key in self.procedure.finds:
+            memory.set(key, found[key])
+
+
+# ---- restart by itself ----
+
+_RST_DLY, _TR_TIME = 'error.rst_dly', 'error.tr_time'
+#: The tries of each fault that has any; a short circuit shows as no fault of its own.
+TRIES: Mapping[int, str] = {
+    2: 'error.ac_fail_err_cnt',
+    3: 'error.temp_hi_err_cnt',
+    4: 'error.ptc_temp_err_cnt',
+    5: 'error.overload_err_cnt',
+    6: 'error.ain_fail_err_cnt',
+    7: 'error.dc_low_err_cnt',
+    8: 'error.dc_high_err_cnt',
+    10: 'error.imagn_low_err_cnt',
+    11: 'error.cur_low_err_cnt',
+    12: 'error.cur_high_err_cnt',
+    13: 'error.run_fail_err_cnt',
+}
+
+
+class SelfRestart:
+    """
+    Acknowledges faults by itself, and goes on: RstDly, TrTime and ErrCnt of the group Error.
+
+    [M0] and [M2] have one line for each of them: "time from when fault disappears to restart",
+    "time inverter must run perfectly not to stop" and "tries". What is simulated is how we read
+    them: a fault whose cause is gone ends after RstDly, as often as ErrCnt says; a drive that then
+    runs for TrTime without a fault has all tries again. With ErrCnt = 0, the factory setting, it
+    waits to be acknowledged.
+    """
+
+    def __init__(self, memory: Memory, faults: Faults) -> None:
+        self._memory = memory
+        self._faults = faults
+        self._tries: Counter[int] = Counter()
+        self._waited = 0.0
+        self._ran = 0.0
+
+    def tripped(self, code: int) -> None:
+        """Take note of a fault."""
+        self._tries[code] += 1
+        self._waited = self._ran = 0.0
+
+    def wait(self, dt: float, *, driven: bool, voltage: bool) -> None:
+        """Let ``dt`` seconds pass; while there is voltage, the reaction to a fault goes on."""
+        if self.waiting and not voltage:
+            self._waited += dt
+            if self._waited >= self._memory.number(_RST_DLY):
+                self._waited = 0.0
+                self._faults.acknowledge()
+        elif self._tries and not self._faults and driven:
+            self._ran += dt
+            if self._ran >= self._memory.number(_TR_TIME):
+                self._tries.clear()
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a fault is active that ends by itself."""
+        codes = self._faults.codes
+        return bool(codes) and not self._faults.lasting and all(map(self._has_tries, codes))
+
+    def _has_tries(self, code: int) -> bool:
+        key = TRIES.get(code, '')
+        return key in self._memory.model and self._tries[code] <= self._memory.number(key)

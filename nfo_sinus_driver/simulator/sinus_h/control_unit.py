@@ -11,38 +11,177 @@ sign, and the module says "Operation" while the motor stands.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import enum
 from typing import Any
 
-from nfo_sinus_driver.simulator.control_unit import ControlUnit
+from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus_h import keypad
-from nfo_sinus_driver.simulator.sinus_h.state_machine import (
-    LEVELS,
-    NONE,
-    PATTERNS,
-    PROFIDRIVE,
-    Control,
-    State,
-    StateMachine,
-    Status,
-    Stop,
-)
-from nfo_sinus_driver.simulator.sinus_h.trips import LOST_COMMAND
 from nfo_sinus_driver.simulator.telegram1 import FieldbusWatch
+
+
+class Control(enum.IntFlag):
+    """STW1 [M3 §7.2.1]."""
+
+    ON = 1 << 0
+    NO_COAST_STOP = 1 << 1
+    NO_QUICK_STOP = 1 << 2
+    ENABLE_OPERATION = 1 << 3
+    ENABLE_RAMP = 1 << 4
+    UNFREEZE_RAMP = 1 << 5
+    ENABLE_SETPOINT = 1 << 6
+    FAULT_ACKNOWLEDGE = 1 << 7
+    CONTROL_BY_PLC = 1 << 10
+
+
+class Status(enum.IntFlag):
+    """ZSW1 [M3 §7.2.2]."""
+
+    READY_TO_SWITCH_ON = 1 << 0
+    READY_FOR_OPERATION = 1 << 1
+    OPERATION = 1 << 2
+    FAULT = 1 << 3
+    NO_COAST_STOP = 1 << 4
+    NO_QUICK_STOP = 1 << 5
+    SWITCHING_ON_INHIBITED = 1 << 6
+    WARNING = 1 << 7
+    SPEED_REACHED = 1 << 8
+    CONTROL_REQUESTED = 1 << 9
+
+
+class State(enum.Enum):
+    """The states of the module."""
+
+    SWITCHING_ON_INHIBITED = 'S1'
+    READY_FOR_SWITCHING_ON = 'S2'
+    READY_FOR_OPERATION = 'S3'
+    OPERATION = 'S4'
+
+
+class Order(enum.Enum):
+    """What bits 0 to 3 of STW1 command [M3 §6]; SwitchON is OperationDisable, too."""
+
+    COAST_STOP = enum.auto()
+    QUICK_STOP = enum.auto()
+    SWITCH_OFF = enum.auto()
+    SWITCH_ON = enum.auto()
+    OPERATION_ENABLE = enum.auto()
+
+    @classmethod
+    def of(cls, word: Control) -> Order:
+        """Return what a word commands."""
+        if not word & Control.NO_COAST_STOP:
+            return cls.COAST_STOP
+        if not word & Control.NO_QUICK_STOP:
+            return cls.QUICK_STOP
+        if not word & Control.ON:
+            return cls.SWITCH_OFF
+        return cls.OPERATION_ENABLE if word & Control.ENABLE_OPERATION else cls.SWITCH_ON
+
+
+_S1, _S2, _S3, _S4 = State
+#: The bits of each state [M3 §7.2.2].
+_PATTERNS = {
+    _S1: Status.SWITCHING_ON_INHIBITED,
+    _S2: Status.READY_TO_SWITCH_ON,
+    _S3: Status.READY_TO_SWITCH_ON | Status.READY_FOR_OPERATION,
+    _S4: Status.READY_TO_SWITCH_ON | Status.READY_FOR_OPERATION | Status.OPERATION,
+}
+#: The table of [M3 §6]. The diagram is missing, and with it perhaps exits that the table does not
+#: print [C65].
+_EXITS = {
+    (_S1, Order.SWITCH_OFF): _S2,
+    (_S2, Order.COAST_STOP): _S1,
+    (_S2, Order.QUICK_STOP): _S1,
+    (_S2, Order.SWITCH_ON): _S3,
+    (_S2, Order.OPERATION_ENABLE): _S3,
+    (_S3, Order.SWITCH_OFF): _S2,
+    (_S3, Order.OPERATION_ENABLE): _S4,
+    (_S4, Order.COAST_STOP): _S1,
+    (_S4, Order.QUICK_STOP): _S1,
+    (_S4, Order.SWITCH_ON): _S3,
+}
+#: What follows only where unlisted exits are taken as other drives of the profile have them; with
+#: LEVELS S1 is left, too, by a word that has been there all the time.
+NONE, PROFIDRIVE, LEVELS = 'none', 'profidrive', 'levels'
+_PROFIDRIVE = {
+    (_S3, Order.QUICK_STOP): _S1,
+    (_S3, Order.COAST_STOP): _S1,
+    (_S4, Order.SWITCH_OFF): _S2,
+}
+_UNLISTED = {
+    NONE: {},
+    PROFIDRIVE: _PROFIDRIVE,
+    LEVELS: {
+        **_PROFIDRIVE,
+        (_S1, Order.SWITCH_ON): _S2,
+        (_S1, Order.OPERATION_ENABLE): _S2,
+    },
+}
+
+
+class StateMachine:
+    """
+    The state of the module; one telegram leads to the next state at most.
+
+    :ivar state: where it is.
+    :ivar coasts: a motor that does not run any more runs free, else it stops as ADV-8 says.
+    """
+
+    def __init__(self, unlisted: str = NONE) -> None:
+        self.state = _S1
+        self.coasts = True
+        self._exits = {**_EXITS, **_UNLISTED[unlisted]}
+
+    def update(self, word: Control, *, inhibited: bool) -> None:
+        """Take the word of a telegram (inhibited: a fault keeps the module from switching on)."""
+        if not word & Control.CONTROL_BY_PLC:
+            # the whole word is ignored [M3 §7.2.1, C107]
+            return
+        order, before = Order.of(word), self.state
+        if not (inhibited and before is _S1):
+            self.state = self._exits.get((before, order), before)
+        if order is Order.COAST_STOP:
+            self.coasts = True
+        elif before is _S4 and self.state is not _S4:
+            self.coasts = False
+
+    def inhibit(self, *, coasts: bool) -> None:
+        """Fall back to S1: a fault, or STOP at the keypad."""
+        self.state, self.coasts = _S1, coasts
+
 
 #: How bits 1 and 2 of the status word are read [C63].
 STATE, WORD = 'state', 'word'
 #: What STOP at the keypad does while the fieldbus commands: no manual says.
 STOPS, IGNORED = 'stops', 'ignored'
-CHOICES = {
-    'unlisted_exits': (NONE, PROFIDRIVE, LEVELS),
-    'echo_bits': (STATE, WORD),
-    'keypad_stop': (STOPS, IGNORED),
-}
-KEYS = ('start', 'stop', 'reset')
 #: The ramp that forces the frequency to 0 goes by the Dec time; the least that a ramp takes (s).
 _LEAST_RAMP = 0.01
+
+
+@dataclass(frozen=True)
+class SinusHVariant(Variant):
+    """
+    One way to read the manual.
+
+    :ivar unlisted_exits: which exits there are that the table does not print: ``none``, those of
+        ``profidrive``: QuickStop and CoastStop lead out of S3, and SwitchOFF out of S4; with
+        ``levels`` SwitchON leads out of S1, too.
+    :ivar echo_bits: bits 1 and 2 of ZSW1 tell the ``state``, as the patterns have it, or are
+        those of the ``word`` that has been input, as the table of the bits has it [C63].
+    :ivar keypad_stop: whether STOP at the keypad stops the motor.
+    """
+
+    unlisted_exits: str = choice(
+        NONE, PROFIDRIVE, LEVELS, text='exits of its states that the manual does not list'
+    )
+    echo_bits: str = choice(
+        STATE, WORD, text='bits 1 and 2 of ZSW1 tell the state, or those of the control word'
+    )
+    keypad_stop: str = choice(
+        STOPS, IGNORED, text='what STOP at the keypad does while the fieldbus commands'
+    )
 
 
 class Lost(enum.Enum):
@@ -59,18 +198,13 @@ class SinusHControlUnit(ControlUnit):
     """
     Runs the motor of a Sinus H.
 
-    :param unlisted_exits: see :class:`StateMachine`.
-    :param echo_bits: bits 1 and 2 of ZSW1 tell the ``state``, as the patterns have it, or are
-        those of the ``word`` that has been input, as the table of the bits has it [C63].
-    :param keypad_stop: whether STOP at the keypad stops the motor.
-    :raises ValueError: one of these cannot be that.
-
     :ivar word: STW1, as it was input last.
     :ivar setpoint: of the last telegram (Hz).
     :ivar machine: the states of the module.
     :ivar fieldbus: the telegrams.
     """
 
+    variant: SinusHVariant
     word: Control
     setpoint: float
     machine: StateMachine
@@ -80,27 +214,8 @@ class SinusHControlUnit(ControlUnit):
     _held: float
     _keypad_runs: bool
 
-    def __init__(
-        self,
-        memory: Memory,
-        address: int,
-        *,
-        unlisted_exits: str = NONE,
-        echo_bits: str = STATE,
-        keypad_stop: str = STOPS,
-    ) -> None:
-        super().__init__(memory, address)
-        given = {
-            'unlisted_exits': unlisted_exits,
-            'echo_bits': echo_bits,
-            'keypad_stop': keypad_stop,
-        }
-        for name, value in given.items():
-            if value not in CHOICES[name]:
-                raise ValueError(f'{name}: choose one of {", ".join(CHOICES[name])}')
-        self._unlisted = unlisted_exits
-        self._echo_bits = echo_bits
-        self._keypad_stop = keypad_stop
+    def __init__(self, memory: Memory, address: int, variant: SinusHVariant) -> None:
+        super().__init__(memory, address, variant)
         self.fieldbus = FieldbusWatch()
         self.restart()
 
@@ -125,8 +240,8 @@ class SinusHControlUnit(ControlUnit):
     @property
     def status_word(self) -> Status:
         """ZSW1 [M3 §7.2.2]."""
-        status = PATTERNS[self.machine.state]
-        if self._echo_bits == WORD:
+        status = _PATTERNS[self.machine.state]
+        if self.variant.echo_bits == WORD:
             status &= ~(Status.READY_FOR_OPERATION | Status.OPERATION)
             status |= _if(self.word & Control.ON, Status.READY_FOR_OPERATION)
             status |= _if(self.word & Control.ENABLE_OPERATION, Status.OPERATION)
@@ -143,19 +258,6 @@ class SinusHControlUnit(ControlUnit):
         """The output frequency (0.01 Hz)."""
         return round(100 * abs(self.motor.frequency))
 
-    def write(self, key: str, raw: int) -> bool:
-        """Take nothing: no bus reaches a parameter here."""
-        return False
-
-    def show(self, key: str) -> int | None:
-        """Return nothing: what is stored is what is shown."""
-        return None
-
-    @property
-    def status_code(self) -> int:
-        """The fault that is active, else 0."""
-        return self.faults.shown
-
     # ---- what it does ----
 
     def restart(self) -> None:
@@ -163,7 +265,7 @@ class SinusHControlUnit(ControlUnit):
         self.initialised = False
         self.word = self._obeyed = Control(0)
         self.setpoint = 0.0
-        self.machine = StateMachine(self._unlisted)
+        self.machine = StateMachine(self.variant.unlisted_exits)
         self.fieldbus.forget()
         self._lost = Lost.NOTHING
         self._held = 0.0
@@ -172,21 +274,21 @@ class SinusHControlUnit(ControlUnit):
     def trip(self, code: int, *, cause_present: bool = False) -> None:
         """Let a fault happen: the module falls back to S1, the motor runs free."""
         super().trip(code, cause_present=cause_present)
-        self.machine.inhibit(Stop.COAST)
+        self.machine.inhibit(coasts=True)
         self._lost = Lost.NOTHING
         self._keypad_runs = False
 
     def press(self, key: str) -> None:
         """Press a key: start and stop of the keypad, or reset of a fault."""
-        commands = self._number(keypad.CMD_SOURCE)
+        commands = self.memory.raw(keypad.CMD_SOURCE)
         if key == 'reset':
             self.faults.acknowledge()
         elif key == 'start':
             self._keypad_runs = commands == 0 and not self.faults
         else:
             self._keypad_runs = False
-            if commands == keypad.FIELDBUS_COMMANDS and self._keypad_stop == STOPS:
-                self.machine.inhibit(Stop.BY_MODE)
+            if commands == keypad.FIELDBUS_COMMANDS and self.variant.keypad_stop == STOPS:
+                self.machine.inhibit(coasts=False)
         self.settle()
 
     def wait(self, dt: float) -> None:
@@ -196,12 +298,12 @@ class SinusHControlUnit(ControlUnit):
         if lost and self._lost is Lost.NOTHING and self._commanded:
             self._lose()
         if self._lost is Lost.BRAKES and not self.motor.driven:
-            self.trip(LOST_COMMAND)
+            self.trip(keypad.LOST_COMMAND)
 
     def _lose(self) -> None:
-        mode = self._number(keypad.LOST_CMD_MODE)
+        mode = self.memory.raw(keypad.LOST_CMD_MODE)
         if mode == keypad.FREE_RUN:
-            self.trip(LOST_COMMAND)
+            self.trip(keypad.LOST_COMMAND)
         elif mode == keypad.DECELERATE:
             self._lost = Lost.BRAKES
         elif mode != keypad.NONE:
@@ -215,7 +317,7 @@ class SinusHControlUnit(ControlUnit):
     @property
     def settled(self) -> bool:
         """Whether nothing happens by the clock alone."""
-        mode = self._number(keypad.LOST_CMD_MODE)
+        mode = self.memory.raw(keypad.LOST_CMD_MODE)
         watched = self._commanded and mode != keypad.NONE and self._lost is not Lost.HOLDS
         return not watched and self._lost is not Lost.BRAKES and not self._brakes
 
@@ -240,8 +342,8 @@ class SinusHControlUnit(ControlUnit):
     @property
     def _commanded(self) -> bool:
         """Whether the fieldbus lets the motor run."""
-        by_fieldbus = self._number(keypad.CMD_SOURCE) == keypad.FIELDBUS_COMMANDS
-        return by_fieldbus and self.machine.state is State.OPERATION
+        by_fieldbus = self.memory.raw(keypad.CMD_SOURCE) == keypad.FIELDBUS_COMMANDS
+        return by_fieldbus and self.machine.state is _S4
 
     @property
     def _runs(self) -> bool:
@@ -254,15 +356,15 @@ class SinusHControlUnit(ControlUnit):
         motor = self.motor
         if self._runs or not motor.driven or motor.at_zero or self.faults:
             return False
-        by_mode = self._number(keypad.STOP_MODE) == keypad.DEC
-        return by_mode and self.initialised and self.machine.stop is Stop.BY_MODE
+        by_mode = self.memory.raw(keypad.STOP_MODE) == keypad.DEC
+        return by_mode and self.initialised and not self.machine.coasts
 
     def _demand(self) -> float:
         """The frequency to ramp to (Hz)."""
         if self._lost is Lost.HOLDS:
             return min(self._held, self.memory.number(keypad.MAX_FREQ))
         reference = self.memory.number(keypad.FREQUENCY)
-        if self._number(keypad.FREQ_REF_SRC) == keypad.FIELDBUS_REFERENCE:
+        if self.memory.raw(keypad.FREQ_REF_SRC) == keypad.FIELDBUS_REFERENCE:
             reference = self.setpoint
         if self._commanded:
             word = self._obeyed
@@ -271,9 +373,6 @@ class SinusHControlUnit(ControlUnit):
             elif not word & Control.UNFREEZE_RAMP:
                 reference = self.motor.ramp
         return min(reference, self.memory.number(keypad.MAX_FREQ))
-
-    def _number(self, key: str) -> int:
-        return self.memory.raw(key)
 
     # ---- for tests and people ----
 

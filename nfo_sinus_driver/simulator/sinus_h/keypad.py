@@ -2,26 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The settings of a Sinus H at its keypad, by the groups and numbers of [M3 §4].
+The settings and trips of a Sinus H at its keypad, by the groups and numbers of [M3 §4, §9].
 
-No telegram reaches them. What [M3] does not print is marked; the maker's manual of the drive has
-it, but its defaults are not known here.
+No telegram reaches them, and none tells which trip it is. What [M3] does not print is marked; the
+maker's manual of the drive has it, but its defaults are not known here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
-from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
+from nfo_sinus_driver.catalog import Access, Family, Kind, Parameter, StatusCode, Value
 from nfo_sinus_driver.catalog.codec import codec_of
 from nfo_sinus_driver.catalog.parameter import Address
-from nfo_sinus_driver.simulator.sinus_h.trips import TRIPS
 
 _KEYPAD = 'keypad'
-_HUNDREDTH = Fraction(1, 100)
-_TENTH = Fraction(1, 10)
 
 CMD_SOURCE = 'drv.cmd_source'
 FREQ_REF_SRC = 'drv.freq_ref_src'
@@ -86,78 +84,73 @@ FACTORY: Mapping[str, Value] = {
     LOST_CMD_TIME: 1.0,
 }
 
+#: By their fault messages. The bit positions behind them are not printed [C69].
+LOST_COMMAND = 35
+_TRIPS: Mapping[int, str] = {
+    1: 'Overload Trip',
+    2: 'Underload Trip',
+    3: 'Inverter Overload Trip',
+    4: 'E-Thermal Trip',
+    5: 'Ground Fault Trip',
+    6: 'Missing Output Phase Trip',
+    7: 'Missing Input Phase Trip',
+    10: 'NTC Trip',
+    11: 'Overcurrent Trip',
+    12: 'Overvoltage Trip',
+    13: 'External Trip',
+    14: 'Arm Short',
+    15: 'Overheat Trip',
+    16: 'Fuse Open Trip',
+    17: 'MC Fail Trip',
+    19: 'PTC (Thermal sensor) Trip',
+    20: 'FAN Trip',
+    22: 'Parameter Write Error',
+    23: 'Pre PID Fail',
+    24: 'IO Board Connection Fault',
+    25: 'External Brake Trip',
+    26: 'No Motor Trip',
+    27: 'Option Card Connection Fault',
+    29: 'Safety A Trip',
+    30: 'Safety B Trip',
+    33: 'BX',
+    34: 'LV',
+    LOST_COMMAND: 'Lost Command',
+    36: 'Keypad Lost Command',
+    49: 'ADC Error',
+    50: 'EEPROM Error',
+    51: 'Watchdog-1 Error',
+    52: 'Watchdog-2 Error',
+    54: 'QueueFull',
+    64: 'Internal Communication Error between the Inverter and the Option Card',
+}
 
-def _settings() -> Iterator[Parameter]:
-    yield _choice(CMD_SOURCE, 'Cmd Source', 'DRV', 6, _COMMANDS, 'M3 §5.2.1')
-    yield _choice(FREQ_REF_SRC, 'Freq Ref Src', 'DRV', 7, _REFERENCES, 'M3 §5.2.2')
-    yield _number(FREQUENCY, 'Cmd Frequency', 'DRV', 1, _HUNDREDTH, 'Hz', 0, 400, '')
-    yield _number(MAX_FREQ, 'Max Freq', 'DRV', 20, _HUNDREDTH, 'Hz', 40, 400, '')
-    yield _number(ACC_TIME, 'Acc Time', 'DRV', 3, _TENTH, 's', 0, 600, '')
-    yield _number(DEC_TIME, 'Dec Time', 'DRV', 4, _TENTH, 's', 0, 600, '')
-    yield _choice(STOP_MODE, 'Stop Mode', 'ADV', 8, _STOP_MODES, 'M3 §6')
-    yield _choice(TELEGRAM, 'opt para-13', 'COM', 22, _TELEGRAMS, 'M3 §5.3.4')
-    yield _number(TRIP_DEC_TIME, 'Trip Dec Time', 'PRT', 7, _TENTH, 's', 0, 600, 'M3 §5.4.1')
-    yield _choice(LOST_CMD_MODE, 'Lost Cmd Mode', 'PRT', 12, _LOST, 'M3 §5.4.1')
-    yield _number(
-        LOST_CMD_TIME, 'Lost Cmd Time', 'PRT', 13, _TENTH, 's', Fraction(1, 10), 120, 'M3 §5.4.2'
-    )
-    # 0 is its default, and out of its range [C66]
-    yield _number(LOST_PRESET_F, 'Lost Preset F', 'PRT', 14, _HUNDREDTH, 'Hz', 0, 60, 'M3 §5.4.3')
 
-
-def with_keypad(model: Family) -> Family:
-    """Return the tables of the family with the settings and the trips that its keypad shows."""
-    own = {setting.key: setting for setting in _settings()}
-    codes = {**model.status_codes, **TRIPS}
-    return replace(model, parameters={**model, **own}, status_codes=codes)
-
-
-def _choice(
-    key: str, name: str, group: str, number: int, labels: Mapping[int, str], source: str
-) -> Parameter:
-    return _parameter(key, name, group, number, labels=labels, source=source)
-
-
-def _number(
+def _setting(
     key: str,
+    place: str,
     name: str,
-    group: str,
-    number: int,
-    factor: Fraction,
-    unit: str,
-    minimum: Fraction | int,
-    maximum: int,
     source: str,
-) -> Parameter:
-    setting = _parameter(key, name, group, number, factor=factor, source=source)
-    return replace(
-        setting, unit=unit, minimum=Fraction(minimum), maximum=Fraction(maximum), decimals=2
-    )
-
-
-def _parameter(
-    key: str,
-    name: str,
-    group: str,
-    number: int,
-    *,
     labels: Mapping[int, str] | None = None,
-    factor: Fraction = Fraction(1),
-    source: str,
+    *,
+    decimals: int = 0,
+    unit: str = '',
+    span: tuple[Fraction | int, int] | None = None,
 ) -> Parameter:
+    """Return a setting; ``place`` is its group and number, as the keypad shows them."""
+    group, _, number = place.partition('-')
+    factor = Fraction(1, 10**decimals)
     codec = codec_of('uint16_be')
-    address = Address(_KEYPAD, group, number, None, codec, factor, source)
     return Parameter(
         key=key,
         name=name,
         group=group,
-        addresses={_KEYPAD: address},
+        addresses={_KEYPAD: Address(_KEYPAD, group, int(number), None, codec, factor, source)},
         scale='',
-        unit='',
-        minimum=None,
-        maximum=None,
+        unit=unit,
+        minimum=Fraction(span[0]) if span else None,
+        maximum=Fraction(span[1]) if span else None,
         steps=(),
-        decimals=0,
+        decimals=2 if span else 0,
         labels=labels or {},
         access=Access.READ_WRITE,
         stopped=False,
@@ -166,4 +159,43 @@ def _parameter(
         option='',
         description='',
         source=source,
+    )
+
+
+_SECONDS: Any = {'decimals': 1, 'unit': 's'}
+_HERTZ: Any = {'decimals': 2, 'unit': 'Hz'}
+_SETTINGS = (
+    _setting(CMD_SOURCE, 'DRV-6', 'Cmd Source', 'M3 §5.2.1', _COMMANDS),
+    _setting(FREQ_REF_SRC, 'DRV-7', 'Freq Ref Src', 'M3 §5.2.2', _REFERENCES),
+    _setting(FREQUENCY, 'DRV-1', 'Cmd Frequency', '', span=(0, 400), **_HERTZ),
+    _setting(MAX_FREQ, 'DRV-20', 'Max Freq', '', span=(40, 400), **_HERTZ),
+    _setting(ACC_TIME, 'DRV-3', 'Acc Time', '', span=(0, 600), **_SECONDS),
+    _setting(DEC_TIME, 'DRV-4', 'Dec Time', '', span=(0, 600), **_SECONDS),
+    _setting(STOP_MODE, 'ADV-8', 'Stop Mode', 'M3 §6', _STOP_MODES),
+    _setting(TELEGRAM, 'COM-22', 'opt para-13', 'M3 §5.3.4', _TELEGRAMS),
+    _setting(TRIP_DEC_TIME, 'PRT-7', 'Trip Dec Time', 'M3 §5.4.1', span=(0, 600), **_SECONDS),
+    _setting(LOST_CMD_MODE, 'PRT-12', 'Lost Cmd Mode', 'M3 §5.4.1', _LOST),
+    _setting(
+        LOST_CMD_TIME,
+        'PRT-13',
+        'Lost Cmd Time',
+        'M3 §5.4.2',
+        span=(Fraction(1, 10), 120),
+        **_SECONDS,
+    ),
+    # 0 is its default, and out of its range [C66]
+    _setting(LOST_PRESET_F, 'PRT-14', 'Lost Preset F', 'M3 §5.4.3', span=(0, 60), **_HERTZ),
+)
+
+
+def with_keypad(model: Family) -> Family:
+    """Return the tables of the family with the settings and the trips that its keypad shows."""
+    trips = {
+        number: StatusCode(number, name, kind=Kind.FAULT, requires_ack=True, description=name)
+        for number, name in _TRIPS.items()
+    }
+    return replace(
+        model,
+        parameters={**model, **{setting.key: setting for setting in _SETTINGS}},
+        status_codes={**model.status_codes, **trips},
     )

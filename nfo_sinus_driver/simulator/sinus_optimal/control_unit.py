@@ -16,17 +16,21 @@ does not expect it:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 from nfo_sinus_driver.families.sinus_optimal.words import Control, Mode, Smode, Status, state_of
+from nfo_sinus_driver.simulator.control_unit import choice
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
 from nfo_sinus_driver.simulator.motor import Regulation, nearest
 from nfo_sinus_driver.simulator.sinus.control_unit import (
+    DROPS,
     KEEPS,
+    LEVELS,
     TERMINAL_SHARE,
     SinusControlUnit,
+    SinusVariant,
     Source,
-    Variant,
 )
 from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
 
@@ -39,19 +43,20 @@ _FULL_FREQUENCY = 50.0
 _MOST_FREQUENCY, _MOST_SPEEDS = 150.0, 3
 
 
-#: How a command of the control word is taken: when its bit rises, or as long as it stands.
-EDGES, LEVELS = 'edges', 'levels'
-COMMANDS = (EDGES, LEVELS)
+@dataclass(frozen=True)
+class OptimalVariant(SinusVariant):
+    """An Optimal: [M1] knows no refusal in a fault, and no table that ends a run command."""
+
+    run_command_in_fault: str = choice(
+        KEEPS, DROPS, text='what an acknowledged fault does to a run command'
+    )
 
 
 class OptimalControlUnit(SinusControlUnit):
     """
     Runs the motor of an Optimal.
 
-    :param commands: bits of the control word count as ``edges`` or as ``levels``: no manual says.
-        One that takes levels goes on by what stands when it has power again.
-    :param options: those of every Sinus.
-    :raises ValueError: an option cannot be that.
+    One that takes commands by levels goes on by what stands when it has power again.
     """
 
     setpoint_of: ClassVar[Mapping[int, str]] = {
@@ -60,18 +65,12 @@ class OptimalControlUnit(SinusControlUnit):
     }
     setpoints = frozenset(setpoint_of.values())
     delayed = 54
-    # [M1] knows no refusal in a fault, and no table that ends a run command
-    usual = Variant(run_command_in_fault=KEEPS)
     run_command = 'fieldbus.smode'
     run_codes = frozenset(Smode)
 
-    def __init__(
-        self, memory: Memory, address: int, *, commands: str = EDGES, **options: Any
-    ) -> None:
-        if commands not in COMMANDS:
-            raise ValueError(f'commands: choose one of {", ".join(COMMANDS)}')
-        super().__init__(memory, address, SinusFaults(memory.model), **options)
-        self._by_level = commands == LEVELS
+    def __init__(self, memory: Memory, address: int, variant: OptimalVariant) -> None:
+        super().__init__(memory, address, variant, SinusFaults(memory.model))
+        self._by_level = variant.commands == LEVELS
         self._steps = ControlSteps(by_level=self._by_level)
         self._running = False
         self._sleeping = False

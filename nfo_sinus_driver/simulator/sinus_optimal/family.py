@@ -1,24 +1,42 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the simulator has to know of an Optimal."""
+"""What the simulator has to know of an Optimal: its tables, its Modbus and its telegram 1."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from nfo_sinus_driver.catalog import Family, load_family
+from nfo_sinus_driver.families.sinus_optimal.words import Control
+from nfo_sinus_driver.simulator import telegram1
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
 from nfo_sinus_driver.simulator.modbus import READ_INPUT
 from nfo_sinus_driver.simulator.sinus import parts
 from nfo_sinus_driver.simulator.sinus.control_unit import FACTORY
-from nfo_sinus_driver.simulator.sinus_optimal import telegram1
-from nfo_sinus_driver.simulator.sinus_optimal.control_unit import OptimalControlUnit
+from nfo_sinus_driver.simulator.sinus_optimal.control_unit import (
+    OptimalControlUnit,
+    OptimalVariant,
+)
+from nfo_sinus_driver.simulator.telegram1 import clipped
 
 #: Settings that need no value of their own: they begin at the least that is allowed.
 _MORE = ('control.run_dly', 'control.f_sleep')
 #: [M1] speaks of a Frequency mode and a Speed mode.
 _MODES = {0: 'Freque', 3: 'Speed'}
+
+
+#: The bit by which a PLC takes control: another one than in Drive Control.
+PLC_CONTROL = 1 << 10
+#: The bits that are the same in both.
+_SAME = (
+    Control.SWITCH_ON
+    | Control.ECHO_1
+    | Control.ECHO_2
+    | Control.ENABLE
+    | Control.FAULT_ACK
+)
 
 
 class ModbusServer(parts.ModbusServer):
@@ -40,11 +58,27 @@ def _machine(model: Family) -> Family:
     return replace(model, parameters={**hidden, **model})
 
 
+class TelegramServer(telegram1.Server):
+    """The fieldbus side of one Optimal."""
+
+    def __init__(self, drive: SimulatedDrive) -> None:
+        assert isinstance(drive.control_unit, OptimalControlUnit)
+        self._unit = drive.control_unit
+
+    def exchange(self, stw1: int, setpoint: int) -> tuple[int, int]:
+        """Take control word and set-point; return status word and actual value."""
+        word = Control(stw1) & _SAME
+        if stw1 & PLC_CONTROL:
+            word |= Control.BUS_CONTROL
+        self._unit.take_telegram(int(word), setpoint)
+        return int(self._unit.status_word), clipped(self._unit.telegram_actual)
+
+
 FAMILY = SimulatedFamily(
     control_unit=OptimalControlUnit,
+    variant=OptimalVariant,
     factory=FACTORY,
     machine=_machine,
-    servers={'modbus': ModbusServer, 'telegram1': telegram1.Server},
-    options=(parts.COMMANDS, *parts.OPTIONS),
-    verbs=parts.VERBS,
+    servers={'modbus': ModbusServer, 'telegram1': TelegramServer},
+    injections=parts.SinusInjections,
 )

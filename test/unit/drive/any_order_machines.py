@@ -15,8 +15,8 @@ from hypothesis.stateful import initialize, precondition, rule
 
 from nfo_sinus_driver.drive import Procedure
 from nfo_sinus_driver.simulator.family import load
-from nfo_sinus_driver.simulator.movitrac31.codes import Bit, Mode
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE, FUNCTION_BITS, SETPOINT
+from nfo_sinus_driver.simulator.movitrac31.parameters import Bit, Mode
 from nfo_sinus_driver.simulator.sinus.control_unit import (
     ALL,
     DROPS,
@@ -26,7 +26,7 @@ from nfo_sinus_driver.simulator.sinus.control_unit import (
     SCMD,
     TAKEN,
 )
-from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import TRIES
 
 _CONTROL = 'fieldbus.drive_control'
 _SIO_ERR = b'\x04!E00AC\x05'.hex()

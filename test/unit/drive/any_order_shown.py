@@ -16,13 +16,13 @@ from typing import Any
 
 from support.rig import Rig
 
-from nfo_sinus_driver.simulator.movitrac31.codes import Bit, Mode, Number
 from nfo_sinus_driver.simulator.movitrac31.commands import (
     CONTROL_MODE,
     FUNCTION_BITS,
     MANUAL,
     SETPOINT,
 )
+from nfo_sinus_driver.simulator.movitrac31.parameters import Bit, Mode, Number
 from nfo_sinus_driver.simulator.sinus.control_unit import ALL, NOTHING, Source
 
 #: What commands a drive of NFO [M0 §7], [M1]; of the mask and its word, the latter comes last.

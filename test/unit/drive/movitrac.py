@@ -13,8 +13,8 @@ from support.rig import Rig
 
 from nfo_sinus_driver.drive import Drive, DriveError
 from nfo_sinus_driver.simulator.family import load
-from nfo_sinus_driver.simulator.movitrac31.codes import Bit
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE, FUNCTION_BITS
+from nfo_sinus_driver.simulator.movitrac31.parameters import Bit
 
 OVERCURRENT = 101
 DIRECTIONS = Bit.CW | Bit.CCW

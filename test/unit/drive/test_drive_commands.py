@@ -12,7 +12,7 @@ from support.rig import Rig
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
-from nfo_sinus_driver.simulator.classic_frames import LineError
+from nfo_sinus_driver.simulator.classic import LineError
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 

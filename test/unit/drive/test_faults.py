@@ -13,7 +13,7 @@ from support.rig import Rig
 from nfo_sinus_driver.catalog import Family, Kind, Meaning, load_family
 from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import TRIES
 
 OVERLOAD, OVERHEATED, SIO_FAIL = 5, 3, 14
 MODE, WORD, MASK = (f'fieldbus.{key}' for key in ('mode', 'drive_control', 'drv_ctrl_write_mask'))

@@ -14,8 +14,8 @@ from support.rig import Rig
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive import Cause, Severity
-from nfo_sinus_driver.simulator.movitrac31.codes import Mode
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
+from nfo_sinus_driver.simulator.movitrac31.parameters import Mode
 
 KEY = 'serial.pc_timeout'
 #: P600 to P609 of terminals that only an option card has, P760 and P880 likewise.

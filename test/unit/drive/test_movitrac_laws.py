@@ -19,8 +19,8 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause, Drive, Severity
-from nfo_sinus_driver.simulator.movitrac31.codes import PC_TIMEOUT, Bit, Mode
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE, SETPOINT
+from nfo_sinus_driver.simulator.movitrac31.parameters import PC_TIMEOUT, Bit, Mode
 
 BITS = 'fieldbus.function_bits'
 each_switch = pytest.mark.parametrize('switch', SWITCHES)

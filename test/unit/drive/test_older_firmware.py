@@ -23,9 +23,9 @@ from nfo_sinus_driver.catalog import Fact, Kind, Role
 from nfo_sinus_driver.drive import Cause, DriveError, Severity
 from nfo_sinus_driver.drive.tuning import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
-from nfo_sinus_driver.simulator.classic_frames import LineError
+from nfo_sinus_driver.simulator.classic import LineError
 from nfo_sinus_driver.simulator.memory import Reason, Refused
-from nfo_sinus_driver.simulator.sinus_g2.classic import Server
+from nfo_sinus_driver.simulator.sinus_g2.servers import ClassicServer as Server
 
 STOP, EXT, BUS = 1, 2, 3
 SIO_FAIL, OFF, STANDBY, LIMIT = 14, 24, 37, 27

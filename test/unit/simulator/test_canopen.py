@@ -10,11 +10,10 @@ from support.addresses import packed, words_of
 
 from nfo_sinus_driver.catalog import Access, load_family
 from nfo_sinus_driver.simulator.can_frames import Frame, bits
-from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.family import load, simulated_drive
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.modbus import server as modbus_server
 from nfo_sinus_driver.simulator.sdo import Abort, AbortCode
-from nfo_sinus_driver.simulator.sinus_g2.canopen_shape import OPTIONS
 
 READ_VENDOR, READ_DATA = '4018100100000000', bytes.fromhex('4018100100000000')
 VENDOR = '431810011b000000'
@@ -402,8 +401,7 @@ def test_arrays_begin_at_one_or_at_zero_and_one_element_acknowledges():
     assert bus.read(ACCEL, 1) == (5000).to_bytes(4, 'little')
     for options, other, acknowledges in (
         ({'canopen_sub_indices': 'from_zero'}, 1, 0),
-        ({'canopen_acknowledging': 'first'}, 2, 1),
-        ({'canopen_acknowledging': 'second'}, 1, 2),
+        ({}, 2, 1),
     ):
         bus = Bus(**options)
         bus.drive.trip(EXT_FAIL)
@@ -424,7 +422,7 @@ def test_where_the_error_log_stands():
 
 
 def test_every_choice_is_possible_and_no_other():
-    for option in OPTIONS:
+    for option in load('sinus_g2').options:
         for choice in option.choices:
             assert there(Bus(**{option.name: choice}), MODE)
         with pytest.raises(ValueError, match=f'{option.name}: choose one of'):

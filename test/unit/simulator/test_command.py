@@ -114,7 +114,7 @@ def test_it_serves_several_lines_with_their_options(start, folder, open_master):
     links = [str(folder / name) for name in ('nfo0', 'nfo1')]
     _, line = start(
         *('--protocol', 'classic', '--link', links[0], '--also', f'modbus_ascii:{links[1]}'),
-        *('--also', 'modbus_tcp:0', '--dialect', '5.0', '--lenient', '--echo', '--paced'),
+        *('--also', 'modbus_tcp:0', '--dialect', '5.0', '--echo', '--paced'),
         *('--gateway-timeout', '0.5', '--turnaround', '0.01'),
     )
     assert re.fullmatch(

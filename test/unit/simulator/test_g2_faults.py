@@ -8,9 +8,8 @@ import pytest
 from nfo_sinus_driver.catalog import Kind, load_family
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.sinus.control_unit import CHOICES, Variant
-from nfo_sinus_driver.simulator.sinus_g2.self_restart import TRIES
-from nfo_sinus_driver.simulator.sinus_g2.tuning import PROCEDURES
+from nfo_sinus_driver.simulator.sinus.control_unit import SinusVariant
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import PROCEDURES, TRIES
 
 MODEL = load_family('sinus_g2')
 FAULTS = [code for code in range(48) if MODEL.status_code(code).kind is Kind.FAULT]
@@ -132,9 +131,9 @@ def test_what_is_refused_while_a_fault_is_active_is_an_option(make_bench):
 
 
 def test_a_variant_that_there_is_not():
-    for name in CHOICES:
+    for name, _, _ in SinusVariant.options():
         with pytest.raises(ValueError, match=f'{name}: choose one of'):
-            Variant(**{name: 'sometimes'})
+            SinusVariant(**{name: 'sometimes'})
 
 
 def test_sio_fail_is_acknowledged_by_mode_stop_alone(make_bench):

@@ -15,7 +15,7 @@ import time
 import pytest
 
 from nfo_sinus_driver.simulator.control import Client, ControlError
-from nfo_sinus_driver.simulator.injections import VERBS
+from nfo_sinus_driver.simulator.family import every_injection
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.simulator import Simulator
 
@@ -158,8 +158,9 @@ def test_what_cannot_happen_is_said(served):
         client.state()
     with pytest.raises(TimeoutError, match=r"not within 0\.05 s.*'mode': 1"):
         client.wait_for(lambda state: state['turning'], timeout=0.05, address=1)
-    assert all(verb.help for verb in VERBS.values())
-    assert all(argument.help for verb in VERBS.values() for argument in verb.arguments)
+    known = every_injection().values()
+    assert all(one.help for one in known)
+    assert all(argument.help for one in known for argument in one.arguments)
 
 
 def test_a_client_says_when_there_is_no_simulator(link, folder):

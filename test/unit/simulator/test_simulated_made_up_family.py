@@ -9,7 +9,7 @@ import struct
 import pytest
 
 from nfo_sinus_driver import families, simulator as room
-from nfo_sinus_driver.simulator.family import every_verb, simulated_drive
+from nfo_sinus_driver.simulator.family import every_injection, simulated_drive
 from nfo_sinus_driver.simulator.main import inject, main
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.simulator import Simulator
@@ -129,11 +129,11 @@ def test_over_a_line(open_master):
 
 
 def test_the_command_line_offers_it(capsys):
-    assert {'heat', 'sio-error'} <= every_verb().keys()
-    for command, argument, offered in [
-        (main, '--help', '--most {50,400}'),
-        (inject, '--help', 'let it be too hot'),
-    ]:
+    assert {'heat', 'sio-error'} <= every_injection().keys()
+    assert main(['--help-all']) == 0
+    assert '--most {400,50}' in capsys.readouterr().out
+    for command, offered in [(main, '--help-all'), (inject, 'let it be too hot')]:
         with pytest.raises(SystemExit):
-            command([argument])
-        assert offered in capsys.readouterr().out
+            command(['--help'])
+        shown = capsys.readouterr().out
+        assert offered in shown and '--most' not in shown

@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import enum
-from typing import Any
+from typing import Annotated, Any
 
-from nfo_sinus_driver.simulator.control_unit import ControlUnit
-from nfo_sinus_driver.simulator.family import Option, SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Argument, Verb
+from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
+from nfo_sinus_driver.simulator.family import SimulatedFamily
+from nfo_sinus_driver.simulator.injections import Injections
 from nfo_sinus_driver.simulator.memory import Memory
 
 
@@ -30,16 +31,19 @@ class Told(enum.IntFlag):
     REMOTE = 1 << 13
 
 
+@dataclass(frozen=True)
+class AcmeVariant(Variant):
+    """One Acme."""
+
+    most: str = choice('400', '50', text='the greatest set-point that is followed (Hz)')
+
+
 class AcmeControlUnit(ControlUnit):
-    """
-    Takes the control word.
+    """Takes the control word."""
 
-    :param most: the greatest set-point that it follows (Hz).
-    """
-
-    def __init__(self, memory: Memory, address: int, *, most: str = '400') -> None:
-        super().__init__(memory, address)
-        self._most = float(most)
+    def __init__(self, memory: Memory, address: int, variant: AcmeVariant) -> None:
+        super().__init__(memory, address, variant)
+        self._most = float(variant.most)
         self._word = Word(0)
 
     def write(self, key: str, raw: int) -> bool:
@@ -96,15 +100,17 @@ class AcmeControlUnit(ControlUnit):
         return {'code': self.status_code, 'word': int(self._word)}
 
 
+class AcmeInjections(Injections):
+    """What else can be made to happen to it."""
+
+    def heat(self, lasts: Annotated[bool, 'it stays so'] = False) -> None:
+        """Let it be too hot."""
+        self._drive.trip(70, cause_present=lasts)
+
+
 FAMILY = SimulatedFamily(
     control_unit=AcmeControlUnit,
+    variant=AcmeVariant,
     factory={'ramp.up': 1.0},
-    options=(Option('most', 'the greatest set-point that is followed', ('50', '400')),),
-    verbs={
-        'heat': Verb(
-            'let it be too hot',
-            lambda target, given: target.one.trip(70, cause_present=given['lasts']),
-            (Argument('lasts', bool, 'it stays so', False),),
-        )
-    },
+    injections=AcmeInjections,
 )

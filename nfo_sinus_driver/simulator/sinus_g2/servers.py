@@ -1,0 +1,429 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What a G2 answers, by protocol: Modbus [M0 §6.2], Classic [M0 §6.1], CANopen [M0 §6.4], telegram 1.
+
+A Classic message that cannot be carried out sets a flag of SioErr, and while the bus has control
+that is a serial fault: the motor coasts, MODE becomes Stop [M0 §6.1.5]. What it has of CANopen's
+communication profile, and how its values stand there, the manual does not say: see
+:class:`~.firmware.G2Variant`; the objects of DS402 [M0 table 11] are not there. The words of
+telegram 1 are those of PROFIdrive [C111], or DriveControl and DriveStatus [M0 tables 14 to 16];
+set-point and actual value are scaled as the parameters are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import enum
+import functools
+import zlib
+
+from nfo_sinus_driver.catalog import Access, Family, Parameter, to_bytes, to_words
+from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd
+from nfo_sinus_driver.simulator import canopen, classic, telegram1
+from nfo_sinus_driver.simulator.canopen import Entries, Entry, Identity
+from nfo_sinus_driver.simulator.classic import LineError, Wrong
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, carried, kept
+from nfo_sinus_driver.simulator.motor import measure
+from nfo_sinus_driver.simulator.sinus import parts
+from nfo_sinus_driver.simulator.sinus.control_unit import LEVELS
+from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
+from nfo_sinus_driver.simulator.sinus_g2.firmware import (
+    DRIVECONTROL,
+    FROM_ONE,
+    HELD,
+    NARROW,
+    NONE,
+    WIDE,
+)
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
+
+# ---- Modbus ----
+
+_REVISION_LENGTH = 17
+_MODEL_LENGTH = 8
+
+
+class ModbusServer(parts.ModbusServer):
+    """The Modbus side of one G2, which tells who it is."""
+
+    functions = parts.ModbusServer.functions | parts.NEWER
+
+    def __init__(self, drive: SimulatedDrive) -> None:
+        super().__init__(drive)
+        self._objects = _device_objects(drive.memory)
+
+    def device_objects(self) -> Mapping[int, bytes]:
+        """Return the objects of Read Device Identification, by their numbers."""
+        return self._objects
+
+
+def _device_objects(memory: Memory) -> Mapping[int, bytes]:
+    """Return the objects of Read Device Identification, by their numbers [M0 §6.2.4]."""
+    versions = f' {memory.number("fieldbus.sw_ver"):.2f} / {memory.number("fieldbus.nfo_ver"):.0f} '
+    texts = (
+        'NFO Drives AB',
+        '',
+        versions.ljust(_REVISION_LENGTH),
+        'http://www.nfo.se',
+        'NFO Sinus',
+        _model(memory.number('motor.p_nom'), memory.number('motor.u_nom')),
+        '',
+    )
+    return {number: text.encode('ascii') for number, text in enumerate(texts)}
+
+
+def _model(power: float, voltage: float) -> str:
+    """Return power and voltage in 8 characters, such as 1.50/400 or 11.0/400."""
+    fitting = (f'{power:.{decimals}f}/{voltage:.0f}' for decimals in (2, 1, 0))
+    return next(text for text in fitting if len(text) <= _MODEL_LENGTH).ljust(_MODEL_LENGTH)
+
+
+# ---- Classic ----
+
+#: Counters of 24 bits [C26].
+_COUNTERS = frozenset({'status.op_time', 'status.rn_time', 'status.br_time'})
+_REFERENCES = frozenset({'status.frq_set', 'status.spd_set', 'status.trq_set', 'status.reg_set'})
+_FLAGS: Mapping[Reason, LineError] = {
+    # there are no functions here, only parameters
+    Reason.FUNCTION: LineError.UNKNOWN,
+    Reason.ADDRESS: LineError.UNKNOWN,
+    Reason.VALUE: LineError.OUT_OF_RANGE,
+    Reason.STATE: LineError.NOT_PERMITTED,
+}
+
+
+class ClassicServer(classic.Server):
+    """The Classic side of one G2; so many times yet a counter ``tears`` while it is read."""
+
+    def __init__(self, drive: SimulatedDrive) -> None:
+        assert isinstance(drive.control_unit, G2ControlUnit)
+        self._drive = drive
+        self._unit = drive.control_unit
+        self._firmware = self._unit.firmware
+        self._ids = _ids(drive.model)
+        self.own_address = self._firmware.own_address
+        self.lower_case = self._firmware.lower_case
+        self.tears = 0
+
+    def enquiry(self, id_: int) -> int:
+        """Return the word that stands at an id."""
+        log = self._drive.model.error_logs['classic']
+        entry, position = divmod(id_ - log.first, log.stride)
+        if 0 <= entry < self._firmware.log_size:
+            return to_words(log.codec.encode(self._drive.faults.log_entry(entry)))[position]
+        parameter, position = self._find(id_)
+        if parameter.access is Access.WRITE:
+            raise Wrong(LineError.UNREADABLE)
+        try:
+            raw = self._read(parameter.key)
+        except Refused as refused:
+            raise Wrong(_FLAGS[refused.reason]) from refused
+        raw *= 10 if parameter.key in self._firmware.tenths else 1
+        if parameter.key in _COUNTERS:
+            # nobody says whether the drive has more than the 24 bits that count [C26]
+            high = 0xFF if self._firmware.short_counters else 0xFFFF
+            raw = self._drive.read_raw(parameter.key)
+            words: tuple[int, ...] = (raw & 0xFFFF, raw >> 16 & high)
+        else:
+            words = to_words(parameter.at('classic').number.encode(raw))
+        if len(words) > 1 and self.tears:
+            role, factor = self._drive.model.role_of.get(parameter.key), parameter.factor('classic')
+            self.tears -= self._drive.counters.carry(role, float(factor))
+        return words[position]
+
+    def select(self, id_: int, word: int, *, to_all: bool) -> None:
+        """Set the parameter at an id."""
+        drive, firmware = self._drive, self._firmware
+        parameter, _ = self._find(id_)
+        key = parameter.key
+        closed = key in _REFERENCES and not firmware.sets_references
+        if closed or parameter.access not in (Access.WRITE, Access.READ_WRITE):
+            raise Wrong(LineError.UNWRITABLE)
+        raw = parameter.at('classic').number.decode(to_bytes([word]))
+        if key == 'fieldbus.scmd':
+            raw = self._understood(raw)
+        if drive.faults and not self._in_spite_of_a_fault(key, raw, to_all):
+            raise Wrong(LineError.BLOCKED)
+        if firmware.bus_only and not self._permitted(key, raw):
+            raise Wrong(LineError.NOT_PERMITTED)
+        if key in firmware.codes and raw not in firmware.codes[key]:
+            raise Wrong(LineError.OUT_OF_RANGE)
+        if key == 'serial.address' and raw > firmware.most_address:
+            raise Wrong(LineError.OUT_OF_RANGE)
+        try:
+            drive.write_raw(key, kept(parameter, raw, 'classic'))
+        except Refused as refused:
+            blocked = refused.reason is Reason.STATE and drive.faults
+            raise Wrong(LineError.BLOCKED if blocked else _FLAGS[refused.reason]) from refused
+        self._unit.written(key, 'classic')
+
+    def refused(self, flag: LineError) -> bool:
+        """Set the flag of SioErr; NAK but for what did not arrive whole."""
+        self._unit.serial_error(flag)
+        # what did not arrive whole has not arrived; of a check sum [M2 §6] thinks otherwise
+        damage = LineError(0) if self._firmware.naks_damage else LineError.CHECK_SUM
+        return not flag & (LineError.STRUCTURE | damage)
+
+    def _in_spite_of_a_fault(self, key: str, raw: int, to_all: bool) -> bool:
+        """Whether a SELECT is one of those that an active fault does not keep off [M0 §6.1.5]."""
+        if key in ('fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'):
+            return True
+        stops = key == 'fieldbus.mode' and raw == Mode.STOP
+        return stops and self._unit.faults.serial and (to_all or self._firmware.obeys_stop)
+
+    def _find(self, id_: int) -> tuple[Parameter, int]:
+        found = self._ids.get(id_)
+        if found is None or found[0].key in self._firmware.lacks:
+            raise Wrong(LineError.UNKNOWN)
+        since, version = found[0].since, self._drive.version
+        if since is not None and version is not None and version < since:
+            raise Wrong(LineError.UNKNOWN)
+        return found
+
+    def _read(self, key: str) -> int:
+        """Read a parameter as this protocol carries it, side effects included."""
+        drive = self._drive
+        raw = drive.read_raw(key)
+        key = self._unit.key_of(key)
+        parameter, role = drive.model[key], drive.model.role_of.get(key)
+        # what is measured may be finer here than in the memory, but for what the unit shows itself
+        shown = None
+        if self._unit.show(key) is None:
+            shown = measure(role, parameter, 'classic', drive.motor, drive.counters)
+        return carried(parameter, raw, 'classic') if shown is None else shown
+
+    def _understood(self, raw: int) -> int:
+        """Return an SCMD as the drive understands it: to the old one much means Stop [C31]."""
+        if not self._firmware.even_stops:
+            return raw
+        if raw == Scmd.RESET_E_OUT:
+            raise Wrong(LineError.OUT_OF_RANGE)
+        return raw if raw & 1 or raw & Scmd.ERASE_E_LOG else Scmd.STOP
+
+    def _permitted(self, key: str, raw: int) -> bool:
+        """Whether MODE permits a SELECT, where nothing is changed before MODE = Sio [C100]."""
+        mode = self._unit.mode
+        if mode == Mode.INHIBIT:
+            # whether this is taken is left to the drive's variant [C101]
+            return key == 'fieldbus.scmd' and raw == Scmd.STOP
+        return mode == Mode.BUS or key == 'fieldbus.mode'
+
+
+@functools.cache
+def _ids(model: Family) -> Mapping[int, tuple[Parameter, int]]:
+    """Return which parameter stands at which id, and which of its words."""
+    return {
+        id_: (parameter, position)
+        for parameter in model.values()
+        if 'classic' in parameter.addresses
+        for position, id_ in enumerate(parameter.at('classic').numbers)
+    }
+
+
+# ---- CANopen ----
+
+#: A drive of profile 402, a frequency converter.
+_DEVICE_TYPE = 0x0001_0192
+#: Made up: no manual tells vendor and product.
+_VENDOR, _PRODUCT = 0x0000_001B, 0x0000_0038
+_NAME, _HARDWARE, _SOFTWARE = 0x1008, 0x1009, 0x100A
+_LOG_ENTRY = 4
+_WIDE, _NARROW = 4, 1
+
+
+class CanopenServer(canopen.Server):
+    """The CANopen side of one G2."""
+
+    def __init__(self, drive: SimulatedDrive) -> None:
+        assert isinstance(drive.control_unit, G2ControlUnit)
+        self._unit = drive.control_unit
+        self._shape = self._unit.variant
+        super().__init__(drive, self._shape.profile)
+
+    def identity(self) -> Identity:
+        """Return who it is, as far as it is in the profile."""
+        number = self.drive.memory.number
+        revision = f'{number("fieldbus.sw_ver"):.2f} / {number("fieldbus.nfo_ver"):.0f}'
+        serial = self.drive.serial_number.strip()
+        # a serial number may have letters, that of CANopen is a number
+        value = int(serial) if serial.isdigit() else zlib.crc32(serial.encode())
+        return Identity(
+            device_type=_DEVICE_TYPE,
+            vendor=_VENDOR,
+            product=_PRODUCT,
+            revision=round(100 * number('fieldbus.sw_ver')),
+            serial=value & 0xFFFF_FFFF,
+            texts={_NAME: 'NFO Sinus', _HARDWARE: '1.00', _SOFTWARE: revision},
+        )
+
+    def established(self) -> None:
+        """Hold the drive in bus mode from now on."""
+        if self._shape.canopen_bus_mode == HELD:
+            self._unit.hold_bus_mode()
+
+    def lost(self) -> None:
+        """Let go of the drive, which may stop for it."""
+        self._unit.bus_lost()
+
+    def entries(self) -> Entries:
+        """Return the parameters and the error log."""
+        found = {(index, sub): self._entry(one) for index, sub, one in self._places()}
+        if self._shape.canopen_sub_indices == FROM_ONE:
+            arrays = {index for index, sub in found if sub}
+            for index in arrays:
+                most = max(sub for other, sub in found if other == index)
+                found[index, 0] = canopen.constant(most, 1)
+        if self._shape.canopen_error_log != NONE:
+            first = int(self._shape.canopen_error_log, 16)
+            found |= {(first + n, 0): self._log_entry(n) for n in range(self.drive.faults.log_size)}
+        return found
+
+    def _places(self) -> Iterator[tuple[int, int, Parameter]]:
+        """Give index and sub-index of each parameter."""
+        model, shape = self.drive.model, self._shape
+        version = self.drive.version
+        for parameter in model.values():
+            since = parameter.since
+            younger = since is not None and version is not None and version < since
+            if younger or 'canopen' not in parameter.addresses:
+                continue
+            address = parameter.at('canopen')
+            sub_index = address.sub_index or 0
+            if sub_index and shape.canopen_sub_indices != FROM_ONE:
+                sub_index -= 1
+            yield address.index, sub_index, parameter
+
+    def _size(self, parameter: Parameter) -> int:
+        """Return how many bytes a parameter has."""
+        usual = parameter.at('canopen').codec.size
+        if self._shape.canopen_types == WIDE:
+            return max(usual, _WIDE)
+        codes = parameter.labels
+        if self._shape.canopen_types == NARROW and codes and max(codes) < 0x80:
+            return _NARROW
+        return usual
+
+    def _entry(self, parameter: Parameter) -> Entry:
+        address, size = parameter.at('canopen'), self._size(parameter)
+        codec, drive, key = address.number, self.drive, parameter.key
+
+        def read() -> bytes:
+            raw = carried(parameter, drive.read_raw(key), 'canopen')
+            if size == codec.size:
+                return codec.encode(raw)
+            return raw.to_bytes(size, 'little', signed=codec.signed)
+
+        def write(data: bytes) -> None:
+            if size == codec.size:
+                raw = codec.decode(data)
+            else:
+                raw = int.from_bytes(data, 'little', signed=codec.signed)
+            if not codec.fits(raw):
+                raise Refused(Reason.VALUE, f'{key} cannot be {raw}')
+            drive.write_raw(key, kept(parameter, raw, 'canopen'))
+            self._unit.written(key, 'canopen')
+
+        writable = parameter.access in (Access.WRITE, Access.READ_WRITE)
+        readable = parameter.access is not Access.WRITE
+        return Entry(size, read if readable else None, write if writable else None)
+
+    def _log_entry(self, entry: int) -> Entry:
+        faults = self.drive.faults
+        return Entry(_LOG_ENTRY, lambda: canopen.number(faults.log_entry(entry), _LOG_ENTRY))
+
+
+# ---- telegram 1 ----
+
+#: What each bit of STW1 of PROFIdrive is in DriveControl.
+_CONTROL = {
+    1 << 0: Control.SWITCH_ON,
+    1 << 1: Control.ENABLE_VOLTAGE,
+    1 << 2: Control.DISABLE_QUICK_STOP,
+    1 << 3: Control.ENABLE_OP,
+    1 << 4: Control.ENABLE_RFG,
+    1 << 5: Control.UNLOCK_RFG,
+    1 << 6: Control.USE_REF_FOR_RFG,
+    1 << 7: Control.RESET_MALFUNCTION,
+    1 << 10: Control.NET_CTRL | Control.NET_REF,
+}
+_CONTROL_BY_PLC = 1 << 10
+
+
+class Zsw1(enum.IntFlag):
+    """ZSW1 of PROFIdrive, standard telegram 1."""
+
+    READY_TO_SWITCH_ON = 1 << 0
+    READY_TO_OPERATE = 1 << 1
+    OPERATION_ENABLED = 1 << 2
+    FAULT = 1 << 3
+    NO_COAST_STOP = 1 << 4
+    NO_QUICK_STOP = 1 << 5
+    SWITCHING_ON_INHIBITED = 1 << 6
+    WARNING = 1 << 7
+    WITHIN_TOLERANCE = 1 << 8
+    CONTROL_REQUESTED = 1 << 9
+    REACHED = 1 << 10
+    PULSES_ENABLED = 1 << 15
+
+
+_SWITCHED_ON = Zsw1.READY_TO_SWITCH_ON | Zsw1.READY_TO_OPERATE
+#: What the states of the drive are in PROFIdrive; S5, switching off, looks like S3.
+_STATES = {
+    Phase.NOT_READY_TO_SWITCH_ON: Zsw1(0),
+    Phase.SWITCH_ON_DISABLED: Zsw1.SWITCHING_ON_INHIBITED,
+    Phase.READY_TO_SWITCH_ON: Zsw1.READY_TO_SWITCH_ON,
+    Phase.SWITCHED_ON: _SWITCHED_ON,
+    Phase.OPERATION_ENABLED: _SWITCHED_ON | Zsw1.OPERATION_ENABLED,
+    Phase.DISABLE: _SWITCHED_ON,
+    Phase.SHUTDOWN: _SWITCHED_ON,
+    Phase.QUICK_STOP: Zsw1.SWITCHING_ON_INHIBITED,
+    Phase.FAULT_REACTION_ACTIVE: Zsw1.FAULT,
+    Phase.FAULTED: Zsw1.FAULT,
+}
+
+
+class TelegramServer(telegram1.Server):
+    """The fieldbus side of one G2."""
+
+    def __init__(self, drive: SimulatedDrive) -> None:
+        assert isinstance(drive.control_unit, G2ControlUnit)
+        self._unit = drive.control_unit
+        #: STW1 that was not ignored last.
+        self._obeyed = 0
+
+    def exchange(self, stw1: int, setpoint: int) -> tuple[int, int]:
+        """Take control word and set-point; return status word and actual value."""
+        unit = self._unit
+        if unit.variant.telegram_words == DRIVECONTROL:
+            unit.take_telegram(self._by_level(stw1), setpoint)
+            return int(unit.status_word), unit.actual
+        # without control by PLC the process data do not count, and what was before goes on
+        if stw1 & _CONTROL_BY_PLC:
+            self._obeyed = stw1
+            word = sum(bit for given, bit in _CONTROL.items() if stw1 & given)
+            unit.take_telegram(self._by_level(word), setpoint)
+        else:
+            unit.fieldbus.heard()
+        return int(self._zsw1(stw1)), unit.actual
+
+    def _by_level(self, word: int) -> int:
+        """Add what makes the drive switch on by a bit that has been there all the time."""
+        return word | Control.AUTO_INIT if self._unit.variant.commands == LEVELS else word
+
+    def _zsw1(self, stw1: int) -> Zsw1:
+        unit, motor = self._unit, self._unit.motor
+        status = _STATES[unit.machine.phase]
+        if stw1 & 1 << 1:
+            status |= Zsw1.NO_COAST_STOP
+        if stw1 & 1 << 2:
+            status |= Zsw1.NO_QUICK_STOP
+        if unit.on_bus:
+            status |= Zsw1.CONTROL_REQUESTED
+        if motor.limited or unit.faults.alarms:
+            status |= Zsw1.WARNING
+        if unit.machine.phase is Phase.OPERATION_ENABLED and motor.reached:
+            status |= Zsw1.WITHIN_TOLERANCE | Zsw1.REACHED
+        return status | Zsw1.PULSES_ENABLED if motor.driven else status
