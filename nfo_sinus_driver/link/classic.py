@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Messages of the Classic protocol of NFO, without I/O, and why one refuses [M0 §6.1], [M2 §5].
+The Classic protocol of NFO: messages, without I/O, why one refuses, the link [M0 §6.1], [M2 §5].
 
 :func:`encode` makes a message; a :class:`Reader` finds messages in whatever bytes come in, in any
 pieces, among noise and the remains of others. Hexadecimal digits are sent in upper case and read
@@ -11,12 +11,27 @@ in both [C86].
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from operator import xor
+import struct
+import time
+from typing import Any
 
-from nfo_sinus_driver.link.interface import LinkError, Refused
-from nfo_sinus_driver.link.line_protocols import BROADCAST, POINT_TO_POINT
+from nfo_sinus_driver.link.another_master import Codec
+from nfo_sinus_driver.link.interface import (
+    Address,
+    Clock,
+    LineSettings,
+    LinkError,
+    PortError,
+    Refused,
+    Reply,
+)
+from nfo_sinus_driver.link.line_protocols import BROADCAST, CLASSIC, POINT_TO_POINT
+from nfo_sinus_driver.link.port import Port
+from nfo_sinus_driver.link.request_link import CodecLink
 
 #: Of how many messages what is sent is kept; the ENQUIRIES of a poll are sent again and again.
 PREPARED = 1024
@@ -84,11 +99,6 @@ def kind(message: Message) -> Kind:
 def kinds(request: Request) -> tuple[Kind, Kind]:
     """Return the kinds of answers that a request may have."""
     return request.number if isinstance(request, Enquiry) else Ack, Nak
-
-
-def nameless(request: Request) -> tuple[Kind, ...]:
-    """Return those of them that do not say what they answer."""
-    return tuple(kind for kind in kinds(request) if isinstance(kind, type))
 
 
 def answers(message: Message, request: Request) -> bool:
@@ -160,9 +170,9 @@ class Reader:
         self._buffer = bytearray()
 
     @property
-    def pending(self) -> int:
-        """How many bytes have come of a message that is not whole yet."""
-        return len(self._buffer)
+    def rest(self) -> bytes:
+        """What has come of a message that is not whole yet."""
+        return bytes(self._buffer)
 
     def feed(self, data: bytes) -> list[Message]:
         """Take bytes that came in; return the messages that became whole, in their order."""
@@ -170,7 +180,12 @@ class Reader:
         found: list[Message] = []
         while self._buffer:
             shapes = _REQUESTS if self._buffer[0] == _EOT else _ANSWERS
-            fit, shape = max([(_fit(self._buffer, shape), shape) for shape in shapes], key=_first)
+            fit = -1
+            shape: tuple[_Chars, ...] = ()
+            for one in shapes:
+                fits = _fit(self._buffer, one)
+                if fits > fit:
+                    fit, shape = fits, one
             message = _decode(self._buffer[:fit]) if fit == len(shape) else None
             if message is not None:
                 found.append(message)
@@ -186,10 +201,6 @@ class Reader:
         """Return where to look on, when only the first ``fit`` characters belong together."""
         # an STX has its address before it, even where that could be a digit of what broke off
         return max(1, fit - (self._buffer[fit] == _STX))
-
-
-def _first(entry: tuple[int, object]) -> int:
-    return entry[0]
 
 
 def _fit(data: bytearray, shape: tuple[_Chars, ...]) -> int:
@@ -280,3 +291,205 @@ def refused_by_flags(word: int) -> Refused:
 def refused_unknown(error: LinkError) -> Refused:
     """Return what to say of a NAK whose reason could not be found out."""
     return Refused(Refused.DEVICE_FAILURE, f'the drive refused (NAK); why is not known: {error}')
+
+
+#: What a message carries.
+_WORD = struct.Struct('>H')
+#: Pauses within an answer may last this long, s: no manual limits them [C86], and an adapter may
+#: hold bytes back.
+_INTER_BYTE_TIMEOUT = 0.07
+#: Silence that shows that an ACK or NAK does not come twice: characters, and s at least.
+_NO_DOUBLE = 2
+_NO_DOUBLE_LEAST = 0.002
+#: How long a write waits at least while another master's request is answered, s.
+_WRITE_WAIT = 0.05
+#: How long drives may be busy with a broadcast, which none of them confirms, s: this at most, else
+#: so many times what the slowest of them took lately for a request of its own, which is forgotten
+#: by and by.
+_TURNAROUND = 0.1
+_TURNAROUND_MARGIN = 2.0
+_KEPT_OF_SLOWEST = 0.98
+#: What every firmware has and may be read at any time [M0 tables 2 and 3], [M2 tables 1 and 2]:
+#: InvSt without acknowledging, MODE, Control/Mode and f-Nom. With four of them one is always
+#: certain, see LateReplies.
+_EVERYWHERE = (INV_ST, MODE, 0x0030, 0x000F)
+#: How old the inverter status may be to show that a serial fault is new, s.
+_FRESH = 1.0
+CODEC = Codec(
+    Enquiry, Select, kind, kinds, answers, encode, Reader, LONGEST_ANSWER, _INTER_BYTE_TIMEOUT
+)
+
+
+class ClassicLink(CodecLink):
+    """
+    A master of the Classic protocol on one line: no belief in a doubtful answer, nor in a bare ACK.
+
+    A REPLY names its parameter, ACK and NAK name nothing.
+
+    Point to point (unit 0) an answer may carry any address [C86]. Do not mix it with others on
+    one line.
+
+    What is promised: no value of another parameter or another drive is taken, no answer up to
+    three time-outs late to a question asked before, no ACK of another write. A REPLY that comes
+    twice is noticed when it comes before the same question, asked again at once, can have been
+    answered, ACK and NAK when they begin again within two characters; later ones may pass for the
+    answer, a REPLY one reading old. ACK, NAK and an ENQUIRY have no check sum: parity is all that
+    protects them, so choose a format that has it.
+    """
+
+    #: Factory settings and formats of both firmwares [M0 §6.1.2], [M2 §4], [C5], [C6]; addresses
+    #: [M0 §6.1.2], [C10].
+    protocol = CLASSIC
+    _codec = CODEC
+    _everywhere = _EVERYWHERE
+
+    def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
+        super().__init__(port, settings, now)
+        #: The inverter status that each unit reported last, and when.
+        self._inv_st: dict[int, tuple[int, float]] = {}
+        #: What the slowest unit took lately until its answer began, s.
+        self._slowest = _TURNAROUND
+
+    def close(self) -> None:
+        """Close the port; harmless when it is closed already."""
+        super().close()
+        self._inv_st.clear()
+
+    def parts(self, address: Address) -> tuple[Address, ...]:
+        """Return the words: a message carries one."""
+        if address.sub_index is None:
+            return (address,)
+        ids = address.index, address.sub_index
+        return tuple(Address(address.space, id_, None, _WORD.size) for id_ in ids)
+
+    def read(self, unit: int, address: Address) -> Reply:
+        """Read one parameter of one word, or one word of another."""
+        (part,) = self.parts(address)
+        if unit == BROADCAST:
+            raise ValueError('nobody answers a broadcast')
+        word, arrived = self._enquire(unit, part.index)
+        return Reply(_WORD.pack(word), arrived)
+
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        """
+        Write one parameter; unit 95 means all of them, and none confirms it.
+
+        It has one word: what has two is never written, and no manual says how.
+
+        :raises LinkError: as its subclasses say.
+        """
+        request = Select(unit, address.index, _WORD.unpack(data)[0])
+        if unit == BROADCAST:
+            return Reply(b'', self._broadcast(request))
+        began = self._now()
+        answer, arrived = self._command(request)
+        if isinstance(answer, Nak):
+            raise self._refusal(unit, began)
+        return Reply(b'', arrived)
+
+    def _enquire(self, unit: int, number: int) -> tuple[int, float]:
+        """Return the value of a parameter, and when it came."""
+        answer, arrived = self._ask(Enquiry(unit, number))
+        if isinstance(answer, Nak):
+            text = f'the drive has no parameter E{number:04X} that can be read (NAK)'
+            raise Refused(Refused.ILLEGAL_ADDRESS, text)
+        if number == INV_ST:
+            self._inv_st[unit] = answer.word, arrived
+        return answer.word, arrived
+
+    def _broadcast(self, request: Select) -> float:
+        """Tell all units something, and leave them the time to do it; return when it was said."""
+        self._await_gap(request, is_write=True)
+        self._another.sent(request)
+        sent = self._send(request, encode(request))
+        self._last = None
+        # an echo, or what is late: nothing answers this
+        until = sent + min(_TURNAROUND, _TURNAROUND_MARGIN * self._slowest)
+        while self._read_line(until):
+            continue
+        return sent
+
+    def _refusal(self, unit: int, began: float) -> Refused:
+        """
+        Ask why a SELECT was answered by NAK [M0 §6.1.5]; nothing but our own error is cleared.
+
+        :param began: when the SELECT was sent.
+        """
+        before, read_at = self._inv_st.get(unit, (SIO_FAIL, 0.0))
+        # a serial fault that was not there just before: this SELECT is its cause
+        ours = before != SIO_FAIL and began - read_at < _FRESH
+        try:
+            inv_st, _ = self._enquire(unit, INV_ST)
+            if inv_st != SIO_FAIL or not ours:
+                return refused_by_status(inv_st)
+            return refused_by_flags(self._enquire(unit, SIO_ERR)[0])
+        except PortError:
+            raise
+        except LinkError as error:
+            return refused_unknown(error)
+
+    # --- belief -----------------------------------------------------------------------------------
+
+    @property
+    def _gap(self) -> float:
+        return _NO_DOUBLE * self._settings.char_time
+
+    @property
+    def _write_wait(self) -> float:
+        return max(_WRITE_WAIT, super()._write_wait)
+
+    def _gap_before(self, request: Any) -> float:
+        # no pause but where an answer that comes twice could pass for that to the request
+        if self._last is None or self._last[0].unit != request.unit:
+            return 0.0
+        last = kind(self._last[1])
+        doubled = isinstance(last, type) and last in kinds(request)
+        return max(self._gap, _NO_DOUBLE_LEAST) if doubled else 0.0
+
+    def _hear_unasked(self, data: bytes, request: Any) -> None:
+        # what was not answered is expected anyway
+        if self._last is not None:
+            self._late.expect(self._last[0], self._now())
+
+    def _ask_once(self, request: Any) -> tuple[Any, float]:
+        reply = super()._ask_once(request)
+        if not self._again or not self._came_early(request):
+            return reply
+        self._make_certain(request)
+        return self._transact(request)
+
+    def _came_early(self, request: Any) -> bool:
+        """
+        Tell whether the last REPLY came before the request can have been answered; expect another.
+
+        It may be the one before, told twice. A line without speed, such as a pseudo-terminal, is
+        always early.
+        """
+        early = self._again and self._last is not None and isinstance(self._last[1], Value)
+        if early:
+            self._late.expect(request, self._now())
+        return early
+
+    def _expect_again(self, request: Any) -> None:
+        self._came_early(request)
+
+    def _took(self, unit: int, seconds: float) -> None:
+        super()._took(unit, seconds)
+        self._slowest = max(seconds, _KEPT_OF_SLOWEST * self._slowest)
+
+    def _was_passed_over(
+        self, messages: Sequence[Any], request: Any, quarantined: Any, now: float
+    ) -> bool:
+        # units answer in order: ours was lost, unless this is a late one to us
+        return self._another.is_there(now) and any(
+            isinstance(one, Value) and one.unit == request.unit and one.number not in quarantined
+            for one in messages
+            if not answers(one, request)
+        )
+
+    def _deadline(self, deadline: float, now: float) -> float:
+        if not self._another.is_there(now):
+            return deadline
+        # its next request may be as far away as the time-out
+        longest = LONGEST_ANSWER * self._settings.char_time
+        return min(deadline, now + longest + 2 * self._slowest)

@@ -53,7 +53,7 @@ MODBUS_TCP = LineProtocol(
 )
 CLASSIC = LineProtocol(
     name='classic',
-    link='classic_link.ClassicLink',
+    link='classic.ClassicLink',
     addressing='classic',
     units=range(POINT_TO_POINT, BROADCAST),
     baud_rate=9600,
@@ -64,7 +64,7 @@ CLASSIC = LineProtocol(
 )
 MOVITRAC = LineProtocol(
     name='movitrac',
-    link='movitrac_link.MovitracLink',
+    link='movitrac.MovitracLink',
     addressing='movitrac',
     # P842 [M4 §2.3.1]
     units=range(64),

@@ -2,20 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Frames of the serial protocol of SEW's MOVITRAC 31.., without I/O [M4 §2.1].
+The serial protocol of SEW's MOVITRAC 31..: frames, without I/O, return codes, the link [M4 §2.1].
 
-:func:`encode` makes a frame; a :class:`Reader` finds the answer to one request in whatever bytes
-come in, in any pieces, among noise and the remains of others. A start delimiter says what a frame
-is and how long; its last byte is the sum of all others, without carry [C85].
+:func:`encode` makes a frame; a :class:`Reader` finds messages in whatever bytes come in, in any
+pieces, among noise and the remains of others. A start delimiter says what a frame is and how long;
+its last byte is the sum of all others, without carry [C85].
+
+A drive that refuses answers by NACK with one of 34 return codes [M4 §2.1.2]. Two of them inform
+only, for the drive has done what it was told [C81].
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any, NamedTuple
 
+from nfo_sinus_driver.link.another_master import Codec
+from nfo_sinus_driver.link.interface import Address, DamagedAnswer, Refused, Reply
 from nfo_sinus_driver.link.line_protocols import MOVITRAC
+from nfo_sinus_driver.link.request_link import CodecLink
 
 #: How many bytes a value has: of a plain frame, and of a long one.
 SIZES = (4, 8)
@@ -172,73 +179,275 @@ def is_glitch(data: bytes) -> bool:
 
 class Reader:
     """
-    Finds the answer to one request in the bytes that come in.
+    Finds all messages, of any master and drive, in the bytes that come in.
 
-    A DATA counts when its index is the one asked for and the sum is right, whatever came before
-    it. ACK and NACK have next to nothing that could be wrong in them, so they count only at the
-    beginning, behind whole frames, such as the echo of the request, or behind a glitch: a byte or
-    two of which none begins a frame. Whatever else comes is passed over.
+    A message with a value counts when its sum is right, whatever came before it. ACK and NACK have
+    next to nothing that could be wrong in them, so they count only at the beginning, behind whole
+    frames, such as the echo of the request, or behind a glitch: a byte or two of which none begins
+    a frame. Whatever else comes is passed over.
 
-    :ivar frame: the bytes of the answer found last.
-    :ivar passed_over: what came before it.
-    :ivar rest: what has come since, or at all.
+    :ivar rest: what came behind the last message, as far as it may become one.
     """
 
-    def __init__(self, request: Request) -> None:
-        self._request = request
+    def __init__(self) -> None:
         self.rest = b''
-        self.frame = b''
-        self.passed_over = b''
+        #: Nothing but what :attr:`rest` has came behind the last message.
+        self._is_all = True
 
-    @property
-    def other(self) -> bytes:
-        """All that came and is no answer."""
-        return self.passed_over + self.rest
-
-    def feed(self, data: bytes) -> Answer | None:
-        """
-        Take bytes that came in.
-
-        :returns: the answer, ``None`` while there is none; feeding may go on after it.
-        """
+    def feed(self, data: bytes) -> list[Message]:
+        """Take bytes that came in; return the messages that became whole, in their order."""
         self.rest += data
-        for start, end, message in _messages(self.rest):
-            if not isinstance(message, Request) and answers(message, self._request):
-                # an answer found before was not believed
-                self.passed_over += self.frame + self.rest[:start]
-                self.frame = self.rest[start:end]
-                self.rest = self.rest[end:]
-                return message
-        return None
+        found: list[Message] = []
+        behind = 0
+        for _, end, message in _messages(self.rest, self._is_all):
+            found.append(message)
+            behind, self._is_all = end, True
+        rest = self.rest[behind:]
+        self.rest = rest[1 - _LONGEST :]
+        self._is_all &= self.rest == rest
+        return found
 
 
-def _messages(data: bytes) -> Iterator[tuple[int, int, Message]]:
-    """Yield each message that counts, where its frame begins and where it ends."""
+def _messages(data: bytes, is_all: bool) -> Iterator[tuple[int, int, Message]]:
+    """
+    Yield each message that counts, where its frame begins and where it ends.
+
+    :param is_all: nothing came between these bytes and the last message.
+    """
     start = behind = 0
     while start < len(data):
         message = decode(data[start:])
         junk = data[behind:start]
-        if message is None or (isinstance(message, (Ack, Nack)) and not is_glitch(junk)):
+        is_verdict = isinstance(message, (Ack, Nack))
+        if message is None or (is_verdict and not (is_all and is_glitch(junk))):
             start += 1
             continue
         end = start + _LENGTHS[data[start]]
         yield start, end, message
         start = behind = end
+        is_all = True
 
 
-class Overhearing:
-    """Finds all messages, of any master and drive, in the bytes that come in."""
+class ReturnCode(NamedTuple):
+    """
+    What a return code says.
 
-    def __init__(self) -> None:
-        self._rest = b''
+    :ivar kind: the code of :class:`Refused` that means the same.
+    :ivar remedy: what a person does about it.
+    """
 
-    def feed(self, data: bytes) -> list[Message]:
-        """Take bytes that came in; return the messages that became whole, in their order."""
-        self._rest += data
-        found: list[Message] = []
-        behind = 0
-        for _, end, message in _messages(self._rest):
-            found.append(message)
-            behind = end
-        self._rest = self._rest[behind:][1 - _LONGEST :]
-        return found
+    kind: int
+    meaning: str
+    remedy: str
+
+
+_NO_SUCH = Refused.ILLEGAL_ADDRESS
+_VALUE = Refused.ILLEGAL_VALUE
+_STATE = Refused.DEVICE_FAILURE
+
+_OPTION = ReturnCode(
+    _NO_SUCH,
+    'the necessary option pcb is not installed',
+    'fit the option that the parameter belongs to, or leave it as it is',
+)
+_OTHER_INTERFACE = ReturnCode(
+    _STATE,
+    'not permitted via this serial interface',
+    'use the keypad, or the other interface (X4 or X20)',
+)
+_INHIBIT = (
+    'stop the motor, then inhibit the controller: call the service ~/quick_stop, or open a '
+    'terminal that has the function /Controller inhibit'
+)
+
+#: What the drive has done all the same.
+DONE: Mapping[int, str] = {
+    0x1E: 'factory setting was started',
+    0x28: 'parameter stored to volatile memory, lost on power-down (P801 is Off)',
+}
+REFUSALS: Mapping[int, ReturnCode] = {
+    0x10: ReturnCode(_NO_SUCH, 'illegal index', 'look whether the model is set right'),
+    0x11: ReturnCode(
+        _NO_SUCH, 'function or parameter not implemented', 'this size or firmware does not have it'
+    ),
+    0x12: ReturnCode(_NO_SUCH, 'read access only', 'nobody can write it'),
+    0x13: ReturnCode(_STATE, 'parameter lock (P800) active', 'set P800 to No'),
+    0x14: ReturnCode(
+        Refused.BUSY, 'factory setting (P830) running', 'wait until it is done, some seconds'
+    ),
+    0x15: ReturnCode(_VALUE, 'parameter value too large', 'choose a smaller one'),
+    0x16: ReturnCode(_VALUE, 'parameter value too small', 'choose a larger one'),
+    0x17: _OPTION,
+    0x18: ReturnCode(
+        _STATE, 'fault in system software', 'switch the drive off and on; if it stays, ask SEW'
+    ),
+    0x19: _OTHER_INTERFACE,
+    0x1A: ReturnCode(_STATE, 'speed control (P770) active', 'set P770 to V/f mode first'),
+    0x1B: ReturnCode(_STATE, 'unauthorized access', 'it is for the maker alone'),
+    0x1C: ReturnCode(_STATE, 'output stage is not inhibited', _INHIBIT),
+    0x1D: ReturnCode(
+        _VALUE, 'invalid parameter value', 'choose one of its steps; not all between are allowed'
+    ),
+    0x22: ReturnCode(
+        _STATE,
+        '4Q operation 1 (P890) required, for example for hoist function 1 (P710)',
+        'set P890 to Yes first',
+    ),
+    0x23: ReturnCode(
+        _STATE,
+        '4Q operation 2 (P891) required, for example for hoist function 2 (P712)',
+        'set P891 to Yes first',
+    ),
+    0x24: ReturnCode(_STATE, 'DC braking 1 (P730) active', 'set P730 to No first'),
+    0x25: ReturnCode(_STATE, 'DC braking 2 (P733) active', 'set P733 to No first'),
+    0x26: ReturnCode(_STATE, 'hoist function set 1 (P710) active', 'set P710 to No first'),
+    0x27: ReturnCode(_STATE, 'hoist function set 2 (P712) active', 'set P712 to No first'),
+    0x29: _OTHER_INTERFACE,
+    0x2A: ReturnCode(_STATE, 'speed control (P770) inactive', 'set P770 to Speed control first'),
+    0x2B: ReturnCode(_STATE, 'controller inhibit required', _INHIBIT),
+    0x2C: ReturnCode(
+        _STATE,
+        'motor size-up 1 (P328) and rapid start 1 (P720) exclude each other',
+        'set the other one to No first',
+    ),
+    0x2D: ReturnCode(
+        _STATE,
+        'motor size-up 2 (P348) and rapid start 2 (P723) exclude each other',
+        'set the other one to No first',
+    ),
+    0x2E: _OPTION,
+    0x2F: ReturnCode(
+        _STATE,
+        '4Q operation 1 (P890) and DC braking 1 (P730) exclude each other',
+        'set the other one to No first',
+    ),
+    0x30: ReturnCode(
+        _STATE,
+        '4Q operation 2 (P891) and DC braking 2 (P733) exclude each other',
+        'set the other one to No first',
+    ),
+    0x31: ReturnCode(
+        _STATE,
+        'controller inhibit active',
+        'take the inhibit away first (terminal or function bits); that may start the motor',
+    ),
+    0x32: ReturnCode(
+        _STATE, 'synchronous operation control (P760) inactive', 'set P760 to Yes first'
+    ),
+    0x33: ReturnCode(
+        _STATE,
+        'this drive is slave of the synchronous operation control (P761)',
+        'change it in the master, or P761 first',
+    ),
+    0x34: ReturnCode(
+        Refused.ILLEGAL_FUNCTION,
+        'illegal message type',
+        'the parameter may be of the other length, 4 or 8 bytes: look whether the model is right',
+    ),
+}
+
+
+def refusal(code: int) -> Refused:
+    """Return what a NACK with a return code says."""
+    hexadecimal = f'(return code {code:02X})'
+    known = REFUSALS.get(code)
+    if known is None:
+        why = DONE.get(code, 'the drive refused; no manual lists why')
+        return Refused(_STATE, f'{why} {hexadecimal}')
+    return Refused(known.kind, f'{known.meaning}: {known.remedy} {hexadecimal}')
+
+
+#: How much later than at once a drive may be told to answer (P843), s.
+LONGEST_RESPONSE_TIME = 0.2
+#: Pauses within an answer, s: 10 ms of the drive [M4 §2.4.2], and what a USB adapter holds back.
+_INTER_BYTE_TIMEOUT = 0.03
+#: Silence between two frames, in characters: the manual wants none, but the drive has to let go of
+#: the two wires before it can see a start delimiter.
+_GAP = 2
+#: The least that an answer takes, s; less is a line without speed.
+_AT_ONCE = 0.001
+#: What every drive has and may be read at any time: its address (P842), its response time (P843),
+#: frequency and heat sink temperature. With four of them one is always certain, see LateReplies.
+_EVERYWHERE = (206, 207, 0, 4)
+CODEC = Codec(
+    Enquiry, Select, kind, kinds, answers, encode, Reader, LONGEST_ANSWER, _INTER_BYTE_TIMEOUT
+)
+
+
+class MovitracLink(CodecLink):
+    """
+    A master of the MOVITRAC's protocol on one line: no belief in a doubtful answer.
+
+    A DATA names its index, ACK and NACK name nothing, and no answer names its drive. Where a late
+    answer may be *another* drive's, or be the one before told twice, the line is listened to for as
+    long as the right answer may take; if anything more comes, nothing is believed. So a drive that
+    is dead costs its neighbours no transaction.
+
+    Drives may be set to answer up to 0.2 s late (P843). Nothing has to say so: the first request,
+    and each after a failure, is waited for so much longer than ``response_timeout``, any other as
+    much longer as the drive has taken of late.
+
+    What is promised: no value of another index is taken, no answer of the drive up to three
+    time-outs late to a question asked before, no ACK of another write to it. Not told apart is a
+    late answer of another drive just when the right one is lost, and one that is told twice, the
+    second time when the right one may be on its way, but does not come. There is no parity, and
+    the check is a sum: choose short wires.
+    """
+
+    #: [M4 §2.3.1], [M4 §2.3.3]; 31 drives on a line at most, with addresses of 64 [C75].
+    protocol = MOVITRAC
+    _codec = CODEC
+    _everywhere = _EVERYWHERE
+    _longest_response = LONGEST_RESPONSE_TIME
+
+    def parts(self, address: Address) -> tuple[Address]:
+        """Return the whole: a frame carries all of a value."""
+        return (address,)
+
+    def read(self, unit: int, address: Address) -> Reply:
+        """Read one parameter, of 4 or of 8 bytes."""
+        answer, arrived = self._ask(Enquiry(unit, address.index))
+        if isinstance(answer, Nack):
+            raise refusal(answer.code)
+        if len(answer.value) != address.size:
+            came = f'a value of {len(answer.value)} bytes came instead of {address.size}'
+            raise DamagedAnswer(f'unit {unit}, index {address.index}: {came}')
+        return Reply(answer.value, arrived)
+
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        """
+        Write one parameter, of 4 or of 8 bytes.
+
+        A drive that says by NACK that it has started a factory setting, or keeps the value only
+        until it is switched off, has done it [C81].
+        """
+        answer, arrived = self._command(Select(unit, address.index, data))
+        if isinstance(answer, Nack) and answer.code not in DONE:
+            raise refusal(answer.code)
+        return Reply(b'', arrived)
+
+    @property
+    def _gap(self) -> float:
+        return _GAP * self._settings.char_time
+
+    def _hear_unasked(self, data: bytes, request: Any) -> None:
+        # switching a transmitter makes a byte or two
+        if not is_glitch(data):
+            super()._hear_unasked(data, request)
+
+    def _patience(self, unit: int) -> float:
+        longest = self._late.longest(unit)
+        unsettled = bool(self._late.quarantined(unit, self._now()))
+        return LONGEST_RESPONSE_TIME if unsettled or not longest else longest
+
+    def _took(self, unit: int, seconds: float) -> None:
+        super()._took(unit, max(_AT_ONCE, seconds))
+
+    def _confirm(self, request: Any, answer: Any, arrived: float, until: float) -> None:
+        # it may be the one before, told twice, or another unit's, late
+        foreign = self._late.may_be_of_another(request.unit, kind(answer), arrived)
+        if not (self._again or foreign) or self._now() >= until:
+            return
+        if data := self._read_line(until):
+            self._another.hear(data, self._now())
+            raise DamagedAnswer(f'unit {request.unit}: two answers came, one of them is late')

@@ -349,15 +349,15 @@ LAWS = (
     Mutant(
         8,
         'a late answer of a MOVITRAC is believed',
-        'nfo_sinus_driver/link/movitrac_link.py',
-        '                if movitrac.kind(answer) not in quarantined and not doubtful:',
+        'nfo_sinus_driver/link/request_link.py',
+        '                if codec.kind(message) not in quarantined and not doubtful:',
         '                if not doubtful:',
         ('test/unit/link/test_movitrac_late.py',),
     ),
     Mutant(
         8,
         'an answer to another master of a MOVITRAC is believed',
-        'nfo_sinus_driver/link/movitrac_link.py',
+        'nfo_sinus_driver/link/request_link.py',
         ' not in quarantined and not doubtful:',
         ' not in quarantined:',
         ('test/unit/drive/test_another_master.py',),
@@ -373,9 +373,9 @@ LAWS = (
     Mutant(
         8,
         'a value that a MOVITRAC tells twice is believed twice',
-        'nfo_sinus_driver/link/movitrac_link.py',
-        '(frame == self._last and arrived < soonest)',
-        'False',
+        'nfo_sinus_driver/link/movitrac.py',
+        'if not (self._again or foreign)',
+        'if not foreign',
         ('test/unit/link/test_movitrac_late.py',),
     ),
     Mutant(

@@ -47,8 +47,8 @@ NEVER_SHOWN = {
     'catalog/family.py': 'the same',
     'catalog/table.py': 'the same',
     'link/lawicel.py': 'a frame that no request makes; the rate was checked before',
-    'link/classic.py': 'a frame that no request makes; the address was checked before',
-    'link/classic_link.py': 'nobody reads by a broadcast',
+    'link/classic.py': 'a frame that no request makes; the address was checked before, and nothing '
+    'reads by a broadcast',
     'link/movitrac.py': 'a frame that no request makes; the address was checked before',
     'link/sdo.py': 'no parameter of a table has such a size',
     'drive/drive_state.py': 'the node makes another session, and asks before',

@@ -144,7 +144,7 @@ EVERY_NAME = set().union(*NAMES.values())
 #: Files and sentences for the families that one protocol reaches.
 OF_PROTOCOL = {
     'classic.py': 'classic',
-    'movitrac_refusal.py': 'movitrac',
+    'movitrac.py': 'movitrac',
     PROTOCOLS['movitrac'].check: 'movitrac',
 }
 SAYING = [

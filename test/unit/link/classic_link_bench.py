@@ -12,7 +12,7 @@ import pytest
 from support.addresses import classic_id, packed
 from virtual_wire import Wire
 
-from nfo_sinus_driver.link.classic_link import ClassicLink
+from nfo_sinus_driver.link.classic import ClassicLink
 from nfo_sinus_driver.link.interface import Address, LineSettings, Refused, Reply
 
 TIMEOUT = 0.1

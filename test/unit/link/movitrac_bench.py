@@ -11,7 +11,7 @@ from movitrac_far_end import FarEnd, Fate
 from virtual_wire import Wire
 
 from nfo_sinus_driver.link.interface import Address, LineSettings, Reply
-from nfo_sinus_driver.link.movitrac_link import MovitracLink
+from nfo_sinus_driver.link.movitrac import MovitracLink
 
 TIMEOUT = 0.2
 SETTINGS = LineSettings(baud_rate=9600, char_format='8N1', response_timeout=TIMEOUT)

@@ -17,7 +17,7 @@ import pytest
 from support.addresses import classic_id, packed
 
 from nfo_sinus_driver.link import classic
-from nfo_sinus_driver.link.classic_link import ClassicLink
+from nfo_sinus_driver.link.classic import ClassicLink
 from nfo_sinus_driver.link.interface import (
     BAUD_RATES,
     DamagedAnswer,

@@ -97,9 +97,8 @@ def test_an_answer_that_is_overlooked_is_found(monkeypatch: pytest.MonkeyPatch) 
     assert 'was not found' in _what('classic')
     feed_one = movitrac.Reader.feed
 
-    def feed_seldom(reader: movitrac.Reader, data: bytes) -> movitrac.Answer | None:
-        answer = feed_one(reader, data)
-        return None if isinstance(answer, movitrac.Data) else answer
+    def feed_seldom(reader: movitrac.Reader, data: bytes) -> list[movitrac.Message]:
+        return [one for one in feed_one(reader, data) if not isinstance(one, movitrac.Data)]
 
     monkeypatch.setattr(movitrac.Reader, 'feed', feed_seldom)
     assert 'was not found' in _what('movitrac')

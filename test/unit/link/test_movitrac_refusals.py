@@ -10,7 +10,7 @@ from movitrac_far_end import Fate
 import pytest
 
 from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.movitrac_refusal import DONE, REFUSALS, refusal
+from nfo_sinus_driver.link.movitrac import DONE, REFUSALS, refusal
 
 #: Words of the manual's table [M4 §2.1.2], and what a program makes of each code.
 MANUAL = {

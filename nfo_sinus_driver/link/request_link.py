@@ -1,0 +1,547 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Requests on one serial line: ask, wait, believe.
+
+What every protocol does alike stands in :class:`RequestLink`; each adds its messages and what they
+do not say. :class:`CodecLink` serves those whose answers are told from requests by a codec.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+import contextlib
+import time
+from typing import Any, Generic, Protocol, TypeVar
+
+from nfo_sinus_driver.link.another_master import DOUBTFUL, TRIES, Codec, OtherRequests
+from nfo_sinus_driver.link.interface import (
+    Address,
+    Clock,
+    DamagedAnswer,
+    LineProtocol,
+    LineSettings,
+    LinkError,
+    NeverSilent,
+    NoAnswer,
+    NothingToAsk,
+    PortError,
+    Refused,
+    Remarks,
+    Reply,
+)
+from nfo_sinus_driver.link.late_replies import LateReplies
+from nfo_sinus_driver.link.port import Port, port_of
+
+#: How long a write waits at least for a line that is not silent, s.
+WRITE_WAIT = 0.02
+_NEVER_SILENT = 'the line is never silent: noise, or another master on it'
+
+_Request = TypeVar('_Request')
+_Answer = TypeVar('_Answer')
+_Self = TypeVar('_Self', bound='RequestLink[Any]')
+
+
+class Echo:
+    """
+    Tells an echo of a request from its answer.
+
+    Who finds the request itself among the bytes that come sets ``present``; from then on every
+    request has to come back before anything else counts. That matters most where the answer is
+    the same as the request: function 06 of Modbus.
+
+    :ivar present: every request comes back.
+    :ivar before: what came between the request and its echo.
+    :ivar held: what has come in place of the echo so far.
+    """
+
+    def __init__(self) -> None:
+        self.present = False
+        self.before = b''
+        self._awaited = b''
+        self.held = b''
+
+    def sent(self, frame: bytes) -> None:
+        """Expect a request to come back, if they do."""
+        self._awaited = frame if self.present else b''
+        self.held = self.before = b''
+
+    @property
+    def bytes_needed(self) -> int:
+        """How many bytes of the echo have to come yet."""
+        return max(0, len(self._awaited) - len(self.held))
+
+    def strip(self, data: bytes) -> bytes:
+        """Return what of the bytes that came is no echo, nor came before it."""
+        if not self._awaited:
+            return data
+        self.held += data
+        before, echo, rest = self.held.partition(self._awaited)
+        if echo:
+            self.before = before
+            self._awaited = self.held = b''
+        return rest
+
+    def give_up(self) -> bytes:
+        """Return what came instead of the echo."""
+        held, self.held, self._awaited = self.held, b'', b''
+        return held
+
+
+class AnyMaster(Protocol):
+    """What finds another master on the line."""
+
+    def is_there(self, now: float) -> bool:
+        """Tell whether another master has been heard of late."""
+
+    def open_until(self, unit: int) -> float:
+        """Return until when an answer of a unit may be to another master; 0: it is not."""
+
+    def hear(self, data: bytes, now: float) -> bool:
+        """Take bytes; tell whether they are known to be of another exchange."""
+
+    def clear(self) -> None:
+        """Forget what was heard: the port is closed."""
+
+
+class RequestLink(ABC, Generic[_Request]):
+    """
+    A master on one serial line; one request at a time.
+
+    Between frames the line is silent for a gap, counted from the last byte on it. Whenever an
+    answer is missing or damaged, or bytes come unasked, the kinds of answers that may still come
+    are in quarantine (:class:`LateReplies`). A read whose answer could be confused with them is
+    sent after the unit has answered something else, a *resync read*. A write is sent at once, for
+    it may be a stop. An answer that may be to another master is not believed; a read is repeated.
+
+    An adapter that echoes what is sent is noticed at the first request; from then on an answer
+    counts only behind the echo.
+    """
+
+    supervision = None
+    protocol: LineProtocol
+    _another: AnyMaster
+    _late: LateReplies[Any, Any]
+
+    def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
+        self._now = now
+        self._port = port
+        self._settings = settings
+        self.remarks = Remarks()
+        self._echo = Echo()
+        #: When the last byte was on the line, as far as we know.
+        self._line_end = 0.0
+
+    @classmethod
+    def on_port(cls: type[_Self], port: str, settings: LineSettings) -> _Self:
+        """Return the link on a port; a ValueError says what is no port."""
+        return cls(port_of(port, settings), settings)
+
+    def open(self) -> None:
+        """Open the port."""
+        self._port.open()
+        self._line_end = self._now()
+
+    def close(self) -> None:
+        """Close the port; harmless when it is closed already."""
+        self._port.close()
+        self._late.clear()
+        self._another.clear()
+        self._echo = Echo()
+
+    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
+        """
+        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+
+        :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
+        """
+        request = self._read_request(unit, source)
+        self._await_gap(request, is_write=True)
+        try:
+            with contextlib.suppress(NoAnswer, DamagedAnswer, Refused):
+                self._transact(request)
+            self._expect_again(request)
+            return self.write(unit, address, data)
+        except LinkError as error:
+            error.maybe_done = True
+            raise
+
+    @abstractmethod
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        """Write one parameter (LinkError: as its subclasses say)."""
+
+    # --- what the protocols differ in -------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def _gap(self) -> float:
+        """How long the line is silent between two frames, s."""
+
+    @property
+    @abstractmethod
+    def _write_wait(self) -> float:
+        """How long a write waits for a line that is not silent, s: one answer at least."""
+
+    @abstractmethod
+    def _read_request(self, unit: int, address: Address) -> _Request:
+        """Return the request that reads a parameter."""
+
+    @abstractmethod
+    def _resync_reads(self, unit: int) -> Iterable[_Request]:
+        """Yield requests that do nothing, the best first."""
+
+    @abstractmethod
+    def _telling_kinds(self, request: _Request) -> Sequence[Any]:
+        """Return the kinds of answers by which one to a read has to be told from others."""
+
+    @abstractmethod
+    def _transact(self, request: _Request) -> tuple[Any, float]:
+        """Send a request; return its answer, and when its last byte came."""
+
+    @abstractmethod
+    def _take_late(self, request: _Request, now: float) -> None:
+        """Put in quarantine what another master asked and may be answered late."""
+
+    def _gap_before(self, request: _Request) -> float:
+        """Return how long the line is silent before a request if nothing comes unasked, s."""
+        return self._gap
+
+    def _hear_unasked(self, data: bytes, request: _Request) -> None:
+        """Take note of bytes that are of no exchange that is known."""
+        self._late.heard_unasked(self._now())
+
+    def _expect_again(self, request: _Request) -> None:
+        """Expect an answer once more where the last may have been the one before, told twice."""
+
+    # --- belief -----------------------------------------------------------------------------------
+
+    def _ask(self, request: _Request) -> tuple[Any, float]:
+        """Return the answer to a read, and when it came; another master may cost some tries."""
+        for tries_left in reversed(range(TRIES)):
+            try:
+                return self._ask_once(request)
+            except DamagedAnswer:
+                if not tries_left or not self._another.is_there(self._now()):
+                    raise
+        raise AssertionError
+
+    def _ask_once(self, request: _Request) -> tuple[Any, float]:
+        self._await_gap(request)
+        resynced = self._make_certain(request)
+        try:
+            return self._transact(request)
+        except LinkError as error:
+            error.heard = resynced
+            raise
+
+    def _make_certain(self, request: Any) -> bool:
+        """
+        Have the unit answer something else first, if needed; tell whether it did.
+
+        :raises NotReady: everything that could be asked first is in quarantine, too.
+        """
+        if not self._late.quarantined(request.unit, self._now()):
+            return False
+        question = self._first_certain(request.unit, request)
+        if question is request:
+            return False
+        try:
+            self._resync_read(question)
+        except LinkError as error:
+            # the request itself has not been sent
+            error.maybe_done = False
+            raise
+        self._await_gap(request)
+        return True
+
+    def _first_certain(self, unit: int, *requests: _Request) -> _Request:
+        """Return the first of some requests, or of the resync reads, that is not in doubt."""
+
+        def questions() -> Iterator[tuple[_Request, Sequence[Any]]]:
+            for request in requests:
+                yield request, self._telling_kinds(request)
+            for request in self._resync_reads(unit):
+                yield request, self._telling_kinds(request)
+
+        return self._late.first_certain(unit, questions(), self._now())
+
+    def _resync_read(self, request: _Request) -> None:
+        """Have a unit answer; whatever it says, what was late has come before it."""
+        with contextlib.suppress(Refused):
+            self._transact(request)
+
+    # --- the line ---------------------------------------------------------------------------------
+
+    def _await_gap(self, request: Any, *, is_write: bool = False) -> bool:
+        """
+        Wait for a gap of silence; tell whether bytes came meanwhile that nobody asked for.
+
+        A write may be a stop, and the noise may be on our side of the line alone: rather than not
+        at all it is sent into it, as soon as no answer that began before can still be coming.
+
+        :raises NeverSilent: there is none.
+        """
+        wait = self._write_wait if is_write else self._settings.response_timeout
+        give_up = self._now() + wait
+        gap = self._gap_before(request)
+        stray = False
+        while True:
+            data, now, silent = self._await_silence(gap, wait)
+            if data and not self._another.hear(data, now):
+                stray = True
+                self._hear_unasked(data, request)
+            if not silent and not is_write:
+                raise NeverSilent(_NEVER_SILENT)
+            until = min(self._another.open_until(request.unit), give_up)
+            if now >= until:
+                break
+            # what another master asked is answered first
+            if data := self._read_line(until):
+                self._another.hear(data, self._now())
+                gap = self._gap
+        self._take_late(request, now)
+        return stray
+
+    def _await_silence(self, gap: float, wait: float) -> tuple[bytes, float, bool]:
+        """
+        Wait for silence on the line.
+
+        :param gap: how long it has to last, s.
+        :param wait: how much longer than that it is waited for, s.
+        :returns: all bytes that came meanwhile, the moment, and whether silence came, too.
+        """
+        give_up = max(self._line_end + gap, self._now()) + wait
+        came = b''
+        while True:
+            data = self._port.read(self._line_end + gap)
+            now = self._now()
+            if data:
+                came += data
+                gap = self._gap
+                self._line_end = max(self._line_end, now)
+                if now > give_up:
+                    return came, now, False
+            elif now >= self._line_end + gap:
+                return came, now, True
+
+    def _send(self, request: _Request, frame: bytes) -> float:
+        """Hand a request to the port; return when its last byte will have left."""
+        self._late.sent(request)
+        self._echo.sent(frame)
+        self._line_end = self._now() + len(frame) * self._settings.char_time
+        self._port.write(frame)
+        return self._line_end
+
+    def _read_line(self, until: float) -> bytes:
+        """Return what comes on the line until a moment; nothing: it has passed."""
+        while True:
+            data = self._port.read(until)
+            now = self._now()
+            if data:
+                # what comes while the request still leaves is no answer to it
+                self._line_end = max(self._line_end, now)
+                return data
+            if now >= until:
+                return data
+
+
+class _Ambiguous(DamagedAnswer):
+    """An answer came that names nothing and may belong to an earlier request."""
+
+
+class CodecLink(RequestLink[Any]):
+    """
+    A master of a protocol whose refusals and confirmations name nothing.
+
+    If the answer to a write is in quarantine it is not believed: the line is cleared by reading
+    something, and :class:`DamagedAnswer` says that the outcome is unknown.
+
+    The requests of another master are found (:class:`OtherRequests`). What may answer them, and
+    any answer that may have met another one, is not believed; a read is repeated.
+    """
+
+    _codec: Codec
+    #: Which parameters every drive has, and may be read at any time: with four of them one is
+    #: always certain, see :class:`LateReplies`.
+    _everywhere: tuple[int, ...]
+    #: How much later than at once a drive may answer, s.
+    _longest_response = 0.0
+
+    def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
+        super().__init__(port, settings, now)
+        codec = self._codec
+        self._late = LateReplies(settings.response_timeout, codec.kinds)
+        self._another: OtherRequests = OtherRequests(
+            self.remarks, settings.response_timeout + self._longest_response, codec
+        )
+        #: The last answer is the one before, and came before the request can have been answered.
+        self._again = False
+        #: The last request, its answer and when it came; ``None``: it had none.
+        self._last: tuple[Any, Any, float] | None = None
+
+    def close(self) -> None:
+        """Close the port; harmless when it is closed already."""
+        super().close()
+        self._last = None
+
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+        """
+        Take parameters that are safe to read; here those are asked that every drive has.
+
+        To ask a drive for what it does not have may be a fault, for which it stops [M2 table 4].
+        """
+
+    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
+        """Write one parameter, then read another; in as many transactions as that takes."""
+        self.write(unit, address, data)
+        return self.read(unit, source)
+
+    @abstractmethod
+    def read(self, unit: int, address: Address) -> Reply:
+        """Read one parameter (LinkError: as its subclasses say)."""
+
+    def identify(self, unit: int) -> NothingToAsk:
+        """Return no questions: the protocol has none but for parameters."""
+        return NothingToAsk()
+
+    def _read_request(self, unit: int, address: Address) -> Any:
+        return self._codec.enquiry(unit, address.index)
+
+    @property
+    def _write_wait(self) -> float:
+        return max(WRITE_WAIT, self._codec.longest_answer * self._settings.char_time)
+
+    def _resync_reads(self, unit: int) -> Iterable[Any]:
+        return (self._codec.enquiry(unit, number) for number in self._everywhere)
+
+    def _telling_kinds(self, request: Any) -> Sequence[Any]:
+        return self._codec.kinds(request)[:1]
+
+    def _take_late(self, request: Any, now: float) -> None:
+        if late := self._another.take_late(now):
+            self._late.expect(late, now)
+
+    def _patience(self, unit: int) -> float:
+        """Return how much later than at once an answer may begin, s."""
+        return 0.0
+
+    def _confirm(self, request: Any, answer: Any, arrived: float, until: float) -> None:
+        """
+        Make sure of an answer.
+
+        :param until: when the right answer has come, if this was none.
+        :raises DamagedAnswer: it is none.
+        """
+
+    def _command(self, request: Any) -> tuple[Any, float]:
+        """Return the answer to a write, and when it came."""
+        self._await_gap(request, is_write=True)
+        try:
+            return self._transact(request)
+        except _Ambiguous:
+            # not after mere noise: a stop that is given again would only have to wait for it
+            self._settle(request.unit)
+            raise
+
+    def _settle(self, unit: int) -> None:
+        """Read something, so that the next answer is believed again; if not, then not."""
+        try:
+            self._await_gap(self._codec.enquiry(unit, self._everywhere[0]))
+            self._resync_read(self._first_certain(unit))
+        except PortError:
+            raise
+        except LinkError:
+            return
+
+    # --- one transaction --------------------------------------------------------------------------
+
+    def _transact(self, request: Any) -> tuple[Any, float]:
+        char_time = self._settings.char_time
+        before, self._last, self._again = self._last, None, False
+        patience = self._patience(request.unit)
+        self._another.sent(request)
+        sent = self._send(request, self._codec.encode(request))
+        try:
+            answer, arrived, behind = self._receive(request, sent + patience)
+            length = len(self._codec.encode(answer)) * char_time
+            # a character less, for no clock is exact
+            repeated = before is not None and before[1] == answer
+            self._again = repeated and arrived < sent + length - char_time
+            self._confirm(request, answer, arrived, sent + patience + length)
+        except (NoAnswer, DamagedAnswer):
+            self._late.expect(request, self._now())
+            if self._echo.give_up():
+                # an adapter that echoes no more; if it does, the next echo will tell
+                self._echo.present = False
+            raise
+        # units answer in order: whatever was still to come from it has come before this
+        self._late.release(request.unit)
+        self._took(request.unit, arrived - sent - length)
+        self._last = request, answer, arrived
+        # and the request has left, even where the port is faster than its settings say
+        self._line_end = arrived
+        if behind:
+            self._hear_unasked(behind, request)
+        return answer, arrived
+
+    def _receive(self, request: Any, due: float) -> tuple[Any, float, bytes]:
+        """
+        Return the answer, when it came, and what came behind it.
+
+        :param due: when it begins at last, if the drive is as fast as it can be.
+        """
+        codec, unit = self._codec, request.unit
+        quarantined = self._late.quarantined(unit, self._now())
+        longest = codec.longest_answer * self._settings.char_time + codec.inter_byte_timeout
+        deadline = due + self._settings.response_timeout
+        # one answer, and as much rubbish again, however long the line is not silent
+        last_chance = deadline + 2 * longest
+        reader = codec.reader()
+        came = 0
+        while data := self._read_line(deadline):
+            now = self._now()
+            self._another.hear(data, now)
+            data = self._echo.strip(data)
+            came += len(data)
+            messages = reader.feed(data)
+            for number, message in enumerate(messages, start=1):
+                if message == request:
+                    came -= len(codec.encode(request))
+                    # or another master asks the same
+                    self._echo.present |= not self._another.is_there(now)
+                    continue
+                if not codec.answers(message, request):
+                    continue
+                stray = len(self._echo.before) + came - len(codec.encode(message))
+                doubtful = self._another.doubts(message, request, now, stray)
+                if codec.kind(message) not in quarantined and not doubtful:
+                    behind = b''.join(map(codec.encode, messages[number:])) + reader.rest
+                    return message, now, behind
+                if isinstance(request, codec.select):
+                    raise _Ambiguous(f'unit {unit} answered, but perhaps to an earlier request')
+                if doubtful:
+                    raise DamagedAnswer(f'unit {unit}: {DOUBTFUL}')
+            lost = self._was_passed_over(messages, request, quarantined, now)
+            if lost or self._another.was_answered:
+                raise DamagedAnswer(f'unit {unit}: {DOUBTFUL}')
+            deadline = self._deadline(min(max(deadline, now + longest), last_chance), now)
+        came += len(self._echo.before) + len(self._echo.held)
+        if came:
+            raise DamagedAnswer(f'unit {unit}: {came} bytes came that are no answer')
+        raise NoAnswer(f'unit {unit} did not answer')
+
+    def _took(self, unit: int, seconds: float) -> None:
+        """Take note how long a unit took to answer."""
+        self._late.took(unit, seconds)
+
+    def _was_passed_over(
+        self, messages: Sequence[Any], request: Any, quarantined: Any, now: float
+    ) -> bool:
+        """Tell whether an answer to another master shows that the request was lost."""
+        return False
+
+    def _deadline(self, deadline: float, now: float) -> float:
+        """Return until when more of an answer is waited for."""
+        return deadline
