@@ -5,24 +5,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set as AbstractSet
+from collections.abc import Callable, Iterator, Sequence, Set as AbstractSet
 import contextlib
 from dataclasses import replace
 import re
 import time
 
-from nfo_sinus_driver.link import nmt, sdo
-from nfo_sinus_driver.link.another_client import AnotherClient
+from nfo_sinus_driver.link import sdo
+from nfo_sinus_driver.link.another_master import Sightings
 from nfo_sinus_driver.link.can import FUNCTION_CODE, CanPort, Frame, SocketCan
-from nfo_sinus_driver.link.canopen_identify import CanopenInquiry
-from nfo_sinus_driver.link.canopen_supervision import CanopenSupervision
+from nfo_sinus_driver.link.canopen_supervision import HEARTBEATS, CanopenSupervision, start
 from nfo_sinus_driver.link.interface import (
     Address,
     Clock,
     DamagedAnswer,
+    Identification,
     LineSettings,
     LinkError,
     NoAnswer,
+    NotReady,
     PortError,
     Refused,
     Remarks,
@@ -31,9 +32,8 @@ from nfo_sinus_driver.link.interface import (
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.lawicel import LawicelPort
 from nfo_sinus_driver.link.line_protocols import CANOPEN
-from nfo_sinus_driver.link.object_shapes import SECOND, ObjectShapes
 from nfo_sinus_driver.link.port import port_of
-from nfo_sinus_driver.link.sdo import Download, Kind, Transfer, Upload
+from nfo_sinus_driver.link.sdo import SECOND, Download, Kind, ObjectShapes, Transfer, Upload
 
 #: Bit rate of the serial port of an adapter; those on USB do not care.
 _ADAPTER_RATE = 115_200
@@ -50,6 +50,138 @@ _FRAME_BITS = 108
 _EXPEDITED = 4
 #: How many times is read what another client's requests have made uncertain.
 _TRIES = 3
+
+
+def _remark(unit: int) -> str:
+    return (
+        f'another SDO client asks node {unit}: a node answers one client at a time, so disconnect '
+        'it or stop its program; until then readings come later, and commands of its own may '
+        'reach the drive'
+    )
+
+
+class AnotherClient:
+    """
+    Finds what another client asks the nodes that are asked here.
+
+    A node carries out what it is asked in order, whoever asks. So an answer that the other's
+    request may have too is uncertain until the node has answered something else, asked later. A
+    segment names no object, and whatever begins a transfer ends the one before: a transfer in
+    segments is uncertain when anything else was asked meanwhile.
+    """
+
+    def __init__(self, remarks: Remarks) -> None:
+        self._sightings = Sightings(remarks)
+        #: What each node was asked last, until it comes back: some adapters return what they sent.
+        self._own: dict[int, bytes] = {}
+        #: The nodes of which the beginning of the last transfer came back.
+        self._returned: set[int] = set()
+        self._disturbed: set[int] = set()
+        self._meanwhile: set[Kind] = set()
+
+    def sent(self, frame: Frame) -> None:
+        """Take note of a request of ours; what was asked before it is answered before it."""
+        self._own[frame.identifier - sdo.REQUESTS] = frame.data
+        self._meanwhile.clear()
+
+    def begins(self, unit: int) -> None:
+        """Take note that a transfer of ours is about to begin."""
+        self._returned.discard(unit)
+        self._disturbed.discard(unit)
+
+    def is_there(self, now: float) -> bool:
+        """Tell whether another client has been heard of late."""
+        return self._sightings.is_there(now)
+
+    def disturbed(self, unit: int) -> bool:
+        """Tell whether a node was asked anything else since our transfer began."""
+        return unit in self._disturbed
+
+    @property
+    def meanwhile(self) -> frozenset[Kind]:
+        """The kinds of answers that it may still get, asked for since our last request."""
+        return frozenset(self._meanwhile)
+
+    def hear(self, frame: Frame, now: float) -> frozenset[Kind]:
+        """Take a frame; return the kinds of answers that another client may get to it."""
+        unit = frame.identifier - sdo.REQUESTS
+        if unit not in self._own:
+            return frozenset()
+        kinds = sdo.kinds_asked_for(frame.data)
+        names_object = kinds.isdisjoint(sdo.SEGMENTS)
+        if frame.data == self._own[unit] and (names_object or unit in self._returned):
+            # or the other asks the very same: its answer says what ours does
+            self._own[unit] = b''
+            self._returned.add(unit)
+            return frozenset()
+        self._sightings.add(now, _remark(unit))
+        self._disturbed.add(unit)
+        self._meanwhile |= kinds
+        return kinds
+
+
+_SPACE = 'object'
+#: The longest text that is expected.
+_TEXT = 64
+
+
+def _number(data: bytes) -> str:
+    return str(int.from_bytes(data, 'little'))
+
+
+def _text(data: bytes) -> str:
+    """Return a text as the drive has it; what cannot be printed is left out."""
+    text = data.decode('ascii', errors='replace').partition('\0')[0]
+    return ''.join(char for char in text if char.isascii() and char.isprintable()).strip()
+
+
+#: What is asked, index and sub-index, for which field, and what is made of the bytes.
+_QUESTIONS: tuple[tuple[int, int, int, str, Callable[[bytes], str]], ...] = (
+    (0x1018, 1, 4, 'vendor', _number),
+    (0x1018, 2, 4, 'product_code', _number),
+    (0x1018, 4, 4, 'serial', _number),
+    (0x1008, 0, _TEXT, 'product', _text),
+    (0x100A, 0, _TEXT, 'revision', _text),
+)
+
+
+class CanopenInquiry:
+    """
+    Questions to a node about itself, one by one.
+
+    :param read: reads an object of a node.
+    """
+
+    def __init__(self, unit: int, read: Callable[[int, Address], Reply]) -> None:
+        self._unit = unit
+        self._read = read
+        self._left = list(_QUESTIONS)
+        self.found = Identification()
+
+    @property
+    def done(self) -> bool:
+        """There is nothing left to ask."""
+        return not self._left
+
+    def ask(self) -> Reply:
+        """
+        Ask the next question: one transaction.
+
+        A question that failed is not asked again; only after :class:`NotReady` it still is to be.
+
+        :raises LinkError: as its subclasses say.
+        """
+        index, sub_index, size, field, value_of = self._left[0]
+        try:
+            reply = self._read(self._unit, Address(_SPACE, index, sub_index, size))
+        except NotReady:
+            raise
+        except LinkError:
+            del self._left[0]
+            raise
+        del self._left[0]
+        self.found = replace(self.found, **{field: value_of(reply.data)})
+        return reply
 
 
 class _Ambiguous(DamagedAnswer):
@@ -117,7 +249,7 @@ class CanopenLink:
         :raises ValueError: it is none of them; the message says what to write.
         """
         if _INTERFACE.fullmatch(port):
-            identifiers = sdo.ANSWERS, sdo.REQUESTS, nmt.HEARTBEATS
+            identifiers = sdo.ANSWERS, sdo.REQUESTS, HEARTBEATS
             wanted = tuple((identifier, FUNCTION_CODE) for identifier in identifiers)
             return cls(SocketCan(port, wanted), settings)
         serial = port_of(port, replace(settings, baud_rate=_ADAPTER_RATE, char_format='8N1'))
@@ -205,7 +337,7 @@ class CanopenLink:
         unit = download.unit
         self._drain()
         if unit not in self._started:
-            self._port.send(nmt.start(unit))
+            self._port.send(start(unit))
             self._started.add(unit)
         self.supervision.asks(unit, writes=True)
         try:

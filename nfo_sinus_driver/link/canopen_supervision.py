@@ -16,9 +16,17 @@ from collections.abc import Callable, Generator, Sequence, Set as AbstractSet
 import math
 from typing import NamedTuple
 
-from nfo_sinus_driver.link import nmt
 from nfo_sinus_driver.link.can import CanPort, Frame
 from nfo_sinus_driver.link.interface import Address, Clock, Refused, Reply
+
+#: Added to the address of a node, the identifier of its boot-up and of its heartbeat.
+HEARTBEATS = 0x700
+#: The node ids that there are.
+NODES = range(1, 128)
+
+_COMMANDS = 0x000
+_START = 0x01
+_BOOTED, _OPERATIONAL = b'\x00', b'\x05'
 
 #: How often nodes hear the heartbeat, s, and how often at least in the time that one watches for.
 _HEARTBEAT = 0.1
@@ -34,6 +42,27 @@ _LONGEST = 0xFFFF
 
 HEARTBEAT_MEANS = 'consumer heartbeat, object 1016h'
 GUARDING_MEANS = 'node guarding, objects 100Ch and 100Dh'
+
+
+def heartbeat(client: int) -> Frame:
+    """Return what a client sends for as long as it is there; it is this node to those who watch."""
+    return Frame(HEARTBEATS + client, _OPERATIONAL)
+
+
+def guarding_request(unit: int) -> Frame:
+    """Return what asks a node for its state; one that is asked no more notices."""
+    return Frame(HEARTBEATS + unit, bytes(1), remote=True)
+
+
+def start(unit: int) -> Frame:
+    """Return what makes a node operational; there is no answer to it."""
+    return Frame(_COMMANDS, bytes((_START, unit)))
+
+
+def booted(frame: Frame) -> int | None:
+    """Return which node has started anew; ``None``: the frame says nothing of the kind."""
+    unit = frame.identifier - HEARTBEATS
+    return unit if unit in NODES and frame.data == _BOOTED else None
 
 
 class _Guarding(NamedTuple):
@@ -92,7 +121,7 @@ class CanopenSupervision:
 
     def heard(self, frames: Sequence[Frame]) -> AbstractSet[int]:
         """Take what has come; return which nodes have started anew."""
-        started = {unit for unit in map(nmt.booted, frames) if unit is not None}
+        started = {unit for unit in map(booted, frames) if unit is not None}
         self._restarted |= started
         return started
 
@@ -106,12 +135,12 @@ class CanopenSupervision:
     def send_due(self, now: float) -> None:
         """Send what is due (PortError: the port is lost)."""
         if (self._commands or self._watching) and now >= self._beat_due:
-            self._port.send(nmt.heartbeat(self.client))
+            self._port.send(heartbeat(self.client))
             shortest = min((seconds for seconds, _ in self._watching.values()), default=math.inf)
             self._beat_due = now + min(_HEARTBEAT, shortest / _BEATS)
         for unit, guarding in self._guarded.items():
             if now >= guarding.due:
-                self._port.send(nmt.guarding(unit))
+                self._port.send(guarding_request(unit))
                 self._guarded[unit] = guarding._replace(due=now + guarding.period)
 
     # --- for the thread that has the line ---------------------------------------------------------
@@ -147,8 +176,8 @@ class CanopenSupervision:
         """The node that this client is to those that watch over it; none that is asked."""
         if self._client:
             return self._client
-        free = [unit for unit in reversed(nmt.NODES) if unit not in self._asked]
-        return free[0] if free else nmt.NODES[-1]
+        free = [unit for unit in reversed(NODES) if unit not in self._asked]
+        return free[0] if free else NODES[-1]
 
     def show_heartbeat(self, unit: int, seconds: float, entry: int) -> None:
         """Show a heartbeat to a node that watches for so long, s, by an entry of object 1016h."""

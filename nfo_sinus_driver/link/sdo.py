@@ -7,18 +7,87 @@ Service data objects of CANopen, the side of the client, without I/O (CiA 301 §
 A :class:`Transfer` is asked what to send, and told what came, until it is over. Up to four bytes go
 in one exchange, *expedited*; longer values in segments of seven bytes, each confirmed, whose
 toggle bit tells each from the one before. An answer is recognised by its *kind*: what it does and
-to which object; only segments do not say to which.
+to which object; only segments do not say to which. A server ends a transfer by an abort code.
+:class:`ObjectShapes` is what only a node can say of its objects: how long values are, where arrays
+begin [C102].
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Set as AbstractSet
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set as AbstractSet
 import struct
 from typing import NamedTuple
 
-from nfo_sinus_driver.link import sdo_abort
-from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link.interface import Address, DamagedAnswer, Refused
+
+#: What a client says that has waited in vain.
+TIMED_OUT = 0x0504_0000
+#: The object has no such sub-index.
+NO_SUB_INDEX = 0x0609_0011
+#: The value has another length there: any other, a shorter one, a longer one.
+WRONG_LENGTH, TOO_LONG, TOO_SHORT = 0x0607_0010, 0x0607_0012, 0x0607_0013
+
+
+class Aborted(Refused):
+    """
+    The node has ended the transfer.
+
+    :ivar abort: with which of :data:`ABORT_CODES`.
+    """
+
+    def __init__(self, abort: int, kind: int, reason: str) -> None:
+        super().__init__(kind, reason)
+        self.abort = abort
+
+
+_FUNCTION = Refused.ILLEGAL_FUNCTION
+_NO_SUCH = Refused.ILLEGAL_ADDRESS
+_VALUE = Refused.ILLEGAL_VALUE
+_STATE = Refused.DEVICE_FAILURE
+
+#: What an abort code says: the code of :class:`Refused` that means the same, and its words.
+ABORT_CODES: Mapping[int, tuple[int, str]] = {
+    0x0503_0000: (_STATE, 'the toggle bit did not alternate'),
+    TIMED_OUT: (_STATE, 'the drive waited in vain for the next segment'),
+    0x0504_0001: (_FUNCTION, 'the drive does not know this command'),
+    0x0504_0002: (_FUNCTION, 'invalid block size'),
+    0x0504_0003: (_FUNCTION, 'invalid sequence number'),
+    0x0504_0004: (_STATE, 'a check sum was wrong'),
+    0x0504_0005: (_STATE, 'the drive is out of memory'),
+    0x0601_0000: (_NO_SUCH, 'the object does not support this access'),
+    0x0601_0001: (_NO_SUCH, 'the object can only be written'),
+    0x0601_0002: (_NO_SUCH, 'the object can only be read'),
+    0x0602_0000: (_NO_SUCH, 'the drive has no such object'),
+    0x0604_0041: (_STATE, 'the object cannot be mapped to the process data'),
+    0x0604_0042: (_STATE, 'the process data would be too long'),
+    0x0604_0043: (_STATE, 'the parameters do not fit together'),
+    0x0604_0047: (_STATE, 'the drive is not compatible within itself'),
+    0x0606_0000: (_STATE, 'a hardware error of the drive'),
+    WRONG_LENGTH: (_VALUE, 'the value has the wrong length'),
+    TOO_LONG: (_VALUE, 'the value is too long'),
+    TOO_SHORT: (_VALUE, 'the value is too short'),
+    NO_SUB_INDEX: (_NO_SUCH, 'the object has no such sub-index'),
+    0x0609_0030: (_VALUE, 'the drive does not accept this value'),
+    0x0609_0031: (_VALUE, 'the value is too large'),
+    0x0609_0032: (_VALUE, 'the value is too small'),
+    0x0609_0036: (_VALUE, 'the maximum is less than the minimum'),
+    0x060A_0023: (_STATE, 'what it takes is not available'),
+    0x0800_0000: (_STATE, 'the drive refused'),
+    0x0800_0020: (_STATE, 'the drive cannot transfer or store the value'),
+    0x0800_0021: (_STATE, 'the drive cannot do this: it is under local control'),
+    0x0800_0022: (_STATE, 'the drive cannot do this in its present state'),
+    0x0800_0023: (_STATE, 'the drive has no list of its objects'),
+    0x0800_0024: (_STATE, 'there is no value'),
+}
+_UNKNOWN = (_STATE, 'the drive refused')
+
+
+def refusal(code: int) -> Aborted:
+    """Return what an abort says."""
+    kind, meaning = ABORT_CODES.get(code, _UNKNOWN)
+    return Aborted(code, kind, f'{meaning} (SDO abort {code:08X}h)')
+
 
 #: Added to the address of a node, the identifiers of what it is asked, and of its answers.
 REQUESTS = 0x600
@@ -143,7 +212,7 @@ class Transfer(ABC):
             return False
         if told is not None and told.command == _ABORT:
             self.request = None
-            raise sdo_abort.refusal(_SIZE.unpack_from(message, 4)[0])
+            raise refusal(_SIZE.unpack_from(message, 4)[0])
         if self._expected in SEGMENTS:
             if message[0] & _TOGGLE != self._toggle:
                 return False
@@ -153,7 +222,7 @@ class Transfer(ABC):
 
     def abort(self) -> bytes:
         """Return what makes the server forget the transfer; there is no answer to it."""
-        return self._message(_ABORT, _SIZE.pack(sdo_abort.TIMED_OUT))
+        return self._message(_ABORT, _SIZE.pack(TIMED_OUT))
 
     @abstractmethod
     def _go_on(self, message: bytes) -> None:
@@ -254,3 +323,135 @@ def _segments(value: bytes) -> Iterator[bytes]:
         flags = toggle | (_SEGMENT - len(data)) << 1 | is_last
         yield bytes((_DOWNLOAD_SEGMENT | flags,)) + data.ljust(_SEGMENT, b'\0')
         toggle ^= _TOGGLE
+
+
+#: How many bytes a number may have on CANopen.
+_LENGTHS = (1, 2, 4, 8)
+#: The sub-index of the second value of an array that is numbered from 1. Asking for it first tells
+#: how an array is numbered: where there is none, that value has the sub-index before. To ask for
+#: the first value would do, in the other case, what nobody asked for: it acknowledges a fault.
+SECOND = 2
+
+
+class ObjectShapes:
+    """
+    What is known of the objects of all nodes of a line; without I/O.
+
+    Arrays are numbered from 1 in the addresses of the catalog. A node may number them from 0.
+    """
+
+    def __init__(self) -> None:
+        #: How many bytes each number has, by node, index and sub-index of the node.
+        self._lengths: dict[tuple[int, int, int], int] = {}
+        #: What has to be taken off the sub-indices of an array.
+        self._offsets: dict[tuple[int, int], int] = {}
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._lengths.clear()
+        self._offsets.clear()
+
+    def sub_index(self, unit: int, address: Address) -> int | None:
+        """Return the sub-index of the node; ``None``: how it numbers the array is not known yet."""
+        if not address.sub_index or address.signed is None:
+            return address.sub_index or 0
+        offset = self._offsets.get((unit, address.index))
+        return None if offset is None else address.sub_index - offset
+
+    def note_array(self, unit: int, index: int, refusal: Refused | None) -> None:
+        """
+        Take note of what a node answers to a question for the :data:`SECOND` value of an array.
+
+        :raises Refused: that does not tell how the array is numbered.
+        """
+        if refusal is None:
+            self._offsets[unit, index] = 0
+        elif isinstance(refusal, Aborted) and refusal.abort == NO_SUB_INDEX:
+            self._offsets[unit, index] = 1
+        else:
+            raise refusal
+
+    def fit_read(self, unit: int, address: Address, sub_index: int, data: bytes) -> bytes:
+        """
+        Return a value in as many bytes as the catalog has for it; note how many the node has.
+
+        :raises DamagedAnswer: it is no such number.
+        """
+        if address.signed is None:
+            return data
+        if len(data) in _LENGTHS:
+            self._lengths[unit, address.index, sub_index] = len(data)
+            fitted = _fitted(data, address.size, signed=address.signed)
+            if fitted is not None:
+                return fitted
+        raise DamagedAnswer(
+            f'unit {unit}, object {address.index:04X}h, sub-index {sub_index}: '
+            f'{data.hex(" ") or "nothing"} is no number of {address.size} bytes'
+        )
+
+    def write(
+        self,
+        unit: int,
+        address: Address,
+        sub_index: int,
+        data: bytes,
+        send: Callable[[bytes], float],
+    ) -> float:
+        """
+        Write a value in as many bytes as the node has for it.
+
+        Where no reading has told, and it says that they are too many or too few, it has done
+        nothing, and others are tried.
+
+        :param send: writes bytes; returns when it was confirmed.
+        :raises LinkError: as ``send`` does.
+        """
+        if address.signed is None:
+            return send(data)
+        place = unit, address.index, sub_index
+        length = self._lengths.get(place, len(data))
+        try:
+            return send(_resized(data, length, signed=address.signed))
+        except Aborted as refusal:
+            for other in _others(refusal.abort, length):
+                fitted = _fitted(data, other, signed=address.signed)
+                if fitted is None:
+                    continue
+                try:
+                    arrived = send(fitted)
+                except Aborted:
+                    continue
+                self._lengths[place] = other
+                return arrived
+            raise
+
+
+def _others(abort: int, length: int) -> Sequence[int]:
+    """Return which other lengths may be right, the likeliest first."""
+    if abort == TOO_LONG:
+        return [other for other in reversed(_LENGTHS) if other < length]
+    if abort == TOO_SHORT:
+        return [other for other in _LENGTHS if other > length]
+    if abort != WRONG_LENGTH:
+        return ()
+    return [other for other in (2, 4, 1, 8) if other != length]
+
+
+def _fitted(data: bytes, length: int, *, signed: bool) -> bytes | None:
+    """Return a number in so many bytes; ``None``: it has more."""
+    number = int.from_bytes(data, 'little', signed=signed)
+    try:
+        return number.to_bytes(length, 'little', signed=signed)
+    except OverflowError:
+        return None
+
+
+def _resized(data: bytes, length: int, *, signed: bool) -> bytes:
+    """Return a number in so many bytes (Refused: it has more)."""
+    fitted = _fitted(data, length, signed=signed)
+    if fitted is None:
+        number = int.from_bytes(data, 'little', signed=signed)
+        raise Refused(
+            Refused.ILLEGAL_VALUE, f'the drive has {length} bytes for it, {number} takes more'
+        )
+    return fitted

@@ -405,7 +405,7 @@ LAWS = (
     Mutant(
         8,
         'a transfer in segments is believed although another client has ended it',
-        'nfo_sinus_driver/link/another_client.py',
+        'nfo_sinus_driver/link/canopen_link.py',
         '        return unit in self._disturbed',
         '        return False',
         ('test/unit/link/test_another_sdo_client.py',),
@@ -413,7 +413,7 @@ LAWS = (
     Mutant(
         8,
         'what another client asked while ours was answered is no more in doubt',
-        'nfo_sinus_driver/link/another_client.py',
+        'nfo_sinus_driver/link/canopen_link.py',
         '        return frozenset(self._meanwhile)',
         '        return frozenset()',
         ('test/unit/link/test_another_sdo_client.py',),

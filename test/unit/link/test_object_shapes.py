@@ -10,7 +10,7 @@ from canopen_far_end import NO_OBJECT, WRONG_LENGTH, Server
 from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.link import Address, DamagedAnswer, Refused, sdo_abort
+from nfo_sinus_driver.link import Address, DamagedAnswer, Refused, sdo
 
 MODE = 0x2022
 INV_ST = 0x2026
@@ -32,7 +32,7 @@ class Strict(Server):
         has = len(self.objects[place])
         if len(value) == has:
             return super()._store(value)
-        codes = {'longer': sdo_abort.TOO_LONG, 'shorter': sdo_abort.TOO_SHORT}
+        codes = {'longer': sdo.TOO_LONG, 'shorter': sdo.TOO_SHORT}
         told = codes['longer' if len(value) > has else 'shorter']
         return self._abort(WRONG_LENGTH if self.abort == WRONG_LENGTH else told)
 
@@ -77,7 +77,7 @@ def test_what_the_catalog_has_no_room_for_is_no_value() -> None:
 
 @given(
     st.data(), st.sampled_from([1, 2, 4]), st.sampled_from([1, 2, 4, 8]), st.booleans(),
-    st.sampled_from([WRONG_LENGTH, sdo_abort.TOO_LONG]),
+    st.sampled_from([WRONG_LENGTH, sdo.TOO_LONG]),
 )
 def test_a_length_that_nobody_has_told_is_found_by_trying(
     data: st.DataObject, size: int, length: int, signed: bool, abort: int
