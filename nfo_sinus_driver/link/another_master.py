@@ -279,7 +279,7 @@ class AnotherMaster:
         """Tell whether another master has been heard of late."""
         return self._sightings.is_there(now)
 
-    def stands_until(self, unit: int) -> float:
+    def open_until(self, unit: int) -> float:
         """Return until when an answer of a unit may be to another master; 0: it is not."""
         question = self._standing.get(unit)
         return 0.0 if question is None else question.until
@@ -292,13 +292,14 @@ class AnotherMaster:
         del self._standing[unit]
         return question.answer_head
 
-    def hear(self, data: bytes, now: float) -> None:
-        """Take bytes that are no answer to us."""
+    def hear(self, data: bytes, now: float) -> bool:
+        """Take bytes that are no answer to us; what of them is of no frame is kept for a while."""
         if not data:
-            return
+            return False
         self._buffer = (self._buffer + data)[-_MOST:]
         while self._find(now):
             pass
+        return False
 
     def was_answered_in(self, data: bytes) -> bool:
         """Tell whether another master's request and the answer to it are in some bytes."""

@@ -15,7 +15,6 @@ from nfo_sinus_driver.link.interface import (
     Address,
     Identification,
     LineProtocol,
-    LinkError,
     NotReady,
     Remarks,
     Reply,
@@ -48,19 +47,6 @@ class ModbusLink(ABC):
         """Write one parameter and read another, in one transaction (function 23)."""
         return Reply(*self._ask(write_and_read_of(unit, address, data, source)))
 
-    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
-        """
-        Read a parameter whose value nobody needs, then write another; nothing is sent between.
-
-        :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
-        """
-        self._ask_unheard(read_of(unit, source))
-        try:
-            return self.write(unit, address, data)
-        except LinkError as error:
-            error.maybe_done = True
-            raise
-
     def identify(self, unit: int) -> ModbusInquiry:
         """Return the questions by which a unit tells who it is (functions 43/14 and 17)."""
         return ModbusInquiry(unit, self._ask)
@@ -68,10 +54,6 @@ class ModbusLink(ABC):
     @abstractmethod
     def _ask(self, request: Request[_T]) -> tuple[_T, float]:
         """Return the answer to a request, and when its last byte came."""
-
-    @abstractmethod
-    def _ask_unheard(self, request: Request[object]) -> None:
-        """Send a request at once and wait for its answer, whatever that is and says."""
 
 
 REPORT_SLAVE_ID = 17

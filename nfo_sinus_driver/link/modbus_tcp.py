@@ -40,7 +40,7 @@ from nfo_sinus_driver.link.interface import (
 )
 from nfo_sinus_driver.link.line_protocols import MODBUS_TCP
 from nfo_sinus_driver.link.modbus_link import ModbusLink
-from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, understand
+from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, read_of, understand
 from nfo_sinus_driver.link.tcp_connection import Connection, TcpConnection
 
 _HEADER = struct.Struct('>HHH')
@@ -193,6 +193,23 @@ class TcpLink(ModbusLink):
         if address.space == telegram.ADDRESSING:
             return self._blocks(unit, address).write_and_read(address, data, source)
         return super().write_and_read(unit, address, data, source)
+
+    def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
+        """
+        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+
+        :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
+        """
+        with contextlib.suppress(NoAnswer, DamagedAnswer, Refused, NoPath):
+            try:
+                self._exchange(read_of(unit, source))
+            except OSError as error:
+                raise self._lost(error) from error
+        try:
+            return self.write(unit, address, data)
+        except LinkError as error:
+            error.maybe_done = True
+            raise
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Take parameters that are safe to read; here nothing has to be resynchronised."""
@@ -364,14 +381,6 @@ class TcpLink(ModbusLink):
             f'the gateway did not answer for unit {unit}: '
             'response_timeout has to be longer than its own'
         )
-
-    def _ask_unheard(self, request: Request[object]) -> None:
-        """Send a request and wait for its answer, whatever that is and says."""
-        with contextlib.suppress(NoAnswer, DamagedAnswer, Refused, NoPath):
-            try:
-                self._exchange(request)
-            except OSError as error:
-                raise self._lost(error) from error
 
     def _understood(self, request: Request[_T], message: bytes) -> _T:
         try:

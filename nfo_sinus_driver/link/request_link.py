@@ -158,7 +158,7 @@ class RequestLink(ABC, Generic[_Request]):
         :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
         """
         request = self._read_request(unit, source)
-        self._await_gap(request, is_write=True)
+        self._await_gap(request)
         try:
             with contextlib.suppress(NoAnswer, DamagedAnswer, Refused):
                 self._transact(request)

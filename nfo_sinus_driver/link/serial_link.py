@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-import contextlib
 import time
 from typing import Any, TypeVar
 
@@ -22,7 +21,6 @@ from nfo_sinus_driver.link.interface import (
     NoAnswer,
     NotReady,
     Refused,
-    Remarks,
     Reply,
 )
 from nfo_sinus_driver.link.late_replies import Doubt, LateReplies
@@ -31,12 +29,12 @@ from nfo_sinus_driver.link.modbus_pdu import (
     AnswerReader,
     Request,
     Write,
-    WriteAndRead,
     read_of,
     refusal_head,
     write_and_read_of,
 )
-from nfo_sinus_driver.link.port import NEVER_SILENT, Port, await_silence, port_of
+from nfo_sinus_driver.link.port import Port
+from nfo_sinus_driver.link.request_link import WRITE_WAIT, RequestLink
 
 _T = TypeVar('_T')
 
@@ -54,26 +52,18 @@ _LONG_PAUSE = 0.03
 #: No pause is waited for longer, s.
 _MOST_PAUSE = 0.2
 
-#: How often a read is asked while another master asks at the same time.
-_TRIES = 3
 #: How many of the longest pauses within an answer there may be.
 _PAUSES = 3
-#: How long a write waits at least for a line that is not silent, s.
-_WRITE_WAIT = 0.02
 #: Bytes in the answer to a read of two registers.
 _TWO_REGISTERS = 7
 
 
-class SerialLink(ModbusLink):
+class SerialLink(RequestLink[Request[Any]], ModbusLink):
     """
     A Modbus master on one line.
 
-    Between frames the line is silent for a gap at least, counted from the last byte seen on it.
-
-    A read answer does not name its register. So whenever an answer is missing or damaged, or
-    bytes come that nobody asked for, its shape is in quarantine (:class:`LateReplies`): a request
-    whose answer could be confused with it is only sent after one of another shape has been
-    answered. A write is sent at once, for it may be a stop, and its answer names what was written.
+    A read answer does not name its register, so its kind is its shape; the answer to a write names
+    what was written.
 
     For the same reason an answer with the very bytes of the one before is not believed at once: it
     may be the one before, told twice. The right one would come when a unit answers, so until then
@@ -83,17 +73,15 @@ class SerialLink(ModbusLink):
     for that.
     """
 
+    _another: AnotherMaster
+
     def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
-        self._now = now
-        self._port = port
-        self._settings = settings
-        self.remarks = Remarks()
+        super().__init__(port, settings, now)
         self._late: LateReplies[Request[Any], bytes] = LateReplies(
             settings.response_timeout, answer_kinds
         )
         self._another = AnotherMaster(self.remarks, settings.response_timeout, self._messages)
         self._resync_addresses: dict[int, tuple[Address, ...]] = {}
-        self._echo = Echo()
         #: How long a pause within an answer may be on this line, s, as far as answers have shown.
         self._pause = 0.0
         #: When the last request had left.
@@ -104,29 +92,17 @@ class SerialLink(ModbusLink):
         self._stray = False
         #: The last answer may be to another master.
         self._doubtful = False
-        #: When the last byte was on the line, as far as we know.
-        self._line_end = 0.0
-
-    @classmethod
-    def on_port(cls, port: str, settings: LineSettings) -> SerialLink:
-        """Return the link on a port; a ValueError says what is no port."""
-        return cls(port_of(port, settings), settings)
-
-    def open(self) -> None:
-        """Open the port."""
-        self._port.open()
-        self._line_end = self._now()
-
-    def close(self) -> None:
-        """Close the port; harmless when it is closed already."""
-        self._port.close()
-        self._late.clear()
-        self._another.clear()
-        self._echo = Echo()
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
         self._resync_addresses[unit] = tuple(addresses)
+
+    def write(self, unit: int, address: Address, data: bytes) -> Reply:
+        """Write one parameter (function 06 for one register, 16 for several)."""
+        request = Write(unit, address.index, data)
+        self._await_gap(request, is_write=True)
+        # a write answer names what was written, and nobody believes it without reading back
+        return Reply(*self._believed(request))
 
     def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """
@@ -138,19 +114,17 @@ class SerialLink(ModbusLink):
         :raises LinkError: as its subclasses say.
         """
         request = write_and_read_of(unit, address, data, source)
-        self._await_silence(request)
+        self._await_gap(request, is_write=True)
         quarantined = self._late.quarantined(unit, self._now())
         doubted = not quarantined.isdisjoint(answer_kinds(request))
         if doubted or self._another.is_there(self._now()):
             return self.write(unit, address, data)
-        return Reply(*self._ask(request))
+        reply = self._believed(request)
+        if self._doubtful:
+            raise DamagedAnswer(f'unit {unit}: {DOUBTFUL}')
+        return Reply(*reply)
 
     # --- what the protocols differ in -------------------------------------------------------------
-
-    @property
-    @abstractmethod
-    def _gap(self) -> float:
-        """How long the line is silent between two frames, s."""
 
     @abstractmethod
     def _encode(self, request: Request[Any]) -> bytes:
@@ -170,75 +144,56 @@ class SerialLink(ModbusLink):
 
     # --- belief -----------------------------------------------------------------------------------
 
-    def _ask(self, request: Request[_T]) -> tuple[_T, float]:
-        """Return the answer to a request, and when its last byte came."""
-        if isinstance(request, Write):
-            return self._ask_once(request)
-        for tries_left in reversed(range(1 if isinstance(request, WriteAndRead) else _TRIES)):
-            try:
-                answer = self._ask_once(request)
-            except Refused:
-                if not self._doubtful:
-                    raise
-            except DamagedAnswer:
-                if not tries_left or not self._another.is_there(self._now()):
-                    raise
-            else:
-                if not self._doubtful:
-                    return answer
-        raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
+    def _ask_once(self, request: Request[Any]) -> tuple[Any, float]:
+        self._await_gap(request)
+        resynced = self._make_certain(request)
+        refusal: Refused | None = None
+        try:
+            answer = self._believed(request)
+        except Refused as error:
+            refusal = error
+        except LinkError as error:
+            error.heard = resynced
+            raise
+        if self._doubtful:
+            raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
+        if refusal is not None:
+            raise refusal
+        return answer
 
-    def _ask_once(self, request: Request[_T]) -> tuple[_T, float]:
-        """Return the answer to a request, which may be to another master."""
-        self._await_silence(request)
-        # a write answer names what was written, and nobody believes it without reading back
-        resynced = not isinstance(request, Write) and self._make_certain(request)
+    def _believed(self, request: Request[_T]) -> tuple[_T, float]:
+        """Return the answer to a request; it may be to another master, but is none told twice."""
         try:
             answer = self._transact(request)
         except Refused:
             self._confirm(request)
             raise
-        except LinkError as error:
-            error.heard = resynced
-            raise
         self._confirm(request, names_it=isinstance(request, Write))
         return answer
 
-    def _ask_unheard(self, request: Request[object]) -> None:
-        """Send a request at once and wait for its answer, whatever that is and says."""
-        self._await_silence(request)
-        with contextlib.suppress(NoAnswer, DamagedAnswer, Refused):
-            self._transact(request)
+    def _read_request(self, unit: int, address: Address) -> Request[Any]:
+        return read_of(unit, address)
+
+    def _expect_again(self, request: Request[Any]) -> None:
         if self._late.repeated is not None:
-            # it may be the one before, told twice
             self._late.expect(request, self._now())
 
-    def _make_certain(self, request: Request[Any]) -> bool:
-        """Have the unit answer something else first, if needed; tells whether it was asked."""
-        unit, now = request.unit, self._now()
-        if request.answer_head not in self._late.quarantined(unit, now):
-            return False
-        questions = [(request, (request.answer_head,)), *self._resync_reads(unit)]
-        question = self._late.first_certain(unit, questions, now)
-        if question is request:
-            return False
-        try:
-            self._resync_read(question)
-        except LinkError as error:
-            # nobody has heard the request itself
-            error.maybe_done = False
-            raise
-        self._await_silence(request)
-        return True
+    def _resync_reads(self, unit: int) -> Iterator[Request[Any]]:
+        """
+        Yield requests that do nothing, the quickest first.
 
-    def _resync_reads(self, unit: int) -> Iterator[tuple[Request[Any], Sequence[bytes]]]:
-        return resync_reads(unit, self._resync_addresses.get(unit, ()))
+        First the parameters that the drive is known to have. Then functions 17 and 43/14, which
+        only identify a drive [M0 §6.2.4]: one that does not have them [C57] refuses, and a refusal
+        names the function, so that tells as much.
+        """
+        for address in self._resync_addresses.get(unit, ()):
+            yield read_of(unit, address)
+        yield ReportSlaveId(unit)
+        yield ReadDevice(unit, SPECIFIC, _PRODUCT_CODE)
 
-    def _resync_read(self, read: Request[Any]) -> None:
-        """Have a unit answer, whatever it says."""
-        # a refusal that is believed tells as well as an answer that all is said
-        with contextlib.suppress(Refused):
-            self._transact(read)
+    def _telling_kinds(self, request: Request[Any]) -> Sequence[bytes]:
+        identifies = isinstance(request, (ReportSlaveId, ReadDevice))
+        return answer_kinds(request) if identifies else (request.answer_head,)
 
     def _confirm(self, request: Request[Any], *, names_it: bool = False) -> None:
         """Make sure that the answer, if it ``names_it`` not itself, is not the one before again."""
@@ -259,9 +214,8 @@ class SerialLink(ModbusLink):
         stray = self._stray
         self._confirming = True
         try:
-            stray |= self._await_silence(request)
-            reads = self._resync_reads(request.unit)
-            self._resync_read(self._late.first_certain(request.unit, reads, self._now()))
+            stray |= self._await_gap(request)
+            self._resync_read(self._first_certain(request.unit))
             if not stray and not self._stray:
                 return
         except (NotReady, NeverSilent):
@@ -284,37 +238,13 @@ class SerialLink(ModbusLink):
                 self._late.heard_unasked(self._now())
                 raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
-    def _await_silence(self, request: Request[Any]) -> bool:
-        """
-        Wait for a gap of silence; tell whether bytes came meanwhile that nobody asked for.
-
-        A write may be a stop, and the noise may be on our side of the line alone: rather than not
-        at all it is sent into it, as soon as no answer that began before can still be coming.
-
-        :raises NeverSilent: there is none.
-        """
-        is_write = isinstance(request, (Write, WriteAndRead))
-        wait = self._write_wait if is_write else self._settings.response_timeout
-        give_up = self._now() + self._settings.response_timeout
-        came = False
-        while True:
-            heard = await_silence(self._port, self._now, self._line_end, self._gap, wait)
-            data, self._line_end, silent = heard
-            came |= bool(data)
-            now = self._now()
-            self._another.hear(data, now)
-            if not silent and not is_write:
-                self._late.heard_unasked(now)
-                raise NeverSilent(NEVER_SILENT)
-            until = min(self._another.stands_until(request.unit), give_up)
-            if is_write or now >= until:
-                break
-            # what another master asked is answered first
-            if data := self._port.read(until):
-                self._line_end = max(self._line_end, self._now())
-                self._another.hear(data, self._line_end)
-        if late := self._another.take_late(request.unit, now):
-            self._late.quarantine(request.unit, (late,), now)
+    def _await_gap(self, request: Request[Any], *, is_write: bool = False) -> bool:
+        try:
+            came = super()._await_gap(request, is_write=is_write)
+        except NeverSilent:
+            self._late.heard_unasked(self._now())
+            raise
+        now = self._now()
         stray = bool(self._another.take_rest(request.unit)) and (
             came or self._another.is_there(now)
         )
@@ -322,22 +252,24 @@ class SerialLink(ModbusLink):
             self._late.heard_unasked(now)
         return stray
 
+    def _hear_unasked(self, data: bytes, request: Request[Any]) -> None:
+        # what of it is of no frame of another master shows when the line is silent
+        return
+
+    def _take_late(self, request: Request[Any], now: float) -> None:
+        if late := self._another.take_late(request.unit, now):
+            self._late.quarantine(request.unit, (late,), now)
+
     @property
     def _write_wait(self) -> float:
-        """How long a write waits for a line that is not silent, s: one answer of two registers."""
-        longest = self._frame_length(_TWO_REGISTERS) * self._settings.char_time
-        return max(_WRITE_WAIT, longest)
+        return max(WRITE_WAIT, self._frame_length(_TWO_REGISTERS) * self._settings.char_time)
 
     # --- one transaction --------------------------------------------------------------------------
 
     def _transact(self, request: Request[_T]) -> tuple[_T, float]:
         frame = self._encode(request)
-        self._late.sent(request)
-        self._echo.sent(frame)
         self._another.sent(frame)
-        self._port.write(frame)
-        self._sent_at = self._now() + len(frame) * self._settings.char_time
-        self._line_end = self._sent_at
+        self._sent_at = self._send(request, frame)
         reader = self._reader(request)
         try:
             answer, arrived = self._receive(request, reader, frame)
@@ -361,7 +293,7 @@ class SerialLink(ModbusLink):
             stray = self._echo.before + other.replace(frame, b'', 1)
             self._stray = bool(stray)
             self._another.hear(stray, now)
-            stands = now < self._another.stands_until(request.unit)
+            stands = now < self._another.open_until(request.unit)
             self._doubtful = self._another.is_there(now) and (self._stray or stands)
         length = len(reader.frame) * self._settings.char_time
         self._late.note(request, reader.frame, arrived, length)
@@ -464,51 +396,6 @@ def _feed(reader: AnswerReader[_T], data: bytes, refusals: list[Refused] | None)
             data = b''
 
 
-class Echo:
-    """
-    Tells an echo of a request from its answer.
-
-    Who finds the request itself among the bytes that come sets ``present``; from then on every
-    request has to come back before anything else counts. That matters most where the answer is
-    the same as the request: function 06.
-
-    :ivar present: every request comes back.
-    :ivar before: what came between the request and its echo.
-    """
-
-    def __init__(self) -> None:
-        self.present = False
-        self.before = b''
-        self._awaited = b''
-        self._held = b''
-
-    def sent(self, frame: bytes) -> None:
-        """Expect a request to come back, if they do."""
-        self._awaited = frame if self.present else b''
-        self._held = self.before = b''
-
-    @property
-    def bytes_needed(self) -> int:
-        """How many bytes of the echo have to come yet."""
-        return max(0, len(self._awaited) - len(self._held))
-
-    def strip(self, data: bytes) -> bytes:
-        """Return what of the bytes that came is no echo, nor came before it."""
-        if not self._awaited:
-            return data
-        self._held += data
-        before, echo, rest = self._held.partition(self._awaited)
-        if echo:
-            self.before = before
-            self._awaited = self._held = b''
-        return rest
-
-    def give_up(self) -> bytes:
-        """Return what came instead of the echo."""
-        held, self._held, self._awaited = self._held, b'', b''
-        return held
-
-
 #: The object of function 43/14 whose text is empty, so its answer is the shortest [M0 §6.2.4].
 _PRODUCT_CODE = 1
 
@@ -516,20 +403,3 @@ _PRODUCT_CODE = 1
 def answer_kinds(request: Request[Any]) -> tuple[bytes, bytes]:
     """Return what tells the answer to a request from others, and what its refusal."""
     return request.answer_head, refusal_head(request)
-
-
-def resync_reads(
-    unit: int, addresses: Sequence[Address]
-) -> Iterator[tuple[Request[Any], Sequence[bytes]]]:
-    """
-    Yield requests that do nothing, the quickest first, each with what has to tell its answer.
-
-    First the parameters that the drive is known to have. Then functions 17 and 43/14, which only
-    identify a drive [M0 §6.2.4]: one that does not have them [C57] refuses, and a refusal names
-    the function, so that tells as much.
-    """
-    for address in addresses:
-        read = read_of(unit, address)
-        yield read, (read.answer_head,)
-    for request in (ReportSlaveId(unit), ReadDevice(unit, SPECIFIC, _PRODUCT_CODE)):
-        yield request, answer_kinds(request)

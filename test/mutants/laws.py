@@ -310,7 +310,7 @@ LAWS = (
         8,
         'a late answer is believed',
         'nfo_sinus_driver/link/serial_link.py',
-        '        resynced = not isinstance(request, Write) and self._make_certain(request)',
+        '        resynced = self._make_certain(request)',
         '        resynced = False',
         (RTU_LINK,),
     ),

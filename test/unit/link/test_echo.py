@@ -25,8 +25,8 @@ from virtual_wire import AsciiWire, Fate, Slave, Wire
 from nfo_sinus_driver.link import BusSettings
 from nfo_sinus_driver.link.interface import Address, DamagedAnswer, LinkError, NoAnswer, Refused
 from nfo_sinus_driver.link.modbus_ascii import AsciiLink
+from nfo_sinus_driver.link.request_link import Echo
 from nfo_sinus_driver.link.rtu import RtuLink
-from nfo_sinus_driver.link.serial_link import Echo
 
 KINDS = {'rtu': (RtuLink, Wire), 'ascii': (AsciiLink, AsciiWire)}
 
