@@ -29,8 +29,7 @@ from nfo_sinus_driver.link.interface import (
     Supervision,
     Watch,
 )
-from nfo_sinus_driver.link.line_protocols import ADDRESSES, BIT_RATES, PROTOCOLS
-from nfo_sinus_driver.link.protocols import BusSettings, open_link
+from nfo_sinus_driver.link.protocols import ADDRESSES, BIT_RATES, PROTOCOLS, BusSettings, open_link
 from nfo_sinus_driver.link.reconnect import Reconnect
 
 __all__ = [

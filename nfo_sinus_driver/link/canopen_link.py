@@ -31,8 +31,8 @@ from nfo_sinus_driver.link.interface import (
 )
 from nfo_sinus_driver.link.late_replies import LateReplies
 from nfo_sinus_driver.link.lawicel import LawicelPort
-from nfo_sinus_driver.link.line_protocols import CANOPEN
 from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.protocols import CANOPEN
 from nfo_sinus_driver.link.sdo import SECOND, Download, Kind, ObjectShapes, Transfer, Upload
 
 #: Bit rate of the serial port of an adapter; those on USB do not care.

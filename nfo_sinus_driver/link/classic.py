@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache, reduce
+from functools import cached_property, lru_cache, reduce
 from operator import xor
 import struct
 import time
@@ -29,8 +29,8 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Reply,
 )
-from nfo_sinus_driver.link.line_protocols import BROADCAST, CLASSIC, POINT_TO_POINT
 from nfo_sinus_driver.link.port import Port
+from nfo_sinus_driver.link.protocols import BROADCAST, CLASSIC, POINT_TO_POINT
 from nfo_sinus_driver.link.request_link import CodecLink
 
 #: Of how many messages what is sent is kept; the ENQUIRIES of a poll are sent again and again.
@@ -430,7 +430,7 @@ class ClassicLink(CodecLink):
 
     # --- belief -----------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def _gap(self) -> float:
         return _NO_DOUBLE * self._settings.char_time
 

@@ -18,8 +18,8 @@ from typing import Any, TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link.another_master import message_lengths
-from nfo_sinus_driver.link.line_protocols import MODBUS_ASCII
 from nfo_sinus_driver.link.modbus_pdu import AnswerReader, Request
+from nfo_sinus_driver.link.protocols import MODBUS_ASCII
 from nfo_sinus_driver.link.serial_link import SerialLink
 
 #: How long a pause between two characters of a frame may last, s.
@@ -115,7 +115,7 @@ class AsciiLink(SerialLink):
 
     protocol = MODBUS_ASCII
 
-    @property
+    @functools.cached_property
     def _gap(self) -> float:
         return _SWITCHING * self._settings.char_time
 

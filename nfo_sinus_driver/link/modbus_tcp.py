@@ -38,9 +38,9 @@ from nfo_sinus_driver.link.interface import (
     Remarks,
     Reply,
 )
-from nfo_sinus_driver.link.line_protocols import MODBUS_TCP
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, read_of, understand
+from nfo_sinus_driver.link.protocols import MODBUS_TCP
 from nfo_sinus_driver.link.tcp_connection import Connection, TcpConnection
 
 _HEADER = struct.Struct('>HHH')

@@ -16,12 +16,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 from nfo_sinus_driver.link.another_master import Codec
 from nfo_sinus_driver.link.interface import Address, DamagedAnswer, Refused, Reply
-from nfo_sinus_driver.link.line_protocols import MOVITRAC
+from nfo_sinus_driver.link.protocols import MOVITRAC
 from nfo_sinus_driver.link.request_link import CodecLink
 
 #: How many bytes a value has: of a plain frame, and of a long one.
@@ -426,7 +426,7 @@ class MovitracLink(CodecLink):
             raise refusal(answer.code)
         return Reply(b'', arrived)
 
-    @property
+    @cached_property
     def _gap(self) -> float:
         return _GAP * self._settings.char_time
 

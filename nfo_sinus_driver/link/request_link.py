@@ -467,8 +467,8 @@ class CodecLink(RequestLink[Any]):
             answer, arrived, behind = self._receive(request, sent + patience)
             length = len(self._codec.encode(answer)) * char_time
             # a character less, for no clock is exact
-            repeated = before is not None and before[1] == answer
-            self._again = repeated and arrived < sent + length - char_time
+            early = arrived < sent + length - char_time
+            self._again = early and before is not None and before[1] == answer
             self._confirm(request, answer, arrived, sent + patience + length)
         except (NoAnswer, DamagedAnswer):
             self._late.expect(request, self._now())
@@ -507,12 +507,11 @@ class CodecLink(RequestLink[Any]):
             came += len(data)
             messages = reader.feed(data)
             for number, message in enumerate(messages, start=1):
-                if message == request:
-                    came -= len(codec.encode(request))
-                    # or another master asks the same
-                    self._echo.present |= not self._another.is_there(now)
-                    continue
                 if not codec.answers(message, request):
+                    if message == request:
+                        came -= len(codec.encode(request))
+                        # or another master asks the same
+                        self._echo.present |= not self._another.is_there(now)
                     continue
                 stray = len(self._echo.before) + came - len(codec.encode(message))
                 doubtful = self._another.doubts(message, request, now, stray)

@@ -16,8 +16,8 @@ from typing import Any, TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
 from nfo_sinus_driver.link.another_master import message_lengths
-from nfo_sinus_driver.link.line_protocols import MODBUS_RTU
 from nfo_sinus_driver.link.modbus_pdu import AnswerReader, Request
+from nfo_sinus_driver.link.protocols import MODBUS_RTU
 from nfo_sinus_driver.link.serial_link import SerialLink
 
 #: How many bytes the check sum has.
@@ -99,7 +99,7 @@ class RtuLink(SerialLink):
 
     protocol = MODBUS_RTU
 
-    @property
+    @functools.cached_property
     def _gap(self) -> float:
         return self._settings.frame_gap
 

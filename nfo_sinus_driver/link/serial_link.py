@@ -286,15 +286,19 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             now = self._now()
             # what comes back before the answer to a write may be its answer, and another master may
             # ask the same as we do
-            alone = not self._another.is_there(now)
-            came_back = not isinstance(request, Write) and frame in other
+            there = self._another.is_there(now)
+            came_back = frame in other and not isinstance(request, Write)
+            alone = not there
             if alone and came_back:
                 self._echo.present = True
             stray = self._echo.before + other.replace(frame, b'', 1)
             self._stray = bool(stray)
-            self._another.hear(stray, now)
-            stands = now < self._another.open_until(request.unit)
-            self._doubtful = self._another.is_there(now) and (self._stray or stands)
+            if stray:
+                self._another.hear(stray, now)
+                there = self._another.is_there(now)
+            self._doubtful = there and (
+                self._stray or now < self._another.open_until(request.unit)
+            )
         length = len(reader.frame) * self._settings.char_time
         self._late.note(request, reader.frame, arrived, length)
         late = request.answer_head in self._late.quarantined(request.unit, arrived)

@@ -10,7 +10,7 @@ import pytest
 
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.lawicel import BIT_RATES, Heard, Reader, bit_rate, encode
-from nfo_sinus_driver.link.line_protocols import CANOPEN
+from nfo_sinus_driver.link.protocols import CANOPEN
 
 FRAMES = st.builds(Frame, st.integers(0, 0x7FF), st.binary(max_size=8), st.just(False))
 #: What else an adapter says.
