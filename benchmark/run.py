@@ -5,7 +5,7 @@
 How fast the driver is, how soon it stops a motor, and how it bears noise: prints tables.
 
 Simulated drives on a line that takes its time, a master and its clients, each a process of its
-own. The peer is what a user would write instead; docs/performance.md explains the rows.
+own. The peer is what a user would write instead; benchmark/results.md explains the rows.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import speed
 
 from nfo_sinus_driver.demo.bench import own_domain
 
-_PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'performance.md'
+_PAGE = Path(__file__).resolve().parents[1] / 'benchmark' / 'results.md'
 _LIBRARIES = ('rclpy', 'minimalmodbus', 'pyserial')
 _MARK = '<!-- {}: from here to the end mark written by benchmark/ with --write -->'
 _END = '<!-- {}: end -->'
@@ -115,7 +115,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--runs', type=int, help='how often everything is measured (default: 5; --quick: 1)')
     add('--quick', action='store_true', help='shorter windows, fewer events, one run')
     add('--only', action='append', choices=_GROUPS, help='only these tables; may be repeated')
-    add('--write', action='store_true', help=f'put the tables into docs/{_PAGE.name}')
+    add('--write', action='store_true', help=f'put the tables into benchmark/{_PAGE.name}')
     add('--domain', type=int, metavar='ID', help='ROS domain (default: one of its own)')
     return parser
 
