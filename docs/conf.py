@@ -9,7 +9,9 @@ import re
 project = 'nfo_sinus_driver'
 copyright = 'the nfo_sinus_driver authors, Apache License 2.0'
 extensions = ['myst_parser', 'sphinxcontrib.mermaid']
-include_patterns = ['README.md', 'CONTRIBUTING.md', 'CHANGELOG.rst', 'docs/*.md']
+include_patterns = [
+    *('README.md', 'CONTRIBUTING.md', 'CHANGELOG.rst', 'docs/*.md', 'benchmark/results.md'),
+]
 exclude_patterns = ['.*', 'build', 'install', 'log', 'site']
 root_doc = 'docs/README'
 html_theme = 'furo'
@@ -26,7 +28,7 @@ _ROOT = Path(__file__).resolve().parents[1]
 
 
 def _prepare(app, name, source):
-    """Give the index a table of contents, in the order of its own table, and no page a folder."""
+    """Give the index a table of contents for each group of it; links to folders become text."""
     folder = (_ROOT / name).parent
 
     def without_folder(link):
@@ -36,9 +38,12 @@ def _prepare(app, name, source):
     source[0] = re.sub(r'(?<!!)\[([^]]+)\]\(([^)#\s]+)\)', without_folder, source[0])
     if name != _INDEX:
         return
-    pages = re.findall(r'^\| \[[^]]+\]\(([\w.]+)\.md\)', source[0], re.MULTILINE)
-    entries = '\n'.join(['/README', *pages, '/CONTRIBUTING', '/CHANGELOG'])
-    source[0] += f'\n```{{toctree}}\n:hidden:\n\n{entries}\n```\n'
+    # the title of each group, and the rows of its table
+    for title, rows in re.findall(r'^## (.+)\n\n((?:\|.*\n)+)', source[0], re.MULTILINE):
+        pages = re.findall(r'^\| \[[^]]+\]\(([\w./]+)\.md\)', rows, re.MULTILINE)
+        pages += ['../CONTRIBUTING', '../CHANGELOG'] if title == 'Internals' else []
+        entries = '\n'.join(pages)
+        source[0] += f'\n```{{toctree}}\n:hidden:\n:caption: {title}\n\n{entries}\n```\n'
 
 
 def setup(app):
