@@ -81,7 +81,7 @@ class HeldSignals:
             cleanup.callback(signal.set_wakeup_fd, before)
             for number in _HELD:
                 cleanup.callback(_put_back, number, signal.signal(number, _noted))
-            # what nobody asked for would end it when all is done
+            # what was not requested would end it when all is done
             cleanup.callback(self._forget)
             self._cleanup = cleanup.pop_all()
 
@@ -128,7 +128,7 @@ def _put_back(number: int, handler: signal._HANDLER) -> None:
 
 class OtherProcess:
     """
-    A process that is somebody else's, such as the one that started this one.
+    A process of another user, such as the one that started this one.
 
     :raises ProcessLookupError: there is none of that number.
     """
@@ -156,7 +156,7 @@ class OtherProcess:
         except ProcessLookupError:
             return True
         except PermissionError:
-            # it is there, as somebody else's
+            # it is there, of another user
             pass
         return False
 

@@ -119,7 +119,7 @@ def require_yes(options: argparse.Namespace, question: str) -> None:
     if options.yes:
         return
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        raise UsageError(f'{question} Nobody can be asked here: say so with --yes')
+        raise UsageError(f'{question} There is no terminal to answer: say so with --yes')
     print(f'{question} [y/N] ', end='', file=sys.stderr, flush=True)
     answer = sys.stdin.readline()
     if not answer.endswith('\n'):

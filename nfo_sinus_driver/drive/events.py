@@ -416,7 +416,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Event:
-    """A report nobody asked for, and the inverter status shown at last, if there was one."""
+    """An unrequested report, and the inverter status shown at last, if there was one."""
 
     severity: Severity
     report: Report

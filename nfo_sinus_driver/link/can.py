@@ -143,7 +143,7 @@ class SocketCan:
         except OSError as error:
             if error.errno not in (errno.ENOBUFS, errno.EAGAIN):
                 raise self._lost(error) from error
-            # the queue is full, for nobody acknowledges
+            # the queue is full, for no node acknowledges
             self.trouble = CANNOT_SEND
 
     def receive(self, until: float) -> Sequence[Frame]:

@@ -197,8 +197,8 @@ class CanopenLink:
     object, or a segment: after a missing answer its kind is in quarantine (:class:`LateReplies`),
     and the object is only read when the node has answered about another one. A write is never kept
     waiting, for it may be a stop; but if an earlier one of the same object may still be answered,
-    the answer is not believed: something is read, and :class:`DamagedAnswer` says that nobody
-    knows.
+    the answer is not believed: something is read, and :class:`DamagedAnswer` says that the outcome
+    is unknown.
 
     CAN itself sees to it that no frame is damaged, but one may be told twice, the second time right
     behind the first. So what is the same as the answer before, and comes before the request can
@@ -358,7 +358,7 @@ class CanopenLink:
         self, unit: int, source: Address, address: Address, data: bytes
     ) -> Reply:
         """
-        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+        Read a parameter whose value is not needed, then write another; nothing is sent between.
 
         :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
         """
@@ -392,7 +392,7 @@ class CanopenLink:
         except Refused:
             return
         except LinkError as error:
-            # nobody has heard the request for which it was asked
+            # no node has received the request for which it was asked
             error.maybe_done = False
             raise
 
@@ -447,7 +447,7 @@ class CanopenLink:
         self._late.quarantine(unit, self._another.meanwhile, self._now())
 
     def _drain(self) -> None:
-        """Take what came unasked: an answer that is late, one to somebody else, a boot-up."""
+        """Take what came unasked: an answer that is late, one to another client, a boot-up."""
         while self._take(0.0):
             continue
 

@@ -31,7 +31,7 @@ _BOOTED, _OPERATIONAL = b'\x00', b'\x05'
 #: How often nodes hear the heartbeat, s, and how often at least in the time that one watches for.
 _HEARTBEAT = 0.1
 _BEATS = 4
-#: How often it is listened to a line on which nobody asks anything, s.
+#: How often it is listened to a line without requests, s.
 _LISTENING = 0.1
 #: How many times in a row a guarded node may miss that it is asked: its life time factor.
 _LIFE_FACTOR = 4
@@ -101,7 +101,7 @@ class CanopenSupervision:
         self._guarded: dict[int, _Guarding] = {}
         #: Which node this client is to those that watch over it; 0: it is not settled.
         self._client = 0
-        #: It has written something, so that somebody may want to know that it is there.
+        #: It has written something, so that its presence may be of interest.
         self._commands = False
         self._beat_due = self._listen_due = 0.0
 
@@ -288,7 +288,7 @@ class CanopenWatch:
                 return
             number = int.from_bytes(told, 'little')
             if number & _LONGEST and number >> 16 & 0x7F not in (0, client):
-                # it watches over somebody else by this one
+                # it watches another node by this one
                 continue
             supervision.show_heartbeat(unit, milliseconds / 1000, entry)
             if (yield _Request(place, wanted)) is not None and (yield _Request(place)) == wanted:

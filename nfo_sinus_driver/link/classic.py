@@ -366,7 +366,7 @@ class ClassicLink(CodecLink):
         """Read one parameter of one word, or one word of another."""
         (part,) = self.parts(address)
         if unit == BROADCAST:
-            raise ValueError('nobody answers a broadcast')
+            raise ValueError('a broadcast is not answered')
         word, arrived = self._enquire(unit, part.index)
         return Reply(_WORD.pack(word), arrived)
 

@@ -38,7 +38,7 @@ class Address(NamedTuple):
     """
 
     space: str
-    index: int  # type: ignore[assignment]  # hides a method of tuples that nobody calls
+    index: int  # type: ignore[assignment]  # hides a method of tuples that is never called
     sub_index: int | None
     size: int
     signed: bool | None = None
@@ -102,7 +102,7 @@ class Inquiry(Protocol):
 
 class Watch(Protocol):
     """
-    How a unit is made to notice that nobody talks to it any more; step by step, as an inquiry.
+    How a unit is made to notice silence on the line; step by step, as an inquiry.
 
     :ivar means: by what it notices; ``''``: it has nothing for it, or it is turned off.
     """
@@ -302,7 +302,7 @@ class Link(Protocol):
 
     def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
-        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+        Read a parameter whose value is not needed, then write another; nothing is sent between.
 
         For reading that does something, such as acknowledging a fault (02A4h, E00E8). Whatever
         becomes of the read, the write is the next thing on the line.
@@ -346,7 +346,7 @@ class Connecting(PortError):
 
 
 class NoAnswer(LinkError):
-    """Nobody answered in time."""
+    """No answer in time."""
 
     maybe_done = True
 
@@ -382,7 +382,7 @@ class GatewayFault(DamagedAnswer):
 
 
 class NeverSilent(DamagedAnswer):
-    """Somebody talks all the time, so nothing was sent."""
+    """The line is never silent, so nothing was sent."""
 
     maybe_done = False
 

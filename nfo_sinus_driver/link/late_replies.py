@@ -17,7 +17,7 @@ from nfo_sinus_driver.link.interface import NotReady
 
 #: How late a reply may come, in time-outs, before it counts as lost for good.
 LATEST_REPLY = 4
-#: How long a line is not trusted that has told something nobody asked for, s.
+#: How long a line is not trusted that has brought something unrequested, s.
 SUSPECT_FOR = 60.0
 #: How much later than its slowest reply of late a unit may reply.
 _LATER = 1.25
@@ -59,7 +59,7 @@ class LateReplies(Generic[_Request, _Kind]):
     One of any other kind is that to the present request, and whatever was to come has come before
     it. Where each reply names its very request, as over Modbus TCP, nothing is ever in quarantine.
 
-    So nobody has to wait until a quarantine is over: :meth:`first_certain` finds something to ask
+    No request has to wait until a quarantine is over: :meth:`first_certain` finds what to ask
     meanwhile. A request that fails takes a time-out, and what could answer it stays in quarantine
     for three more, so there are never more than three such kinds: of four questions with replies
     of different kinds one is always certain, and of three after a time-out at most.
@@ -153,7 +153,7 @@ class LateReplies(Generic[_Request, _Kind]):
         self.repeated = None
 
     def heard_unasked(self, now: float) -> None:
-        """Take note of bytes that nobody asked for: the last request may be answered once more."""
+        """Take note of unrequested bytes: the last request may be answered once more."""
         self._suspect_until = now + SUSPECT_FOR
         if self._last is not None:
             self.expect(self._last, now)
@@ -173,7 +173,7 @@ class LateReplies(Generic[_Request, _Kind]):
         """
         Return what has to be done before the reply to the last request is believed.
 
-        A line that has told something nobody asked for is not trusted for a while.
+        A line that has brought something unrequested is not trusted for a while.
 
         :param names_it: the reply says itself what it is about.
         """

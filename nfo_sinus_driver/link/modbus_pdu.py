@@ -228,7 +228,7 @@ class AnswerReader(ABC, Generic[_T]):
 
     An answer counts only when unit, function, length and check sum are right, and for a write
     register and value too. Everything else is passed over: it can be noise, or the answer of
-    somebody else. A read answer does not name its register, so the caller has to make sure that
+    another master. A read answer does not name its register, so the caller has to make sure that
     no answer to an earlier request of the same shape can still come.
 
     :ivar frame: the bytes of the answer or refusal found last.

@@ -7,7 +7,7 @@ Modbus TCP of a master: frames, without I/O, and the link to drives behind a gat
 A frame is a number that the answer repeats, two bytes of zero, the length of the message and the
 message (MODBUS Messaging on TCP/IP Implementation Guide V1.0b §3.1.3). TCP itself sees to it that
 bytes come whole and in order, so there is no check sum, and a header that makes no sense says that
-somebody else is there.
+another device is there.
 """
 
 from __future__ import annotations
@@ -196,7 +196,7 @@ class TcpLink(ModbusLink):
 
     def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
-        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+        Read a parameter whose value is not needed, then write another; nothing is sent between.
 
         :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
         """

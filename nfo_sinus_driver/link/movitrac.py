@@ -270,7 +270,7 @@ REFUSALS: Mapping[int, ReturnCode] = {
     0x11: ReturnCode(
         _NO_SUCH, 'function or parameter not implemented', 'this size or firmware does not have it'
     ),
-    0x12: ReturnCode(_NO_SUCH, 'read access only', 'nobody can write it'),
+    0x12: ReturnCode(_NO_SUCH, 'read access only', 'it cannot be written'),
     0x13: ReturnCode(_STATE, 'parameter lock (P800) active', 'set P800 to No'),
     0x14: ReturnCode(
         Refused.BUSY, 'factory setting (P830) running', 'wait until it is done, some seconds'

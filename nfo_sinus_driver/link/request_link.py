@@ -153,7 +153,7 @@ class RequestLink(ABC, Generic[_Request]):
 
     def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
         """
-        Read a parameter whose value nobody needs, then write another; nothing is sent between.
+        Read a parameter whose value is not needed, then write another; nothing is sent between.
 
         :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
         """
@@ -276,7 +276,7 @@ class RequestLink(ABC, Generic[_Request]):
 
     def _await_gap(self, request: Any, *, is_write: bool = False) -> bool:
         """
-        Wait for a gap of silence; tell whether bytes came meanwhile that nobody asked for.
+        Wait for a gap of silence; tell whether bytes came meanwhile that were not requested.
 
         A write may be a stop, and the noise may be on our side of the line alone: rather than not
         at all it is sent into it, as soon as no answer that began before can still be coming.

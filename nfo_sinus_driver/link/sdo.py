@@ -129,7 +129,7 @@ class Kind(NamedTuple):
     """
 
     command: int
-    index: int = -1  # type: ignore[assignment]  # hides a method of tuples that nobody calls
+    index: int = -1  # type: ignore[assignment]  # hides a method of tuples that is never called
     sub_index: int = -1
 
 
@@ -329,7 +329,7 @@ def _segments(value: bytes) -> Iterator[bytes]:
 _LENGTHS = (1, 2, 4, 8)
 #: The sub-index of the second value of an array that is numbered from 1. Asking for it first tells
 #: how an array is numbered: where there is none, that value has the sub-index before. To ask for
-#: the first value would do, in the other case, what nobody asked for: it acknowledges a fault.
+#: the first value would do, in the other case, what was not requested: it acknowledges a fault.
 SECOND = 2
 
 

@@ -67,7 +67,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
     For the same reason an answer with the very bytes of the one before is not believed at once: it
     may be the one before, told twice. The right one would come when a unit answers, so until then
-    the line is listened to. A line that has told something nobody asked for is not trusted so far
+    the line is listened to. A line that has brought something unrequested is not trusted so far
     for a while: there it is believed only after a request of another shape. If it answers the same
     question too, what it says is right, but one more may come: the next request of its shape waits
     for that.
@@ -101,7 +101,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         """Write one parameter (function 06 for one register, 16 for several)."""
         request = Write(unit, address.index, data)
         self._await_gap(request, is_write=True)
-        # a write answer names what was written, and nobody believes it without reading back
+        # a write answer names what was written, and it is not believed without reading back
         return Reply(*self._believed(request))
 
     def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
@@ -325,7 +325,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         quarantined = self._late.quarantined(request.unit, self._now())
         believe_refusal = refusal_head(request) not in quarantined
         first = deadline = self._line_end + self._settings.response_timeout
-        # one answer, and as much rubbish again, however long somebody keeps talking
+        # one answer, and as much rubbish again, however long bytes keep coming
         length = self._frame_length(request.answer_length)
         last_chance = first + 2 * length * char_time
         came = 0

@@ -33,7 +33,7 @@ class UrlPort:
         self._serial: serial.SerialBase | None = None
 
     def open(self) -> None:
-        """Connect (PortError: nobody there)."""
+        """Connect (PortError: no answer)."""
         try:
             self._serial = serial.serial_for_url(
                 self._url,

@@ -5,7 +5,7 @@ A CAN bus with nodes on it, and the adapter through which a master is there.
 
 Knows no clock of its own: it is told the time, so that tests can make it up. Of the frames that
 wait for the bus the one with the least identifier goes first; the adapter sends its own in order. A
-frame that nobody takes (no node has power, a line that carries nothing, another bit rate) is not
+frame that no node takes (no node has power, a line that carries nothing, another bit rate) is not
 sent again later.
 """
 
@@ -126,7 +126,7 @@ class CanLine(Wire):
         self._foreign_at = float('inf')
 
     def set_traffic(self, rate: float, now: float) -> None:
-        """Let others send frames that are for nobody here; 0 ends it."""
+        """Let others send frames that are for no node here; 0 ends it."""
         if not 0 <= rate <= self.timing.baud:
             raise ValueError(f'{rate:g} frames a second are not possible at {self.speed}')
         self._foreign_gap = 1 / rate if rate else 0.0

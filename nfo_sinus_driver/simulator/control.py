@@ -42,7 +42,7 @@ def control_path(link: str | None = None, tcp: int | None = None) -> str:
     return str(Path(tempfile.gettempdir()) / f'nfo-simulator-{name}.control')
 
 
-def somebody_listens(path: str) -> bool:
+def is_listening(path: str) -> bool:
     """Whether a live simulator has its control channel at ``path``."""
     with socket.socket(socket.AF_UNIX) as probe:
         probe.settimeout(1.0)
@@ -94,7 +94,7 @@ class ControlServer:
 
     def __init__(self, path: str, handler: Handler) -> None:
         self.path = path
-        if somebody_listens(path):
+        if is_listening(path):
             raise ControlError(
                 f'a simulator already runs with its control channel at {path}: stop it, '
                 'or choose another --link or --control'

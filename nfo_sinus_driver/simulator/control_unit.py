@@ -143,7 +143,7 @@ class ControlUnit(abc.ABC):
 
     @abc.abstractmethod
     def restart(self) -> None:
-        """Begin as after power-on: nobody commands. What is in the memory stays."""
+        """Begin as after power-on: without control. What is in the memory stays."""
 
     def boot(self) -> None:
         """End the self-test after power-on."""

@@ -82,7 +82,7 @@ class Adapter:
         if self._unsent == _DEPTH:
             self._flags |= _QUEUE_FULL
             return _BEL
-        # nobody acknowledges it; until the queue is full that does not show
+        # no node acknowledges it; until the queue is full that does not show
         self._unsent += 1
         return (b'Z' if frame.extended else b'z') + _CR
 

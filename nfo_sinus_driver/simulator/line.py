@@ -25,7 +25,7 @@ from nfo_sinus_driver.simulator.wire import Wire
 #: By how much an RTU frame is shorter than the same one of Modbus TCP.
 _SHORTER = 4
 #: Whose echo is.
-_NOBODY = -1
+_NO_UNIT = -1
 
 
 @dataclass
@@ -174,7 +174,7 @@ class Line(Wire):
     def _send_back(self, data: bytes, now: float) -> None:
         begin = max(now, self._echo_end)
         self._echo_end = begin + len(data) * self._character
-        self._on_its_way(_Answer(_NOBODY, Reply(data), is_echo=True), begin)
+        self._on_its_way(_Answer(_NO_UNIT, Reply(data), is_echo=True), begin)
 
     def _free(self, address: int) -> float:
         """Return when a drive that has answers on their way may begin the next, a new frame."""

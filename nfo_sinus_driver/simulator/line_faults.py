@@ -118,7 +118,7 @@ class LineFaults:
         return replies
 
     def noise(self) -> bytes:
-        """Return some bytes that nobody has sent."""
+        """Return some bytes that were not sent."""
         noise = self._random.randbytes(self._random.randint(1, 5))
         mask = (1 << self._bits) - 1
         return bytes(byte & mask for byte in noise)

@@ -58,7 +58,7 @@ class Memory:
     :param settings: values other than the factory's, in engineering units, by key.
     :raises ValueError: an unknown key, or a value that the drive would refuse.
 
-    :ivar given: the keys of the settings, which nobody but the bus and the keypad changes.
+    :ivar given: the keys of the settings, which the bus and the keypad alone change.
     """
 
     def __init__(

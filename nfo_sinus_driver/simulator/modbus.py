@@ -40,7 +40,7 @@ _MOST_WRITTEN_WITH_READ = 121
 
 
 class Requests(abc.ABC):
-    """What somebody does with Modbus requests, whose registers are another's business."""
+    """What a unit does with Modbus requests; its registers are elsewhere."""
 
     #: The functions that it has.
     functions: ClassVar[frozenset[int]]

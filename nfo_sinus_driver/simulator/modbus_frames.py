@@ -16,7 +16,7 @@ from nfo_sinus_driver.simulator.modbus import is_write, server
 from nfo_sinus_driver.simulator.protocol import Protocol, Request, Station
 from nfo_sinus_driver.simulator.timing import Timing
 
-#: Everybody obeys a write to this address and nobody answers.
+#: All units obey a write to this address, and none answers.
 BROADCAST = 0
 
 #: Added to t3.5 before silence is believed: the system may hold bytes of one frame apart (s).
@@ -39,7 +39,7 @@ _MOST_IN_TCP = 254
 
 
 class _InFrames(Protocol):
-    """What RTU and ASCII have in common: an address, a PDU, and silence where nobody answers."""
+    """What RTU and ASCII have in common: an address, a PDU, and silence where no unit answers."""
 
     @staticmethod
     def concerns(station: Station, request: Request) -> bool:

@@ -31,7 +31,7 @@ class Port(Protocol):
         """Return what has arrived; nothing is fine."""
 
     def send(self, data: bytes) -> None:
-        """Send; what nobody takes is lost, as on a wire."""
+        """Send; what is not taken is lost, as on a wire."""
 
     def hang_up(self) -> None:
         """Go away, as an adapter does that is pulled out."""
@@ -77,7 +77,7 @@ class PtyPort:
             raise
 
     def send(self, data: bytes) -> None:
-        """Send; what does not fit because nobody reads is lost."""
+        """Send; what does not fit because it is not read is lost."""
         if self._ends is not None:
             with contextlib.suppress(BlockingIOError):
                 os.write(self._ends[0], data)
@@ -121,7 +121,7 @@ class PtyPort:
 
 
 def _put_link(link: Path, device: str) -> None:
-    """Make or replace the link in one step, so that nobody ever sees it missing."""
+    """Make or replace the link in one step, so that it is never missing."""
     if link.is_symlink():
         if not os.readlink(link).startswith('/dev/pts/'):
             raise PortError(f'{link} is a link to {os.readlink(link)}: choose another --link')
@@ -171,7 +171,7 @@ class TcpPort:
         return data
 
     def send(self, data: bytes) -> None:
-        """Send; what nobody takes is lost."""
+        """Send; what is not taken is lost."""
         if self._client is not None:
             with contextlib.suppress(OSError):
                 self._client.send(data)

@@ -16,7 +16,7 @@ from typing import Any
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families import USUAL
-from nfo_sinus_driver.simulator.control import ControlServer, control_path, somebody_listens
+from nfo_sinus_driver.simulator.control import ControlServer, control_path, is_listening
 from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, endpoint, parse_endpoint
 from nfo_sinus_driver.simulator.family import load, simulated_drive
@@ -26,7 +26,7 @@ from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.timing import sharpen_timers
 
-#: How often every drive catches up with the clock while nobody asks it (s).
+#: How often every drive catches up with the clock while no request comes (s).
 _TICK = 0.05
 #: A drive does not catch up when something is due within this time (s).
 _HURRY = 0.0005
@@ -139,7 +139,7 @@ class Simulator:
         with contextlib.ExitStack() as stack:
             if control == '' and first.tcp is None:
                 control = control_path(link)
-            if control and somebody_listens(control):
+            if control and is_listening(control):
                 raise PortError(
                     f'a simulator already serves there (control channel {control}): '
                     'stop it, or choose another --link or --control'

@@ -40,7 +40,7 @@ class Wire(abc.ABC):
 
     def set_traffic(self, rate: float, now: float) -> None:
         """
-        Let others send frames that are for nobody here.
+        Let others send frames that are for no unit here.
 
         :param rate: how many a second; 0: none.
         :raises ValueError: there are no others on such a line.

@@ -38,7 +38,7 @@ from nfo_sinus_driver.simulator.timing import Timing
 class Source(enum.Enum):
     """Where the drive takes its commands from."""
 
-    #: Nobody: status Stop.
+    #: None: status Stop.
     STOP = 'stop'
     #: The terminals.
     EXT = 'ext'
@@ -194,7 +194,7 @@ class SinusControlUnit(ControlUnit):
         self.mode_ext_writes = 0
         self.fieldbus = FieldbusWatch()
         self._telegram: int | None = None
-        #: Seconds of RunDly left; None while nobody wants to run.
+        #: Seconds of RunDly left; None while no run command stands.
         self._delay_left: float | None = None
 
     def line_rules(self, protocol: str) -> LineRules:
@@ -204,7 +204,7 @@ class SinusControlUnit(ControlUnit):
     # ---- who commands ----
 
     def restart(self) -> None:
-        """Begin as after power-on: nobody commands. Set-points are in the memory and stay."""
+        """Begin as after power-on: without control. Set-points are in the memory and stay."""
         self.initialised = False
         self._forget_fieldbus()
         self.take(Source.STOP)
@@ -458,11 +458,11 @@ class SinusControlUnit(ControlUnit):
 
     @abc.abstractmethod
     def _commanded(self) -> bool:
-        """Whether somebody but the keypad wants the motor to run."""
+        """Whether a run command stands that is not the keypad's."""
 
     @property
     def _wanted(self) -> bool:
-        """Whether somebody wants the motor to run, and RUN allows it."""
+        """Whether a run command stands, and RUN allows it."""
         return self.source is Source.KEYPAD or (self.run_input and self._commanded())
 
     def _keep_delay(self) -> None:

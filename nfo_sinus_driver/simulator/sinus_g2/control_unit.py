@@ -100,7 +100,7 @@ _PASSING = frozenset(
 )
 #: The inverter status while it tunes [M0 table 19].
 _TUNING = 28
-#: What DriveStatus adds while it tunes: the motor has current, and nobody says what that shows as.
+#: What DriveStatus adds while it tunes: the motor has current; no manual says what that shows.
 _TUNING_STATUS = (
     Status.READY_TO_SWITCH_ON
     | Status.SWITCHED_ON
@@ -227,7 +227,7 @@ class G2ControlUnit(SinusControlUnit):
         self.scmd = scmd
 
     def control(self, word: Control) -> None:
-        """Take a control word from DriveControl; without NetCtrl control goes to nobody."""
+        """Take a control word from DriveControl; without NetCtrl control is free."""
         if word & Control.NET_CTRL:
             self.source = Source.CONTROL_WORD
         elif self.source is Source.CONTROL_WORD:

@@ -123,7 +123,7 @@ class ClassicServer(classic.Server):
             raise Wrong(_FLAGS[refused.reason]) from refused
         raw *= 10 if parameter.key in self._firmware.tenths else 1
         if parameter.key in _COUNTERS:
-            # nobody says whether the drive has more than the 24 bits that count [C26]
+            # no manual says whether the drive has more than the 24 bits that count [C26]
             high = 0xFF if self._firmware.short_counters else 0xFFFF
             raw = self._drive.read_raw(parameter.key)
             words: tuple[int, ...] = (raw & 0xFFFF, raw >> 16 & high)

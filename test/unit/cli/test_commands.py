@@ -329,7 +329,7 @@ def test_tune_asks_on_a_terminal(bench: Bench, answer: str, tunes: bool) -> None
 def test_tune_does_not_begin_unasked(bench: Bench) -> None:
     done = bench.run('tune', 'rs', text='y\n')
     assert done.status == 2
-    assert 'Nobody can be asked here: say so with --yes' in done.err
+    assert 'There is no terminal to answer: say so with --yes' in done.err
     assert bench.writes() == []
 
 
