@@ -43,6 +43,10 @@ class ExclusiveAccess:
         #: The procedure shall stop what it does, or not begin it.
         self.aborted = False
 
+    def abort(self) -> None:
+        """Have the procedure stop."""
+        self.aborted = True
+
     def require_wanted(self) -> None:
         """Raise a :class:`DriveError` if the procedure was stopped meanwhile."""
         if self.aborted:
@@ -138,7 +142,7 @@ class Controller:
             if not self.enabled and self._enabling not in (None, self._bus.current):
                 self._bus.cancel(self._enabling)
         elif before is ControlState.PROCEDURE and self._access is not None:
-            self._access.aborted = True
+            self._access.abort()
         if self.state is ControlState.IDLE and not self._state.connected:
             self._control.dispatch(ControlEvent.LOST)
 

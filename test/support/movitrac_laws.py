@@ -59,7 +59,10 @@ class MovitracJudge:
             elif words != _REMOTE_CONTROL:
                 yield 'another P841 than Remote control can start the motor'
         elif request.unit in self._between and any(words):
-            yield 'while P841 is Remote setpoint nothing but 0 is written'
+            # bits without a direction are a stop: an enable that fails half-way is followed by one
+            is_stop = request.place == _BITS and not words[1] & _DIRECTIONS
+            if not is_stop:
+                yield 'while P841 is Remote setpoint no direction and no set-point but 0 is written'
         if request.place == _SIZE:
             yield from self._judge_size(request.unit, words)
         if request.place == _BITS:
