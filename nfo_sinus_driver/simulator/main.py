@@ -159,6 +159,19 @@ def _settings(model: str, given: Sequence[str]) -> dict[str, Value]:
     return settings
 
 
+def _addresses(text: str) -> list[int]:
+    """Read a list of addresses, such as ``1-10,20``."""
+    found: list[int] = []
+    for part in text.split(','):
+        first, dash, last = part.partition('-')
+        last = last if dash else first
+        whole = first.isdecimal() and last.isdecimal()
+        if not (whole and int(first) <= int(last) < 1000):
+            raise argparse.ArgumentTypeError(f'{text} is no list of addresses, such as 1-10,20')
+        found += range(int(first), int(last) + 1)
+    return found
+
+
 def _tcp(text: str) -> int:
     port = int(text, 10)
     if not 0 <= port <= 65535:
@@ -199,10 +212,11 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
     add('--model', default=USUAL, choices=simulated(), help=f'default: {USUAL}')
     add(
         '--address',
-        type=int,
-        action='append',
-        metavar='N',
-        help='address of a drive, as its protocol has them; once for each drive (default: 1)',
+        type=_addresses,
+        action='extend',
+        metavar='LIST',
+        help='addresses of the drives, as their protocol has them, such as 1-10,20; may be '
+        'repeated (default: 1)',
     )
     add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal')
     add('--tcp', type=_tcp, metavar='PORT', help='serve a TCP port of 127.0.0.1 (0: any free one)')

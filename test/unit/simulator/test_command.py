@@ -73,9 +73,9 @@ def inject(capsys):
 
 
 def test_it_says_what_it_serves_and_leaves_nothing_behind(start, link, open_master):
-    process, line = start('--link', link, '--address', '1', '--address', '2')
+    process, line = start('--link', link, '--address', '1-2,5', '--address', '7')
     assert line == (
-        f'serving modbus_rtu at 19200 8E1 on {link}, drives 1, 2; control {link}.control'
+        f'serving modbus_rtu at 19200 8E1 on {link}, drives 1, 2, 5, 7; control {link}.control'
     )
     assert len(open_master(link).ask(2, READ_MODE, 7)) == 7
     second, _ = start('--link', link)
@@ -92,6 +92,13 @@ def test_it_says_what_it_serves_and_leaves_nothing_behind(start, link, open_mast
     assert os.path.lexists(link)
     _, line = start('--link', link)
     assert line.startswith('serving'), 'one that was killed is replaced'
+
+
+@pytest.mark.parametrize('wrong', ['', '1-', '-3', '3-1', '1,x', '1-9999999999'])
+def test_what_is_no_list_of_addresses_is_refused(wrong, capsys):
+    with pytest.raises(SystemExit):
+        main([f'--address={wrong}'])
+    assert 'no list of addresses, such as 1-10,20' in capsys.readouterr().err
 
 
 def test_a_signal_ends_it_whatever_thread_it_comes_to_and_though_it_was_suspended(start, link):
@@ -235,7 +242,7 @@ def test_wrong_arguments(capsys):
         ('--protocol profinet', 'modbus_rtu'),
         ('--address 0', '1 to 247'),
         ('--address 248', '1 to 247'),
-        ('--address x', 'invalid'),
+        ('--address x', 'no list of addresses'),
         ('--address 1 --address 1', 'given twice'),
         ('--set control.acel=1', 'did you mean control.accel'),
         ('--model sinus_optimal --set control.acel=1', 'did you mean control.accel'),
