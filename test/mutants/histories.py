@@ -37,7 +37,7 @@ HISTORIES = (
     *(
         Mutant(
             2,
-            f'{what} does not stop_following ({tests[-1]})',
+            f'{what} does not end the following of set-points ({tests[-1]})',
             CONTROLLER,
             '        if reason is not None:\n            self._sequence.start()',
             f'        if {new}:\n            self._sequence.start()',

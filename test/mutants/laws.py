@@ -53,7 +53,7 @@ LAWS = (
     ),
     Mutant(
         2,
-        'a keypad STOP does not stop_following',
+        'a keypad STOP does not end the following of set-points',
         ADVICE,
         '    elif not status.from_bus:\n        cause = _why',
         '    elif False:\n        cause = _why',
@@ -61,7 +61,7 @@ LAWS = (
     ),
     Mutant(
         2,
-        'a lost RUN input does not stop_following',
+        'a lost RUN input does not end the following of set-points',
         ADVICE,
         '    elif not status.runs:\n        cause =',
         '    elif False:\n        cause =',
