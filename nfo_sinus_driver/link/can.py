@@ -78,6 +78,8 @@ class CanPort(Protocol):
 
 #: struct can_frame and struct can_filter (linux/can.h).
 _FRAME = struct.Struct('=IB3x8s')
+#: How many frames are taken at once: on a full bus more come all the while.
+_MOST_AT_ONCE = 1000
 _FILTER = struct.Struct('=II')
 #: Extended, remote and error frames: in the identifier.
 _OTHER_FRAMES = 0xE000_0000
@@ -157,15 +159,16 @@ class SocketCan:
         try:
             if not select.select((bus,), (), (), max(0.0, until - time.monotonic()))[0]:
                 return found
-            while True:
+            while len(found) < _MOST_AT_ONCE:
                 identifier, length, data = _FRAME.unpack(bus.recv(_FRAME.size))
                 if identifier in IDENTIFIERS and length <= MOST_DATA:
                     found.append(Frame(identifier, data[:length]))
                     self.trouble = ''
         except BlockingIOError:
-            return found
+            pass
         except OSError as error:
             raise self._lost(error) from error
+        return found
 
     @property
     def _bus(self) -> socket.socket:

@@ -14,7 +14,12 @@ import time
 from nfo_sinus_driver.link import sdo
 from nfo_sinus_driver.link.another_master import Sightings
 from nfo_sinus_driver.link.can import FUNCTION_CODE, CanPort, Frame, SocketCan
-from nfo_sinus_driver.link.canopen_supervision import HEARTBEATS, CanopenSupervision, start
+from nfo_sinus_driver.link.canopen_supervision import (
+    HEARTBEATS,
+    LONGEST_DRAIN,
+    CanopenSupervision,
+    start,
+)
 from nfo_sinus_driver.link.interface import (
     Address,
     Clock,
@@ -448,7 +453,8 @@ class CanopenLink:
 
     def _drain(self) -> None:
         """Take what came unasked: an answer that is late, one to another client, a boot-up."""
-        while self._take(0.0):
+        until = self._now() + LONGEST_DRAIN
+        while self._take(0.0) and self._now() < until:
             continue
 
     def _take(self, until: float) -> Sequence[Frame]:

@@ -33,6 +33,8 @@ _HEARTBEAT = 0.1
 _BEATS = 4
 #: How often it is listened to a line without requests, s.
 _LISTENING = 0.1
+#: How long frames are taken that came unasked, s: on a full bus more come all the while.
+LONGEST_DRAIN = 0.1
 #: How many times in a row a guarded node may miss that it is asked: its life time factor.
 _LIFE_FACTOR = 4
 #: Of how many clients a node may watch over the heartbeats, as far as it is looked.
@@ -154,7 +156,7 @@ class CanopenSupervision:
         """Send what is due, and take what came unasked (PortError: the port is lost)."""
         now = self.now()
         self.send_due(now)
-        while self._take(0.0):
+        while self._take(0.0) and self.now() < now + LONGEST_DRAIN:
             continue
         self._listen_due = now + _LISTENING
 

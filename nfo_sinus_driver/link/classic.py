@@ -405,8 +405,8 @@ class ClassicLink(CodecLink):
         self._last = None
         # an echo, or what is late: nothing answers this
         until = sent + min(_TURNAROUND, _TURNAROUND_MARGIN * self._slowest)
-        while self._read_line(until):
-            continue
+        while self._now() < until:
+            self._read_line(until)
         return sent
 
     def _refusal(self, unit: int, began: float) -> Refused:

@@ -526,6 +526,8 @@ class CodecLink(RequestLink[Any]):
             if lost or self._another.was_answered:
                 raise DamagedAnswer(f'unit {unit}: {DOUBTFUL}')
             deadline = self._deadline(min(max(deadline, now + longest), last_chance), now)
+            if now >= deadline:
+                break
         came += len(self._echo.before) + len(self._echo.held)
         if came:
             raise DamagedAnswer(f'unit {unit}: {came} bytes came that are no answer')

@@ -357,6 +357,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             pause = max(reader.inter_byte_timeout, self._pause)
             rest = (self._echo.bytes_needed + reader.bytes_needed) * char_time + pause
             deadline = min(max(first, now + rest), last_chance + _PAUSES * pause)
+            if now >= deadline:
+                break
         held = self._echo.give_up()
         if held and not isinstance(request, Write):
             answer = _feed(reader, held, refusals)
