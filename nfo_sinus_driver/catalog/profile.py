@@ -63,7 +63,7 @@ class Read:
     """Read a parameter; brings its value. ``once``: the request is not repeated."""
 
     key: str
-    once: bool = False
+    retry: bool = True
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Write:
     :ivar value: a float is rounded to the drive's step; anything else is written as it is or not.
     :ivar at: the parameter in whose place it is written where the line reaches that one; ``key``
         still says how.
-    :ivar once: do not repeat the request when there is no response.
+    :ivar retry: repeat the request when there is no response.
     :ivar head: at the head of the bus, as the very next frame.
     :ivar stored: it goes to a memory that wears out: it is written only where another value stands,
         and reported.
@@ -83,7 +83,7 @@ class Write:
     key: str
     value: Value
     at: str = ''
-    once: bool = False
+    retry: bool = True
     head: bool = False
     stored: bool = False
 
@@ -242,14 +242,14 @@ class SetpointTarget:
         """Return the set-point that the values of these keys mean to the drive."""
         return float(values[self.key])
 
-    def zero(self, *, once: bool) -> Steps[None]:
+    def zero(self, *, retry: bool) -> Steps[None]:
         """Write set-point 0; ``once``: do not repeat a request without a response."""
         for write in self.writes(0.0):
-            yield Write(write.key, write.value, at=write.at, once=once)
+            yield Write(write.key, write.value, at=write.at, retry=retry)
 
     def set_to_zero(self) -> Steps[None]:
         """Write set-point 0, and read it back, or :class:`NotPossible`."""
-        yield from self.zero(once=False)
+        yield from self.zero(retry=True)
         values: dict[str, Value] = {}
         for key in dict.fromkeys(write.key for write in self.writes(0.0)):
             values[key] = yield Read(key)

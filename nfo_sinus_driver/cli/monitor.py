@@ -128,18 +128,18 @@ def _read(
     session: Session, drive: OfflineDrive
 ) -> tuple[InverterStatus, Mapping[Role, float]]:
     """Read the status of a drive and what it measures; NaN for what it has not got."""
-    if drive.state.identity is None:
+    if drive.state.nameplate.identity is None:
         drive.identify(thoroughly=False)
 
     async def measure() -> tuple[InverterStatus, Mapping[Role, float]]:
-        status = await drive.state.read_status(Priority.POLL, once=True)
+        status = await drive.state.read_status(Priority.POLL, retry=False)
         values = dict.fromkeys(_VALUES, math.nan)
         for role in _VALUES:
             key = drive.model.key(role)
             if not drive.params.reaches(key):
                 continue
             try:
-                values[role] = await drive.params.read_number(key, Priority.POLL, once=True)
+                values[role] = await drive.params.read_number(key, Priority.POLL, retry=False)
             except Refused:
                 # it has none
                 continue

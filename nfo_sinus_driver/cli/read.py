@@ -231,7 +231,7 @@ def _read(drive: OfflineDrive, wanted: Mapping[str, Parameter]) -> Mapping[str, 
     drive.identify(thoroughly=False)
     settings = [key for key, parameter in wanted.items() if parameter.is_setting]
     values = dict(drive.read(settings)) if settings or not wanted else {}
-    others = [key for key in wanted if key not in settings and drive.state.has(key)]
+    others = [key for key in wanted if key not in settings and drive.state.nameplate.has(key)]
     values.update(_measure(drive, others))
     return values
 

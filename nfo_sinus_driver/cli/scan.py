@@ -206,7 +206,7 @@ async def _first_answer(drive: OfflineDrive, silence_retries: int) -> None:
     status = drive.model.key_of_status
     while True:
         try:
-            await drive.params.read_data(status, Priority.POLL, once=True)
+            await drive.params.read_data(status, Priority.POLL, retry=False)
             return
         except NoAnswer:
             if not silence_retries:

@@ -98,7 +98,7 @@ class Ack(Verb):
                 facts = {
                     'acknowledged': not failed and _is_to_acknowledge(status),
                     'code': status.code,
-                    'text': offline.state.text_of(status.code),
+                    'text': offline.state.nameplate.text_of(status.code),
                     'code_now': now.code,
                     'text_now': offline.state.text,
                     'message': answer,

@@ -97,7 +97,7 @@ async def carry_out(
         try:
             if isinstance(step, profile.Read):
                 params.require_fitted(step.key)
-                brought = await params.read(step.key, priority, once=step.once)
+                brought = await params.read(step.key, priority, retry=step.retry)
             elif isinstance(step, profile.Write) and step.stored:
                 await _store(step, params, priority, tell)
             elif isinstance(step, profile.Write):
@@ -130,15 +130,15 @@ async def _stands(
         return False
     address, data = params.target(step)
     try:
-        return await params.read_from(address, priority, once=True) == data
+        return await params.read_from(address, priority, retry=False) == data
     except LinkError:
         return False
 
 
 async def read_scales(state: DriveState) -> None:
     """Read the scale of speeds, and report one that is not the one before."""
-    if await state.scales.read():
-        state.tell(Severity.INFO, Cause.SPEED_SCALE, scale=str(state.scales.speed))
+    if await state.nameplate.scales.read():
+        state.tell(Severity.INFO, Cause.SPEED_SCALE, scale=str(state.nameplate.scales.speed))
 
 
 async def read_limits(state: DriveState, control_mode: str) -> profile.Limits:
@@ -150,7 +150,7 @@ async def read_limits(state: DriveState, control_mode: str) -> profile.Limits:
     target = state.model.profile.setpoints.get(control_mode)
     if target is None:
         return profile.Limits()
-    steps = target.read_limits(state.has, older=state.settings_need_control)
+    steps = target.read_limits(state.nameplate.has, older=state.nameplate.is_older)
     limits = await carry_out(steps, state.params, Priority.SERVICE)
     if not state.params.is_rescaled(target.key):
         return limits

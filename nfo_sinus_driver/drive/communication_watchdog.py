@@ -51,7 +51,7 @@ class CommunicationWatchdog:
             await self.require_set()
         except DriveError as error:
             state, status = self._state, self._state.status
-            barred = state.settings_need_control and status is not None and not status.from_bus
+            barred = state.nameplate.is_older and status is not None and not status.from_bus
             if not barred and (status is None or not status.faulted):
                 raise
             self._state.tell(Severity.WARNING, Cause.OWN_TIMEOUT_LATER, why=error.report)
@@ -78,7 +78,7 @@ class CommunicationWatchdog:
             if not state.timeout.can_be_set:
                 raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
             wanted[key(Role.COMMUNICATION_TIMEOUT)] = seconds
-        if state.has(key(Role.STOP_AT_TIMEOUT)):
+        if state.nameplate.has(key(Role.STOP_AT_TIMEOUT)):
             wanted[key(Role.STOP_AT_TIMEOUT)] = True
         try:
             changes = await self._change(wanted)

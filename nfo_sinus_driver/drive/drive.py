@@ -71,7 +71,7 @@ class Drive:
         if settings.method != 'monitor':
             self._controller = Controller(self.state, Commands(self.state), self.setpoint)
         self._watch = Poller(
-            self.state, self.setpoint, self._controller, lambda: self._connect(patient=False)
+            self.state, self.setpoint, self._controller, lambda: self._connect(retry=False)
         )
         self._procedures = procedures = Procedures(self.state, self._controller)
         self.parameters = Parameters(self.state, procedures, self.run, self._take_parameters)
@@ -107,7 +107,7 @@ class Drive:
     @property
     def identity(self) -> Identity | None:
         """What answered; ``None`` before the first answer."""
-        return self.state.identity
+        return self.state.nameplate.identity
 
     @property
     def ever_responded(self) -> bool:
@@ -162,7 +162,7 @@ class Drive:
             try:
                 return await command()
             except LinkError as error:
-                check = None if self.state.identity else self.line_check
+                check = None if self.state.nameplate.identity else self.line_check
                 raise DriveError(explain(error, self._unit, check=check)) from error
             except Cancelled:
                 raise DriveError(Cause.ENDING) from None
@@ -187,16 +187,16 @@ class Drive:
     # --- any thread, carried out on the bus ---------------------------------------------------
 
     @on_bus
-    async def connect(self, *, patient: bool = True, parameters: bool = False) -> Identity:
+    async def connect(self, *, retry: bool = True, parameters: bool = False) -> Identity:
         """
         Identify the drive, make sure that nothing runs unasked, and watch it from then on.
 
         :param parameters: read all its parameters before, and watch them too.
-        :param patient: repeat the first request when there is no response; who tries again anyway
+        :param retry: repeat the first request when there is no response; who tries again anyway
             saves the other drives on the line that time.
         """
         if not self._watch.begun:
-            await self._connect(patient)
+            await self._connect(retry)
             if parameters:
                 try:
                     await self.parameters.read_now()
@@ -207,8 +207,8 @@ class Drive:
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
             self._watch.begin()
             self._error_log_monitor.begin()
-        assert self.state.identity is not None
-        return self.state.identity
+        assert self.state.nameplate.identity is not None
+        return self.state.nameplate.identity
 
     @on_bus
     async def require_standing(self) -> None:
@@ -217,7 +217,7 @@ class Drive:
 
         It is looked at anew, for after :meth:`disconnect` it may have been left to its ramp.
         """
-        if self._controller is None or self.state.identity is None:
+        if self._controller is None or self.state.nameplate.identity is None:
             return
         status = await self.state.read_status(Priority.SERVICE)
         if status.driven and status.from_bus:
@@ -297,9 +297,9 @@ class Drive:
     @on_bus
     async def identify(self, *, thoroughly: bool = True) -> Identity:
         """Find out who answers, thoroughly with model and serial number; what runs runs on."""
-        identity = await self.state.identify()
-        await self.state.scales.read()
-        return await self.state.read_nameplate() if thoroughly else identity
+        identity = await self.state.nameplate.identify()
+        await self.state.nameplate.scales.read()
+        return await self.state.nameplate.read_more() if thoroughly else identity
 
     @on_bus
     async def read_status(self) -> InverterStatus:
@@ -385,11 +385,11 @@ class Drive:
         if self._controller is not None and self._controller.closed:
             raise DriveError(Cause.ENDING)
 
-    async def _connect(self, patient: bool) -> None:
+    async def _connect(self, retry: bool) -> None:
         state = self.state
         self.params.connected()
         try:
-            await state.identify(patient=patient)
+            await state.nameplate.identify(retry=retry)
         except Refused as error:
             if error.code == Refused.BUSY:
                 raise
@@ -403,7 +403,7 @@ class Drive:
         if self._controller is not None:
             await self._controller.secure_found()
             await self._watchdog.prepare()
-        identity = await state.read_nameplate()
+        identity = await state.nameplate.read_more()
         self._watch.connected()
         self.setpoint.connected()
         self.log.connected()

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is known of one drive: who it is, what its status says, whether it answers."""
+"""What is known of one drive: what its status says, whether it answers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from collections import deque
 from collections.abc import Callable, Iterator
 import contextlib
 from dataclasses import replace
-from fractions import Fraction
 import logging
 import math
 
@@ -20,16 +19,14 @@ from nfo_sinus_driver.catalog import (
     InverterStatus,
     Kind,
     Meaning,
-    OlderDialect,
     Role,
     load_family,
 )
 from nfo_sinus_driver.catalog.inverter_status import NO_CODE
 from nfo_sinus_driver.drive.communication_timeout import CommunicationTimeout
 from nfo_sinus_driver.drive.events import Cause, DriveError, Event, Report, Severity
-from nfo_sinus_driver.drive.identity import Identity
+from nfo_sinus_driver.drive.identity import Nameplate
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
-from nfo_sinus_driver.drive.scales import Scales
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED, Listener, Measured
 from nfo_sinus_driver.link import Refused, Reply
@@ -81,6 +78,8 @@ class DriveState:
         )
         #: Who is told about every poll and event.
         self.listener = listener
+        #: Who it says it is.
+        self.nameplate = Nameplate(self.params, settings, self.tell)
         self.connected = False
         #: The last poll was answered; while it was not, no other request should wait for it.
         self.responsive = False
@@ -90,7 +89,6 @@ class DriveState:
         self.missed_reply = False
         #: How many requests had got no answer when the status was last read.
         self._unanswered = 0
-        self.identity: Identity | None = None
         self.status: InverterStatus | None = None
         #: How far apart the last statuses were, s, the newest last.
         self._intervals: deque[float] = deque((0.0,), maxlen=4)
@@ -107,17 +105,14 @@ class DriveState:
         self.tuning = False
         self.control_mode = ''
         self.unit = ''
-        #: Its firmware is of those that do not know every parameter.
-        self._older = False
-        self.scales = Scales(self.params, self.has, settings.scales)
         #: What it does by itself when it hears nothing.
-        self.timeout = CommunicationTimeout(self.params, self.model, self.has)
+        self.timeout = CommunicationTimeout(self.params, self.model, self.nameplate.has)
 
     async def read_status(
         self,
         priority: Priority,
         *,
-        once: bool = False,
+        retry: bool = True,
         alarming: Callable[[InverterStatus], bool] = lambda _: False,
         told: Reply | None = None,
         code_for: float = 0.0,
@@ -125,7 +120,7 @@ class DriveState:
         """
         Read the status, without acknowledging anything.
 
-        :param once: do not repeat a request when there is no response.
+        :param retry: repeat a request when there is no response.
         :param told: the status word, where the drive has just told it with something else.
         :param code_for: how long an inverter status counts, s, that was read with the very status
             word that stands, if nothing was on its way then (:attr:`InverterStatus.plain`).
@@ -133,25 +128,25 @@ class DriveState:
             and has not before, the rest is read at the head of the bus.
         :raises LinkError: the drive does not answer.
         """
-        if not self.has(self.word_key):
-            return await self._look_at_code(priority, once)
+        if not self.nameplate.has(self.word_key):
+            return await self._look_at_code(priority, retry)
         before = self.status
         if told is None:
-            word, at = await self._read_int(self.word_key, priority, once)
+            word, at = await self._read_int(self.word_key, priority, retry)
         else:
             word, at = self.status_word(told.data), told.arrived
         half = self.status_of_word(word, at)
         alarmed = before is not None and word != before.word and alarming(half)
         priority = Priority.LOOK if alarmed else priority
         if self.model.profile.status_word.code is not None:
-            status = await self._with_control(half, priority, once)
-            return await self._with_frequency(status, priority, once)
+            status = await self._with_control(half, priority, retry)
+            return await self._with_frequency(status, priority, retry)
         held = self.status
         if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
             status = replace(held, at=at)
             if not alarming(status):
                 return self._note_status(status)
-        code, code_at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, once)
+        code, code_at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, retry)
         status = replace(half, code=code, code_at=code_at)
         is_new = before is not None and code != before.code
         news = is_new and not alarmed
@@ -166,9 +161,9 @@ class DriveState:
         if news and alarming(replace(status, word=None)):
             differs, priority = True, Priority.LOOK
         if differs:
-            word, at = await self._read_int(self.word_key, priority, once)
+            word, at = await self._read_int(self.word_key, priority, retry)
             status = replace(status, word=word, at=at)
-        return await self._with_frequency(status, priority, once)
+        return await self._with_frequency(status, priority, retry)
 
     def status_of_word(self, word: int, at: float) -> InverterStatus:
         """Return what a status word says alone; what only the rest tells is not known of it."""
@@ -209,20 +204,20 @@ class DriveState:
             await self.bus.sleep(LOOK_PERIOD)
 
     async def _with_frequency(
-        self, status: InverterStatus, priority: Priority, once: bool
+        self, status: InverterStatus, priority: Priority, retry: bool
     ) -> InverterStatus:
         """Complete a status by the frequency, where its word alone tells no stop, or it is free."""
         if not (status.by_frequency or self.model.profile.status_word.frequency_beside):
             return self._note_status(status)
         try:
-            frequency = await self._measure(Role.ACTUAL_FREQUENCY, priority, once, status)
+            frequency = await self._measure(Role.ACTUAL_FREQUENCY, priority, retry, status)
         except Refused:
             frequency = math.nan
         self.polled(Role.ACTUAL_FREQUENCY, frequency)
         return self._note_status(status.with_frequency(frequency, self.status))
 
-    async def _read_int(self, key: str, priority: Priority, once: bool) -> tuple[int, float]:
-        reply = await self.params.read_reply(key, priority, once=once)
+    async def _read_int(self, key: str, priority: Priority, retry: bool) -> tuple[int, float]:
+        reply = await self.params.read_reply(key, priority, retry=retry)
         return int(self.params.number(key, reply.data)), reply.arrived
 
     @property
@@ -234,11 +229,11 @@ class DriveState:
         """Return the status word that bytes mean."""
         return int(self.params.number(self.word_key, data))
 
-    async def _look_at_code(self, priority: Priority, once: bool) -> InverterStatus:
+    async def _look_at_code(self, priority: Priority, retry: bool) -> InverterStatus:
         """Do with the inverter status alone: older firmware has no status word [C21]."""
-        code, at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, once)
+        code, at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, retry)
         status = InverterStatus(at, None, code, self.model, code_at=at)
-        return self._note_status(await self._with_control(status, priority, once))
+        return self._note_status(await self._with_control(status, priority, retry))
 
     def _with_control_as_before(self, status: InverterStatus) -> InverterStatus:
         before = self.status
@@ -247,7 +242,7 @@ class DriveState:
         return replace(status, by_mode=before.by_mode, by_mode_at=before.by_mode_at)
 
     async def _with_control(
-        self, status: InverterStatus, priority: Priority, once: bool
+        self, status: InverterStatus, priority: Priority, retry: bool
     ) -> InverterStatus:
         """
         Complete a status by who has control, where neither its word nor its code tells it.
@@ -262,17 +257,17 @@ class DriveState:
         if same and status.by_mode and status.at - status.by_mode_at < _BY_MODE_FOR:
             return status
         source = self.model.key(Role.CONTROL_SOURCE)
-        reply = await self.params.read_reply(source, priority, once=once)
+        reply = await self.params.read_reply(source, priority, retry=retry)
         holder = self.model.profile.holders.get(self.params.value(source, reply.data))
-        by_bus = holder is Holder.BUS and not await self._operated_locally(priority, once)
+        by_bus = holder is Holder.BUS and not await self._operated_locally(priority, retry)
         return replace(status, by_mode=by_bus, by_mode_at=reply.arrived)
 
-    async def _operated_locally(self, priority: Priority, once: bool) -> bool:
+    async def _operated_locally(self, priority: Priority, retry: bool) -> bool:
         """Tell whether keypad or terminals command, whatever the control source says."""
         key = self.model.key(Role.LOCAL_OPERATION)
         if not self.params.reaches(key):
             return False
-        return bool(await self.params.read(key, priority, once=once))
+        return bool(await self.params.read(key, priority, retry=retry))
 
     def _note_status(self, status: InverterStatus) -> InverterStatus:
         # a look of low priority may be overtaken by one that began later
@@ -364,16 +359,16 @@ class DriveState:
 
         :raises LinkError: it does not answer, or refuses.
         """
-        return await self._measure(role, priority, True, self.status)
+        return await self._measure(role, priority, False, self.status)
 
     async def _measure(
-        self, role: Role, priority: Priority, once: bool, status: InverterStatus | None
+        self, role: Role, priority: Priority, retry: bool, status: InverterStatus | None
     ) -> float:
         """Measure; a status tells the direction of what turns, where the value does not."""
         key = self.model.key(role)
         if not key:
             return math.nan
-        data = await self.params.read_data(key, priority, once=once)
+        data = await self.params.read_data(key, priority, retry=retry)
         value = self.params.number(key, data)
         if not self.params.is_odd(key):
             turns = role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
@@ -407,96 +402,8 @@ class DriveState:
         """The speed as last polled, rpm."""
         return self.last_polled(Role.ACTUAL_SPEED).value
 
-    async def identify(self, *, patient: bool = True) -> Identity:
-        """
-        Find out whether a drive answers, and with which firmware.
-
-        :param patient: ask again if none does; a silent drive costs its neighbours time-outs.
-        """
-        # anything will do that every drive answers, whichever dialect it knows
-        priority = Priority.SERVICE if patient else Priority.POLL
-        await self.params.read(self.model.key_of_status, priority, once=not patient)
-        dialect = self._dialect
-        before, was_older = self.identity, self._older
-        self._be_older(dialect is not None and self.settings.classic_dialect == dialect.name)
-        firmware_key = self.model.key(Role.FIRMWARE)
-        if self._older or not self.params.reaches(firmware_key):
-            self.identity = Identity()
-            return self.identity
-        if dialect is not None and not await self._may_ask_firmware(dialect):
-            if before is None:
-                # what the older firmware knows the newer one knows, too
-                self.identity, self._older = Identity(), True
-                self.tell(
-                    Severity.WARNING,
-                    Cause.FIRMWARE_NOT_ASKED,
-                    before=dialect.before,
-                    dialect=dialect.name,
-                )
-            else:
-                self._be_older(was_older)
-            return self.identity or Identity()
-        try:
-            firmware = await self.params.read_number(firmware_key, Priority.SERVICE)
-            motor_key = self.model.key(Role.MOTOR_FIRMWARE)
-            motor = await self.params.read_number(motor_key, Priority.SERVICE)
-        except Refused:
-            if dialect is None or self.settings.classic_dialect:
-                raise
-            self._be_older(True)
-            self.identity = Identity()
-        else:
-            self._be_older(dialect is not None and firmware < dialect.before)
-            self.identity = Identity(firmware, int(motor))
-        return self.identity
-
-    def _be_older(self, older: bool) -> None:
-        """Take the firmware for one of the older dialect, or not."""
-        self._older = older
-        dialect = self._dialect
-        self.scales.use_dialect(dialect.factors if older and dialect is not None else {})
-
-    @property
-    def _dialect(self) -> OlderDialect | None:
-        dialect = self.model.profile.older
-        here = dialect is not None and dialect.protocol == self.params.protocol
-        return dialect if here else None
-
-    async def _may_ask_firmware(self, dialect: OlderDialect) -> bool:
-        """
-        Tell whether the firmware can be asked for without harm, which an older one does not know.
-
-        Who commands by what only newer firmware has says by that that the drive is not of those.
-        """
-        method = self.model.profile.methods.get(self.settings.method)
-        if self.settings.classic_dialect or (method is not None and not method.older):
-            return True
-        key = self.model.key(Role.CONTROL_SOURCE)
-        source = await self.params.read(key, Priority.SERVICE)
-        return self.model.profile.holders.get(source) in dialect.harmless
-
-    @property
-    def settings_need_control(self) -> bool:
-        """It takes settings only while the bus has control [C100], or may be of those that do."""
-        return self._older
-
-    async def read_nameplate(self) -> Identity:
-        """Ask for more of who it is; nothing depends on that, for many do not tell [C57]."""
-        assert self.identity is not None
-        if self.params.in_block:
-            # a PLC would answer for itself [C118]
-            return self.identity
-        told = await self.params.identify(Priority.SERVICE)
-        self.identity = replace(
-            self.identity,
-            vendor=told.vendor,
-            model=f'{told.product} {told.model}'.strip(),
-            serial=told.serial,
-        )
-        return self.identity
-
     async def read_control_mode(
-        self, priority: Priority = Priority.SERVICE, *, once: bool = False
+        self, priority: Priority = Priority.SERVICE, *, retry: bool = True
     ) -> str:
         """
         Read which quantity is controlled: ``Freque``, ``Speed``, ``Torque`` or ``PI-Reg``.
@@ -505,13 +412,13 @@ class DriveState:
         """
         key = self.model.key(Role.CONTROL_MODE)
         if self.params.reaches(key):
-            mode = str(await self.params.read(key, priority, once=once))
+            mode = str(await self.params.read(key, priority, retry=retry))
         else:
             mode = self.settings.expected_control_mode or 'Freque'
         unit = _UNITS.get(mode, '')
         if mode == 'PI-Reg':
             key = self.model.key(Role.PROCESS_UNIT)
-            unit = str(await self.params.read(key, priority, once=once))
+            unit = str(await self.params.read(key, priority, retry=retry))
         # both at once: neither is published without the other
         self.control_mode, self.unit = mode, unit
         return mode
@@ -540,14 +447,7 @@ class DriveState:
     @property
     def text(self) -> str:
         """The inverter status as on the display."""
-        return '' if self.status is None else self.text_of(self.status.code)
-
-    def text_of(self, code: int) -> str:
-        """Return what the display of this firmware says for a code."""
-        firmware = self.identity.version if self.identity else None
-        if self._older and firmware is None:
-            firmware = Fraction(0)
-        return self.model.status_code(code).shown(firmware)
+        return '' if self.status is None else self.nameplate.text_of(self.status.code)
 
     def describe(self) -> str:
         """Return code and text of the inverter status; ``''`` before it was read."""
@@ -557,14 +457,6 @@ class DriveState:
         """Return a report that has the inverter status and the name of the enable input, too."""
         named = self.model.profile.enable_input
         return Report(cause, status=self.describe(), enable_input=named, **values)
-
-    def has(self, key: str) -> bool:
-        """Tell whether the drive has a parameter: its model, this line and its firmware do."""
-        if not self.params.reaches(key) or (self._older and not self.model[key].older):
-            return False
-        since = self.model[key].since
-        firmware = self.identity.firmware if self.identity else math.nan
-        return since is None or not firmware < float(since) - 0.001
 
     def tell(self, severity: Severity, what: Report | Cause, /, **values: object) -> None:
         """Tell the listener; what cannot be told keeps nothing from being done."""

@@ -86,7 +86,7 @@ class ErrorLog:
                 continue
             told.append(f'{what} {value:g} {self._state.model[key].unit}')
         code = self.area.code(entry)
-        text = self.area.unknown(entry) or self._state.text_of(code)
+        text = self.area.unknown(entry) or self._state.nameplate.text_of(code)
         return LogEntry(code, text, readings=tuple(told))
 
     async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
@@ -101,7 +101,7 @@ class ErrorLog:
     async def read_time(self, priority: Priority) -> float:
         """Read the operating time, h, which shows whether the drive was off meanwhile."""
         key = self._state.model.key(Role.OPERATING_TIME)
-        reply = await self._params.read_reply(key, priority, once=priority > Priority.POLL)
+        reply = await self._params.read_reply(key, priority, retry=priority <= Priority.POLL)
         hours = self._params.number(key, reply.data)
         elapsed = (reply.arrived - self._shown_at) / _HOUR
         # what is shown is less than a tick behind what was counted
@@ -136,8 +136,8 @@ class ErrorLog:
         """Reset the kWh counter E-Out, from firmware 4.38 on [M0 table 18], and see it at 0."""
         energy = self._state.model.key(Role.ENERGY)
         self._procedures.require(Reset.ENERGY)
-        if not self._state.has(energy):
-            since, told = self._state.model[energy].since, self._state.identity
+        if not self._state.nameplate.has(energy):
+            since, told = self._state.model[energy].since, self._state.nameplate.identity
             raise DriveError(
                 Cause.ENERGY_RESET_UNKNOWN,
                 what=Reset.ENERGY.value,
@@ -205,7 +205,7 @@ class ErrorLog:
     async def _entry_of(self, area: ErrorLogArea, number: int, priority: Priority) -> int:
         # no client waits for what is read in the background, so it is not retried at once
         data = await self._params.read_from(
-            Address(*area.place(number)), priority, once=priority > Priority.POLL
+            Address(*area.place(number)), priority, retry=priority <= Priority.POLL
         )
         return area.codec.decode(data)
 
@@ -219,7 +219,7 @@ class ErrorLog:
             # what is in the tick of the first reading may be from before it was switched on
             if then > self.powered_since:
                 at = clock() - age * _HOUR
-        text = self._state.text_of(code)
+        text = self._state.nameplate.text_of(code)
         return LogEntry(code, text, round(then, 1), age, at, latest, now=clock)
 
 

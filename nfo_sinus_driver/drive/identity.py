@@ -1,14 +1,23 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who a drive says it is."""
+"""Who a drive says it is, and what its firmware therefore has."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from fractions import Fraction
 import functools
 import math
+
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import OlderDialect, Role
+from nfo_sinus_driver.drive.events import Cause, Report, Severity
+from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.drive.scales import Scales
+from nfo_sinus_driver.drive.settings import DriveSettings
+from nfo_sinus_driver.link import Refused
 
 
 @dataclass(frozen=True)
@@ -42,5 +51,124 @@ class Identity:
         return f'{self.firmware:.2f} / {self.motor_firmware}'
 
     def __str__(self) -> str:
-        told = {'': self.model, 'firmware ': self.versions, 'serial ': self.serial}
-        return ', '.join(f'{name}{value}' for name, value in told.items() if value)
+        known = {'': self.model, 'firmware ': self.versions, 'serial ': self.serial}
+        return ', '.join(f'{name}{value}' for name, value in known.items() if value)
+
+
+class Nameplate:
+    """
+    The identity of one drive, and what it has by that: parameters, texts, scales; for the bus.
+
+    :param report: reports what is found.
+    :ivar identity: who answers; ``None`` before the drive was asked.
+    :ivar is_older: its firmware is of those that do not know every parameter, or may be; these
+        take settings only while the bus has control [C100].
+    """
+
+    def __init__(
+        self,
+        params: ParameterAccess,
+        settings: DriveSettings,
+        report: Callable[[Severity, Report], None],
+    ) -> None:
+        self._params = params
+        self._model = params.model
+        self._settings = settings
+        self._report = report
+        self.identity: Identity | None = None
+        self.is_older = False
+        self.scales = Scales(params, self.has, settings.scales)
+
+    async def identify(self, *, retry: bool = True) -> Identity:
+        """
+        Find out whether a drive answers, and with which firmware.
+
+        :param retry: ask again if none does; a silent drive costs its neighbours time-outs.
+        """
+        # anything will do that every drive answers, whichever dialect it knows
+        priority = Priority.SERVICE if retry else Priority.POLL
+        await self._params.read(self._model.key_of_status, priority, retry=retry)
+        dialect = self._dialect
+        before, was_older = self.identity, self.is_older
+        self._be_older(dialect is not None and self._settings.classic_dialect == dialect.name)
+        firmware_key = self._model.key(Role.FIRMWARE)
+        if self.is_older or not self._params.reaches(firmware_key):
+            self.identity = Identity()
+            return self.identity
+        if dialect is not None and not await self._may_ask_firmware(dialect):
+            if before is None:
+                # what the older firmware knows the newer one knows, too
+                self.identity, self.is_older = Identity(), True
+                report = Report(
+                    Cause.FIRMWARE_NOT_ASKED, before=dialect.before, dialect=dialect.name
+                )
+                self._report(Severity.WARNING, report)
+            else:
+                self._be_older(was_older)
+            return self.identity or Identity()
+        try:
+            firmware = await self._params.read_number(firmware_key, Priority.SERVICE)
+            motor_key = self._model.key(Role.MOTOR_FIRMWARE)
+            motor = await self._params.read_number(motor_key, Priority.SERVICE)
+        except Refused:
+            if dialect is None or self._settings.classic_dialect:
+                raise
+            self._be_older(True)
+            self.identity = Identity()
+        else:
+            self._be_older(dialect is not None and firmware < dialect.before)
+            self.identity = Identity(firmware, int(motor))
+        return self.identity
+
+    def _be_older(self, older: bool) -> None:
+        """Take the firmware for one of the older dialect, or not."""
+        self.is_older = older
+        dialect = self._dialect
+        self.scales.use_dialect(dialect.factors if older and dialect is not None else {})
+
+    @property
+    def _dialect(self) -> OlderDialect | None:
+        dialect = self._model.profile.older
+        here = dialect is not None and dialect.protocol == self._params.protocol
+        return dialect if here else None
+
+    async def _may_ask_firmware(self, dialect: OlderDialect) -> bool:
+        """
+        Tell whether the firmware can be asked for without harm, which an older one does not know.
+
+        A control method that only newer firmware has says that the drive is not of the older.
+        """
+        method = self._model.profile.methods.get(self._settings.method)
+        if self._settings.classic_dialect or (method is not None and not method.older):
+            return True
+        key = self._model.key(Role.CONTROL_SOURCE)
+        source = await self._params.read(key, Priority.SERVICE)
+        return self._model.profile.holders.get(source) in dialect.harmless
+
+    async def read_more(self) -> Identity:
+        """Read vendor, product and serial number; nothing needs them, many have none [C57]."""
+        assert self.identity is not None
+        if self._params.in_block:
+            # a PLC would answer for itself [C118]
+            return self.identity
+        found = await self._params.identify(Priority.SERVICE)
+        model = f'{found.product} {found.model}'.strip()
+        self.identity = replace(
+            self.identity, vendor=found.vendor, model=model, serial=found.serial
+        )
+        return self.identity
+
+    def text_of(self, code: int) -> str:
+        """Return what the display of this firmware says for a code."""
+        firmware = self.identity.version if self.identity else None
+        if self.is_older and firmware is None:
+            firmware = Fraction(0)
+        return self._model.status_code(code).shown(firmware)
+
+    def has(self, key: str) -> bool:
+        """Tell whether the drive has a parameter: its model, this line and its firmware do."""
+        if not self._params.reaches(key) or (self.is_older and not self._model[key].older):
+            return False
+        since = self._model[key].since
+        firmware = self.identity.firmware if self.identity else math.nan
+        return since is None or not firmware < float(since) - 0.001

@@ -161,17 +161,17 @@ class ParameterAccess:
         assert not isinstance(value, str), key
         return float(value)
 
-    async def read(self, key: str, priority: Priority, *, once: bool = False) -> Value:
+    async def read(self, key: str, priority: Priority, *, retry: bool = True) -> Value:
         """Read a parameter."""
-        return self.value(key, await self.read_data(key, priority, once=once))
+        return self.value(key, await self.read_data(key, priority, retry=retry))
 
-    async def read_data(self, key: str, priority: Priority, *, once: bool = False) -> bytes:
+    async def read_data(self, key: str, priority: Priority, *, retry: bool = True) -> bytes:
         """Read a parameter as it stands in the drive."""
-        return (await self.read_reply(key, priority, once=once)).data
+        return (await self.read_reply(key, priority, retry=retry)).data
 
-    async def read_number(self, key: str, priority: Priority, *, once: bool = False) -> float:
+    async def read_number(self, key: str, priority: Priority, *, retry: bool = True) -> float:
         """Read a parameter that is a number."""
-        return self.number(key, await self.read_data(key, priority, once=once))
+        return self.number(key, await self.read_data(key, priority, retry=retry))
 
     async def identify(self, priority: Priority) -> Identification:
         """Ask the drive who it is; what it does not tell stays empty."""
@@ -184,7 +184,7 @@ class ParameterAccess:
     async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges; once, because a person asked for it."""
         assert self.model[key].access is Access.ACKNOWLEDGE, key
-        reply = await self._ask(self.address(key), priority, None, once=True)
+        reply = await self._ask(self.address(key), priority, None, retry=False)
         return self.value(key, reply.data)
 
     async def acknowledge_and_write(self, key: str, step: Write) -> None:
@@ -204,17 +204,17 @@ class ParameterAccess:
         """Write as a profile says, unless ``require_wanted`` raises when its turn has come."""
         address, data = self.target(step)
         priority = Priority.STOP if step.head else priority
-        await self._ask(address, priority, data, step.once, require_wanted)
+        await self._ask(address, priority, data, step.retry, require_wanted)
 
     async def write_data(
-        self, key: str, data: bytes, priority: Priority, *, once: bool = False
+        self, key: str, data: bytes, priority: Priority, *, retry: bool = True
     ) -> None:
         """Write a parameter as it shall stand in the drive, whatever its range."""
-        await self._ask(self.address(key), priority, data, once)
+        await self._ask(self.address(key), priority, data, retry)
 
-    async def read_from(self, address: Address, priority: Priority, *, once: bool = False) -> bytes:
+    async def read_from(self, address: Address, priority: Priority, *, retry: bool = True) -> bytes:
         """Read what stands at an address."""
-        return (await self._ask(address, priority, None, once)).data
+        return (await self._ask(address, priority, None, retry)).data
 
     def is_odd(self, key: str) -> bool:
         """Tell whether what was read last of a parameter cannot be, and was read more than once."""
@@ -227,11 +227,11 @@ class ParameterAccess:
         except ValueError:
             return False
 
-    async def read_reply(self, key: str, priority: Priority, *, once: bool = False) -> Reply:
+    async def read_reply(self, key: str, priority: Priority, *, retry: bool = True) -> Reply:
         """Read a parameter as it stands in the drive; what cannot be counts when it comes again."""
         address = self.address(key)
         try:
-            reply = await self._ask(address, priority, None, once)
+            reply = await self._ask(address, priority, None, retry)
         except Refused as error:
             if error.code in _NONE_SUCH and self.model[key].option:
                 self._denials[key] = [*self._denials.get(key, ()), error][-_DENIALS:]
@@ -244,7 +244,7 @@ class ParameterAccess:
                 self._odd[key] = reply.data
                 break
             before = reply.data
-            reply = await self._ask(address, priority, None, once)
+            reply = await self._ask(address, priority, None, retry)
             readings += 1
         return reply
 
@@ -257,12 +257,12 @@ class ParameterAccess:
         address: Address,
         priority: Priority,
         data: bytes | None,
-        once: bool,
+        retry: bool,
         require_wanted: Callable[[], None] = lambda: None,
     ) -> Reply:
-        tries = 1 if once else 1 + self._retries
+        tries = 1 + self._retries if retry else 1
         # what is busy has done nothing; a stop that is sent once is repeated by who wants it
-        busy = 0 if once and priority <= Priority.LOOK else _BUSY_TRIES
+        busy = 0 if not retry and priority <= Priority.LOOK else _BUSY_TRIES
         while True:
             try:
                 if data is None:

@@ -328,7 +328,7 @@ class WriteAccess:
 
             async def allow() -> None:
                 nonlocal access
-                if not self._state.settings_need_control:
+                if not self._state.nameplate.is_older:
                     return
                 if await self._procedures.controller.method.in_control(Priority.SERVICE):
                     return
@@ -369,7 +369,7 @@ def write_forbidden(key: str, state: DriveState) -> Report | None:
         return None
     if not settings.allow_communication_changes:
         return Report(Cause.COMMUNICATION_PROTECTED)
-    firmware = state.identity.firmware if state.identity else 0.0
+    firmware = state.nameplate.identity.firmware if state.nameplate.identity else 0.0
     if firmware < state.model.profile.uncertain.get(key, 0.0):
         return Report(Cause.CODES_UNCERTAIN, firmware=firmware)
     return None

@@ -172,7 +172,9 @@ class Parameters:
         return [
             key
             for key in every
-            if (only is None or key in only) and self.reaches(key) and self._state.has(key)
+            if (only is None or key in only)
+            and self.reaches(key)
+            and self._state.nameplate.has(key)
         ]
 
     def validate(self, key: str, value: Value) -> Value:
@@ -215,7 +217,7 @@ class Parameters:
             refused: dict[str, Refused] = {}
             for key in keys:
                 try:
-                    await self._read(key, once=False)
+                    await self._read(key, retry=True)
                     self._unread -= 1
                 except Refused as error:
                     # by a busy drive, perhaps: asked again when the others are read
@@ -264,7 +266,7 @@ class Parameters:
         for number, key in enumerate(due, start=1):
             if state.connected and state.responsive:
                 try:
-                    await self._read(key, once=True)
+                    await self._read(key, retry=False)
                 except Refused:
                     pass
                 except LinkError:
@@ -283,7 +285,7 @@ class Parameters:
         """Tell whether a running motor keeps it from being changed, or this firmware has none."""
         status = self._state.status
         barred = self._state.model[key].stopped and status is not None and status.driven
-        return barred or not self._state.has(key)
+        return barred or not self._state.nameplate.has(key)
 
     async def change_now(
         self, wanted: Mapping[str, Value], *, guarded: bool = True, told_as: Cause = Cause.CHANGED
@@ -400,16 +402,16 @@ class Parameters:
     async def refresh(self) -> Report:
         """Read every parameter again; the answer says which have changed."""
         before = self._values
-        keys = [key for key in self._keys if self._state.has(key)]
+        keys = [key for key in self._keys if self._state.nameplate.has(key)]
         for key in keys:
             with contextlib.suppress(Refused):
                 # a person waits for it, so it goes by turns with the polls
-                await self._read(key, once=False, priority=Priority.POLL)
+                await self._read(key, retry=True, priority=Priority.POLL)
         changed = [key for key in keys if before.get(key) != self._values.get(key)]
         return Report(Cause.SETTINGS_REFRESHED, count=len(keys), changed=tuple(changed))
 
-    async def _read(self, key: str, *, once: bool, priority: Priority = Priority.REFRESH) -> None:
-        data = await self._params.read_data(key, priority, once=once)
+    async def _read(self, key: str, *, retry: bool, priority: Priority = Priority.REFRESH) -> None:
+        data = await self._params.read_data(key, priority, retry=retry)
         if key not in self._changing or key not in self._data:
             self._learn(key, data)
 

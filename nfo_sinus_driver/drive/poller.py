@@ -315,7 +315,7 @@ class Poller:
             word, told = told, None
             return await state.read_status(
                 Priority.POLL,
-                once=True,
+                retry=False,
                 alarming=self._alarming,
                 told=word,
                 code_for=self._code_holds,
@@ -338,7 +338,7 @@ class Poller:
         if self._mode_is_due:
             self._mode_read_at = self._bus.now()
             before = state.control_mode
-            mode = await self._insist(lambda: state.read_control_mode(Priority.POLL, once=True))
+            mode = await self._insist(lambda: state.read_control_mode(Priority.POLL, retry=False))
             if mode != before and self._controller:
                 # before it is told: a set-point never has the unit of another mode
                 self._controller.judge(status)
@@ -485,7 +485,7 @@ def take_snapshot(
         setpoint=setpoint.commanded,
         setpoint_age=setpoint.age,
         setpoint_clamped=setpoint.clamped,
-        text=state.text_of(status.code),
+        text=state.nameplate.text_of(status.code),
         description=code.description,
         remedy=code.remedy,
         kind=status.kind,

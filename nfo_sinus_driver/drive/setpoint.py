@@ -427,7 +427,7 @@ class Setpoint:
                     return
                 self._may_have(0.0)
                 try:
-                    await self._params.write(replace(step, once=True), Priority.STOP)
+                    await self._params.write(replace(step, retry=False), Priority.STOP)
                 except LinkError as error:
                     if isinstance(error, Refused) and not self._may_be_busy(error):
                         why = Report(Cause.SETPOINT_REFUSED, value=0.0, error=str(error))

@@ -105,7 +105,7 @@ class StartSequence:
         kept its run command, too, would turn the motor at once.
         """
         self._deadline = self._state.bus.now() + _START_TIMEOUT
-        if not self._state.settings_need_control:
+        if not self._state.nameplate.is_older:
             with contextlib.suppress(DriveError, Refused):
                 await self._method.zero_setpoint(control_mode, Priority.SERVICE)
         await self._method.take_control(self._await_status)

@@ -264,12 +264,12 @@ class StopSequence:
             self._unheard += 1
             # among late answers a refusal is not believed, until something else was answered
             if isinstance(error, DamagedAnswer) and before is _Outcome.UNHEARD:
-                await self._state.read_status(Priority.LOOK, once=True)
+                await self._state.read_status(Priority.LOOK, retry=False)
             if self._unheard < _UNHEARD_BEFORE_FORCE:
                 raise
             failure = error
         # one that answers nothing at all ends it here
-        status = await self._state.read_status(Priority.LOOK, once=True)
+        status = await self._state.read_status(Priority.LOOK, retry=False)
         if failure is None:
             status = await self._newer(status, reasons, self._told_at)
         if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
@@ -302,7 +302,7 @@ class StopSequence:
         """Stop by all that is left [C126]; return what keeps that from being confirmed."""
         obeyed = await self._method.force_stop(control_mode)
         told_at = self._bus.now()
-        status = await self._state.read_status(Priority.LOOK, once=True)
+        status = await self._state.read_status(Priority.LOOK, retry=False)
         if not obeyed:
             return why
         self._told_at = min(self._told_at, told_at)
@@ -323,7 +323,7 @@ class StopSequence:
             if self._bus.now() > until:
                 break
             await self._bus.sleep(drive_state.LOOK_PERIOD)
-            status = await self._state.read_status(Priority.LOOK, once=True)
+            status = await self._state.read_status(Priority.LOOK, retry=False)
         return status
 
     def _why_not(self, status: InverterStatus, refusal: LinkError | None) -> Report | None:

@@ -58,7 +58,7 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
 
     async def measure(role: Role) -> None:
         # which firmware it has may be known only later
-        if denied[role] >= _DENIALS or not state.has(state.model.key(role)):
+        if denied[role] >= _DENIALS or not state.nameplate.has(state.model.key(role)):
             return
         try:
             values[role] = await state.measure(role, Priority.TELEMETRY)

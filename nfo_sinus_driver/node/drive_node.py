@@ -123,7 +123,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         if self._ending:
             return TransitionCallbackReturn.FAILURE
         try:
-            asked_for = self.managed.connect(patient=self.lifecycle.by_operator)
+            asked_for = self.managed.connect(retry=self.lifecycle.by_operator)
         except (DriveError, NodeError, ValueError) as error:
             # of a port that is lost the bus node says so, for all its drives
             port_lost = self._bus_context.bus.port_error is not None

@@ -110,11 +110,11 @@ class ManagedDrive:
             raise NodeError(self._lifecycle.why_not_active)
         return self._drive
 
-    def connect(self, *, patient: bool) -> bool:
+    def connect(self, *, retry: bool) -> bool:
         """
         Find the drive that the settings ask for, and watch it from then on.
 
-        :param patient: repeat the first request when there is no response.
+        :param retry: repeat the first request when there is no response.
         :returns: false if the settings ask for another one meanwhile.
         :raises DriveError: it does not respond, or may not be taken over.
         :raises NodeError: the one before has not stopped yet.
@@ -132,7 +132,7 @@ class ManagedDrive:
             ):
                 self._drive.require_standing().result()
             self._drive = Drive(self._bus, self._concrete, self._listener)
-        self._drive.connect(patient=patient, parameters=True).result()
+        self._drive.connect(retry=retry, parameters=True).result()
         asked_for = self._is_asked_for
         if asked_for:
             self._drive.settings = self._concrete

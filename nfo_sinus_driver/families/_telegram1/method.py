@@ -142,11 +142,11 @@ class Telegram1(ControlMethod):
         the one by which it stops; a drive that keypad or terminals control is left alone.
         """
         try:
-            yield Write(CLEAR, self.runs | FAULT_ACK, once=True)
+            yield Write(CLEAR, self.runs | FAULT_ACK, retry=False)
         except Refusal:
-            word = int((yield Read(STATUS, once=True)))
+            word = int((yield Read(STATUS, retry=False)))
             if word & RELEASED and (word & self.control or self.echoes):
-                yield begin(self.stopping(word), once=True)
+                yield begin(self.stopping(word), retry=False)
 
     def stopping(self, word: int) -> int:
         """Return STW1 by which a drive with this status stops as usual, and keeps control."""
@@ -186,14 +186,14 @@ class Telegram1(ControlMethod):
         return status.state not in (State.FAULTED, State.FAULT_REACTION_ACTIVE)
 
 
-def begin(word: int, *, once: bool = False) -> Write:
+def begin(word: int, *, retry: bool = True) -> Write:
     """Return what writes STW1 by which no motor is let run, and set-point 0."""
-    return Write(BEGIN, word << 16, once=once)
+    return Write(BEGIN, word << 16, retry=retry)
 
 
-def following(word: int, *, once: bool = False) -> Write:
+def following(word: int, *, retry: bool = True) -> Write:
     """Return what writes STW1 that goes on from the one before, and set-point 0."""
-    return Write(NEXT, word << 16, once=once)
+    return Write(NEXT, word << 16, retry=retry)
 
 
 def in_charge(status: Status | None) -> Steps[str]:

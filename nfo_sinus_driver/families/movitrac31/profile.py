@@ -123,13 +123,13 @@ class DirectionAndSize(SetpointTarget):
         base = _BASE.get((yield from _pattern()))
         return math.inf if base is None else float((yield Read(base)))
 
-    def zero(self, *, once: bool) -> Steps[None]:
+    def zero(self, *, retry: bool) -> Steps[None]:
         """Write size 0 and leave the bits alone, for a direction among them would be a command."""
-        yield Write(self.key, 0.0, once=once)
+        yield Write(self.key, 0.0, retry=retry)
 
     def set_to_zero(self) -> Steps[None]:
         """Write size 0, and read it back alone."""
-        yield from self.zero(once=False)
+        yield from self.zero(retry=True)
         kept = float((yield Read(self.key)))
         if kept:
             raise NotPossible(f'the drive keeps a set-point of {kept:g} where 0 was written')
@@ -221,7 +221,7 @@ class FunctionBits(ControlMethod):
 
     def run(self) -> Steps[None]:
         """Enable, forward; once, for the state before a second one would be unknown."""
-        yield Write(BITS, int(Bits.ENABLE | Bits.CLOCKWISE), once=True)
+        yield Write(BITS, int(Bits.ENABLE | Bits.CLOCKWISE), retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
         """
@@ -230,17 +230,17 @@ class FunctionBits(ControlMethod):
         None is given, for a direction may come from a terminal. Does nothing to a drive that is not
         under control of the line: refused if it is and does not obey.
         """
-        yield from self._stop_by(_take_direction(), _SETPOINT.zero(once=True))
+        yield from self._stop_by(_take_direction(), _SETPOINT.zero(retry=False))
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once, by controller inhibit; control is kept."""
         inhibit = Write(BITS, int(Bits.CONTROLLER_INHIBIT))
-        yield from self._stop_by(one(inhibit), _SETPOINT.zero(once=False))
+        yield from self._stop_by(one(inhibit), _SETPOINT.zero(retry=True))
 
     def release(self) -> Steps[None]:
         """Remove function bits and set-point; P841 stays, for another one can start the motor."""
         if (yield from self.in_control()):
-            yield from self._stop_by(one(Write(BITS, 0)), _SETPOINT.zero(once=False))
+            yield from self._stop_by(one(Write(BITS, 0)), _SETPOINT.zero(retry=True))
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove function bits and set-point while a fault is active, each by itself."""
@@ -282,8 +282,8 @@ def _take_direction() -> Steps[None]:
     """
     kept = Bits(0)
     with contextlib.suppress(Refusal):
-        kept = Bits(int((yield Read(BITS, once=True))))
-    yield Write(BITS, int(kept & (Bits.ENABLE | Bits.CONTROLLER_INHIBIT)), once=True)
+        kept = Bits(int((yield Read(BITS, retry=False))))
+    yield Write(BITS, int(kept & (Bits.ENABLE | Bits.CONTROLLER_INHIBIT)), retry=False)
 
 
 def _would_turn() -> Steps[bool]:

@@ -164,7 +164,7 @@ class ModeScmd(_G2):
     references = tuple(_COMMANDS)
     coasts = True
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {
-        procedure: Write('fieldbus.scmd', command, once=True, head=True)
+        procedure: Write('fieldbus.scmd', command, retry=False, head=True)
         for procedure, command in (
             (Procedure.FULL, Scmd.FULL_TUNING),
             (Procedure.BASIC, Scmd.BASIC_TUNING),
@@ -209,7 +209,7 @@ class ModeScmd(_G2):
 
     def run(self) -> Steps[None]:
         """Give the run command; once, for the state before a second one would be unknown."""
-        yield Write(self._command, _COMMANDS[self._reference], once=True)
+        yield Write(self._command, _COMMANDS[self._reference], retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
         """
@@ -219,8 +219,8 @@ class ModeScmd(_G2):
         although the bus has control or, under Inhibit, nothing tells which: it may be tuning
         [C101].
         """
-        zeroes = (target.zero(once=True) for target in self._targets(control_mode))
-        yield from self._stop_by(one(Write(self._command, Scmd.STOP, once=True)), *zeroes)
+        zeroes = (target.zero(retry=False) for target in self._targets(control_mode))
+        yield from self._stop_by(one(Write(self._command, Scmd.STOP, retry=False)), *zeroes)
 
     def perhaps_in_control(self) -> Steps[bool]:
         """Tell whether the bus may have control: under Inhibit nothing tells."""
@@ -232,7 +232,7 @@ class ModeScmd(_G2):
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once, as <Stop> on the keypad does; control is given back."""
         # a drive may well refuse a set-point while the bus has no control
-        zeroes = (target.zero(once=False) for target in self._targets(control_mode))
+        zeroes = (target.zero(retry=True) for target in self._targets(control_mode))
         yield from self._stop_by(one(Write(MODE, Mode.STOP)), *zeroes)
 
     def release(self) -> Steps[None]:
@@ -343,10 +343,10 @@ class DriveControl(_G2):
         """
         yield Until(lambda status: status.state in (State.READY_TO_SWITCH_ON, State.STOPPING))
         switched_on = self._ready | Control.SWITCH_ON
-        yield Write(CONTROL_WORD, switched_on, once=True)
+        yield Write(CONTROL_WORD, switched_on, retry=False)
         yield Until(lambda status: status.state in (State.SWITCHED_ON, State.STOPPING))
         # reverse is the sign of the set-point; both direction bits at once mean no change [C36]
-        yield Write(CONTROL_WORD, switched_on | Control.ENABLE_OP, once=True)
+        yield Write(CONTROL_WORD, switched_on | Control.ENABLE_OP, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
         """
@@ -355,14 +355,14 @@ class DriveControl(_G2):
         Each step by itself [C126]. Does nothing to a drive that is not under bus control: who has
         control stays as it is.
         """
-        zeroes = (target.zero(once=True) for target in self._targets(control_mode))
+        zeroes = (target.zero(retry=False) for target in self._targets(control_mode))
         yield from self._stop_by(self._change_or_write(~_RUN, Control(0)), *zeroes)
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Go to QUICK_STOP, which coasts [C96]; control is kept."""
         coast = ~(_RUN | Control.DISABLE_QUICK_STOP)
-        zeroes = (target.zero(once=False) for target in self._targets(control_mode))
-        change = self._change_or_write(coast, Control.OVERRIDE_COAST, once=False)
+        zeroes = (target.zero(retry=True) for target in self._targets(control_mode))
+        change = self._change_or_write(coast, Control.OVERRIDE_COAST, retry=True)
         yield from self._stop_by(change, *zeroes)
 
     def force_stop(self, control_mode: str) -> Steps[bool]:
@@ -382,7 +382,7 @@ class DriveControl(_G2):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Reset the run bits; where that is refused, write set-point 0 and MODE = Stop."""
-        if (yield from taken(self._change_or_write(~_RUN, Control(0), once=False))):
+        if (yield from taken(self._change_or_write(~_RUN, Control(0), retry=True))):
             return Removal.COMMAND
         released = yield from taken(one(Write(MODE, Mode.STOP)))
         if released and not (yield from self.perhaps_in_control()):
@@ -424,28 +424,28 @@ class DriveControl(_G2):
             raise NotPossible(_CONTROLLED_ELSEWHERE)
         return why
 
-    def _change(self, keep: Control, add: Control, *, once: bool = True) -> Steps[None]:
+    def _change(self, keep: Control, add: Control, *, retry: bool = False) -> Steps[None]:
         """Change some bits of the control word and leave the others to who has control."""
         if self._reaches(_MASK):
             # in one transaction: the AND mask first, then the OR mask [M0 §7.1]
-            yield Write(_MASK, int(keep) & 0xFFFF | int(add) << 16, once=once)
+            yield Write(_MASK, int(keep) & 0xFFFF | int(add) << 16, retry=retry)
             return
         word = Control(int((yield Read(CONTROL_WORD))))
-        yield Write(CONTROL_WORD, word & keep | add, once=once)
+        yield Write(CONTROL_WORD, word & keep | add, retry=retry)
 
-    def _change_or_write(self, keep: Control, add: Control, *, once: bool = True) -> Steps[None]:
+    def _change_or_write(self, keep: Control, add: Control, *, retry: bool = False) -> Steps[None]:
         """Change some bits of the control word for a stop, in whatever way the drive takes it."""
         masked = self._reaches(_MASK)
-        if masked and (yield from taken(self._change(keep, add, once=once))):
+        if masked and (yield from taken(self._change(keep, add, retry=retry))):
             return
         word = self._ready
         try:
-            word = Control(int((yield Read(CONTROL_WORD, once=once))))
+            word = Control(int((yield Read(CONTROL_WORD, retry=retry))))
         except Refusal:
             # what it has of ours, then, but never to who has control by keypad or terminals
             if not (yield from self.perhaps_in_control()):
                 raise
-        yield Write(CONTROL_WORD, word & keep | add, once=once)
+        yield Write(CONTROL_WORD, word & keep | add, retry=retry)
 
 
 def _in_charge(status: Status | None) -> Steps[str]:

@@ -47,7 +47,7 @@ class HTelegram1(Telegram1):
         """SwitchON, then OperationEnable when the drive shows S3."""
         yield method.following(int(ON))
         yield Until(lambda status: status.state is State.SWITCHED_ON)
-        yield method.following(int(RUN), once=True)
+        yield method.following(int(RUN), retry=False)
 
     def stopping(self, word: int) -> int:
         """Return OperationDisable: SwitchOFF does not leave S4, whatever ZSW1 shows [C116]."""

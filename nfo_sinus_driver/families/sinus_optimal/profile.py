@@ -153,21 +153,21 @@ class DriveControl(ControlMethod):
         enabled = _READY | Control.ENABLE
         yield Write(CONTROL_WORD, enabled)
         yield Until(lambda status: bool((status.word or 0) & words.Status.ENABLED))
-        yield Write(CONTROL_WORD, enabled | _RUN, once=True)
+        yield Write(CONTROL_WORD, enabled | _RUN, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
         """Reset Switch on, and leave the other bits to who has control."""
-        yield from self._stop_by(self._switch_off(once=True))
+        yield from self._stop_by(self._switch_off(retry=False))
 
-    def _switch_off(self, *, once: bool = False) -> Steps[None]:
+    def _switch_off(self, *, retry: bool = True) -> Steps[None]:
         word = int(_READY | Control.ENABLE)
         try:
-            word = int((yield Read(CONTROL_WORD, once=once)))
+            word = int((yield Read(CONTROL_WORD, retry=retry)))
         except Refusal:
             # what it has of ours, then, but never to who has control by keypad or terminals
             if not (yield from self.perhaps_in_control()):
                 raise
-        yield Write(CONTROL_WORD, word & ~_RUN, once=once)
+        yield Write(CONTROL_WORD, word & ~_RUN, retry=retry)
 
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Reset Switch on, then take Enable away, by which the motor is released [C109]."""

@@ -114,7 +114,7 @@ class AnyOrder(RuleBasedStateMachine):
     @precondition(lambda self: not self.laws.watched)
     @rule(wait=WAITS)
     def connect(self, wait: float = 0.1) -> None:
-        future = self.rig.drive.connect(patient=False)
+        future = self.rig.drive.connect(retry=False)
         self.rig.answer(future)
         if future.exception() is None:
             self.laws.connected()

@@ -175,7 +175,7 @@ def test_a_wrong_bit_rate_says_what_to_check() -> None:
     with Rig('canopen') as rig:
         rig.line.wire.timing = dataclasses.replace(rig.line.wire.timing, baud=250_000)
         for _ in range(10):
-            answer = rig.answer(rig.drive.connect(patient=False))
+            answer = rig.answer(rig.drive.connect(retry=False))
         assert 'with this bit rate?' in answer and 'the node id, the bit rate' in answer
 
 

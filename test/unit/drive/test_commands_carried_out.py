@@ -40,8 +40,8 @@ class Noted:
     def require_fitted(self, key: str) -> None:
         pass
 
-    async def read(self, key: str, priority: Priority, *, once: bool) -> Any:
-        return self._next('read', key, priority, once)
+    async def read(self, key: str, priority: Priority, *, retry: bool) -> Any:
+        return self._next('read', key, priority, retry)
 
     async def write(self, step: Write, priority: Priority) -> None:
         self._next('write', step, priority)
@@ -60,7 +60,7 @@ class Noted:
 
 def test_each_step_brings_what_the_next_one_is_given() -> None:
     def steps() -> Steps[int]:
-        first = yield Read('a', once=True)
+        first = yield Read('a', retry=False)
         yield Write('b', first)
         flags = yield Acknowledge('c')
         yield AcknowledgeThenWrite('c', Write('b', 0))
@@ -71,7 +71,7 @@ def test_each_step_brings_what_the_next_one_is_given() -> None:
     done = carry_out(steps(), cast(ParameterAccess, noted), Priority.STOP, noted.reached)
     assert asyncio.run(done) == 7
     assert noted.asked == [
-        ('read', 'a', Priority.STOP, True),
+        ('read', 'a', Priority.STOP, False),
         ('write', Write('b', 3), Priority.STOP),
         ('acknowledge', 'c', Priority.STOP),
         ('acknowledge and write', 'c', Write('b', 0)),

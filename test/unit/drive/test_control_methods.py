@@ -83,7 +83,7 @@ def test_a_stop_is_confirmed_in_a_control_mode_that_no_manual_lists(
         rig.enable()
         inverter = rig.drive.state
 
-        async def read(priority: Priority = Priority.SERVICE, *, once: bool = False) -> str:
+        async def read(priority: Priority = Priority.SERVICE, *, retry: bool = True) -> str:
             inverter.control_mode = '7'
             return inverter.control_mode
 

@@ -20,7 +20,7 @@ def test_the_ends_of_every_setting_go_there_and_back_and_nothing_beyond(
 ) -> None:
     with Rig(way) as rig:
         registers = rig.connect().drive.params
-        has = rig.drive.state.has
+        has = rig.drive.state.nameplate.has
     wrong: list[tuple[str, object]] = []
 
     def there_and_back(key: str, value: Value) -> bytes | None:

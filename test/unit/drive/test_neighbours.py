@@ -214,13 +214,13 @@ def test_settings_that_are_read_again_slow_no_other_drive() -> None:
         assert not reading.done()
 
 
-@pytest.mark.parametrize('patient', [True, False])
-def test_a_drive_that_is_silent_when_it_is_read_slows_no_other(patient: bool) -> None:
+@pytest.mark.parametrize('retry', [True, False])
+def test_a_drive_that_is_silent_when_it_is_read_slows_no_other(retry: bool) -> None:
     with made(2, line={}) as rig:
         start(rig, 1)
-        if not patient:
+        if not retry:
             rig.line.unplug(2)
-        reading = rig.drives[2].connect(patient=patient, parameters=True)
+        reading = rig.drives[2].connect(retry=retry, parameters=True)
         rig.pass_time(0.5)
         rig.line.unplug(2)
         rig.answer(reading)

@@ -202,7 +202,7 @@ def test_set_point_0_leaves_the_bits_alone() -> None:
 
 
 def test_it_runs_forward_at_first() -> None:
-    play(method.run(), (Write(BITS, FORWARD, once=True), None))
+    play(method.run(), (Write(BITS, FORWARD, retry=False), None))
     # as set-points take it to be
     assert target.writes(0.0)[-2:] == (Write(BITS, FORWARD), Write(SIZE, 0.0))
 
@@ -219,18 +219,18 @@ def test_a_stop_takes_the_direction_away_and_gives_no_enable() -> None:
     ):
         play(
             method.stop('Freque'),
-            (Read(BITS, once=True), stands),
-            (Write(BITS, left, once=True), None),
-            (Write(SIZE, 0.0, once=True), REFUSED if stands is REFUSED else None),
+            (Read(BITS, retry=False), stands),
+            (Write(BITS, left, retry=False), None),
+            (Write(SIZE, 0.0, retry=False), REFUSED if stands is REFUSED else None),
         )
 
 
 def test_a_stop_that_is_refused() -> None:
-    begun = (Read(BITS, once=True), FORWARD), (Write(BITS, ENABLE, once=True), REFUSED)
+    begun = (Read(BITS, retry=False), FORWARD), (Write(BITS, ENABLE, retry=False), REFUSED)
     play(method.stop('Freque'), *begun, (Read(MODE), STANDARD))
     for mode in (REMOTE, REFUSED):
         with pytest.raises(Refusal):
-            to_zero = Write(SIZE, 0.0, once=True), None
+            to_zero = Write(SIZE, 0.0, retry=False), None
             play(method.stop('Freque'), *begun, (Read(MODE), mode), to_zero)
 
 
@@ -240,9 +240,9 @@ def test_set_point_0_is_written_although_the_bits_are_refused() -> None:
         step = next(steps)
         while True:
             asked.append(step)
-            refused = step != Write(SIZE, 0.0, once=True)
+            refused = step != Write(SIZE, 0.0, retry=False)
             step = steps.throw(REFUSED) if refused else steps.send(None)
-    assert Write(SIZE, 0.0, once=True) in asked
+    assert Write(SIZE, 0.0, retry=False) in asked
 
 
 def test_a_quick_stop_inhibits_the_controller() -> None:

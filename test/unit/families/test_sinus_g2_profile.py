@@ -42,8 +42,8 @@ SCMD_STOP = Write(SCMD, 0)
 TO_NOBODY = Write(MODE, STOP)
 
 
-def zero(once: bool = False, key: str = 'status.frq_set') -> Write:
-    return Write(key, 0.0, at='fieldbus.setpoint', once=once)
+def zero(retry: bool = True, key: str = 'status.frq_set') -> Write:
+    return Write(key, 0.0, at='fieldbus.setpoint', retry=retry)
 
 
 #: Set-point 0, read back; and what the drive keeps.
@@ -64,9 +64,9 @@ def control(reference: str = 'fieldbus', *, classic: bool = False) -> ControlMet
     return _method('drive_control', reference, classic)
 
 
-def change(clear: int, add: int = 0, *, once: bool = True) -> Write:
+def change(clear: int, add: int = 0, *, retry: bool = False) -> Write:
     """Some bits of the control word, as one transaction: the AND mask is the low word."""
-    return Write(MASK, ~clear & 0xFFFF | add << 16, once=once)
+    return Write(MASK, ~clear & 0xFFFF | add << 16, retry=retry)
 
 
 # --- MODE and SCMD --------------------------------------------------------------------------------
@@ -105,11 +105,11 @@ def test_the_run_command_says_where_the_reference_comes_from() -> None:
     for reference, command in (
         *(('fieldbus', 0x101), ('terminal', 0x81), ('op_mode', 0x41), ('fix7_reverse', 0x3D)),
     ):
-        play(scmd(reference).run(), (Write(SCMD, command, once=True), None))
+        play(scmd(reference).run(), (Write(SCMD, command, retry=False), None))
 
 
 def test_stop() -> None:
-    stop, to_zero = Write(SCMD, 0, once=True), zero(once=True)
+    stop, to_zero = Write(SCMD, 0, retry=False), zero(retry=False)
     play(scmd().stop('Freque'), (stop, None), (to_zero, None))
     # no set-point is followed in a mode that is not known
     play(scmd().stop(''), (stop, None))
@@ -120,7 +120,7 @@ def test_stop() -> None:
 
 def test_a_refused_stop_is_told_where_the_bus_may_have_control() -> None:
     first = Refusal('the first')
-    refused, to_zero = (Write(SCMD, 0, once=True), first), (zero(once=True), None)
+    refused, to_zero = (Write(SCMD, 0, retry=False), first), (zero(retry=False), None)
     for mode in (BUS, INHIBIT, REFUSED):
         with pytest.raises(Refusal) as told:
             play(scmd().stop('Freque'), refused, (Read(MODE), mode), to_zero)
@@ -217,7 +217,7 @@ def test_procedures() -> None:
         Reset.ENERGY: 0x900,
     }
     for procedure, command in commands.items():
-        assert scmd().procedures[procedure] == Write(SCMD, command, once=True, head=True)
+        assert scmd().procedures[procedure] == Write(SCMD, command, retry=False, head=True)
         assert G2.profile.methods_with(procedure) == ['mode_scmd']
 
 
@@ -239,47 +239,48 @@ def test_the_control_word_is_taken_and_runs() -> None:
         play(
             method.run(),
             (Wait(status(state=State.READY_TO_SWITCH_ON), stopping, not_by=others), None),
-            (Write(WORD, ready | 1, once=True), None),
+            (Write(WORD, ready | 1, retry=False), None),
             (Wait(status(state=State.SWITCHED_ON), stopping, not_by=others), None),
-            (Write(WORD, ready | 9, once=True), None),
+            (Write(WORD, ready | 9, retry=False), None),
         )
 
 
 def test_the_run_bits_are_reset_and_the_others_left() -> None:
-    play(control().stop('Freque'), (change(RUN_BITS), None), (zero(once=True), None))
+    play(control().stop('Freque'), (change(RUN_BITS), None), (zero(retry=False), None))
     # Classic has no masks
     play(
         control(classic=True).stop('Freque'),
-        (Read(WORD, once=True), 0xC07F),
-        (Write(WORD, 0xC076, once=True), None),
-        (zero(once=True), None),
+        (Read(WORD, retry=False), 0xC07F),
+        (Write(WORD, 0xC076, retry=False), None),
+        (zero(retry=False), None),
     )
 
 
 def test_a_refused_reset_is_told_where_the_network_has_control() -> None:
     # a mask is not the only way to reset them
-    refused = (change(RUN_BITS), REFUSED), (Read(WORD, once=True), 0xC07F)
-    refused += ((Write(WORD, 0xC076, once=True), REFUSED),)
+    refused = (change(RUN_BITS), REFUSED), (Read(WORD, retry=False), 0xC07F)
+    refused += ((Write(WORD, 0xC076, retry=False), REFUSED),)
     play(control().stop('Freque'), *refused, (Read(STATUS), 0))
     with pytest.raises(Refusal):
-        play(control().stop('Freque'), *refused, (Read(STATUS), FROM_NET), (zero(once=True), None))
+        steps = *refused, (Read(STATUS), FROM_NET), (zero(retry=False), None)
+        play(control().stop('Freque'), *steps)
 
 
 def test_a_control_word_that_cannot_be_read_is_written_only_where_the_network_has_control() -> None:
-    refused = (change(RUN_BITS), REFUSED), (Read(WORD, once=True), REFUSED)
-    blind = (Write(WORD, READY | NET_REF, once=True), None), (zero(once=True), None)
+    refused = (change(RUN_BITS), REFUSED), (Read(WORD, retry=False), REFUSED)
+    blind = (Write(WORD, READY | NET_REF, retry=False), None), (zero(retry=False), None)
     play(control().stop('Freque'), *refused, (Read(STATUS), FROM_NET), *blind)
     play(control().stop('Freque'), *refused, (Read(STATUS), 0), (Read(STATUS), 0))
 
 
 def test_quick_stop_coasts_and_keeps_control() -> None:
-    coast = change(RUN_BITS | 4, 0x800, once=False)
+    coast = change(RUN_BITS | 4, 0x800, retry=True)
     play(control().quick_stop('Freque'), (coast, None), (zero(), REFUSED))
 
 
 #: A drive that lets go of no run bits, in whatever way they are reset.
 NOT_RESET = (
-    (change(RUN_BITS, once=False), REFUSED),
+    (change(RUN_BITS, retry=True), REFUSED),
     (Read(WORD), 0xC07F),
     (Write(WORD, 0xC076), REFUSED),
 )
@@ -288,7 +289,7 @@ NOT_RESET = (
 def test_what_is_removed_by_the_control_word() -> None:
     given_back, refused = (TO_NOBODY, None), (TO_NOBODY, REFUSED)
     for script, removed in (
-        (((change(RUN_BITS, once=False), None),), Removal.COMMAND),
+        (((change(RUN_BITS, retry=True), None),), Removal.COMMAND),
         ((*NOT_RESET, given_back, (Read(STATUS), 0)), Removal.COMMAND),
         ((*NOT_RESET, given_back, (Read(STATUS), FROM_NET), *ZEROED), Removal.SETPOINT),
         ((*NOT_RESET, refused, *ZEROED), Removal.SETPOINT),
@@ -309,7 +310,7 @@ def test_where_no_edge_is_taken_reading_has_to_do() -> None:
     low = change(RUN_BITS | 0x80)
     stop = AcknowledgeThenWrite(ACK, Write(WORD, READY | NET_REF))
     for removed, end in (
-        (((change(RUN_BITS, once=False), None),), (Acknowledge(ACK), 5)),
+        (((change(RUN_BITS, retry=True), None),), (Acknowledge(ACK), 5)),
         ((*NOT_RESET, (TO_NOBODY, REFUSED), *KEPT), (stop, REFUSED)),
     ):
         script = ((low, REFUSED), *removed, end)

@@ -39,11 +39,11 @@ def test_who_has_control() -> None:
 def test_no_way_releases_the_motor_at_once() -> None:
     assert not smode.coasts
     assert not control.coasts
-    stop = Write(SMODE, 0, once=True)
-    zero = [(Write(key, 0.0, once=True), None) for key in (FREQUENCY, SPEED)]
+    stop = Write(SMODE, 0, retry=False)
+    zero = [(Write(key, 0.0, retry=False), None) for key in (FREQUENCY, SPEED)]
     play(smode.quick_stop('Freque'), (stop, None), *zero)
-    word = Read(WORD, once=True)
-    play(control.quick_stop('Freque'), (word, 0x4009), (Write(WORD, 0x4008, once=True), None))
+    word = Read(WORD, retry=False)
+    play(control.quick_stop('Freque'), (word, 0x4009), (Write(WORD, 0x4008, retry=False), None))
 
 
 def test_control_is_taken_and_given_to_the_keypad() -> None:
@@ -53,7 +53,7 @@ def test_control_is_taken_and_given_to_the_keypad() -> None:
         (Write(MODE, BUS), None),
         (Write(SMODE, 0, head=True), None),
     )
-    play(smode.run(), (Write(SMODE, 0x101, once=True), None))
+    play(smode.run(), (Write(SMODE, 0x101, retry=False), None))
     stop_first = (Write(SMODE, 0), None), (Write(MODE, MANUAL), None)
     play(smode.release(), (Read(MODE), BUS), *stop_first)
     play(smode.release(), (Read(MODE), AUTO))
@@ -107,12 +107,12 @@ def test_it_is_enabled_and_then_switched_on() -> None:
         control.run(),
         (Write(WORD, enabled), None),
         (shown, None),
-        (Write(WORD, enabled | SWITCH_ON, once=True), None),
+        (Write(WORD, enabled | SWITCH_ON, retry=False), None),
     )
 
 
 def test_switch_on_is_reset_and_the_others_left() -> None:
-    read, low = (Read(WORD, once=True), 0x400F), Write(WORD, 0x400E, once=True)
+    read, low = (Read(WORD, retry=False), 0x400F), Write(WORD, 0x400E, retry=False)
     play(control.stop('Freque'), read, (low, None))
     play(control.stop('Freque'), read, (low, REFUSED), (Read(STATUS), 0))
     with pytest.raises(Refusal):

@@ -47,7 +47,7 @@ class G2Telegram1(Telegram1):
         """Switch on, then enable operation when the drive shows that it is switched on."""
         yield method.following(int(profidrive.ON))
         yield Until(lambda status: status.state is State.SWITCHED_ON)
-        yield method.following(int(profidrive.RUN), once=True)
+        yield method.following(int(profidrive.RUN), retry=False)
 
     def stopping(self, word: int) -> int:
         """Return the word that leaves operation enabled: without it the motor would coast."""
@@ -93,9 +93,9 @@ class G2DriveControl(Telegram1):
         """
         yield Until(lambda status: status.state in _STARTABLE)
         on = self.ready | drivecontrol.Control.SWITCH_ON
-        yield method.following(on, once=True)
+        yield method.following(on, retry=False)
         yield Until(lambda status: status.state in (State.SWITCHED_ON, State.STOPPING))
-        yield method.following(on | drivecontrol.Control.ENABLE_OP, once=True)
+        yield method.following(on | drivecontrol.Control.ENABLE_OP, retry=False)
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Go to QUICK_STOP, which coasts [C96]; control is kept."""

@@ -59,7 +59,7 @@ class OptimalTelegram1(Telegram1):
         """Enable, then switch on, when the drive shows that it is enabled."""
         yield method.following(self.ready | _ENABLE)
         yield Until(lambda status: bool((status.word or 0) & Status.ENABLED))
-        yield method.following(self.ready | _ENABLE | _SWITCH_ON, once=True)
+        yield method.following(self.ready | _ENABLE | _SWITCH_ON, retry=False)
 
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Clear Switch on, then take Enable away, by which the motor is released [C109]."""

@@ -90,13 +90,13 @@ class DriveControl(ControlMethod):
 
     def run(self) -> Steps[None]:
         """Give the run command."""
-        yield Write(_WORD, Word.REMOTE | Word.RUN, once=True)
+        yield Write(_WORD, Word.REMOTE | Word.RUN, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
         """Take the run command back, and write set-point 0."""
         if (yield from self.in_control()):
-            yield Write(_WORD, Word.REMOTE, once=True)
-            yield from _FREQUENCY.zero(once=True)
+            yield Write(_WORD, Word.REMOTE, retry=False)
+            yield from _FREQUENCY.zero(retry=False)
 
     def release(self) -> Steps[None]:
         """Give control back."""

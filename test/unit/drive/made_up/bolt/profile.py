@@ -99,13 +99,13 @@ class FunctionBits(ControlMethod):
 
     def run(self) -> Steps[None]:
         """Give the run command."""
-        yield Write(_BITS, Bit.RUN, once=True)
+        yield Write(_BITS, Bit.RUN, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
         """Take the run command back, and write set-point 0."""
         if (yield from self.in_control()):
-            yield Write(_BITS, 0, once=True)
-            yield from _FREQUENCY.zero(once=True)
+            yield Write(_BITS, 0, retry=False)
+            yield from _FREQUENCY.zero(retry=False)
 
     def release(self) -> Steps[None]:
         """Leave control where it is."""
