@@ -47,7 +47,9 @@ class Setting:
     @property
     def description(self) -> str:
         """What it means, and what 0 or an empty text does."""
-        nothing = "''" if isinstance(self.default, str) else '0'
+        nothing = '0'
+        if isinstance(self.default, (str, list)):
+            nothing = "''" if isinstance(self.default, str) else 'empty'
         return f'{self.text}; {nothing}: {self.zero}' if self.zero else self.text
 
     @property
@@ -76,7 +78,8 @@ class Setting:
 
 def setting(default: _T, text: str, low: float | None = None, high: float = 0.0, **more: Any) -> _T:
     """Return a field of a dataclass that is a :class:`Setting`."""
-    made = Setting(default, text, low, high, **more)
+    shown = list(default) if isinstance(default, tuple) else default
+    made = Setting(shown, text, low, high, **more)
     return field(default=default, metadata={'setting': made})
 
 

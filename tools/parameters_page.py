@@ -18,7 +18,7 @@ from nfo_sinus_driver.catalog.family import (
     load_family,
     usual_family,
 )
-from nfo_sinus_driver.catalog.parameter import NO_SETTINGS, Access, Parameter
+from nfo_sinus_driver.catalog.parameter import Access, Parameter
 
 _KINDS = {float: 'double', int: 'integer', str: 'string', bool: 'bool'}
 _ACCESS = {
@@ -68,8 +68,8 @@ The name of the ROS parameter, and of the setting on the drive's own display; {c
 
 _NO_SETTINGS = 'Its manual prints none.\n'
 
-_NOT_READ = """\
-The drive has these, and this driver neither reads nor writes them.
+_ONLY_READ = """\
+Read-only ROS parameters, where the drive has them.
 """
 
 _TIMED = """\
@@ -127,12 +127,11 @@ def _family(family: Family, taken: list[str]) -> Iterator[str]:
         yield f'#### {group}\n'
         yield _table(_SETTING_COLUMNS, rows)
         yield from _long_lists(rows)
-    not_read = [row for row in family.values() if row.access is Access.READ]
-    not_read = [row for row in not_read if row.group not in NO_SETTINGS]
-    if not_read:
-        yield '### Not read by this driver\n'
-        yield _NOT_READ
-        yield _table(_OTHER_COLUMNS, not_read)
+    only_read = [row for row in family.kept if not row.is_setting]
+    if only_read:
+        yield '### Only read\n'
+        yield _ONLY_READ
+        yield _table(_OTHER_COLUMNS, only_read)
     for group, title in (('Status', 'Measured values'), ('Fieldbus', 'Words of the bus')):
         rows = [parameter for parameter in family.values() if parameter.group == group]
         if rows:

@@ -69,8 +69,18 @@ class Family(Mapping[str, Parameter]):
 
     @property
     def settings(self) -> tuple[Parameter, ...]:
-        """The parameters that become ROS parameters, in the order of the manual."""
+        """The parameters that can be set, in the order of the manual."""
         return tuple(parameter for parameter in self.values() if parameter.is_setting)
+
+    @property
+    def kept(self) -> tuple[Parameter, ...]:
+        """The parameters that become ROS parameters: the settings, and what is only read."""
+        return tuple(parameter for parameter in self.values() if parameter.is_kept)
+
+    @property
+    def measured(self) -> tuple[Parameter, ...]:
+        """The measured values, by whose names the topic ``~/measured`` has them."""
+        return tuple(parameter for parameter in self.values() if parameter.is_measured)
 
     def key(self, role: Role) -> str:
         """Return the key of the parameter that has a role; ``''`` if this family has none."""

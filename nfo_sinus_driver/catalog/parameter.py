@@ -151,6 +151,22 @@ class Parameter:
         return int if whole and not self.scale else float
 
     @property
+    def is_kept(self) -> bool:
+        """Whether it is a ROS parameter: a setting, or what is only read of the same groups."""
+        read_only = self.access is Access.READ and self.group not in NO_SETTINGS
+        return self.is_setting or read_only
+
+    @property
+    def is_readable(self) -> bool:
+        """Whether reading it has no effect."""
+        return self.access in (Access.READ, Access.READ_WRITE)
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether it is a number that the drive tells of itself, and no setting."""
+        return self.is_readable and not self.is_kept and self.kind in (int, float)
+
+    @property
     def is_setting(self) -> bool:
         """Whether the drive keeps it for people to read and write: a ROS parameter."""
         return self.access is Access.READ_WRITE and self.group not in NO_SETTINGS

@@ -60,7 +60,7 @@ class Status(Protocol):
 
 @dataclass(frozen=True)
 class Read:
-    """Read a parameter; brings its value. ``once``: the request is not repeated."""
+    """Read a parameter; brings its value. ``retry``: repeat the request without a response."""
 
     key: str
     retry: bool = True
@@ -487,6 +487,8 @@ class Profile:
         settings changes while the motor is enabled.
     :ivar line_check: what to look at, in this order, while a drive of it has never answered, by the
         protocol; where one is not there, what the protocol says itself.
+    :ivar measured: the measured values that matter beside the telemetry: the usual ones of
+        ``~/measured``.
     :ivar holds_control: why the bus gets control as soon as anybody asks anything, and keeps it, by
         the protocol over which that is so.
     """
@@ -509,6 +511,7 @@ class Profile:
     start_settings: frozenset[str] = frozenset()
     line_check: Mapping[str, str] = field(default_factory=dict)
     holds_control: Mapping[str, str] = field(default_factory=dict)
+    measured: tuple[str, ...] = ()
     words: Mapping[str, Profile] = field(default_factory=dict)
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Future
 import contextlib
 import math
@@ -95,7 +95,7 @@ class ControlSession(EventListener):
         self.drive: Drive
         self.show: Callable[[], object] = lambda: None
         self.reported: list[Report] = []
-        self.values: dict[Role, float] = {}
+        self.values: Mapping[Role, float] = {}
         self.answer: Report | None = None
 
     def command(self, **settings: Any) -> Drive:

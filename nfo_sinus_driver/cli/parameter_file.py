@@ -22,7 +22,7 @@ from typing import Any
 
 import yaml
 
-from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
+from nfo_sinus_driver.catalog import Family, Parameter, Value
 from nfo_sinus_driver.cli.console import CliError, listed
 from nfo_sinus_driver.drive.parameter_writer import show
 
@@ -200,7 +200,6 @@ def _one_line(text: str) -> str:
 
 
 _SWITCH = {'on': True, 'true': True, 'off': False, 'false': False}
-_MEASURED = 'Status'
 #: Why a setting of the line is left alone.
 BARRED = (
     'settings of the line are changed with --allow-communication-changes alone, '
@@ -246,18 +245,9 @@ def parse_value(parameter: Parameter, text: str) -> Value:
         raise ValueError(f'{parameter.key}: {text!r} is not a number') from None
 
 
-def measured(model: Family) -> tuple[Parameter, ...]:
-    """Return what a drive measures, where reading it has no effect."""
-    return tuple(
-        parameter
-        for parameter in model.values()
-        if parameter.group == _MEASURED and parameter.access is Access.READ
-    )
-
-
 def readable(model: Family) -> Mapping[str, Parameter]:
-    """Return what this tool shows when asked for it by name: settings and measured values."""
-    return {parameter.key: parameter for parameter in (*model.settings, *measured(model))}
+    """Return what this tool shows when asked for it by name: what can be read without effect."""
+    return {parameter.key: parameter for parameter in model.values() if parameter.is_readable}
 
 
 def require_names(names: Iterable[str], known: Iterable[str], whose: str, end: str = '') -> None:

@@ -27,7 +27,6 @@ from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, add_yes, cha
 from nfo_sinus_driver.cli.parameter_file import (
     BARRED,
     is_barred,
-    measured,
     parse_value,
     readable,
     require_names,
@@ -214,7 +213,7 @@ def _put_values(wanted: Mapping[str, Parameter], values: Mapping[str, Value]) ->
 
 
 def _of_group(drive: OfflineDrive, name: str) -> dict[str, Parameter]:
-    every = (*drive.model.settings, *measured(drive.model))
+    every = readable(drive.model).values()
     found = {
         parameter.key: parameter
         for parameter in every

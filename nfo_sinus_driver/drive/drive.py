@@ -199,7 +199,7 @@ class Drive:
             await self._connect(retry)
             if parameters:
                 try:
-                    await self.parameters.read_now()
+                    await self.parameters.read_now([one.key for one in self.model.kept])
                 except BaseException:
                     # no poller watches it yet
                     self._set_disconnected()

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 import contextlib
 from dataclasses import replace
 import logging
@@ -101,6 +101,7 @@ class DriveState:
         self._told_impossible: set[str] = set()
         #: What was polled last.
         self._polled: dict[Role, Measured] = {}
+        self._measured: Mapping[str, float] = {}
         #: It changes its parameters itself just now.
         self.tuning = False
         self.control_mode = ''
@@ -210,7 +211,8 @@ class DriveState:
         if not (status.by_frequency or self.model.profile.status_word.frequency_beside):
             return self._note_status(status)
         try:
-            frequency = await self._measure(Role.ACTUAL_FREQUENCY, priority, retry, status)
+            key = self.model.key(Role.ACTUAL_FREQUENCY)
+            frequency = await self._measure(key, priority, retry, status)
         except Refused:
             frequency = math.nan
         self.polled(Role.ACTUAL_FREQUENCY, frequency)
@@ -353,25 +355,23 @@ class DriveState:
         finally:
             self.tuning = False
 
-    async def measure(self, role: Role, priority: Priority) -> float:
+    async def measure(self, key: str, priority: Priority) -> float:
         """
         Read a measured value once; NaN if there is none such, or if it cannot be, and that again.
 
+        :param key: of its parameter; ``''``: there is none.
         :raises LinkError: it does not answer, or refuses.
         """
-        return await self._measure(role, priority, False, self.status)
+        return await self._measure(key, priority, False, self.status) if key else math.nan
 
     async def _measure(
-        self, role: Role, priority: Priority, retry: bool, status: InverterStatus | None
+        self, key: str, priority: Priority, retry: bool, status: InverterStatus | None
     ) -> float:
         """Measure; a status tells the direction of what turns, where the value does not."""
-        key = self.model.key(role)
-        if not key:
-            return math.nan
         data = await self.params.read_data(key, priority, retry=retry)
         value = self.params.number(key, data)
         if not self.params.is_odd(key):
-            turns = role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
+            turns = self.model.role_of.get(key) in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
             return status.signed(value) if turns and status is not None else value
         if key not in self._told_impossible:
             self._told_impossible.add(key)
@@ -380,13 +380,30 @@ class DriveState:
             self.tell(Severity.WARNING, Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
         return math.nan
 
+    @property
+    def measured_keys(self) -> tuple[str, ...]:
+        """The parameters whose values are measured beside the telemetry."""
+        named = tuple(filter(None, self.settings.measured))
+        return named or tuple(filter(self.params.reaches, self.model.profile.measured))
+
     def polled(self, role: Role, value: float) -> None:
         """Take note of what a poll has measured just now."""
         self._polled[role] = Measured(value, self.bus.now())
 
+    def note_measured(self, values: Mapping[str, float]) -> None:
+        """Take note of what was measured beside the telemetry, by key."""
+        self._measured = values
+
     def forget_polled(self) -> None:
         """Take note that what was polled is not known of the drive that is there now."""
         self._polled.clear()
+        self._measured = {}
+
+    @property
+    def own_setpoint(self) -> float:
+        """The set-point that the drive tells, in the unit of its control mode; NaN if none."""
+        target = self.model.profile.setpoints.get(self.control_mode)
+        return math.nan if target is None else self._measured.get(target.key, math.nan)
 
     def last_polled(self, role: Role | None) -> Measured:
         """Return what a poll has measured last."""

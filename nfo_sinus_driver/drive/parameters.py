@@ -167,14 +167,12 @@ class Parameters:
         return self._params.reaches(key)
 
     def available(self, only: Collection[str] | None = None) -> list[str]:
-        """Return the settings that the drive should have, all or some of them, in their order."""
-        every = [parameter.key for parameter in self._state.model.settings]
+        """Return what the drive should keep, all settings or some of it, in its order."""
         return [
-            key
-            for key in every
-            if (only is None or key in only)
-            and self.reaches(key)
-            and self._state.nameplate.has(key)
+            parameter.key
+            for parameter in self._state.model.kept
+            if (parameter.is_setting if only is None else parameter.key in only)
+            and self._state.nameplate.has(parameter.key)
         ]
 
     def validate(self, key: str, value: Value) -> Value:

@@ -17,6 +17,7 @@ from nfo_sinus_driver.drive.diagnosis import Conditions, explain_failure, explai
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.snapshot import NAN, NOT_MEASURED, Measured, Snapshot
 from nfo_sinus_driver.link import Interrupted, LinkError, NoData, PortError, Refused, Reply
 
@@ -377,7 +378,8 @@ class Poller:
 
     async def _read_measured(self, role: Role) -> float:
         try:
-            return await self._insist(lambda: self._state.measure(role, Priority.POLL))
+            key = self._state.model.key(role)
+            return await self._insist(lambda: self._state.measure(key, Priority.POLL))
         except (PortError, Interrupted):
             # raised once only: the status that is read next would show a drive that was stopped
             raise
@@ -476,13 +478,14 @@ def take_snapshot(
     if status is None:
         return Snapshot(state.bus.now(), *standing)
     code = status.listed
+    watched = state.settings.method == MONITOR
     return Snapshot(
         status.at,
         *standing,
         status=status,
         control_mode=state.control_mode,
         unit=state.unit,
-        setpoint=setpoint.commanded,
+        setpoint=state.own_setpoint if watched else setpoint.commanded,
         setpoint_age=setpoint.age,
         setpoint_clamped=setpoint.clamped,
         text=state.nameplate.text_of(status.code),

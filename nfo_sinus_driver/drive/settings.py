@@ -16,6 +16,7 @@ from nfo_sinus_driver.catalog import (
     Profile,
     Role,
     families,
+    load_family,
     load_parameter,
     load_profile,
     usual_family,
@@ -149,6 +150,11 @@ class DriveSettings:
         0, 1000, unit='Hz', zero='as poll_rate',
     )
     telemetry_rate: float = setting(2.0, 'measured values', 0, 100, unit='Hz', zero='off')
+    measured: Sequence[str] = setting(
+        ('',),
+        'what ~/measured has, at telemetry_rate: measured values by the names of their parameters',
+        zero='those that matter of the model',
+    )
     lost_after: float = setting(
         1.0,
         'a drive that is asked and sends no valid frame for this long is lost and stopped; any '
@@ -276,6 +282,7 @@ class DriveSettings:
             _one_of('telegram_words', self.telegram_words, _telegram_words(self.model, self.method))
         modes = _control_modes(self.model, self.method)
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
+        self._require_measured()
         self._check_drive_timeout()
         for name, one in settings.items():
             # what a family decides was checked above
@@ -304,6 +311,18 @@ class DriveSettings:
                 f'drive_timeout {self.drive_timeout:g} s lies between two steps of the drive, '
                 f'{below:g} and {above:g}'
             )
+
+    def _require_measured(self) -> None:
+        names = tuple(filter(None, self.measured))
+        if not names or self.model == AUTO:
+            return
+        family = load_family(self.model, self.method, self.telegram_words)
+        known = tuple(parameter.key for parameter in family.measured)
+        for name in names:
+            if name not in known:
+                raise ValueError(
+                    f'measured: {self.model} measures no {name!r}: choose of {", ".join(known)}'
+                )
 
     def _require_known_method(self) -> None:
         for profile in _profiles(self.model):

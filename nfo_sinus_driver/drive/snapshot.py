@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 import math
@@ -73,10 +73,17 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Telemetry:
-    """Measured values by role, NaN where there is none; the last arrived at ``at``, s."""
+    """
+    Measured values, NaN where there is none.
+
+    :ivar at: when the last one arrived, s of the clock of the bus.
+    :ivar values: those that every family may have, by role.
+    :ivar measured: those that the setting ``measured`` names, by key.
+    """
 
     at: float
-    values: dict[Role, float]
+    values: Mapping[Role, float]
+    measured: Mapping[str, float] = field(default_factory=dict)
 
 
 class Listener(Protocol):

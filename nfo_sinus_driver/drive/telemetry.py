@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 
 from nfo_sinus_driver.bus import Priority
@@ -49,43 +49,48 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
 
     :param yields: tells whether the line is left to others just now.
     """
-    values = dict.fromkeys((*FAST, *SLOW), NAN)
-    #: How often in a row the drive said that it has none of them.
-    denied = dict.fromkeys(values, 0)
+    key_of = state.model.key
+    #: By key: what was measured, and how often in a row the drive said that it has none of it.
+    values: dict[str, float] = {}
+    denied: Counter[str] = Counter()
     # the first time all are read, so that the first message is whole
     due = deque(SLOW)
     first = True
 
-    async def measure(role: Role) -> None:
+    async def measure(key: str) -> None:
+        values.setdefault(key, NAN)
         # which firmware it has may be known only later
-        if denied[role] >= _DENIALS or not state.nameplate.has(state.model.key(role)):
+        if denied[key] >= _DENIALS or not state.nameplate.has(key):
             return
         try:
-            values[role] = await state.measure(role, Priority.TELEMETRY)
-            denied[role] = 0
+            values[key] = await state.measure(key, Priority.TELEMETRY)
+            denied[key] = 0
         except Refused as error:
-            values[role] = NAN
+            values[key] = NAN
             # over Classic it says so of everything while it tunes
-            denied[role] += error.code in _NONE_SUCH and not state.tuning
+            denied[key] += error.code in _NONE_SUCH and not state.tuning
 
     while True:
         started = state.bus.now()
         rate = state.settings.telemetry_rate
         if rate and state.connected and state.responsive and not yields():
             try:
-                for role in (*FAST, *due) if first else (*FAST, due[0]):
-                    await measure(role)
+                roles = (*FAST, *due) if first else (*FAST, due[0])
+                named = state.measured_keys
+                for key in dict.fromkeys((*map(key_of, roles), *named)):
+                    await measure(key)
                 due.rotate(-1)
                 first = False
+                by_role = {role: values.get(key_of(role), NAN) for role in (*FAST, *SLOW)}
                 # these two are polled anyway
-                polled = {
-                    Role.ACTUAL_FREQUENCY: state.frequency,
-                    Role.ACTUAL_SPEED: state.speed,
-                }
-                state.listener.on_telemetry(Telemetry(state.bus.now(), {**values, **polled}))
+                by_role[Role.ACTUAL_FREQUENCY] = state.frequency
+                by_role[Role.ACTUAL_SPEED] = state.speed
+                by_key = {key: values[key] for key in named}
+                state.note_measured(by_key)
+                state.listener.on_telemetry(Telemetry(state.bus.now(), by_role, by_key))
             except LinkError:
                 # the poll says so if the drive is lost
                 state.missed()
-                values.update(dict.fromkeys(FAST, NAN))
+                values.update(dict.fromkeys((*map(key_of, FAST), *state.measured_keys), NAN))
         period = 1 / rate if rate else _OFF_PERIOD
         await state.bus.sleep(period - (state.bus.now() - started))

@@ -113,7 +113,7 @@ class DriveNode(LifecycleNodeMixin, Node):
     @property
     def later_parameters(self) -> list[str]:
         """The names of the parameters that will be declared when the drive is there."""
-        return [parameter.key for parameter in self.managed.drive.model.settings]
+        return [parameter.key for parameter in self.managed.drive.model.kept]
 
     # --- lifecycle ----------------------------------------------------------------------------
 

@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter
 from nfo_sinus_driver.catalog import Family, Parameter as CatalogParameter, Value
 from nfo_sinus_driver.drive import Change, Drive
 from nfo_sinus_driver.node.overrides import declared_names, did_you_mean
-from nfo_sinus_driver.node.rclpy_internals import overrides_of
+from nfo_sinus_driver.node.rclpy_internals import overrides_of, writable
 from nfo_sinus_driver.node.wording import NodeError
 
 #: How long a change may wait for the bus before it is said that it is not known, s.
@@ -48,7 +48,7 @@ class DriveParameters:
     # --- from the drive -----------------------------------------------------------------------
 
     def declare(self, drive: Drive) -> None:
-        """Declare every setting that the drive has, with the value that it has."""
+        """Declare what the drive keeps, with the value that it has."""
         self.undeclare()
         self._drive = drive
         for key, value in drive.parameters.values.items():
@@ -63,7 +63,9 @@ class DriveParameters:
         """Take back what was declared: what the drive has is not known any more."""
         self._drive = None
         while self._declared:
-            self._node.undeclare_parameter(self._declared.pop())
+            key = self._declared.pop()
+            with writable(self._node, key):
+                self._node.undeclare_parameter(key)
 
     def note(self, keys: Collection[str]) -> None:
         """Have parameters follow the drive; may be called from any thread."""
@@ -83,16 +85,26 @@ class DriveParameters:
                 continue
             # the drive is right, also where the manual does not allow what it has
             parameter = Parameter(key, value=value)
-            self._node.set_descriptor(
-                key, descriptor(drive, key, value), parameter.get_parameter_value()
-            )
-            self._node.set_parameters([parameter])
+            shown = descriptor(drive, key, value)
+            with writable(self._node, key):
+                shown.read_only = False
+                self._node.set_descriptor(key, shown, parameter.get_parameter_value())
+                self._node.set_parameters([parameter])
 
     # --- to the drive -------------------------------------------------------------------------
 
     def validate(self, parameters: Iterable[Parameter]) -> list[Parameter]:
-        """Return parameters as the drive will have them, or raise why not; nothing is asked."""
-        return [self._admit(parameter) for parameter in parameters]
+        """
+        Return parameters as the drive will have them, or raise why not; nothing is asked.
+
+        What is only read is left out where it is as the drive has it: so a dump can be loaded.
+        """
+        admitted = [self._admit(parameter) for parameter in parameters]
+        return [one for one in admitted if not self._is_read_only(one.name)]
+
+    def _is_read_only(self, name: str) -> bool:
+        drive = self._drive
+        return drive is not None and name in self._declared and not drive.model[name].is_setting
 
     def _admit(self, parameter: Parameter) -> Parameter:
         if not self._node.has_parameter(parameter.name):
@@ -106,7 +118,10 @@ class DriveParameters:
         unset = parameter.type_ is Parameter.Type.NOT_SET
         if drive is None or unset or parameter.name not in self._declared:
             return parameter
-        value = coerce(drive.model[parameter.name], parameter.value)
+        known = drive.model[parameter.name]
+        value = coerce(known, parameter.value)
+        if not known.is_setting and value != drive.parameters.values[parameter.name]:
+            raise ValueError(f'{parameter.name} is only read: the drive itself changes it')
         return Parameter(parameter.name, value=drive.parameters.validate(parameter.name, value))
 
     @contextlib.contextmanager
@@ -188,6 +203,7 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
     shown = ParameterDescriptor(
         name=key,
         type=Parameter.Type.from_parameter_value(value).value,
+        read_only=not parameter.is_setting,
         description=f'{parameter.name}: {parameter.description}{unit}',
         additional_constraints='; '.join(_constraints(parameter, drive.model)),
     )

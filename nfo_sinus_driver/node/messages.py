@@ -14,13 +14,14 @@ from nfo_sinus_msgs.msg import (
     DriveStatus,
     ErrorLogEntry,
     InvSt,
+    Measured,
     Telemetry as TelemetryMessage,
 )
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from nfo_sinus_driver.bus import Statistics
-from nfo_sinus_driver.catalog import Fact, Kind, Role, State
+from nfo_sinus_driver.catalog import Fact, Family, Kind, Role, State
 from nfo_sinus_driver.drive import Drive, InverterStatus, LogEntry, Snapshot, Telemetry
 from nfo_sinus_driver.node.scale import Scale
 
@@ -115,6 +116,16 @@ def telemetry(measured: Telemetry, stamp: Time, frame_id: str) -> TelemetryMessa
     """Return the Telemetry message of measured values."""
     values = {field: measured.values.get(role, math.nan) for field, role in _TELEMETRY.items()}
     return TelemetryMessage(header=Header(stamp=stamp, frame_id=frame_id), **values)
+
+
+def measured(telemetry: Telemetry, model: Family, stamp: Time, frame_id: str) -> Measured:
+    """Return the Measured message of what the setting ``measured`` names."""
+    return Measured(
+        header=Header(stamp=stamp, frame_id=frame_id),
+        name=list(telemetry.measured),
+        value=list(telemetry.measured.values()),
+        unit=[model[key].unit for key in telemetry.measured],
+    )
 
 
 def error_log_entry(entry: LogEntry, stamp: Time) -> ErrorLogEntry:

@@ -9,7 +9,8 @@ A version of rclpy that has them no longer fails ``test/ros/test_rclpy_internals
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+import contextlib
 
 from rclpy.lifecycle import LifecycleNodeMixin
 from rclpy.node import Node
@@ -25,6 +26,19 @@ def overrides_of(node: Node) -> Mapping[str, Parameter]:
 def change_state_service(node: LifecycleNodeMixin) -> Service:
     """Return the service ``~/change_state``, whose callback raises on an invalid transition."""
     return node._service_change_state
+
+
+@contextlib.contextmanager
+def writable(node: Node, name: str) -> Iterator[None]:
+    """Let a parameter that is read-only for clients follow what it shows."""
+    # rclpy keeps the very object
+    descriptor = node.describe_parameter(name)
+    read_only, descriptor.read_only = descriptor.read_only, False
+    try:
+        yield
+    finally:
+        if node.has_parameter(name):
+            node.describe_parameter(name).read_only = read_only
 
 
 def state_label(node: LifecycleNodeMixin) -> str:

@@ -15,6 +15,7 @@ from nfo_sinus_msgs.msg import (
     DriveStatus,
     ErrorLogEntry,
     InvSt,
+    Measured,
     Telemetry as TelemetryMessage,
 )
 from rclpy.lifecycle import LifecycleNodeMixin
@@ -80,6 +81,7 @@ class Reporter:
         self._frequency = create(Float32, '~/actual_frequency', RELIABLE)
         self._joint_states = create(JointState, '~/joint_states', RELIABLE)
         self._telemetry = create(TelemetryMessage, '~/telemetry', RELIABLE)
+        self._measured = create(Measured, '~/measured', RELIABLE)
         queue.put_every(_PERIOD, self._report_regularly)
 
     # --- called by the bus --------------------------------------------------------------------
@@ -147,7 +149,10 @@ class Reporter:
 
     def _publish_telemetry(self, telemetry: Telemetry) -> None:
         stamp = _message(self._telemetry_stamps.next(telemetry.at))
-        self._telemetry.publish(messages.telemetry(telemetry, stamp, self._frame_id()))
+        frame_id = self._frame_id()
+        self._telemetry.publish(messages.telemetry(telemetry, stamp, frame_id))
+        model = self._managed().drive.model
+        self._measured.publish(messages.measured(telemetry, model, stamp, frame_id))
 
     def _publish_log_entry(self, entry: LogEntry) -> None:
         self._log_entries.publish(messages.error_log_entry(entry, self.stamp(entry.at)))

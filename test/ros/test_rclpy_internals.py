@@ -9,6 +9,7 @@ from pathlib import Path
 import re
 
 from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
 from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
@@ -28,6 +29,13 @@ def test_they_are_there(domain: int) -> None:
         assert rclpy_internals.change_state_service(node).srv_type is ChangeState
         assert callable(rclpy_internals.change_state_service(node).callback)
         assert rclpy_internals.state_label(node) == 'unconfigured'
+        node.declare_parameter('shown', 1, ParameterDescriptor(read_only=True))
+        with rclpy_internals.writable(node, 'shown'):
+            assert node.set_parameters([Parameter('shown', value=2)])[0].successful
+        assert not node.set_parameters([Parameter('shown', value=3)])[0].successful
+        assert node.get_parameter('shown').value == 2
+        with rclpy_internals.writable(node, 'shown'):
+            node.undeclare_parameter('shown')
     finally:
         node.destroy_node()
         rclpy.shutdown()

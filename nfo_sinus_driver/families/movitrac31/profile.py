@@ -362,6 +362,15 @@ PROFILE = Profile(
     setpoints={'Freque': _SETPOINT},
     in_charge=_in_charge,
     start_settings=_START_SETTINGS,
+    measured=(
+        'status.heat_sink_temperature',
+        'status.external_current_limit',
+        'status.apparent_current',
+        'status.inverter_utilization',
+        'status.motor_utilization_1',
+        'status.motor_utilization_2',
+        'status.terminals',
+    ),
     # a tenth above what the display values have [M4 §4]: the motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 440.0, Role.ACTUAL_SPEED: 9999.0},
 )

@@ -467,6 +467,13 @@ PROFILE = Profile(
         'telegram1': G2Telegram1,
     },
     setpoints=_SETPOINTS,
+    measured=(
+        'status.frq_set',
+        'status.spd_set',
+        'status.trq_set',
+        'status.reg_set',
+        'status.reg_act',
+    ),
     in_charge=_in_charge,
     # it works even on drives with a serial fault ([M0 §6.1.5], [C9])
     broadcast_stop=Write(MODE, Mode.STOP),

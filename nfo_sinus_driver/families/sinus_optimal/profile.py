@@ -215,6 +215,12 @@ PROFILE = Profile(
         'telegram1': OptimalTelegram1,
     },
     setpoints=_SETPOINTS,
+    measured=(
+        'fieldbus.input_freq_setpoint',
+        'fieldbus.input_speed_setpoint',
+        'status.control_freq',
+        'status.control_speed',
+    ),
     in_charge=_in_charge,
     most=MOST,
 )

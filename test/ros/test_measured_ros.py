@@ -1,0 +1,49 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a drive tells and nobody can set: on ``~/measured``, or as a read-only parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from bench import Bench, Client
+from nfo_sinus_msgs.msg import Measured
+from parameter_bench import refused, set_one, values
+import pytest
+from ways import WAYS
+
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.demo.bench import own_domain
+from nfo_sinus_driver.node.qos import RELIABLE
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with own_domain() as domain, Bench(domain, tmp_path, WAYS['movitrac']) as bench:
+        yield bench
+
+
+def test_measured_values_and_what_is_only_read(bench: Bench) -> None:
+    bench.simulator(paced=False)
+    bench.driver('-p', 'telemetry_rate:=5.0')
+    client: Client = bench.client().connected()
+    client.listen('measured', Measured, '/nfo_sinus/measured', RELIABLE)
+    heat = 'status.heat_sink_temperature'
+    message = client.wait_for('measured', lambda one: one.value[0] > 0, 'a warm heat sink')
+    usual = list(load_family('movitrac31').profile.measured)
+    assert (message.name, len(message.value)) == (usual, len(usual))
+    assert message.unit[:3] == ['°C', '%', '%']
+
+    # named while it runs, and named wrongly
+    assert client.set_parameters(measured=['status.frequency']).successful
+    client.wait_for('measured', lambda one: one.name == ['status.frequency'], 'the other')
+    refused(client.set_parameters(measured=['status.no_such']), 'status.no_such', heat)
+
+    # only read: shown and refused; what was dumped can be loaded
+    name = 'terminal.output_61'
+    assert client.descriptor(name).read_only
+    before = values(client, name)[name]
+    assert set_one(client, name, before).successful
+    refused(set_one(client, name, 'Rotating field on'), name, 'only read')

@@ -1,0 +1,96 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""``~/measured``: the quantities that the telemetry has no field for, by the drive's own names."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from support.rig import WAYS, Rig
+from support.said import says
+
+from nfo_sinus_driver.catalog import families, load_family, load_profile
+from nfo_sinus_driver.drive import Cause, DriveSettings
+
+#: Where the drive shows the set-point that it was given [M0 table 4, M1].
+OWN_SETPOINT = {
+    'rtu': 'status.frq_set', 'classic': 'status.frq_set', 'canopen': 'status.frq_set',
+    'rtu, control word': 'status.frq_set', 'optimal': 'fieldbus.input_freq_setpoint',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_what_matters_of_a_model_is_measured_without_being_named(way: str) -> None:
+    with Rig(way).turn() as rig:
+        rig.pass_time(4.0)
+        values = rig.notes.telemetry[-1].measured
+        model = rig.drive.model
+        usual = [key for key in model.profile.measured if rig.drive.params.reaches(key)]
+        assert list(values) == usual
+        lacking = {key for key in usual if not rig.drive.state.nameplate.has(key)}
+        assert {key for key, value in values.items() if math.isnan(value)} == lacking
+        if way in OWN_SETPOINT:
+            assert values[OWN_SETPOINT[way]] == pytest.approx(20.0, abs=0.11)
+
+
+def test_the_manuals_own_example_of_a_safety_value_is_there() -> None:
+    # heat sink temperature, P001 [M4 §1.1]
+    with Rig('movitrac').turn() as rig:
+        rig.pass_time(1.0)
+        assert 0 < rig.notes.telemetry[-1].measured['status.heat_sink_temperature'] < 90
+
+
+def test_names_choose_and_keep_their_order() -> None:
+    names = ['status.dc_link', 'status.reg_act', 'status.frq_act']
+    with Rig(measured=names).turn() as rig:
+        rig.pass_time(1.0)
+        values = rig.notes.telemetry[-1].measured
+        assert list(values) == names
+        assert values['status.dc_link'] == pytest.approx(565, abs=30)
+        assert values['status.frq_act'] == pytest.approx(20.0, abs=0.11)
+
+
+def test_a_value_that_is_lost_is_nan_and_not_the_old_one() -> None:
+    with Rig(measured=['status.reg_act']).turn() as rig:
+        rig.pass_time(1.0)
+        rig.meet = lambda key, data: 'refused' if key == 'status.reg_act' else None
+        rig.pass_time(1.0)
+        assert math.isnan(rig.notes.telemetry[-1].measured['status.reg_act'])
+        assert rig.drive.following
+
+
+@pytest.mark.parametrize('name', ['motor.p_nom', 'fieldbus.scmd', 'status.no_such', 'speed'])
+def test_other_names_are_refused_with_those_that_there_are(name: str) -> None:
+    with pytest.raises(ValueError, match=f'measured: sinus_g2 measures no {name!r}.*status.frq_a'):
+        DriveSettings(measured=[name])
+
+
+@pytest.mark.parametrize('model', families())
+def test_the_usual_ones_of_every_model_are_measured_values_of_it(model: str) -> None:
+    for method in load_profile(model).methods:
+        family = load_family(model, method)
+        assert {*family.profile.measured} <= {parameter.key for parameter in family.measured}
+
+
+@pytest.mark.parametrize('way', ['rtu', 'optimal'])
+def test_a_drive_that_is_only_watched_tells_the_setpoint_that_another_gave_it(way: str) -> None:
+    with Rig(way, control_method='monitor').connect() as rig:
+        target = rig.drive.model.profile.setpoints['Freque'].key
+        rig.far.memory.set(target, 12.5)
+        rig.pass_time(1.5)
+        assert rig.notes.snapshots[-1].setpoint == pytest.approx(12.5)
+
+
+def test_what_is_only_read_is_kept_up_beside_the_settings() -> None:
+    with Rig('movitrac') as rig:
+        rig.answer(rig.drive.connect(parameters=True))
+        values = rig.drive.parameters.values
+        key = 'special.software_system'
+        assert not rig.drive.model[key].is_setting
+        before = int(values[key])
+        rig.far.memory.set(key, before + 7)
+        rig.wait_until(lambda: rig.drive.parameters.values[key] == before + 7, 120.0)
+        change = rig.answer(rig.drive.parameters.change({key: before}))
+        assert says(change, Cause.NO_SETTING)
