@@ -320,7 +320,8 @@ DRIVES = {
         silence='PC time out',
         stopped='No enable',
         running='Enable',
-        most=400.0,
+        # fmax from the factory
+        most=50.0,
         nominal=50.0,
         without_run_input='terminal 43 (Enable/Stop) is open',
         no_timeout=('--set', 'serial.pc_timeout=0'),

@@ -20,6 +20,7 @@ from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import (
     ControlMethod,
     Holder,
+    Limits,
     NotPossible,
     Profile,
     Read,
@@ -83,11 +84,16 @@ _START_SETTINGS = frozenset(
         *(CONTROL_MODE, 'motor.enable_set_selection'),
     )
 )
-#: The frequency at which a motor has its rated voltage, by pattern.
+#: The frequency at which a motor has its rated voltage, and the greatest, by pattern.
 _BASE = {
     'V/f pattern 1': 'frequency.f_base_1',
     'V/f pattern 2': 'frequency.f_base_2',
     'V/f pattern 3': 'frequency.f_base_3',
+}
+_GREATEST = {
+    'V/f pattern 1': 'frequency.f_max_1',
+    'V/f pattern 2': 'frequency.f_max_2',
+    'V/f pattern 3': 'frequency.f_max_3',
 }
 
 
@@ -118,10 +124,12 @@ class DirectionAndSize(SetpointTarget):
         reverse = int(values[BITS]) & Bits.COUNTER_CLOCKWISE
         return math.copysign(float(values[self.key]), -1 if reverse else 1)
 
-    def read_nominal(self, has: Callable[[str], bool]) -> Steps[float]:
-        """Read the base frequency of the V/f pattern in use."""
-        base = _BASE.get((yield from _pattern()))
-        return math.inf if base is None else float((yield Read(base)))
+    def read_limits(self, has: Callable[[str], bool], *, older: bool = False) -> Steps[Limits]:
+        """Read base and greatest frequency of the V/f pattern in use (P201, P202 and the like)."""
+        pattern = yield from _pattern()
+        nominal = yield from _read_of(_BASE, pattern)
+        most = min(self.most, (yield from _read_of(_GREATEST, pattern)))
+        return Limits(-most, most, nominal)
 
     def zero(self, *, retry: bool) -> Steps[None]:
         """Write size 0 and leave the bits alone, for a direction among them would be a command."""
@@ -338,6 +346,11 @@ def _require_still_at_zero() -> Steps[None]:
         raise NotPossible(
             f'the motor would turn at set-point 0: set {least} to 0 (it is {frequency:g} Hz)'
         )
+
+
+def _read_of(keys: Mapping[str, str], pattern: str) -> Steps[float]:
+    """Read the frequency of a V/f pattern; infinite for one that the manual does not list."""
+    return float((yield Read(keys[pattern]))) if pattern in keys else math.inf
 
 
 def _pattern() -> Steps[str]:

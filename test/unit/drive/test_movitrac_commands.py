@@ -36,7 +36,7 @@ def asked_by_enable(rig: Rig) -> list[str]:
     return asked
 
 
-@pytest.mark.parametrize(('settings', 'most'), [({}, 38), (REMOTE, 31)], ids=['P841', 'mine'])
+@pytest.mark.parametrize(('settings', 'most'), [({}, 39), (REMOTE, 32)], ids=['P841', 'mine'])
 def test_an_enable_asks_little_of_a_drive_whose_settings_were_read(
     settings: dict[str, Any], most: int
 ) -> None:
@@ -97,6 +97,24 @@ def test_an_enable_is_refused_with_the_reason() -> None:
             if found != (True, False, False, Mode.STANDARD, False):
                 wrong[reason] = answer, found
     assert not wrong
+
+
+@pytest.mark.parametrize(('settings', 'most'), [
+    ({'frequency.f_max_1': 30.0}, 30.0),
+    ({'frequency.vf_pattern_1': 'V/f pattern 3', 'frequency.f_max_3': 35.0}, 35.0),
+])
+def test_a_set_point_beyond_fmax_is_shown_as_clamped(
+    settings: dict[str, Any], most: float
+) -> None:
+    with make(parameters=settings, setpoint_max=60.0) as rig:
+        rig.turn()
+        for asked, given in ((50.0, most), (-50.0, -most), (25.0, 25.0)):
+            rig.send(asked)
+            rig.pass_time(2.0)
+            snapshot = rig.drive.snapshot
+            assert (snapshot.setpoint, snapshot.setpoint_clamped) == (given, asked != given)
+            assert rig.far.motor.frequency == pytest.approx(given, abs=0.1)
+        assert rig.notes.said(f'is limited to {most:g} (setpoint_max, or')
 
 
 @pytest.mark.parametrize(

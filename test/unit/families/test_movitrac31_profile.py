@@ -15,7 +15,7 @@ from hypothesis import given, strategies as st
 import pytest
 from support.steps import REFUSED, play
 
-from nfo_sinus_driver.catalog import Holder, NotPossible, Refusal, Removal, load_family
+from nfo_sinus_driver.catalog import Holder, Limits, NotPossible, Refusal, Removal, load_family
 from nfo_sinus_driver.catalog.profile import Read, Write
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.families.movitrac31 import words
@@ -354,16 +354,20 @@ def test_a_set_point_is_rounded_to_the_steps_of_the_drive() -> None:
     assert target.most == 400
 
 
-def test_nominal_is_the_base_frequency_of_the_pattern_in_use() -> None:
-    for word, in_set, pattern, base, nominal in (
-        (0x00010010, 1, 1, '50', 50.0), (0x00010018, 2, 3, 87.0, 87.0)
+def test_limits_are_those_of_the_pattern_in_use() -> None:
+    for word, in_set, pattern, base, greatest, most in (
+        (0x00010010, 1, 1, '50', 70.0, 70.0),
+        (0x00010018, 2, 2, '60', 40.0, 40.0),
+        (0x00010018, 2, 3, 87.0, 400.0, 400.0),
     ):
         steps = (
             (Read(WORD), word),
             (Read(f'frequency.vf_pattern_{in_set}'), f'V/f pattern {pattern}'),
             (Read(f'frequency.f_base_{pattern}'), base),
+            (Read(f'frequency.f_max_{pattern}'), greatest),
         )
-        assert play(target.read_nominal(MOVITRAC.__contains__), *steps) == nominal
+        limits = play(target.read_limits(MOVITRAC.__contains__), *steps)
+        assert limits == Limits(-most, most, float(base))
 
 
 # --- what the tables have of it -------------------------------------------------------------------
