@@ -442,6 +442,23 @@ class ControlMethod(abc.ABC):
 
 
 @dataclass(frozen=True)
+class Product:
+    """
+    Who a drive says it is by its parameters; ``''`` is what it does not tell.
+
+    :ivar vendor: who made it.
+    :ivar model: its product name and size.
+    :ivar software: the part number of its software.
+    :ivar listed: the manual lists this model.
+    """
+
+    vendor: str = ''
+    model: str = ''
+    software: str = ''
+    listed: bool = True
+
+
+@dataclass(frozen=True)
 class OlderDialect:
     """
     Firmware that lacks parameters of the family, on a protocol where asking for one does harm.
@@ -475,6 +492,8 @@ class Profile:
         here before; given the status that was seen last, or ``None``.
     :ivar broadcast_stop: releases the motors of all drives of a line that has a broadcast.
     :ivar names_itself: it tells who it is by Modbus functions 43 and 17.
+    :ivar product: reads who it is, where parameters tell that; :class:`NotPossible` if it is none
+        of this family. ``None``: none tells it.
     :ivar told_by: a parameter that no other family has there; ``''``: there is none.
     :ivar writes_and_reads: it has Modbus function 23.
     :ivar releases: what its stop mode is where an ordinary stop releases the motor.
@@ -502,6 +521,7 @@ class Profile:
     enable_input: str = 'enable input'
     broadcast_stop: Write | None = None
     names_itself: bool = False
+    product: Callable[[], Steps[Product]] | None = None
     told_by: str = ''
     writes_and_reads: bool = False
     releases: Value = ''

@@ -81,6 +81,8 @@ class Drive:
         self.log = ErrorLog(self.state, procedures)
         self._error_log_monitor = ErrorLogMonitor(self.state, self.log)
         self._tuning = Tuning(self.state, self.parameters, procedures)
+        #: It has said who it is, and is of this family.
+        self._recognised = False
         bus.on_restart(self._unit, self._watch.restarted)
         bus.require_sign_of_life(self._unit, settings.lost_after)
         #: What goes on while it is connected, and while it is active.
@@ -299,7 +301,7 @@ class Drive:
         """Find out who answers, thoroughly with model and serial number; what runs runs on."""
         identity = await self.state.nameplate.identify()
         await self.state.nameplate.scales.read()
-        return await self.state.nameplate.read_more() if thoroughly else identity
+        return await self._read_nameplate() if thoroughly else identity
 
     @on_bus
     async def read_status(self) -> InverterStatus:
@@ -396,6 +398,9 @@ class Drive:
             raise DriveError(
                 Cause.OTHER_MODEL, error=str(error), model=state.model.name
             ) from error
+        # nothing is written to a drive of another family; one that was connected is stopped first
+        if early := not self._recognised and state.model.profile.product is not None:
+            await self._read_nameplate()
         await read_scales(state)
         await state.read_control_mode()
         await state.timeout.read()
@@ -403,25 +408,43 @@ class Drive:
         if self._controller is not None:
             await self._controller.secure_found()
             await self._watchdog.prepare()
-        identity = await state.nameplate.read_more()
+        if not early:
+            await self._read_nameplate()
         self._watch.connected()
         self.setpoint.connected()
         self.log.connected()
         state.found()
         if self._controller is not None:
             self._controller.connected()
-        name = '' if identity.model else state.model.name
-        if identity.model and not state.model.profile.names_itself:
-            title = state.model.profile.title
-            state.tell(
-                Severity.WARNING, Cause.UNEXPECTED_IDENTITY, model=identity.model, title=title
-            )
-        told = ', '.join(part for part in (name, str(identity)) if part)
-        state.tell(Severity.INFO, Cause.CONNECTED, drive=told)
+        self._report_identity()
         held = state.model.profile.holds_control.get(self.params.protocol)
         if self._controller is None and held:
             state.tell(Severity.WARNING, Cause.HELD_BY_LINE, why=held)
         self._watchdog.warn_if_unfit()
+
+    async def _read_nameplate(self) -> Identity:
+        """Read vendor, product and software (DriveError: it says that it is of another family)."""
+        nameplate, read = self.state.nameplate, self.model.profile.product
+        self._recognised = False
+        if read is None:
+            return await nameplate.read_more()
+        identity = nameplate.take(await carry_out(read(), self.params, Priority.SERVICE))
+        self._recognised = True
+        return identity
+
+    def _report_identity(self) -> None:
+        state, profile, identity = self.state, self.model.profile, self.identity
+        assert identity is not None
+        if identity.model and not (profile.names_itself or profile.product):
+            state.tell(
+                Severity.WARNING,
+                Cause.UNEXPECTED_IDENTITY,
+                model=identity.model,
+                title=profile.title,
+            )
+        name = '' if identity.model else self.model.name
+        told = ', '.join(part for part in (name, str(identity)) if part)
+        state.tell(Severity.INFO, Cause.CONNECTED, drive=told)
 
     def _set_disconnected(self) -> None:
         self.state.lost()

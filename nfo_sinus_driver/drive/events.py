@@ -63,6 +63,10 @@ class Cause(enum.Enum):
     UNEXPECTED_IDENTITY = (
         'this drive says that it is a {model}; no {title} says anything: {call.set_model}'
     )
+    UNLISTED_MODEL = (
+        'this drive says that it is a {model}, which the manual of the {title} does not list: '
+        'check the model before the motor runs'
+    )
     SEVERAL_MODELS = (
         'the drive at address {address} does not tell what it is: set model to {models}'
     )

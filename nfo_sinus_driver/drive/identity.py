@@ -12,7 +12,7 @@ import functools
 import math
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import OlderDialect, Role
+from nfo_sinus_driver.catalog import OlderDialect, Product, Role
 from nfo_sinus_driver.drive.events import Cause, Report, Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.scales import Scales
@@ -30,6 +30,7 @@ class Identity:
     :ivar vendor: who made it.
     :ivar model: its product name and size, such as ``NFO Sinus 1.50/400`` [M0 §6.2.4].
     :ivar serial: its serial number.
+    :ivar software: the part number of its software, of one that has no SWVer.
     """
 
     firmware: float = math.nan
@@ -37,6 +38,7 @@ class Identity:
     vendor: str = ''
     model: str = ''
     serial: str = ''
+    software: str = ''
 
     @functools.cached_property
     def version(self) -> Fraction | None:
@@ -45,9 +47,9 @@ class Identity:
 
     @property
     def versions(self) -> str:
-        """Both firmwares, such as ``4.38 / 4018``."""
+        """Both firmwares, such as ``4.38 / 4018``, or the part number of the software."""
         if math.isnan(self.firmware):
-            return ''
+            return self.software
         return f'{self.firmware:.2f} / {self.motor_firmware}'
 
     def __str__(self) -> str:
@@ -156,6 +158,18 @@ class Nameplate:
         self.identity = replace(
             self.identity, vendor=found.vendor, model=model, serial=found.serial
         )
+        return self.identity
+
+    def take(self, product: Product) -> Identity:
+        """Take who the drive says it is; warn of what its manual does not list."""
+        assert self.identity is not None
+        self.identity = replace(
+            self.identity, vendor=product.vendor, model=product.model, software=product.software
+        )
+        if not product.listed:
+            title = self._model.profile.title
+            report = Report(Cause.UNLISTED_MODEL, model=product.model, title=title)
+            self._report(Severity.WARNING, report)
         return self.identity
 
     def text_of(self, code: int) -> str:

@@ -35,6 +35,7 @@ from nfo_sinus_driver.catalog.profile import (
 )
 from nfo_sinus_driver.catalog.status import Role, StatusCode
 from nfo_sinus_driver.families.movitrac31 import words
+from nfo_sinus_driver.families.movitrac31.product import read_if_there, read_product
 from nfo_sinus_driver.families.movitrac31.words import Bits
 
 BITS = 'fieldbus.function_bits'
@@ -181,7 +182,7 @@ class FunctionBits(ControlMethod):
         :raises NotPossible: something else drives it, or would, or it would turn at set-point 0.
         """
         for key, value, remedy in _ELSEWHERE:
-            if (yield from _read_if_there(key)) == value:
+            if (yield from read_if_there(key)) == value:
                 raise NotPossible(
                     f'the motor is not driven by set-points of the line: set {remedy}'
                 )
@@ -296,25 +297,16 @@ def _take_direction() -> Steps[None]:
 
 def _would_turn() -> Steps[bool]:
     """Tell whether function bits and set-point would turn the motor if they counted."""
-    bits = yield from _read_if_there(BITS)
+    bits = yield from read_if_there(BITS)
     directed = bits is not None and int(bits) & (Bits.CLOCKWISE | Bits.COUNTER_CLOCKWISE)
-    return bool(directed) and bool((yield from _read_if_there(SIZE)))
-
-
-def _read_if_there(key: str) -> Steps[Value | None]:
-    """Read a setting; ``None`` from a drive that lacks the option card for it."""
-    try:
-        value: Value = yield Read(key)
-    except Refusal:
-        return None
-    return value
+    return bool(directed) and bool((yield from read_if_there(SIZE)))
 
 
 def _assignments() -> Steps[Mapping[int, Value | None]]:
     """Return what each terminal is for; ``None`` of those that the drive does not have."""
     found: dict[int, Value | None] = {41: 'CW/Stop'}
     for terminal, key in _ASSIGNED.items():
-        found[terminal] = yield from _read_if_there(key)
+        found[terminal] = yield from read_if_there(key)
     return found
 
 
@@ -374,6 +366,7 @@ PROFILE = Profile(
     methods={'function_bits': FunctionBits},
     setpoints={'Freque': _SETPOINT},
     in_charge=_in_charge,
+    product=read_product,
     start_settings=_START_SETTINGS,
     measured=(
         'status.heat_sink_temperature',
