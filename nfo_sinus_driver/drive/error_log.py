@@ -80,14 +80,21 @@ class ErrorLog:
         told: list[str] = []
         for what, key in self.area.readings_of(number):
             try:
-                value = await self._params.read_number(key, Priority.POLL)
+                data = await self._params.read_data(key, Priority.POLL)
+                told.append(f'{what} {self._shown(key, data)}')
             except (Refused, ValueError):
-                # what cannot be told, such as a temperature below 0, is left out
+                # what cannot be told is left out
                 continue
-            told.append(f'{what} {value:g} {self._state.model[key].unit}')
         code = self.area.code(entry)
         text = self.area.unknown(entry) or self._state.nameplate.text_of(code)
         return LogEntry(code, text, readings=tuple(told))
+
+    def _shown(self, key: str, data: bytes) -> str:
+        """Return what the drive has kept with an entry; a bit field as it stands in the drive."""
+        parameter = self._params.model[key]
+        if parameter.kind is int:
+            return f'{data.hex().upper()}h'
+        return f'{self._params.number(key, data):g} {parameter.unit}'
 
     async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
         """

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from movitrac import DIRECTIONS, REMOTE, STOPS, bits, make, succeeded
+from movitrac import DIRECTIONS, OVERCURRENT, REMOTE, STOPS, bits, make, succeeded
 import pytest
 from support.rig import Rig
 
@@ -145,6 +145,20 @@ def test_the_last_five_faults_are_shown_newest_first() -> None:
         log = rig.result(rig.drive.error_log())
         assert [entry.code for entry in log] == [101, 103, 145, 106, 107]
         assert [entry.text for entry in log[:2]] == ['Overcurrent', 'Brake chopper']
+
+
+def test_a_fault_is_shown_with_what_the_drive_has_kept_of_it() -> None:
+    with make() as rig:
+        rig.turn()
+        rig.far.trip(OVERCURRENT)
+        (entry,) = rig.result(rig.drive.error_log())
+        kept = rig.far.control_unit._fault_memory.raw
+        # what the two words mean is not certain [C77]
+        status = f'inverter status {kept("status.fault_t0_inverter_status"):08X}h'
+        terminals = f'terminals {kept("status.fault_t0_terminal_status"):08X}h'
+        assert entry.readings[0].startswith('DC link ') and 'frequency 20 Hz' in entry.readings
+        assert entry.readings[-2:] == (status, terminals)
+        assert entry.full_text.startswith('Overcurrent (DC link ')
 
 
 def test_a_fault_code_with_decimals_is_an_unknown_code() -> None:
