@@ -148,6 +148,8 @@ def columns(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list
 _CALLS = Calls(
     acknowledge='type nfo-sinus ack',
     enable='run it again',
+    # at its end a command takes back what it has written
+    quick_stop='release the motor by a terminal',
     program='command',
     drive_timeout='--drive-timeout',
     set_drive_timeout='give --drive-timeout',

@@ -385,6 +385,7 @@ class Cause(enum.Enum):
         'the motor is enabled, and might not do what it is told after that: stop it first'
     )
     VALUE_NOT_ACCEPTED = 'the drive does not accept {value}{behind}'
+    RELEASE_NEEDED = '{why}; {call.quick_stop}, then change it before it is enabled again'
     REFUSED_WHILE_RUNNING = '{why}: the motor must be stopped for this, and it runs'
     REFUSED_WHILE_FAULTED = '{why}; fault {status} is active: {call.acknowledge} first'
     DRIVE_KEEPS = 'the drive keeps {value}'
@@ -463,6 +464,7 @@ class Calls:
 
     :ivar acknowledge: such as ``call /infeed/fault_ack``.
     :ivar enable: likewise.
+    :ivar quick_stop: likewise; the motor stays released by it.
     :ivar program: what this is that speaks.
     :ivar drive_timeout: the name of that setting.
     :ivar set_drive_timeout: such as ``set drive_timeout``.
@@ -473,6 +475,7 @@ class Calls:
 
     acknowledge: str
     enable: str
+    quick_stop: str
     program: str
     drive_timeout: str
     set_drive_timeout: str

@@ -21,6 +21,8 @@ from nfo_sinus_driver.link import LinkError, Refused
 _SERVICE = Priority.SERVICE
 #: How often it is tried to put a value back that the drive refuses.
 _TRIES = 3
+#: How a drive refuses what it may accept after other settings have changed.
+_AS_THINGS_ARE = (Refused.ILLEGAL_VALUE, Refused.SETTINGS_CONFLICT)
 
 
 class ParameterError(DriveError):
@@ -195,7 +197,7 @@ class ParameterWriter:
             return (Written(key, before, data),)
         refused = not_changed(key, await self._why(key, data, kept, failure))
         if kept == before and isinstance(failure, Refused):
-            bad = failure.code == Refused.ILLEGAL_VALUE
+            bad = failure.code in _AS_THINGS_ARE
             raise _BadValue(key, refused.report) if bad else refused from failure
         stuck, left = list[Report](), list[str]()
         if kept != before:
@@ -290,6 +292,8 @@ class ParameterWriter:
         if error.code == Refused.ILLEGAL_VALUE:
             value = self._show(key, data)
             why = Report(Cause.VALUE_NOT_ACCEPTED, value=value, behind=error.behind)
+        elif error.code == Refused.RELEASE_NEEDED:
+            why = Report(Cause.RELEASE_NEEDED, why=why)
         with contextlib.suppress(LinkError):
             # the last poll may have been before the fault
             await state.read_status(_SERVICE)

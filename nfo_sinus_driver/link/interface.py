@@ -391,7 +391,8 @@ class Refused(LinkError):
     """
     The drive answered that it will not.
 
-    :ivar code: the Modbus exception code, or on other protocols the one that means the same.
+    :ivar code: the Modbus exception code, or on other protocols the one that means the same; those
+        from ``SETTINGS_CONFLICT`` on are none of Modbus.
     """
 
     ILLEGAL_FUNCTION = 1
@@ -401,6 +402,10 @@ class Refused(LinkError):
     BUSY = 6
     NO_PATH = 10
     NO_ANSWER = 11
+    #: Other settings forbid the value; it may be accepted after they have changed.
+    SETTINGS_CONFLICT = 0x100
+    #: The output stage has to be off.
+    RELEASE_NEEDED = 0x101
 
     def __init__(self, code: int, reason: str = '') -> None:
         self.code = code

@@ -244,6 +244,8 @@ class ReturnCode(NamedTuple):
 _NO_SUCH = Refused.ILLEGAL_ADDRESS
 _VALUE = Refused.ILLEGAL_VALUE
 _STATE = Refused.DEVICE_FAILURE
+_CONFLICT = Refused.SETTINGS_CONFLICT
+_RELEASE = Refused.RELEASE_NEEDED
 
 _OPTION = ReturnCode(
     _NO_SUCH,
@@ -256,8 +258,8 @@ _OTHER_INTERFACE = ReturnCode(
     'use the keypad, or the other interface (X4 or X20)',
 )
 _INHIBIT = (
-    'stop the motor, then inhibit the controller: call the service ~/quick_stop, or open a '
-    'terminal that has the function /Controller inhibit'
+    'stop the motor, then inhibit the controller, by a quick stop or by a terminal that has the '
+    'function /Controller inhibit'
 )
 
 #: What the drive has done all the same.
@@ -271,7 +273,7 @@ REFUSALS: Mapping[int, ReturnCode] = {
         _NO_SUCH, 'function or parameter not implemented', 'this size or firmware does not have it'
     ),
     0x12: ReturnCode(_NO_SUCH, 'read access only', 'it cannot be written'),
-    0x13: ReturnCode(_STATE, 'parameter lock (P800) active', 'set P800 to No'),
+    0x13: ReturnCode(_CONFLICT, 'parameter lock (P800) active', 'set P800 to No'),
     0x14: ReturnCode(
         Refused.BUSY, 'factory setting (P830) running', 'wait until it is done, some seconds'
     ),
@@ -282,47 +284,47 @@ REFUSALS: Mapping[int, ReturnCode] = {
         _STATE, 'fault in system software', 'switch the drive off and on; if it stays, ask SEW'
     ),
     0x19: _OTHER_INTERFACE,
-    0x1A: ReturnCode(_STATE, 'speed control (P770) active', 'set P770 to V/f mode first'),
+    0x1A: ReturnCode(_CONFLICT, 'speed control (P770) active', 'set P770 to V/f mode first'),
     0x1B: ReturnCode(_STATE, 'unauthorized access', 'it is for the maker alone'),
-    0x1C: ReturnCode(_STATE, 'output stage is not inhibited', _INHIBIT),
+    0x1C: ReturnCode(_RELEASE, 'output stage is not inhibited', _INHIBIT),
     0x1D: ReturnCode(
         _VALUE, 'invalid parameter value', 'choose one of its steps; not all between are allowed'
     ),
     0x22: ReturnCode(
-        _STATE,
+        _CONFLICT,
         '4Q operation 1 (P890) required, for example for hoist function 1 (P710)',
         'set P890 to Yes first',
     ),
     0x23: ReturnCode(
-        _STATE,
+        _CONFLICT,
         '4Q operation 2 (P891) required, for example for hoist function 2 (P712)',
         'set P891 to Yes first',
     ),
-    0x24: ReturnCode(_STATE, 'DC braking 1 (P730) active', 'set P730 to No first'),
-    0x25: ReturnCode(_STATE, 'DC braking 2 (P733) active', 'set P733 to No first'),
-    0x26: ReturnCode(_STATE, 'hoist function set 1 (P710) active', 'set P710 to No first'),
-    0x27: ReturnCode(_STATE, 'hoist function set 2 (P712) active', 'set P712 to No first'),
+    0x24: ReturnCode(_CONFLICT, 'DC braking 1 (P730) active', 'set P730 to No first'),
+    0x25: ReturnCode(_CONFLICT, 'DC braking 2 (P733) active', 'set P733 to No first'),
+    0x26: ReturnCode(_CONFLICT, 'hoist function set 1 (P710) active', 'set P710 to No first'),
+    0x27: ReturnCode(_CONFLICT, 'hoist function set 2 (P712) active', 'set P712 to No first'),
     0x29: _OTHER_INTERFACE,
-    0x2A: ReturnCode(_STATE, 'speed control (P770) inactive', 'set P770 to Speed control first'),
-    0x2B: ReturnCode(_STATE, 'controller inhibit required', _INHIBIT),
+    0x2A: ReturnCode(_CONFLICT, 'speed control (P770) inactive', 'set P770 to Speed control first'),
+    0x2B: ReturnCode(_RELEASE, 'controller inhibit required', _INHIBIT),
     0x2C: ReturnCode(
-        _STATE,
+        _CONFLICT,
         'motor size-up 1 (P328) and rapid start 1 (P720) exclude each other',
         'set the other one to No first',
     ),
     0x2D: ReturnCode(
-        _STATE,
+        _CONFLICT,
         'motor size-up 2 (P348) and rapid start 2 (P723) exclude each other',
         'set the other one to No first',
     ),
     0x2E: _OPTION,
     0x2F: ReturnCode(
-        _STATE,
+        _CONFLICT,
         '4Q operation 1 (P890) and DC braking 1 (P730) exclude each other',
         'set the other one to No first',
     ),
     0x30: ReturnCode(
-        _STATE,
+        _CONFLICT,
         '4Q operation 2 (P891) and DC braking 2 (P733) exclude each other',
         'set the other one to No first',
     ),
@@ -332,10 +334,10 @@ REFUSALS: Mapping[int, ReturnCode] = {
         'take the inhibit away first (terminal or function bits); that may start the motor',
     ),
     0x32: ReturnCode(
-        _STATE, 'synchronous operation control (P760) inactive', 'set P760 to Yes first'
+        _CONFLICT, 'synchronous operation control (P760) inactive', 'set P760 to Yes first'
     ),
     0x33: ReturnCode(
-        _STATE,
+        _CONFLICT,
         'this drive is slave of the synchronous operation control (P761)',
         'change it in the master, or P761 first',
     ),

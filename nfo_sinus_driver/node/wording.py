@@ -24,6 +24,7 @@ class Wording:
         self._calls = Calls(
             acknowledge=f'call {node.resolve_service_name("~/fault_ack")}',
             enable=self.enable,
+            quick_stop=f'call {node.resolve_service_name("~/quick_stop")}',
             program='driver',
             drive_timeout='drive_timeout',
             set_drive_timeout=f'set drive_timeout of {name}',

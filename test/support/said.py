@@ -17,6 +17,7 @@ from nfo_sinus_driver.drive.events import Calls, sentence
 CALLS = Calls(
     acknowledge='call ~/fault_ack',
     enable='call ~/enable',
+    quick_stop='call ~/quick_stop',
     program='driver',
     drive_timeout='drive_timeout',
     set_drive_timeout='set drive_timeout',

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from movitrac import DIRECTIONS, OVERCURRENT, REMOTE, STOPS, bits, make, succeeded
+from movitrac import DIRECTIONS, OVERCURRENT, REMOTE, STOPS, bits, make, succeeded, switched
 import pytest
 from support.rig import Rig
 
@@ -262,3 +262,44 @@ def test_a_setting_that_needs_another_is_refused_without_it_and_taken_with_it(nu
         assert rig.far.memory.raw(hoist) and rig.far.memory.raw(needed)
         assert 'hoist' in rig.answer(change({needed: False}))
         assert rig.far.memory.raw(needed)
+
+
+@pytest.mark.parametrize('needs', ['output_off', 'inhibit'])
+def test_a_setting_that_needs_a_released_motor_is_taken_after_what_its_refusal_says(
+    needs: str
+) -> None:
+    with switched({'settings_need': needs}) as rig:
+        rig.turn()
+        change = rig.drive.parameters.change
+        assert 'call ~/quick_stop, then change it' in rig.answer(change({'ramp.t11_up': 2.0}))
+        assert rig.drive.following
+        rig.result(rig.drive.quick_stop())
+        rig.result(change({'ramp.t11_up': 2.0}))
+        assert rig.far.memory.number('ramp.t11_up') == 2.0
+
+
+@pytest.mark.parametrize('turned', [False, True])
+@pytest.mark.parametrize(('before', 'after'), [
+    ({}, {'control.hoist_1': True, 'special.four_quadrant_1': True}),
+    ({'special.four_quadrant_1': True, 'control.hoist_1': True},
+     {'control.hoist_1': False, 'special.four_quadrant_1': False}),
+    ({'control.dc_braking_2': True},
+     {'control.dc_braking_2': False, 'special.four_quadrant_2': True, 'control.hoist_2': True}),
+    ({'motor.size_up_1': True}, {'motor.size_up_1': False, 'control.rapid_start_1': True}),
+    ({'special.parameter_lock': True}, {'special.parameter_lock': False, 'ramp.t11_up': 2.0}),
+])
+def test_settings_that_depend_on_each_other_are_taken_in_any_order(
+    before: dict[str, Any], after: dict[str, Any], turned: bool
+) -> None:
+    with Rig('movitrac', parameters=before) as rig:
+        change = rig.connect(parameters=True).drive.parameters.change
+        rig.result(change(dict(reversed(after.items())) if turned else after))
+        assert {key: rig.far.memory.get(key) for key in after} == after
+
+
+def test_settings_that_exclude_each_other_are_refused_together() -> None:
+    both = {'special.four_quadrant_1': True, 'control.dc_braking_1': True}
+    with Rig('movitrac') as rig:
+        answer = rig.answer(rig.connect(parameters=True).drive.parameters.change(both))
+        assert 'exclude each other' in answer
+        assert not any(rig.far.memory.raw(key) for key in both)

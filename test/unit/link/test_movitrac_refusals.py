@@ -17,40 +17,42 @@ MANUAL = {
     0x10: ('illegal index', 'no parameter'),
     0x11: ('not implemented', 'no parameter'),
     0x12: ('read access only', 'no parameter'),
-    0x13: ('parameter lock (P800) active', 'state'),
+    0x13: ('parameter lock (P800) active', 'settings'),
     0x14: ('factory setting (P830) running', 'busy'),
     0x15: ('too large', 'value'),
     0x16: ('too small', 'value'),
     0x17: ('option pcb', 'no parameter'),
     0x18: ('fault in system software', 'state'),
     0x19: ('via this serial interface', 'state'),
-    0x1A: ('speed control (P770) active', 'state'),
+    0x1A: ('speed control (P770) active', 'settings'),
     0x1B: ('unauthorized access', 'state'),
-    0x1C: ('output stage is not inhibited', 'state'),
+    0x1C: ('output stage is not inhibited', 'release'),
     0x1D: ('invalid parameter value', 'value'),
-    0x22: ('4Q operation 1 (P890) required', 'state'),
-    0x23: ('4Q operation 2 (P891) required', 'state'),
-    0x24: ('DC braking 1 (P730) active', 'state'),
-    0x25: ('DC braking 2 (P733) active', 'state'),
-    0x26: ('hoist function set 1 (P710) active', 'state'),
-    0x27: ('hoist function set 2 (P712) active', 'state'),
+    0x22: ('4Q operation 1 (P890) required', 'settings'),
+    0x23: ('4Q operation 2 (P891) required', 'settings'),
+    0x24: ('DC braking 1 (P730) active', 'settings'),
+    0x25: ('DC braking 2 (P733) active', 'settings'),
+    0x26: ('hoist function set 1 (P710) active', 'settings'),
+    0x27: ('hoist function set 2 (P712) active', 'settings'),
     0x29: ('via this serial interface', 'state'),
-    0x2A: ('speed control (P770) inactive', 'state'),
-    0x2B: ('controller inhibit required', 'state'),
-    0x2C: ('motor size-up 1 (P328) and rapid start 1 (P720)', 'state'),
-    0x2D: ('motor size-up 2 (P348) and rapid start 2 (P723)', 'state'),
+    0x2A: ('speed control (P770) inactive', 'settings'),
+    0x2B: ('controller inhibit required', 'release'),
+    0x2C: ('motor size-up 1 (P328) and rapid start 1 (P720)', 'settings'),
+    0x2D: ('motor size-up 2 (P348) and rapid start 2 (P723)', 'settings'),
     0x2E: ('option pcb', 'no parameter'),
-    0x2F: ('4Q operation 1 (P890) and DC braking 1 (P730)', 'state'),
-    0x30: ('4Q operation 2 (P891) and DC braking 2 (P733)', 'state'),
+    0x2F: ('4Q operation 1 (P890) and DC braking 1 (P730)', 'settings'),
+    0x30: ('4Q operation 2 (P891) and DC braking 2 (P733)', 'settings'),
     0x31: ('controller inhibit active', 'state'),
-    0x32: ('synchronous operation control (P760) inactive', 'state'),
-    0x33: ('slave of the synchronous operation control (P761)', 'state'),
+    0x32: ('synchronous operation control (P760) inactive', 'settings'),
+    0x33: ('slave of the synchronous operation control (P761)', 'settings'),
     0x34: ('illegal message type', 'no function'),
 }
 KINDS = {
     'no parameter': Refused.ILLEGAL_ADDRESS,
     'value': Refused.ILLEGAL_VALUE,
     'state': Refused.DEVICE_FAILURE,
+    'settings': Refused.SETTINGS_CONFLICT,
+    'release': Refused.RELEASE_NEEDED,
     'busy': Refused.BUSY,
     'no function': Refused.ILLEGAL_FUNCTION,
 }
@@ -108,6 +110,6 @@ def test_a_refusal_is_an_answer() -> None:
 
 @pytest.mark.parametrize('code', [0x1C, 0x2B])
 def test_a_remedy_for_inhibit_names_what_an_operator_has(code: int) -> None:
-    # each way: the service of the node, and the terminal with the function that inhibits
-    assert '~/quick_stop' in REFUSALS[code].remedy
+    # the name of the command is added where that is known
+    assert 'quick stop' in REFUSALS[code].remedy
     assert '/Controller inhibit' in REFUSALS[code].remedy
