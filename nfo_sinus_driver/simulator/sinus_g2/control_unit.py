@@ -26,6 +26,7 @@ from nfo_sinus_driver.simulator.sinus.control_unit import (
     Source,
 )
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules, SinusFaults
+from nfo_sinus_driver.simulator.sinus_g2 import ds402
 from nfo_sinus_driver.simulator.sinus_g2.firmware import G2Variant, firmware_of
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import (
     FAILURES,
@@ -68,6 +69,10 @@ FACTORY: Mapping[str, Value] = {
     'fieldbus.nfo_ver': 4018,
     'fieldbus.spd_scl_numerator': 1,
     'fieldbus.spd_scl_denominator': 1,
+    'fieldbus.vl_velocity_max_amount': 9000,
+    'fieldbus.vl_dimension_factor_numerator': 1,
+    'fieldbus.vl_dimension_factor_denominator': 1,
+    'fieldbus.disable_operation_code': 'Brake',
 }
 #: The regulated quantity of each control mode; PI-Reg regulates the process by the frequency.
 _REGULATION_OF = {
@@ -145,6 +150,9 @@ class G2ControlUnit(SinusControlUnit):
         self.self_restart = SelfRestart(memory, faults)
         self.machine = StateMachine()
         self.word = RELEASED
+        self._profile = ds402.DriveProfile(memory, self.motor, faults)
+        #: The control word that stands came by the drive profile, and so does the reference.
+        self._by_profile = False
         self._dc_brake_left = 0.0
         self.tuning: Tuning | None = None
         #: What InvSt says of the tuning that was finished, until the next command.
@@ -159,6 +167,7 @@ class G2ControlUnit(SinusControlUnit):
         """Begin as after power-on."""
         self.machine = StateMachine()
         self._is_held = False
+        self.memory.put(ds402.CONTROL_WORD, 0)
         super().restart()
 
     def take(self, source: Source) -> None:
@@ -194,8 +203,8 @@ class G2ControlUnit(SinusControlUnit):
         self._next_failure = code
 
     def key_of(self, key: str) -> str:
-        """Return the set-point of the control mode for the common one."""
-        return self.setpoint_key if key == 'fieldbus.setpoint' else key
+        """Return the set-point of the control mode for the common one, and what has two objects."""
+        return self.setpoint_key if key == 'fieldbus.setpoint' else ds402.ALIASES.get(key, key)
 
     def write(self, key: str, raw: int) -> bool:
         """Carry out MODE, SCMD, DriveControl or its mask."""
@@ -203,7 +212,20 @@ class G2ControlUnit(SinusControlUnit):
             keep, add = Control(raw & 0xFFFF), Control(raw >> 16)
             self._write_control(self.word & keep | add)
             return True
+        if key == ds402.CONTROL_WORD:
+            self._write_profile(raw)
+            return True
+        if key == ds402.MODE:
+            self._profile.require_mode(raw)
+            return True
         return super().write(key, raw)
+
+    def _write_profile(self, raw: int) -> None:
+        self.memory.put(ds402.CONTROL_WORD, raw)
+        # under local control ("remote" is 0) it is not processed
+        if self.on_bus:
+            self._write_control(ds402.control(raw))
+            self._by_profile = True
 
     def written(self, key: str, protocol: str) -> None:
         """Take note of a fieldbus: to the older firmware all but Classic is one [C3]."""
@@ -216,10 +238,15 @@ class G2ControlUnit(SinusControlUnit):
             return self.memory.raw(self.setpoint_key)
         if key == 'fieldbus.profidrive_status':
             return int(self.status_word)
+        if key == ds402.STATUS_WORD:
+            return ds402.status_word(self.status_word, self.variant.canopen_ramp)
+        if key in ds402.ALIASES:
+            return self.memory.raw(ds402.ALIASES[key])
         if key == 'status.spd_act':
             parameter = self.memory.model[key]
             return nearest(parameter, self.motor.speed / self._speed_scale, home(parameter))
-        return super().show(key)
+        shown = self._profile.show(key)
+        return super().show(key) if shown is None else shown
 
     def command(self, scmd: Scmd) -> None:
         """Take a run command or Stop from SCMD."""
@@ -234,6 +261,7 @@ class G2ControlUnit(SinusControlUnit):
             self.take(Source.STOP)
         self.scmd = Scmd.STOP
         self.word = word
+        self._by_profile = False
 
     def _write_mode(self, raw: int) -> None:
         source = _SOURCES.get(raw)
@@ -435,6 +463,8 @@ class G2ControlUnit(SinusControlUnit):
         nominal = 1.0 if _REGULATION_OF[code] is Regulation.TORQUE else frequency
         if self.source is Source.SCMD and self.scmd != Scmd.FIELDBUS:
             return nominal * local_share(self.scmd, self._fixed_shares())
+        if self.source is Source.CONTROL_WORD and self._by_profile:
+            return self._profile.reference
         if not self.word & Control.NET_REF:
             return nominal * TERMINAL_SHARE
         setpoint = self.memory.number(self.setpoint_key)

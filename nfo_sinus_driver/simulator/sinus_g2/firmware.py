@@ -18,6 +18,7 @@ from nfo_sinus_driver.simulator.control_unit import choice
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus.control_unit import SinusVariant
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
+from nfo_sinus_driver.simulator.sinus_g2 import ds402
 
 BARE, MINIMAL, FULL = 'bare', 'minimal', 'full'
 TABLE, NARROW, WIDE = 'table', 'narrow', 'wide'
@@ -25,6 +26,7 @@ FROM_ONE, FROM_ZERO = 'from_one', 'from_zero'
 BY_SHAPE, NONE, HEARTBEAT, GUARDING, BOTH = 'by_shape', 'none', 'heartbeat', 'guarding', 'both'
 PRINTED, SHIFTED = '2F7C', '4F7D'
 HELD, FREE = 'held', 'free'
+PRESENT, ABSENT = 'present', 'absent'
 SW_VER = 'fieldbus.sw_ver'
 #: Its codes of SiProt [C5].
 _OLD_FORMAT_CODES = {'7E1': 0, '8N1': 1}
@@ -53,6 +55,10 @@ class G2Variant(SinusVariant):
         that its parameters' numbers give [C2], or nowhere.
     :ivar canopen_bus_mode: bus mode is ``held`` as soon as there is communication [M0 §6.4]; or the
         drive is ``free`` to leave it, as on other buses.
+    :ivar canopen_state_machine: whether DriveControl, DriveStatus and the words of PROFIdrive are
+        there, which a module with a drive profile need not have [M0 §7].
+    :ivar canopen_ramp: what the StatusWord of CiA 402 shows while the motor ramps to a stop: that
+        it is ``running``, or that it is ``ready`` again.
     """
 
     dialect: str = choice(
@@ -87,6 +93,16 @@ class G2Variant(SinusVariant):
     )
     canopen_bus_mode: str = choice(
         HELD, FREE, text='on CANopen: whether the module holds the drive in bus mode'
+    )
+    canopen_state_machine: str = choice(
+        PRESENT,
+        ABSENT,
+        text='on CANopen: whether DriveControl, DriveStatus and the PROFIdrive words are there',
+    )
+    canopen_ramp: str = choice(
+        ds402.RUNNING,
+        ds402.READY,
+        text='on CANopen: what StatusWord (6041h) shows while the motor ramps to a stop',
     )
 
     @property

@@ -7,7 +7,7 @@ What a G2 answers, by protocol: Modbus [M0 §6.2], Classic [M0 §6.1], CANopen [
 A Classic message that cannot be carried out sets a flag of SioErr, and while the bus has control
 that is a serial fault: the motor coasts, MODE becomes Stop [M0 §6.1.5]. What it has of CANopen's
 communication profile, and how its values stand there, the manual does not say: see
-:class:`~.firmware.G2Variant`; the objects of DS402 [M0 table 11] are not there. The words of
+:class:`~.firmware.G2Variant`; of DS402 see :mod:`~.ds402`. The words of
 telegram 1 are those of PROFIdrive [C111], or DriveControl and DriveStatus [M0 tables 14 to 16];
 set-point and actual value are scaled as the parameters are.
 """
@@ -31,6 +31,7 @@ from nfo_sinus_driver.simulator.sinus import parts
 from nfo_sinus_driver.simulator.sinus.control_unit import LEVELS
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.firmware import (
+    ABSENT,
     DRIVECONTROL,
     FROM_ONE,
     HELD,
@@ -231,6 +232,12 @@ _DEVICE_TYPE = 0x0001_0192
 _VENDOR, _PRODUCT = 0x0000_001B, 0x0000_0038
 _NAME, _HARDWARE, _SOFTWARE = 0x1008, 0x1009, 0x100A
 _LOG_ENTRY = 4
+#: "Not yet implemented" [M0 table 11].
+_MISSING = frozenset({0x6076, 0x6087})
+#: ProfidriveStatus, ProfidriveControl, DriveControlMaskWrite, DriveControl, DriveStatus.
+_STATE_MACHINE = frozenset({0x2001, 0x2003, 0x2011, 0x2012, 0x2013})
+#: The objects of a drive profile: their arrays count as CiA 402 says.
+_PROFILE = 0x6000
 _WIDE, _NARROW = 4, 1
 
 
@@ -271,11 +278,10 @@ class CanopenServer(canopen.Server):
     def entries(self) -> Entries:
         """Return the parameters and the error log."""
         found = {(index, sub): self._entry(one) for index, sub, one in self._places()}
-        if self._shape.canopen_sub_indices == FROM_ONE:
-            arrays = {index for index, sub in found if sub}
-            for index in arrays:
-                most = max(sub for other, sub in found if other == index)
-                found[index, 0] = canopen.constant(most, 1)
+        arrays = {index for index, sub in found if sub} - {index for index, sub in found if not sub}
+        for index in arrays:
+            most = max(sub for other, sub in found if other == index)
+            found[index, 0] = canopen.constant(most, 1)
         if self._shape.canopen_error_log != NONE:
             first = int(self._shape.canopen_error_log, 16)
             found |= {(first + n, 0): self._log_entry(n) for n in range(self.drive.faults.log_size)}
@@ -285,14 +291,18 @@ class CanopenServer(canopen.Server):
         """Give index and sub-index of each parameter."""
         model, shape = self.drive.model, self._shape
         version = self.drive.version
+        absent = _MISSING | (_STATE_MACHINE if shape.canopen_state_machine == ABSENT else set())
         for parameter in model.values():
             since = parameter.since
             younger = since is not None and version is not None and version < since
             if younger or 'canopen' not in parameter.addresses:
                 continue
             address = parameter.at('canopen')
+            if address.index in absent:
+                continue
             sub_index = address.sub_index or 0
-            if sub_index and shape.canopen_sub_indices != FROM_ONE:
+            counted = address.index < _PROFILE
+            if sub_index and counted and shape.canopen_sub_indices != FROM_ONE:
                 sub_index -= 1
             yield address.index, sub_index, parameter
 

@@ -28,9 +28,17 @@ SPELLINGS = {
 PAIRS = {
     'invst': ['invst+', 'invst'],
     'spdscl': ['spdsclnumerator', 'spdscldenominator'],
+    'vlvelocityminmaxamount': ['vlvelocityminamount', 'vlvelocitymaxamount'],
+    'vldimensionfactor': ['vldimensionfactornumerator', 'vldimensionfactordenominator'],
+    **{
+        f'vlvelocity{ramp}': [f'vlvelocity{ramp}deltaspeed', f'vlvelocity{ramp}deltatime']
+        for ramp in ('acceleration', 'deceleration')
+    },
 }
 #: Rows that are no parameter: a command, the error log, and what is to be defined [C16].
-NO_PARAMETER = re.compile(r'Tuning|E-?logg|\.\.|(Frq|Trq|Reg)Scl|(Display )?Name|\(|$')
+NO_PARAMETER = re.compile(
+    r'Tuning|E-?logg|\.\.|(Frq|Trq|Reg)Scl|(DS 402 Object |Display )?Name|\(|$'
+)
 #: The tables of parameters of [M0]: protocol, first line, line behind the last.
 TABLES = {
     2: ('classic', '### 6.1.6', 'Table 2:'),
@@ -39,6 +47,7 @@ TABLES = {
     5: ('modbus', '### 6.2.6', 'Table 5:'),
     9: ('profibus', '## 6.3.6', 'Table 9:'),
     10: ('profibus', '### 6.3.7', 'Table 10:'),
+    11: ('canopen', '### 6.4.2', 'Table 11:'),
     12: ('canopen', '### 6.4.3', 'Table 12:'),
     13: ('canopen', '#### 6.4.4', 'Table 13:'),
 }
@@ -203,7 +212,11 @@ def on_canopen(row: Parameter, place: Address, line: Line) -> Iterator[Fact]:
     index = re.match(r'([0-9A-F]{4})h', line.cells[0])
     assert index is not None, line.name
     yield 'index', int(index[1], 16), place.index
-    # no type is printed
+    if len(line.parameters) > 1:
+        yield 'sub-index', line.parameters.index(row) + 1, place.sub_index
+    # no type is printed, and Modbus has no objects of the drive profile
+    if 'modbus' not in row.addresses:
+        return
     yield 'type', type_of(row.at('modbus')), type_of(place)
 
 

@@ -469,7 +469,7 @@ def test_both_read_the_same_in_each_size():
         for one in READABLE:
             found = by_canopen(drive, one), by_modbus(drive, one)
             assert same(one, *found), (types, one.key, found)
-    for place in ((0x6040, 0), (0x6041, 0), (0x2FFF, 0)):
+    for place in ((0x6045, 0), (0x6072, 0), (0x2FFF, 0)):
         with pytest.raises(Abort) as refused:
             drive.servers['canopen'].read(*place)
         assert refused.value.code is AbortCode.NO_OBJECT

@@ -157,6 +157,7 @@ SETTINGS = [one for one in PLACED if one.is_setting and not one.key.startswith('
 #: The library's data types, by how many bytes and whether there is a sign.
 TYPES = {
     (1, False): objectdictionary.UNSIGNED8,
+    (1, True): objectdictionary.INTEGER8,
     (2, False): objectdictionary.UNSIGNED16,
     (4, False): objectdictionary.UNSIGNED32,
     (2, True): objectdictionary.INTEGER16,
@@ -334,9 +335,11 @@ def test_its_client_reads_every_parameter_that_can_be_read():
     client = Here(asked)
     for one in PLACED:
         place = one.at('canopen')
-        if one.access is Access.WRITE:
+        # "not yet implemented" [M0 table 11]
+        refusal = 0x06020000 if place.index in (0x6076, 0x6087) else 0x06010001
+        if one.access is Access.WRITE or refusal == 0x06020000:
             with pytest.raises(canopen.SdoAbortedError) as refused:
                 client.upload(place.index, place.sub_index or 0)
-            assert refused.value.code == 0x06010001
+            assert refused.value.code == refusal
         else:
             assert len(client.upload(place.index, place.sub_index or 0)) == place.codec.size
