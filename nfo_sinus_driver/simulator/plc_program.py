@@ -11,13 +11,15 @@ they do. It knows no clock of its own: a PLC gives it the time.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 import struct
 
 #: How the registers of a block make its fields: words, and two signed numbers.
-_LAYOUT = struct.Struct('>HhHHH6xHhH')
+_LAYOUT = struct.Struct('>HhHHHHHHHhH')
 #: Registers of a block, and the first of those that the driver writes.
 REGISTERS, FIRST_WRITTEN = 11, 8
+#: What the longer telegram of a drive has behind status word and actual value.
+More = tuple[int, int, int]
 
 
 @dataclass
@@ -28,8 +30,11 @@ class Block:
     :ivar zsw1: +0, status word 1 from the drive.
     :ivar actual: +1, its actual value.
     :ivar plc_life: +2, changes with every exchange with the drive.
-    :ivar flags: +3, bit 0 the data are valid, bit 1 released to ROS.
+    :ivar flags: +3, bit 0 the data are valid, bit 1 released to ROS, bit 2 +5 to +7 are valid.
     :ivar version: +4, of this layout.
+    :ivar more1: +5, what the family's longer telegram tells beside; with the next two.
+    :ivar more2: +6.
+    :ivar more3: +7.
     :ivar stw1: +8, control word 1 from the driver.
     :ivar setpoint: +9, its set-point.
     :ivar ros_life: +10, changes while the driver lives.
@@ -40,23 +45,25 @@ class Block:
     plc_life: int = 0
     flags: int = 0
     version: int = 0
+    more1: int = 0
+    more2: int = 0
+    more3: int = 0
     stw1: int = 0
     setpoint: int = 0
     ros_life: int = 0
 
     def registers(self) -> tuple[int, ...]:
         """Return the block as it stands in holding registers."""
-        fields = (self.zsw1, self.actual, self.plc_life, self.flags, self.version)
-        data = _LAYOUT.pack(*fields, self.stw1, self.setpoint, self.ros_life)
+        data = _LAYOUT.pack(*(getattr(self, one.name) for one in fields(self)))
         return struct.unpack(f'>{REGISTERS}H', data)
 
     def put(self, offset: int, words: tuple[int, ...]) -> None:
         """Set registers from ``offset`` on, as a Modbus master does."""
         registers = list(self.registers())
         registers[offset : offset + len(words)] = words
-        fields = _LAYOUT.unpack(struct.pack(f'>{REGISTERS}H', *registers))
-        self.zsw1, self.actual, self.plc_life, self.flags, self.version = fields[:5]
-        self.stw1, self.setpoint, self.ros_life = fields[5:]
+        data = struct.pack(f'>{REGISTERS}H', *registers)
+        for one, value in zip(fields(self), _LAYOUT.unpack(data), strict=True):
+            setattr(self, one.name, value)
 
 
 class Ton:
@@ -91,6 +98,7 @@ class RosTelegram1:
     :param lost_sets: bits that are set then, without which the drive would not obey.
     :param ros_time: how long the driver's life counter may stand still (s).
     :param drive_time: how long no exchange with the drive may come (s).
+    :param layout: of the block; only 2 shows ``more``.
 
     :ivar stw1: for the drive.
     :ivar setpoint: for the drive.
@@ -105,12 +113,14 @@ class RosTelegram1:
         lost_sets: int = 0x0000,
         ros_time: float = 1.0,
         drive_time: float = 0.5,
+        layout: int = 1,
     ) -> None:
         # VAR_INPUT with initial values
         self.lost_clears = lost_clears
         self.lost_sets = lost_sets
         self.ros_time = ros_time
         self.drive_time = drive_time
+        self.layout = layout
         # VAR_OUTPUT
         self.stw1 = 0
         self.setpoint = 0
@@ -124,7 +134,13 @@ class RosTelegram1:
         self.drive_silent = Ton(clock)
 
     def __call__(
-        self, block: Block, zsw1: int, actual: int, exchanged: bool, release: bool
+        self,
+        block: Block,
+        zsw1: int,
+        actual: int,
+        exchanged: bool,
+        release: bool,
+        more: More | None = None,
     ) -> None:
         """
         Run once.
@@ -134,11 +150,18 @@ class RosTelegram1:
         :param actual: its actual value.
         :param exchanged: both came from the drive since the last call.
         :param release: ROS may control the drive.
+        :param more: three words that came with them; ``None``: its telegram has no more.
         """
+        more_valid = more is not None
+        more1, more2, more3 = more or (0, 0, 0)
         self.drive_silent(not exchanged, self.drive_time)
         if exchanged:
             block.zsw1 = zsw1
             block.actual = actual
+            if self.layout == 2:
+                block.more1 = more1
+                block.more2 = more2
+                block.more3 = more3
             self.drive_heard = True
             if block.plc_life == 65535:
                 block.plc_life = 0
@@ -151,8 +174,10 @@ class RosTelegram1:
             self.new_flags = self.new_flags | 0x0001
         if release:
             self.new_flags = self.new_flags | 0x0002
+        if self.drive_heard and more_valid and self.layout == 2:
+            self.new_flags = self.new_flags | 0x0004
         block.flags = self.new_flags
-        block.version = 1
+        block.version = self.layout
         self.ros_still(block.ros_life == self.seen_life, self.ros_time)
         if not self.started:
             self.started = True

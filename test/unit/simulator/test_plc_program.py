@@ -5,14 +5,14 @@
 
 from hypothesis import given, strategies as st
 import pytest
-from structured_text import StRosTelegram1, declared
+from structured_text import StRosTelegram1, structure
 
 from nfo_sinus_driver.simulator.plc_program import Block, RosTelegram1, Ton
 
 #: The layout of the public interface: registers from the beginning of the block.
 LAYOUT = {
     'zsw1': 0, 'actual': 1, 'plc_life': 2, 'flags': 3, 'version': 4,
-    'stw1': 8, 'setpoint': 9, 'ros_life': 10,
+    'more1': 5, 'more2': 6, 'more3': 7, 'stw1': 8, 'setpoint': 9, 'ros_life': 10,
 }
 both = pytest.mark.parametrize('program', [RosTelegram1, StRosTelegram1])
 
@@ -27,8 +27,8 @@ class Bench:
         self.release = True
         self.life = 0
 
-    def cycle(self, exchanged=True, zsw1=0x1234, actual=-5, dt=0.01):
-        self.program(self.block, zsw1, actual, exchanged, self.release)
+    def cycle(self, exchanged=True, zsw1=0x1234, actual=-5, more=None, dt=0.01):
+        self.program(self.block, zsw1, actual, exchanged, self.release, more)
         self.now += dt
 
     def ros(self, stw1, setpoint):
@@ -85,6 +85,23 @@ def test_watchdog_takes_its_bits_and_sets_its_bits_and_no_others(program):
 
 
 @both
+def test_words_of_a_longer_telegram_are_shown_by_layout_2_and_as_long_as_they_are_valid(program):
+    bench = Bench(program, layout=2)
+    more = (0x0001, 0xFFFF, 31)
+    shown = lambda: bench.block.registers()[3:8]  # noqa: E731
+    bench.cycle(more=more)
+    assert shown() == (7, 2, *more)
+    bench.cycle(more=None)
+    assert shown()[:2] == (3, 2), 'its telegram is the short one'
+    bench.cycle(more=more)
+    bench.wait(0.6, exchanged=False, more=more)
+    assert shown()[0] == 2
+    bench = Bench(program)
+    bench.cycle(more=more)
+    assert shown() == (3, 1, 0, 0, 0)
+
+
+@both
 def test_without_release_the_drive_is_stopped_at_once(program):
     bench = Bench(program)
     bench.cycle()
@@ -131,9 +148,7 @@ def test_timer_is_that_of_the_standard():
 
 
 def test_interface_of_both_is_the_public_one():
-    types = {name: type_ for name, type_, _ in declared()['STRUCT']}
-    assert list(types).index('reserved') == 5
-    assert types.pop('reserved') == 'ARRAY[5..7] OF WORD'
+    types = {name: type_ for name, type_, _ in structure('ST_RosTelegram1')}
     assert list(types) == list(LAYOUT)
     signed = {name for name, type_ in types.items() if type_ == 'INT'}
     for name, place in LAYOUT.items():
@@ -144,7 +159,7 @@ def test_interface_of_both_is_the_public_one():
         assert getattr(block, name) == (-1 if name in signed else 0xFFFF)
         assert (block.registers()[place], len(registers)) == (0xFFFF, 11)
     of_st, of_python = (one(lambda: 0.0) for one in (StRosTelegram1, RosTelegram1))
-    for name in ('lost_clears', 'lost_sets', 'ros_time', 'drive_time'):
+    for name in ('lost_clears', 'lost_sets', 'ros_time', 'drive_time', 'layout'):
         assert getattr(of_st, name) == getattr(of_python, name), name
 
 
