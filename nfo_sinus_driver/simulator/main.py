@@ -349,6 +349,24 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
         default=None,
         help='the PLC does not release the drives to ROS',
     )
+    add(
+        '--layout',
+        type=int,
+        choices=(1, 2),
+        help='layout of the blocks of the PLC; 2 has a mailbox for parameters (default: 1)',
+    )
+    add(
+        '--access-time',
+        type=_seconds,
+        metavar='SECONDS',
+        help="how long each of the PLC's WRREC and RDREC takes (default: 0.02)",
+    )
+    add(
+        '--longer-telegram',
+        action='store_true',
+        default=None,
+        help='the PLC exchanges the longer telegram that a family has beside the standard one',
+    )
     add('--help-all', action='store_true', help='show what can be chosen of a drive, too')
     for name, (text, choices) in every_option().items():
         shown = text if with_experts else argparse.SUPPRESS

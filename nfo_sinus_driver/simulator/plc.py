@@ -16,16 +16,27 @@ from dataclasses import dataclass, field
 import random
 from typing import Any
 
-from nfo_sinus_driver.simulator import modbus, telegram1
+from nfo_sinus_driver.simulator import modbus, plc_mailbox, telegram1
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.memory import Reason, Refused
-from nfo_sinus_driver.simulator.plc_program import FIRST_WRITTEN, REGISTERS, Block, RosTelegram1
+from nfo_sinus_driver.simulator.plc_mailbox import Mailbox, RosMailbox
+from nfo_sinus_driver.simulator.plc_program import (
+    FIRST_WRITTEN,
+    REGISTERS,
+    Block,
+    More,
+    RosTelegram1,
+)
+from nfo_sinus_driver.simulator.plc_records import Records
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: The name of the telegram in the tables of the families.
 TELEGRAM = 'telegram1'
 _UNITS = range(1, 248)
 _LAST_REGISTER = 0xFFFF
+#: How many registers a block has, by its layout.
+_REGISTERS = {1: REGISTERS, 2: plc_mailbox.FIRST + plc_mailbox.REGISTERS}
+_GAP = (0,) * (plc_mailbox.FIRST - REGISTERS)
 
 
 @dataclass(frozen=True)
@@ -42,6 +53,9 @@ class PlcSetting:
     :ivar answer_time: the least and the longest time that an answer takes (s).
     :ivar write_and_read: it has function 23.
     :ivar released: the drives are released to ROS.
+    :ivar layout: of the blocks; 2 has a mailbox for parameters.
+    :ivar access_time: how long WRREC takes, and RDREC (s).
+    :ivar longer_telegram: it exchanges the longer telegram that a family has.
     :raises ValueError: a time or a block that cannot be.
     """
 
@@ -53,22 +67,32 @@ class PlcSetting:
     answer_time: tuple[float, float] = (0.0, 0.0)
     write_and_read: bool = True
     released: bool = True
+    layout: int = 1
+    access_time: float = 0.02
+    longer_telegram: bool = False
 
     def __post_init__(self) -> None:
-        for name in ('cycle', 'exchange', 'ros_time', 'drive_time'):
+        for name in ('cycle', 'exchange', 'ros_time', 'drive_time', 'access_time'):
             if not getattr(self, name) > 0:
                 raise ValueError(f'{name} = {getattr(self, name):g} s is not possible')
         low, high = self.answer_time
         if not 0 <= low <= high:
             raise ValueError(f'an answer takes {low:g} to {high:g} s: the lesser time goes first')
+        if self.layout not in _REGISTERS:
+            raise ValueError(f'there is no layout {self.layout}: choose 1 or 2')
         taken: set[tuple[int, int]] = set()
         for unit, register in self.blocks:
-            if unit not in _UNITS or not 0 <= register <= _LAST_REGISTER + 1 - REGISTERS:
+            if unit not in _UNITS or not 0 <= register <= _LAST_REGISTER + 1 - self.registers:
                 raise ValueError(f'no block can be at unit {unit}, register {register}')
-            registers = {(unit, register + offset) for offset in range(REGISTERS)}
+            registers = {(unit, register + offset) for offset in range(self.registers)}
             if registers & taken:
                 raise ValueError(f'the block at unit {unit}, register {register} is over another')
             taken |= registers
+
+    @property
+    def registers(self) -> int:
+        """How many a block has."""
+        return _REGISTERS[self.layout]
 
 
 @dataclass
@@ -78,6 +102,8 @@ class Channel:
 
     :ivar register: the first of the block.
     :ivar cut_until: until when the fieldbus does not reach the drive (s).
+    :ivar mailbox: +16 to +27, with the programs that serve it; in layout 1 it does not show.
+    :ivar more: the last three words of a longer telegram.
     """
 
     drive: SimulatedDrive
@@ -91,27 +117,62 @@ class Channel:
     actual: int = 0
     exchanged: bool = False
     cut_until: float = field(default=float('-inf'))
+    mailbox: Mailbox = field(default_factory=Mailbox)
+    mailbox_program: RosMailbox = field(default_factory=RosMailbox)
+    records: Records = field(default_factory=Records)
+    more: More | None = None
+
+    def reaches(self, now: float) -> bool:
+        """Whether the fieldbus reaches the drive."""
+        return now >= self.cut_until and self.drive.listening and self.server.online
 
     def exchange(self, now: float) -> None:
         """Exchange a telegram with the drive, if it is reached."""
         self.drive.advance_to(now)
-        if now < self.cut_until or not self.drive.listening or not self.server.online:
+        if not self.reaches(now):
             return
-        program = self.program
-        self.zsw1, self.actual = self.server.exchange(program.stw1, program.setpoint)
+        program, server = self.program, self.server
+        self.zsw1, self.actual = server.exchange(program.stw1, program.setpoint)
+        self.more = server.more if server.longer else None
         self.exchanged = True
 
-    def run(self) -> None:
-        """Run the program once."""
-        self.program(self.block, self.zsw1, self.actual, self.exchanged, self.released)
+    def run(self, now: float) -> None:
+        """Run the programs once."""
+        self.program(
+            self.block, self.zsw1, self.actual, self.exchanged, self.released, self.more
+        )
         self.exchanged = False
+        reached = self.reaches(now) and self.server.parameters is not None
+        self.mailbox_program(self.mailbox, reached, *self.records.ended)
+        self.records.run(now, self.mailbox_program, self.server.parameters if reached else None)
+
+    @property
+    def registers(self) -> tuple[int, ...]:
+        """What stands in the block, as many registers as its layout has."""
+        block = self.block.registers()
+        return block if self.program.layout == 1 else block + _GAP + self.mailbox.registers()
+
+    def put(self, offset: int, words: tuple[int, ...]) -> None:
+        """
+        Take registers that are the driver's.
+
+        :raises Refused: ADDRESS: one of them is not.
+        """
+        written = range(offset, offset + len(words))
+        if written[0] >= FIRST_WRITTEN and written[-1] < REGISTERS:
+            self.block.put(offset, words)
+            return
+        first = plc_mailbox.FIRST
+        if written[0] < first or written[-1] >= first + plc_mailbox.WRITTEN:
+            raise Refused(Reason.ADDRESS, f'the PLC writes some of +{offset} on itself')
+        self.mailbox.put(offset - first, words)
 
     def describe(self) -> dict[str, Any]:
         """Return what stands in the block, and what the program says; it can be JSON."""
         return {
             'unit': self.unit,
             'register': self.register,
-            'block': list(self.block.registers()),
+            'block': list(self.registers),
             'stw1': self.program.stw1,
             'setpoint': self.program.setpoint,
             'ros_alive': self.program.ros_alive,
@@ -149,8 +210,8 @@ class Plc:
         self.stopped_until = until
         for address, channel in self.channels.items():
             fresh = self._channel(channel.drive, channel.unit, channel.register)
-            self.channels[address].block = fresh.block
-            self.channels[address].program = fresh.program
+            for name in ('block', 'program', 'mailbox', 'mailbox_program', 'records'):
+                setattr(self.channels[address], name, getattr(fresh, name))
 
     def _channel(self, drive: SimulatedDrive, unit: int, register: int) -> Channel:
         server = drive.servers.get(TELEGRAM)
@@ -162,9 +223,12 @@ class Plc:
             lost_sets=server.lost_sets,
             ros_time=self.setting.ros_time,
             drive_time=self.setting.drive_time,
+            layout=self.setting.layout,
         )
+        server.longer = self.setting.longer_telegram
         released = self.setting.released
-        return Channel(drive, server, unit, register, Block(), program, released)
+        records = Records(self.setting.access_time)
+        return Channel(drive, server, unit, register, Block(), program, released, records=records)
 
     @property
     def units(self) -> list[Unit]:
@@ -194,7 +258,7 @@ class Plc:
                 self._next_cycle += self.setting.cycle
                 if self._runs:
                     for channel in self.channels.values():
-                        channel.run()
+                        channel.run(self._now)
         for channel in self.channels.values():
             channel.drive.advance_to(now)
 
@@ -254,14 +318,12 @@ class Registers(modbus.Requests):
     def read(self, register: int, count: int) -> tuple[int, ...]:
         """Return registers of a block (Refused: ADDRESS)."""
         channel, offset = self._find(register, count)
-        return channel.block.registers()[offset : offset + count]
+        return channel.registers[offset : offset + count]
 
     def write(self, register: int, words: Sequence[int]) -> None:
         """Write registers that are the driver's (Refused: ADDRESS)."""
         channel, offset = self._find(register, len(words))
-        if offset < FIRST_WRITTEN:
-            raise Refused(Reason.ADDRESS, f'the PLC writes register {register} itself')
-        channel.block.put(offset, tuple(words))
+        channel.put(offset, tuple(words))
 
     def write_and_read(
         self, register: int, words: Sequence[int], source: int, count: int
@@ -274,6 +336,6 @@ class Registers(modbus.Requests):
     def _find(self, register: int, count: int) -> tuple[Channel, int]:
         for channel in self._channels:
             offset = register - channel.register
-            if offset in range(REGISTERS + 1 - count):
+            if offset in range(len(channel.registers) + 1 - count):
                 return channel, offset
         raise Refused(Reason.ADDRESS, f'no block has {count} registers at {register}')

@@ -12,6 +12,8 @@ from __future__ import annotations
 import abc
 from typing import ClassVar
 
+from nfo_sinus_driver.simulator.parameter_channel import ParameterChannel
+
 #: The most that a word of the telegram carries, signed.
 _MOST = 0x7FFF
 
@@ -23,10 +25,20 @@ class Server(abc.ABC):
     lost_clears: ClassVar[int] = 0x0001
     lost_sets: ClassVar[int] = 0x0000
 
+    #: Its parameters, as its master reaches them beside the telegrams; ``None``: no manual says.
+    parameters: ParameterChannel | None = None
+    #: Its master exchanges the longer telegram with it, which it has beside the standard one.
+    longer = False
+
     @property
     def online(self) -> bool:
         """Whether the drive takes part in the exchange at all, as it is set."""
-        return True
+        return not self.longer
+
+    @property
+    def more(self) -> tuple[int, int, int] | None:
+        """What the longer telegram tells behind status word and actual value, if it has one."""
+        return None
 
     @abc.abstractmethod
     def exchange(self, stw1: int, setpoint: int) -> tuple[int, int]:

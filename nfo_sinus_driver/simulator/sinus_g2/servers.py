@@ -14,7 +14,7 @@ set-point and actual value are scaled as the parameters are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 import enum
 import functools
 import zlib
@@ -25,8 +25,14 @@ from nfo_sinus_driver.simulator import canopen, classic, telegram1
 from nfo_sinus_driver.simulator.canopen import Entries, Entry, Identity
 from nfo_sinus_driver.simulator.classic import LineError, Wrong
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, carried, kept
 from nfo_sinus_driver.simulator.motor import measure
+from nfo_sinus_driver.simulator.parameter_channel import (
+    ParameterChannel,
+    ParameterEntry,
+    entries_of,
+)
 from nfo_sinus_driver.simulator.sinus import parts
 from nfo_sinus_driver.simulator.sinus.control_unit import LEVELS
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
@@ -379,6 +385,8 @@ class Zsw1(enum.IntFlag):
     PULSES_ENABLED = 1 << 15
 
 
+#: The maker of the module: HMS.
+_HMS = 0x0109
 _SWITCHED_ON = Zsw1.READY_TO_SWITCH_ON | Zsw1.READY_TO_OPERATE
 #: What the states of the drive are in PROFIdrive; S5, switching off, looks like S3.
 _STATES = {
@@ -395,18 +403,30 @@ _STATES = {
 }
 
 
+def _history(faults: Faults, situation: int) -> Callable[[], int]:
+    """Return what reads a fault situation that is over."""
+
+    def read() -> int:
+        past = faults.log[1:] if faults else faults.log
+        return past[situation - 1].code if situation <= len(past) else 0
+
+    return read
+
+
 class TelegramServer(telegram1.Server):
     """The fieldbus side of one G2."""
 
     def __init__(self, drive: SimulatedDrive) -> None:
         assert isinstance(drive.control_unit, G2ControlUnit)
         self._unit = drive.control_unit
-        #: STW1 that was not ignored last.
-        self._obeyed = 0
+        self._drive = drive
+        #: STW1 that was input last, and that was not ignored last.
+        self._word = self._obeyed = 0
+        self.parameters = ParameterChannel({**entries_of(drive, 'profibus'), **self._profile()})
 
     def exchange(self, stw1: int, setpoint: int) -> tuple[int, int]:
         """Take control word and set-point; return status word and actual value."""
-        unit = self._unit
+        unit, self._word = self._unit, stw1
         if unit.variant.telegram_words == DRIVECONTROL:
             unit.take_telegram(self._by_level(stw1), setpoint)
             return int(unit.status_word), unit.actual
@@ -418,6 +438,31 @@ class TelegramServer(telegram1.Server):
         else:
             unit.fieldbus.heard()
         return int(self._zsw1(stw1)), unit.actual
+
+    def _profile(self) -> Mapping[tuple[int, int], ParameterEntry]:
+        """Return the parameters of PROFIdrive [M0 table 8], and the error log [M0 table 9]."""
+        faults, number = self._drive.faults, self._drive.memory.number
+        firmware = round(100 * number('fieldbus.sw_ver'))
+        told = {
+            918: (lambda: self._drive.address,),
+            922: (lambda: 1,),
+            924: (lambda: 2, lambda: 15),
+            944: (lambda: len(faults.log),),
+            947: (lambda: faults.shown, *(_history(faults, n) for n in range(1, 8))),
+            950: (lambda: 8, lambda: 1),
+            964: (lambda: _HMS, lambda: 0, lambda: firmware, lambda: 2013, lambda: 101),
+            965: (lambda: 0x2903,),
+            967: (lambda: self._word,),
+            968: (lambda: int(self._zsw1(self._word)),),
+        }
+        log = self._drive.model.error_logs['profibus']
+        found = {
+            (log.first + n, 0): ParameterEntry(functools.partial(faults.log_entry, n), size=4)
+            for n in range(log.limit)
+        }
+        for pnu, reads in told.items():
+            found |= {(pnu, sub): ParameterEntry(read) for sub, read in enumerate(reads)}
+        return found
 
     def _by_level(self, word: int) -> int:
         """Add what makes the drive switch on by a bit that has been there all the time."""

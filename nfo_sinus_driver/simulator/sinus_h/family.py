@@ -1,21 +1,24 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the simulator has to know of a Sinus H, and telegram 1 as its module takes it [M3 §7.1]."""
+"""What the simulator has to know of a Sinus H, its telegrams and its PNUs [M3 §7, §8]."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Literal
 
 from nfo_sinus_driver.simulator import telegram1
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
 from nfo_sinus_driver.simulator.injections import Injections
+from nfo_sinus_driver.simulator.parameter_channel import ParameterChannel, ParameterEntry
 from nfo_sinus_driver.simulator.sinus_h import keypad
 from nfo_sinus_driver.simulator.sinus_h.control_unit import (
     Control,
     SinusHControlUnit,
     SinusHVariant,
+    Status,
 )
 from nfo_sinus_driver.simulator.telegram1 import clipped
 
@@ -33,16 +36,81 @@ class Server(telegram1.Server):
     def __init__(self, drive: SimulatedDrive) -> None:
         assert isinstance(drive.control_unit, SinusHControlUnit)
         self._unit = drive.control_unit
+        self.parameters = ParameterChannel(self._profile())
 
     @property
     def online(self) -> bool:
-        """Whether the module is set to the standard telegram (COM-22)."""
-        return self._unit.memory.raw(keypad.TELEGRAM) == keypad.STANDARD_TELEGRAM
+        """Whether the module is set to the telegram that its master exchanges (COM-22)."""
+        return self._vendor is self.longer
+
+    @property
+    def _vendor(self) -> bool:
+        return self._unit.memory.raw(keypad.TELEGRAM) != keypad.STANDARD_TELEGRAM
+
+    @property
+    def more(self) -> tuple[int, int, int]:
+        """Alarm information, torque (0.1 %) and current (0.1 A) [M3 §7.2.5 to §7.2.7]."""
+        unit = self._unit
+        # which bit of it a trip sets is not printed [C69]
+        alarms = (1 if unit.faults else 0) | (_WARNING if unit.status_word & Status.WARNING else 0)
+        torque, current = clipped(1000 * unit.motor.torque), clipped(10 * unit.motor.current)
+        return alarms, torque & 0xFFFF, current & 0xFFFF
 
     def exchange(self, stw1: int, setpoint: int) -> tuple[int, int]:
         """Take control word and set-point; return status word and actual value."""
         self._unit.take_telegram(Control(stw1), setpoint)
         return int(self._unit.status_word), clipped(self._unit.actual)
+
+
+    def _profile(self) -> dict[tuple[int, int], ParameterEntry]:
+        """Return the parameters of PROFIdrive [M3 §8]."""
+        unit = self._unit
+        told: dict[int, tuple[Callable[[], int], ...]] = {
+            922: (lambda: _VENDOR_TELEGRAM if self._vendor else 1,),
+            944: (lambda: len(unit.faults.log),),
+            947: tuple(self._message(index) for index in range(_MESSAGES)),
+            953: (lambda: int(bool(unit.status_word & Status.WARNING)),),
+            964: tuple(map(_constant, (849, 1, 102, 2015, 2512))),
+            965: (lambda: 0x0328,),
+            967: (lambda: int(unit.word),),
+            968: (lambda: int(unit.status_word),),
+        }
+        found = {
+            (pnu, sub): ParameterEntry(read)
+            for pnu, reads in told.items()
+            for sub, read in enumerate(reads)
+        }
+        return {**found, (972, 0): ParameterEntry(lambda: 0, self._reset)}
+
+    def _message(self, index: int) -> Callable[[], int]:
+        """Return what reads a fault message of PNU 947 [M3 §9, C68]."""
+
+        def read() -> int:
+            faults = self._unit.faults
+            active = faults.codes
+            past = [[entry.code] for entry in faults.log[len(active) :]]
+            situation, message = divmod(index, _MESSAGES // 8)
+            messages = [active, *past][situation : situation + 1]
+            return dict(enumerate(messages[0] if messages else ())).get(message, 0)
+
+        return read
+
+    def _reset(self, value: int) -> None:
+        """Begin as after power-on, by PNU 972 = 1."""
+        if value == 1:
+            self._unit.restart()
+            self._unit.initialised = True
+
+
+def _constant(word: int) -> Callable[[], int]:
+    return lambda: word
+
+
+#: What PNU 922 says of the longer telegram, and the bit of the alarm information for warnings.
+_VENDOR_TELEGRAM = 100
+_WARNING = 1 << 4
+#: Words of PNU 947: eight situations of eight messages.
+_MESSAGES = 64
 
 
 class SinusHInjections(Injections):

@@ -95,6 +95,104 @@ class Bench:
         return self.drives[address].motor
 
 
+# --- the mailbox of layout 2 ---
+
+LAYOUT_2 = PlcSetting(layout=2)
+
+
+def asked(bench, number, command, pnu, sub_index=0, value=0, wait=0.5):
+    """Ask as the driver does; return +24 to +27 after a while."""
+    bench.write(17, command, pnu, sub_index, value >> 16, value & 0xFFFF)
+    bench.write(16, number)
+    bench.wait(wait)
+    return bench.read(24, 4)
+
+
+def test_parameters_of_a_g2_are_read_and_written_by_pnu():
+    bench = Bench('sinus_g2', settings=LAYOUT_2)
+    drive = bench.drives[1]
+    assert bench.read()[4] == 2
+    accel = round(1000 * drive.peek('control.accel'))
+    assert asked(bench, 1, 1, 1028, 1) == (1, 0, accel >> 16, accel & 0xFFFF)
+    assert asked(bench, 2, 2, 1028, 1, 100_000)[:2] == (2, 0)
+    assert drive.peek('control.accel') == 100.0
+    assert asked(bench, 3, 1, 922) == (3, 0, 0, 1)
+    assert asked(bench, 4, 1, 2000)[:2] == (4, 2)
+    assert asked(bench, 5, 2, 1007, 0, 0xFFFF) == (5, 1, 0, 2), 'f-Nom: out of its range'
+    assert asked(bench, 6, 2, 944, 0, 1) == (6, 1, 0, 1), 'only to be read'
+
+
+def test_fault_of_a_g2_is_read_without_acknowledging_it():
+    bench = Bench('sinus_g2', settings=LAYOUT_2)
+    drive = bench.drives[1]
+    before = asked(bench, 1, 1, 944)[3]
+    drive.trip(3)
+    assert asked(bench, 2, 1, 1038, 1)[1:] == (0, 0, 3)
+    assert asked(bench, 3, 1, 947, 0)[1:] == (0, 0, 3)
+    assert asked(bench, 4, 1, 944)[3] == before + 1
+    assert asked(bench, 5, 1, 13157)[1:3] == (0, 3 << 8)
+    assert drive.faults
+
+
+def test_mailbox_is_busy_while_an_access_is_under_way_and_answers_no_other():
+    bench = Bench('sinus_g2', settings=PlcSetting(layout=2, access_time=0.2))
+    assert asked(bench, 1, 1, 922, wait=0.1)[:2] == (0, 3)
+    assert asked(bench, 2, 2, 1028, 1, 7000, wait=0.1)[:2] == (2, 3)
+    bench.wait(1.0)
+    assert bench.read(24, 2) == (2, 3)
+    assert bench.drives[1].peek('control.accel') != 7.0
+    assert asked(bench, 3, 1, 922, wait=0.6) == (3, 0, 0, 1)
+
+
+def test_without_the_fieldbus_and_of_a_drive_without_pnus_there_is_no_access():
+    bench = Bench('sinus_g2', 'sinus_optimal', settings=LAYOUT_2)
+    bench.plc.channels[1].cut_until = bench.now + 1.0
+    assert asked(bench, 1, 1, 922)[:2] == (1, 4)
+    bench.wait(2.0)
+    bench.write(16, 2)
+    bench.wait(0.01)
+    bench.plc.channels[1].cut_until = bench.now + 1.0
+    bench.wait(0.5)
+    assert bench.read(24, 2) == (2, 4)
+    bench.write(17, 1, 922, 0, 0, 0, unit=2)
+    bench.write(16, 1, unit=2)
+    bench.wait(0.5)
+    assert bench.read(24, 2, unit=2) == (1, 4)
+
+
+def test_registers_of_the_plc_are_not_the_drivers_in_either_layout():
+    bench = Bench('sinus_g2', settings=LAYOUT_2)
+    for register, count in ((0, 1), (7, 2), (10, 2), (11, 1), (15, 2), (21, 2), (24, 1), (27, 1)):
+        assert bench.write(register, *[1] * count)[0] == 0x90, register
+    assert bench.ask(struct.pack('>BHH', 3, 0, 29))[0] == 0x83
+    bench = Bench('sinus_g2')
+    assert bench.write(16, 1)[0] == 0x90
+    assert bench.ask(struct.pack('>BHH', 3, 0, 12))[0] == 0x83
+
+
+def test_longer_telegram_of_a_sinus_h_is_shown_where_both_have_it():
+    telegram = {'com.opt_para_13': 'Vendor Specific Telegram'}
+    longer = PlcSetting(layout=2, longer_telegram=True)
+    bench = Bench('sinus_h', settings=longer, drive_settings=telegram)
+    bench.wait(0.5)
+    assert bench.read(3, 5) == (7, 2, 0, 0, 0)
+    assert asked(bench, 1, 1, 922) == (1, 0, 0, 100)
+    word, setpoint = STARTS['sinus_h'][0][-1], STARTS['sinus_h'][1]
+    bench.start('sinus_h')
+    alarms, torque, current = bench.read(5, 3)
+    motor = bench.motor()
+    assert (alarms, torque) == (0, round(1000 * motor.torque))
+    assert current == pytest.approx(10 * motor.current, abs=1)
+    bench.drives[1].trip(11)
+    bench.live(0.2, word, setpoint)
+    assert bench.read(5, 1) == (1,)
+    assert asked(bench, 2, 1, 947, 0) == (2, 0, 0, 11)
+    assert asked(bench, 3, 1, 947, 1) == (3, 0, 0, 0)
+    mismatched = Bench('sinus_h', settings=longer)
+    mismatched.wait(1.0)
+    assert not mismatched.read(3, 1)[0] & 1
+
+
 # --- who watches whom ---
 
 
