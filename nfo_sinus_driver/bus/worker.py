@@ -47,6 +47,7 @@ from nfo_sinus_driver.link import (
     Connecting,
     GatewaySilent,
     Identification,
+    InProgress,
     LineProtocol,
     Link,
     LinkError,
@@ -486,7 +487,11 @@ class Bus:
                 reply = self._link.write_and_read(
                     transfer.unit, transfer.address, transfer.data, transfer.source
                 )
+        except InProgress:
+            self._account(transfer.unit, started, None)
+            raise
         except NotReady:
+            self._paced_until = paced_until
             raise
         except LinkError as error:
             self._account(transfer.unit, started, error)

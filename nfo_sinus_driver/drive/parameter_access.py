@@ -74,7 +74,7 @@ class ParameterAccess:
         self.protocol = addressing or bus.protocol.addressing
         #: They stand in the registers of a PLC.
         self.in_block = self.protocol != bus.protocol.addressing
-        self._block_address = block_address
+        self._block = block_address if self.in_block else None
         reads = (model.key(role) for role in _RESYNC_READS if role in model.roles)
         bus.use_resync_reads(unit, tuple(self.address(key) for key in reads))
 
@@ -82,7 +82,7 @@ class ParameterAccess:
         """Return where a parameter stands."""
         if key not in self._addresses:
             address = Address(*self.model[key].at(self.protocol).place)
-            self._addresses[key] = address._replace(index=address.index + self._block_address)
+            self._addresses[key] = address._replace(block=self._block)
         return self._addresses[key]
 
     def is_rescaled(self, key: str) -> bool:

@@ -12,6 +12,7 @@ from nfo_sinus_driver.link.interface import (
     GatewayLate,
     GatewaySilent,
     Identification,
+    InProgress,
     Inquiry,
     Interrupted,
     LineProtocol,
@@ -27,6 +28,7 @@ from nfo_sinus_driver.link.interface import (
     Remarks,
     Reply,
     Supervision,
+    Unconfirmed,
     Watch,
 )
 from nfo_sinus_driver.link.protocols import ADDRESSES, BIT_RATES, PROTOCOLS, BusSettings, open_link
@@ -45,6 +47,7 @@ __all__ = [
     'GatewayLate',
     'GatewaySilent',
     'Identification',
+    'InProgress',
     'Inquiry',
     'Interrupted',
     'LineProtocol',
@@ -61,6 +64,7 @@ __all__ = [
     'Remarks',
     'Reply',
     'Supervision',
+    'Unconfirmed',
     'Watch',
     'open_link',
 ]

@@ -35,6 +35,8 @@ class Address(NamedTuple):
     :ivar size: how many bytes it takes.
     :ivar signed: whether the number in them may be negative, for a line where the drive says how
         many bytes it has for it; ``None``: it is no number, and they count as they come.
+    :ivar block: the first register of the block of a PLC that it is reached by; ``None``: it is
+        reached directly.
     """
 
     space: str
@@ -42,6 +44,7 @@ class Address(NamedTuple):
     sub_index: int | None
     size: int
     signed: bool | None = None
+    block: int | None = None
 
 
 class Reply(NamedTuple):
@@ -285,6 +288,8 @@ class Link(Protocol):
         """
         Read one parameter, or one part of it where it has several.
 
+        :raises InProgress: it takes more transactions, and the same has to be called for each; so
+            it is with a write.
         :raises LinkError: as its subclasses say.
         """
 
@@ -367,6 +372,12 @@ class Interrupted(LinkError):
     """What is between has stopped the drive, for it was not reached for longer than its time."""
 
 
+class Unconfirmed(LinkError):
+    """Whether the drive has taken a write is not known, and it may not be repeated."""
+
+    maybe_done = True
+
+
 class NoPath(LinkError):
     """A gateway does not know where the drive is; the message says what to do."""
 
@@ -440,6 +451,10 @@ class NotReady(LinkError):
     def __init__(self, until: float) -> None:
         self.until = until
         super().__init__('answers to earlier requests may still be on their way')
+
+
+class InProgress(NotReady):
+    """One transaction of several was done: the same is to be asked again, for the next of them."""
 
 
 @dataclass(frozen=True)

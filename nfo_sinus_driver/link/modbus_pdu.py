@@ -112,22 +112,31 @@ class Read(_TellsRegisters):
 
 @dataclass(frozen=True)
 class Write:
-    """Write ``data`` to the registers of ``unit`` from ``register`` on (function 06 or 16)."""
+    """
+    Write ``data`` to the registers of ``unit`` from ``register`` on (function 06 or 16).
+
+    :ivar multiple: by function 16 although it is one register.
+    """
 
     unit: int
     register: int
     data: bytes
+    multiple: bool = False
 
     @property
     def function(self) -> int:
         """06 for one register, 16 for several."""
-        return WRITE_SINGLE_REGISTER if len(self.data) == 2 else WRITE_MULTIPLE_REGISTERS
+        return WRITE_SINGLE_REGISTER if self._is_single else WRITE_MULTIPLE_REGISTERS
+
+    @property
+    def _is_single(self) -> bool:
+        return len(self.data) == 2 and not self.multiple
 
     @property
     def body(self) -> bytes:
         """The request without unit and function."""
         size = len(self.data)
-        if size == 2:
+        if self._is_single:
             return self.register.to_bytes(2, 'big') + self.data
         return struct.pack('>HHB', self.register, size // 2, size) + self.data
 
@@ -135,7 +144,7 @@ class Write:
     def answer_head(self) -> bytes:
         """What of the answer is known beforehand: all of it."""
         size = len(self.data)
-        second = self.data if size == 2 else (size // 2).to_bytes(2, 'big')
+        second = self.data if self._is_single else (size // 2).to_bytes(2, 'big')
         return struct.pack('>BBH', self.unit, self.function, self.register) + second
 
     @property

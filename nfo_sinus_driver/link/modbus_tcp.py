@@ -178,19 +178,19 @@ class TcpLink(ModbusLink):
 
     def read(self, unit: int, address: Address) -> Reply:
         """Read one parameter, of a drive or of the block of a PLC."""
-        if address.space == telegram.ADDRESSING:
+        if address.block is not None:
             return self._blocks(unit, address).read(address)
         return super().read(unit, address)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
         """Write one parameter, likewise."""
-        if address.space == telegram.ADDRESSING:
+        if address.block is not None:
             return self._blocks(unit, address).write(address, data)
         return super().write(unit, address, data)
 
     def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """Write one parameter and read another in one transaction, both of the same."""
-        if address.space == telegram.ADDRESSING:
+        if address.block is not None:
             return self._blocks(unit, address).write_and_read(address, data, source)
         return super().write_and_read(unit, address, data, source)
 

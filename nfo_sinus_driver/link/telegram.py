@@ -27,9 +27,11 @@ from collections.abc import Callable
 import struct
 from typing import TypeVar
 
+from nfo_sinus_driver.link import mailbox
 from nfo_sinus_driver.link.interface import (
     Address,
     Clock,
+    InProgress,
     Interrupted,
     LinkError,
     NoData,
@@ -37,12 +39,13 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Reply,
 )
+from nfo_sinus_driver.link.mailbox import Mailbox
 from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write, WriteAndRead
 
 _T = TypeVar('_T')
 
-#: How parameters are addressed that stand in a block, and their space; the index is where the block
-#: begins, and the sub-index which part of it is meant, as follows.
+#: How parameters are addressed that stand in a block, and their space; the sub-index is which part
+#: of it is meant, as follows.
 ADDRESSING = 'telegram1'
 #: To be read: ZSW1, and in the higher word what the PLC says of it, bit 0: valid, 1: released.
 STATUS = 0
@@ -58,6 +61,10 @@ NEXT = 3
 CLEAR = 4
 #: The set-point alone; refused where no STW1 stands.
 SETPOINT = 5
+#: To be read: the layout of the block, whatever else stands in it.
+LAYOUT = 6
+#: What a longer telegram tells, three words from here on; refused where it is not shown.
+MORE = 7
 
 #: Without a new count from us for so long the PLC stops the drive, s.
 PLC_TIME = 1.0
@@ -66,14 +73,21 @@ PLC_TIME = 1.0
 _MOVES = 2
 #: So long the actual value is that of the status read before it, s; the block has both.
 _SHARED_FOR = 0.1
-#: Of the block.
-LAYOUT_VERSION = 1
+#: Layouts of the block that are known; the second one has a mailbox for parameters.
+LAYOUTS = (1, 2)
 #: From where on the driver writes.
 WRITTEN_FROM = 8
 
-_SHOWN = struct.Struct('>5H')
+#: How many registers are read, by the layout.
+_SHOWN = {0: 5, 1: 5, 2: 8}
 _COMMANDED = struct.Struct('>3H')
 _VALID = 1 << 0
+_MORE_VALID = 1 << 2
+_NO_MAILBOX = (
+    'the block of the PLC has layout 1, which has no mailbox for parameters: see layout 2 in '
+    'docs/telegram1.md'
+)
+_NO_MORE = 'the PLC does not show the longer telegram (bit 2 of register +3 of its block is 0)'
 _NOTHING_STANDS = (
     'no control word of this driver stands in the block: it has not been written yet, or the PLC '
     f'was not reached for longer than its time, {PLC_TIME:g} s; enable again'
@@ -82,7 +96,7 @@ _NOTHING_STANDS = (
 Ask = Callable[[Request[_T]], tuple[_T, float]]
 #: What is written, and where.
 _Written = tuple[Address, bytes]
-#: The five registers, and a moment.
+#: The registers that are read, and a moment.
 _Shown = tuple[tuple[int, ...], float]
 
 
@@ -117,14 +131,18 @@ class Block:
         self._life_at = 0.0
         #: What came with the last status, and when; ``None`` once its actual value was taken.
         self._beside: tuple[_Shown, float] | None = None
-        #: The layout was looked at.
-        self._known = False
+        #: The layout that was looked at; 0: none yet.
+        self._layout = 0
         #: Function 23 was refused.
         self._apart = False
+        #: What was read last, and when.
+        self._last: tuple[_Shown, float] | None = None
+        self._mailbox = Mailbox(ask, now, unit, start)
 
     def forget(self) -> None:
         """Write nothing any more, only read: the connection is another one."""
-        self._known = False
+        self._layout = 0
+        self._mailbox.forget()
         self._command, self._live = None, False
         self._acknowledged = None
 
@@ -135,8 +153,14 @@ class Block:
         The actual value is that of the status that was read just before: the two are of one
         telegram, and the PLC is not asked twice.
         """
+        if address.space == mailbox.SPACE:
+            return self._access(address)
         beside, self._beside = self._beside, None
-        if address.sub_index == ACTUAL and beside is not None:
+        if address.sub_index is not None and address.sub_index >= LAYOUT:
+            beside = self._last
+        elif address.sub_index != ACTUAL:
+            beside = None
+        if beside is not None:
             shared, at = beside
             if self._now() - at <= _SHARED_FOR:
                 return Reply(self._part(shared[0], address), shared[1], requests=0)
@@ -148,6 +172,8 @@ class Block:
 
     def write(self, address: Address, data: bytes) -> Reply:
         """Write a part of it."""
+        if address.space == mailbox.SPACE:
+            return self._access(address, data)
         _, arrived = self._exchange((address, data))
         return Reply(b'', arrived)
 
@@ -162,18 +188,34 @@ class Block:
         self._beside = (shown, arrived), self._now()
         return reply
 
+    def _access(self, address: Address, data: bytes | None = None) -> Reply:
+        """Do the next step to read or write a parameter by the mailbox."""
+        if not self._layout:
+            self._look()
+            raise InProgress(self._now())
+        if self._layout == 1:
+            raise Refused(Refused.ILLEGAL_ADDRESS, _NO_MAILBOX)
+        return self._mailbox.access(address, data)
+
     def _part(self, shown: tuple[int, ...], address: Address) -> bytes:
-        word, actual, _, flags, _ = shown
+        word, actual, _, flags, layout = shown[:5]
+        part = address.sub_index
+        if part == LAYOUT:
+            return _word(layout)
         if not flags & _VALID:
             raise NoData(
                 f'the PLC has no valid data from the drive (bit 0 of register {self._start + 3} of '
                 f'unit {self._unit} is 0): check the fieldbus between them and that the drive has '
                 'power'
             )
-        return struct.pack('>HH', word, flags) if address.sub_index == STATUS else _word(actual)
+        if part is not None and part >= MORE:
+            if not flags & _MORE_VALID:
+                raise Refused(Refused.ILLEGAL_ADDRESS, _NO_MORE)
+            return _word(shown[5 + part - MORE])
+        return struct.pack('>HH', word, flags) if part == STATUS else _word(actual)
 
     def _exchange(self, write: _Written | None = None) -> _Shown:
-        """Carry out a transaction; return the five registers, and when they first came."""
+        """Carry out a transaction; return what is shown, and when it first came."""
         began = self._now()
         self._beside = None
         if self._command is not None and began - self._sent_at > PLC_TIME:
@@ -183,7 +225,7 @@ class Block:
                 raise self._interrupted(began - self._sent_at, maybe_done=False)
         if write is None and self._command is None:
             return self._look()
-        if not self._known:
+        if not self._layout:
             # nothing is written to registers that may be something else
             self._look()
             began = self._now()
@@ -234,48 +276,50 @@ class Block:
     def _look(self) -> _Shown:
         """Only read."""
         try:
-            data, arrived = self._ask(Read(self._unit, self._start, 5))
+            data, arrived = self._ask(Read(self._unit, self._start, _SHOWN[self._layout]))
         except Refused as refusal:
             raise self._of_block(refusal) from None
-        return self._take(_SHOWN.unpack(data), arrived)
+        return self._take(_words(data), arrived)
 
     def _send(self, data: bytes) -> _Shown:
         """Write and read."""
-        at = self._start + WRITTEN_FROM
+        at, count = self._start + WRITTEN_FROM, _SHOWN[self._layout]
         try:
             if not self._apart:
-                request = WriteAndRead(self._unit, at, data, self._start, 5)
+                request = WriteAndRead(self._unit, at, data, self._start, count)
                 try:
                     answer, arrived = self._ask(request)
-                    return _SHOWN.unpack(answer), arrived
+                    return _words(answer), arrived
                 except Refused as refusal:
                     if refusal.code != Refused.ILLEGAL_FUNCTION:
                         raise
                     self._apart = True
             self._ask(Write(self._unit, at, data))
             try:
-                answer, arrived = self._ask(Read(self._unit, self._start, 5))
+                answer, arrived = self._ask(Read(self._unit, self._start, count))
             except LinkError as error:
                 error.maybe_done = True
                 raise
-            return _SHOWN.unpack(answer), arrived
+            return _words(answer), arrived
         except Refused as refusal:
             raise self._of_block(refusal) from None
 
     def _take(self, shown: tuple[int, ...], arrived: float) -> _Shown:
         version = shown[4]
-        self._known = version == LAYOUT_VERSION
-        if not self._known:
+        self._layout = version if version in LAYOUTS else 0
+        if not self._layout:
             raise NoPath(
-                f'register {self._start + 4} of unit {self._unit} is {version} and not '
-                f'{LAYOUT_VERSION}, the version of the layout of the block: check block_address, '
-                'and that the program of the PLC is that of docs/telegram1.md'
+                f'register {self._start + 4} of unit {self._unit} is {version} and not 1 or 2, '
+                'the version of the layout of the block: check block_address, and that the '
+                'program of the PLC is that of docs/telegram1.md'
             )
         if shown[2] != self._life:
             self._life = shown[2]
             self._moves = max(self._moves - 1, 0)
             if not self._moves:
                 self._life_at = arrived
+        # the first look does not know yet how much there is to be read
+        self._last = ((shown, self._life_at), self._now()) if len(shown) > 5 else None
         return shown, self._life_at
 
     def _of_block(self, refusal: Refused) -> LinkError:
@@ -304,7 +348,8 @@ class Blocks:
 
     def __call__(self, unit: int, address: Address) -> Block:
         """Return the block that a parameter stands in."""
-        place = unit, address.index
+        assert address.block is not None
+        place = unit, address.block
         if place not in self._blocks:
             self._blocks[place] = Block(self._ask, self._now, *place)
         return self._blocks[place]
@@ -313,6 +358,10 @@ class Blocks:
         """Take note that the connection is another one."""
         for block in self._blocks.values():
             block.forget()
+
+
+def _words(data: bytes) -> tuple[int, ...]:
+    return struct.unpack(f'>{len(data) // 2}H', data)
 
 
 def _word(value: int) -> bytes:

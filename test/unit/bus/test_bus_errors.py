@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 import threading
 import time
 
@@ -14,7 +15,7 @@ import pytest
 from support.addresses import packed, register
 
 from nfo_sinus_driver.bus import Bus, Cancelled, Priority, worker as bus_module
-from nfo_sinus_driver.link import LinkError, NotReady, PortError
+from nfo_sinus_driver.link import InProgress, LinkError, NotReady, PortError
 
 
 @RAISED
@@ -142,6 +143,26 @@ def test_unit_in_doubt_keeps_nobody_waiting(bus: Bus, link: FakeLink) -> None:
     assert writer.outcomes == [(packed(7), None)]
     # nothing was sent while it was in doubt, so nothing is counted
     assert bus.statistics().transactions == 12
+
+
+def test_stop_goes_between_the_transactions_of_a_request_in_several(
+    bus: Bus, link: FakeLink
+) -> None:
+    stops: list[Future[bytes]] = []
+
+    def answer(done: Done) -> bytes:
+        if done.number == 66 and link.numbers.count(66) < 5:
+            if link.numbers.count(66) == 2:
+                stops.append(ask(bus, 0, Priority.STOP, packed(0)))
+            raise InProgress(link.clock())
+        return packed(done.number)
+
+    link.answer = answer
+    assert result(ask(bus, 66, Priority.SERVICE)) == packed(66)
+    assert result(stops[0]) == packed(0)
+    assert link.numbers == [66, 66, 0, 66, 66, 66]
+    # each of them was one, and was answered
+    assert bus.statistics().transactions == 6
 
 
 def test_cancelled_while_its_unit_is_in_doubt(bus: Bus, link: FakeLink) -> None:

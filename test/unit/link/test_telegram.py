@@ -27,12 +27,12 @@ from nfo_sinus_driver.link import (
 from nfo_sinus_driver.link.modbus_pdu import Read, Write, WriteAndRead
 
 START = 100
-STATUS = Address('telegram1', START, telegram.STATUS, 4)
-ACTUAL = Address('telegram1', START, telegram.ACTUAL, 2)
-BEGIN = Address('telegram1', START, telegram.BEGIN, 4)
-NEXT = Address('telegram1', START, telegram.NEXT, 4)
-CLEAR = Address('telegram1', START, telegram.CLEAR, 2)
-SETPOINT = Address('telegram1', START, telegram.SETPOINT, 2)
+STATUS = Address('telegram1', 0, telegram.STATUS, 4, block=START)
+ACTUAL = Address('telegram1', 0, telegram.ACTUAL, 2, block=START)
+BEGIN = Address('telegram1', 0, telegram.BEGIN, 4, block=START)
+NEXT = Address('telegram1', 0, telegram.NEXT, 4, block=START)
+CLEAR = Address('telegram1', 0, telegram.CLEAR, 2, block=START)
+SETPOINT = Address('telegram1', 0, telegram.SETPOINT, 2, block=START)
 READY, RUN = 0x0408, 0x0409
 
 
@@ -187,7 +187,7 @@ def test_not_released_is_told(plc: Plc, block: telegram.Block) -> None:
     assert block.read(STATUS).data == command(0x0207, 1)
 
 
-@pytest.mark.parametrize('version', [0, 2, 0xFFFF])
+@pytest.mark.parametrize('version', [0, 3, 0xFFFF])
 def test_nothing_is_written_to_another_layout(
     plc: Plc, block: telegram.Block, version: int
 ) -> None:

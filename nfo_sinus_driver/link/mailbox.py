@@ -1,0 +1,321 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+
+"""
+The mailbox of a PLC: parameters of a drive on its fieldbus, one at a time, by PNU and sub-index.
+
+A request stands in registers +17 to +21 of the block before its number is written to +16, alone.
+The PLC asks the drive, which takes its time, and writes that number to +24 last. So a request is
+several transactions, and others go between: each ends with :class:`InProgress`, until the last one.
+
+An answer is believed if its number and the request in the mailbox are still ours. What is not
+answered in :data:`TIME` is given up. A number that may have been lost is looked at before it is
+written again: the PLC does nothing twice for one number, and a write never gets a second one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import enum
+import struct
+from typing import NamedTuple, TypeVar
+
+from nfo_sinus_driver.link.interface import (
+    Address,
+    Clock,
+    InProgress,
+    LinkError,
+    NoAnswer,
+    NoPath,
+    NotReady,
+    PortError,
+    Refused,
+    Reply,
+    Unconfirmed,
+)
+from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write, WriteAndRead
+
+_T = TypeVar('_T')
+
+#: The space of addresses that count in PNUs.
+SPACE = 'pnu'
+#: The first register of a mailbox in its block.
+FIRST = 16
+#: How long an answer is waited for, s.
+TIME = 1.0
+#: How often the mailbox is looked at meanwhile, s.
+_PERIOD = 0.02
+#: So long an order that was given up is not taken for another one that is the same, s.
+_REMEMBERED = 1.0
+
+_LAYOUT = struct.Struct('>12H')
+_REQUEST = struct.Struct('>3HL')
+_READ, _WRITE = 1, 2
+#: What +25 says.
+_DONE, _REFUSED, _NONE_SUCH, _BUSY, _NO_ACCESS = range(5)
+#: The error numbers of PROFIdrive that mean what an exception code of Modbus means.
+_CODES = {
+    0x01: (Refused.ILLEGAL_FUNCTION, 'the parameter can only be read'),
+    0x02: (Refused.ILLEGAL_VALUE, 'the drive does not accept this value'),
+    0x0B: (Refused.DEVICE_FAILURE, 'the drive does not let the PLC change parameters'),
+    0x11: (Refused.DEVICE_FAILURE, 'the drive cannot do this in its present state'),
+    0x14: (Refused.ILLEGAL_VALUE, 'the drive does not accept this value'),
+}
+_ANY = Refused.DEVICE_FAILURE, 'the drive refused'
+
+Ask = Callable[[Request[_T]], tuple[_T, float]]
+
+
+class _Stage(enum.Enum):
+    """What is to be done next for a request."""
+
+    PREPARE = enum.auto()
+    ASK = enum.auto()
+    WAIT = enum.auto()
+
+
+class _Wanted(NamedTuple):
+    """What is to be read, or written."""
+
+    address: Address
+    data: bytes | None
+
+    @property
+    def writes(self) -> bool:
+        """It changes the parameter."""
+        return self.data is not None
+
+    @property
+    def place(self) -> str:
+        """The parameter, as the manuals name it."""
+        pnu, sub_index = self.address.index, self.address.sub_index
+        return f'PNU {pnu}' if sub_index is None else f'PNU {pnu}.{sub_index}'
+
+    @property
+    def registers(self) -> bytes:
+        """The registers +17 to +21."""
+        address = self.address
+        where = address.index, address.sub_index or 0
+        if self.data is None:
+            return _REQUEST.pack(_READ, *where, 0)
+        value = int.from_bytes(self.data, 'big', signed=bool(address.signed))
+        return _REQUEST.pack(_WRITE, *where, value & 0xFFFF_FFFF)
+
+
+@dataclass
+class _Pending:
+    """
+    A request that is under way.
+
+    :ivar number: 0 until it has one.
+    :ivar until: when it is given up, s.
+    """
+
+    wanted: _Wanted
+    until: float
+    number: int = 0
+    stage: _Stage = _Stage.PREPARE
+
+
+class _Shown(NamedTuple):
+    """The registers +16 to +27, and when they came."""
+
+    data: bytes
+    arrived: float
+
+    @property
+    def words(self) -> tuple[int, ...]:
+        """The registers as numbers."""
+        return _LAYOUT.unpack(self.data)
+
+    @property
+    def number(self) -> int:
+        """The number of the last request."""
+        return self.words[0]
+
+    @property
+    def request(self) -> bytes:
+        """What was asked with it."""
+        return self.data[2:12]
+
+    @property
+    def answered(self) -> int:
+        """The number of the request that is answered."""
+        return self.words[8]
+
+    @property
+    def result(self) -> int:
+        """What became of it."""
+        return self.words[9]
+
+    @property
+    def error(self) -> int:
+        """The error number of the drive."""
+        return self.words[11]
+
+
+class Mailbox:
+    """
+    The mailbox of one block.
+
+    :param ask: sends a request of Modbus; returns its answer and when that came.
+    :param now: the clock of these moments, s.
+    :param unit: the unit of the PLC.
+    :param start: the first register of the block.
+    """
+
+    def __init__(self, ask: Ask[bytes], now: Clock, unit: int, start: int) -> None:
+        self._ask = ask
+        self._now = now
+        self._unit = unit
+        self._first = start + FIRST
+        self._pending: _Pending | None = None
+        #: A write that was given up while another request was wanted.
+        self._unconfirmed: _Pending | None = None
+        #: Function 23 was refused.
+        self._apart = False
+
+    def forget(self) -> None:
+        """Take note that the connection is another one."""
+        self._pending = self._unconfirmed = None
+
+    def access(self, address: Address, data: bytes | None = None) -> Reply:
+        """
+        Do the next step to read a parameter, or to write ``data`` to it.
+
+        :raises InProgress: there are more.
+        :raises NotReady: another request is under way.
+        :raises NoAnswer: a read was given up.
+        :raises Unconfirmed: a write was given up.
+        :raises Refused: the drive refused, or has no such parameter; BUSY: nothing was done.
+        :raises NoPath: the PLC does not reach the parameters of the drive.
+        """
+        pending = self._pending_for(_Wanted(address, data))
+        try:
+            shown = self._step(pending)
+        except LinkError as error:
+            error.maybe_done = pending.wanted.writes and pending.stage is not _Stage.PREPARE
+            if isinstance(error, PortError):
+                self._pending = None
+            raise
+        if shown is None:
+            raise InProgress(self._now())
+        return self._answer(pending, shown)
+
+    def _pending_for(self, wanted: _Wanted) -> _Pending:
+        """Return the request that is under way for this, or begin one."""
+        now, pending = self._now(), self._pending
+        if pending is not None and now <= pending.until:
+            if pending.wanted == wanted:
+                return pending
+            raise NotReady(min(now + _PERIOD, pending.until + _PERIOD))
+        for late in (pending, self._unconfirmed):
+            if late and late.wanted == wanted and now <= late.until + _REMEMBERED and late.number:
+                self.forget()
+                raise self._unanswered(wanted)
+        if pending is not None and pending.number and pending.wanted.writes:
+            self._unconfirmed = pending
+        self._pending = _Pending(wanted, now + TIME)
+        return self._pending
+
+    def _step(self, pending: _Pending) -> _Shown | None:
+        """Do the next step; return what the mailbox shows then, once the number was written."""
+        if pending.stage is _Stage.PREPARE:
+            shown = self._exchange(1, pending.wanted.registers)
+            pending.number = _unlike(shown.number, shown.answered)
+            pending.stage = _Stage.ASK
+            return None
+        if pending.stage is _Stage.WAIT:
+            return self._exchange()
+        # written it may be, whether the answer comes or not
+        pending.stage = _Stage.WAIT
+        pending.until = self._now() + TIME
+        return self._exchange(0, pending.number.to_bytes(2, 'big'))
+
+    def _answer(self, pending: _Pending, shown: _Shown) -> Reply:
+        """Return what the mailbox answers to a request, if it does."""
+        wanted = pending.wanted
+        if shown.request != wanted.registers:
+            self._pending = None
+            raise self._disturbed(wanted)
+        if shown.number != pending.number:
+            # the write of the number was lost
+            pending.stage = _Stage.ASK
+            raise InProgress(self._now())
+        if shown.answered != pending.number:
+            raise InProgress(min(self._now() + _PERIOD, pending.until + _PERIOD))
+        self._pending = None
+        if shown.result != _DONE:
+            raise self._refused(wanted, shown)
+        if wanted.writes:
+            return Reply(b'', shown.arrived)
+        return Reply(shown.data[-wanted.address.size :], shown.arrived)
+
+    def _exchange(self, offset: int = 0, data: bytes = b'') -> _Shown:
+        """Write registers, if any, and read all."""
+        at, count = self._first, _LAYOUT.size // 2
+        try:
+            if data and not self._apart:
+                try:
+                    written = WriteAndRead(self._unit, at + offset, data, at, count)
+                    return _Shown(*self._ask(written))
+                except Refused as refusal:
+                    if refusal.code != Refused.ILLEGAL_FUNCTION:
+                        raise
+                    self._apart = True
+            if data:
+                self._ask(Write(self._unit, at + offset, data, multiple=True))
+            return _Shown(*self._ask(Read(self._unit, at, count)))
+        except Refused as refusal:
+            raise self._of_registers(refusal) from None
+
+    # --- what went wrong --------------------------------------------------------------------------
+
+    def _refused(self, wanted: _Wanted, shown: _Shown) -> LinkError:
+        if shown.result == _BUSY:
+            return Refused(Refused.BUSY)
+        if shown.result == _NONE_SUCH:
+            return Refused(Refused.ILLEGAL_ADDRESS, f'the drive has no {wanted.place}')
+        if shown.result == _REFUSED:
+            code, text = _CODES.get(shown.error, _ANY)
+            return Refused(code, f'{text} ({wanted.place}, PROFIdrive error {shown.error:02X}h)')
+        return NoPath(
+            f'the PLC does not reach {wanted.place} of the drive (register +25 of its block is '
+            f'{shown.result}): check the fieldbus, and FB_RosParameter in the program of the PLC'
+        )
+
+    def _unanswered(self, wanted: _Wanted) -> LinkError:
+        text = (
+            f'the PLC did not answer for {wanted.place} within {TIME:g} s (register +24 of its '
+            'block): check that its program calls FB_RosMailbox and FB_RosParameter in each cycle'
+        )
+        return self._lost(wanted, text)
+
+    def _disturbed(self, wanted: _Wanted) -> LinkError:
+        text = (
+            f'another client has written to the mailbox of the PLC while {wanted.place} was asked '
+            'for, or the PLC has restarted: only one client may use a mailbox'
+        )
+        return self._lost(wanted, text)
+
+    @staticmethod
+    def _lost(wanted: _Wanted, text: str) -> LinkError:
+        return Unconfirmed(text) if wanted.writes else NoAnswer(text)
+
+    def _of_registers(self, refusal: Refused) -> LinkError:
+        if refusal.code != Refused.ILLEGAL_ADDRESS:
+            return refusal
+        return NoPath(
+            f'unit {self._unit} has no registers {self._first} to {self._first + 11} (exception '
+            f'{refusal.code}), the mailbox of layout 2: check the program of the PLC'
+        )
+
+
+def _unlike(*numbers: int) -> int:
+    """Return the number of a request: none of these, and not 0."""
+    number = numbers[0]
+    while number in (0, *numbers):
+        number = number % 0xFFFF + 1
+    return number
