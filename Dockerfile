@@ -1,4 +1,4 @@
-# ROS 2 Jazzy, and both packages built in the ordinary way; the commands are those of the README.
+# ROS 2 Jazzy, and both packages built in the ordinary way; the commands are those of docs/releases.md.
 #
 #   docker build -t nfo_sinus_driver .
 #   docker run -it --rm --init nfo_sinus_driver ros2 launch nfo_sinus_driver simulation.launch.py
@@ -11,13 +11,15 @@ RUN apt-get update \
 
 WORKDIR /workspace
 COPY . src/nfo_sinus_driver
+# no tool looks for a package inside another one
+RUN ln -s nfo_sinus_driver/msg_defs src/nfo_sinus_msgs
 
 RUN apt-get update \
     && rosdep update --rosdistro jazzy \
-    && rosdep install --from-paths src src/nfo_sinus_driver/msg_defs -i --rosdistro jazzy --default-yes \
+    && rosdep install --from-paths src -i --rosdistro jazzy --default-yes \
     && rm -rf /var/lib/apt/lists/*
 RUN . /opt/ros/jazzy/setup.sh \
-    && colcon build --base-paths src src/nfo_sinus_driver/msg_defs
+    && colcon build
 
 # the entry point of the base image knows its own packages alone
 RUN sed --in-place '/^exec/i source /workspace/install/setup.bash' /ros_entrypoint.sh

@@ -13,7 +13,6 @@ import json
 import math
 import os
 from pathlib import Path
-import shutil
 import signal
 import socket
 import subprocess
@@ -23,6 +22,7 @@ import time
 from typing import Any
 import warnings
 
+from ament_index_python.packages import get_package_prefix
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 import forks
@@ -553,6 +553,5 @@ def _no_traceback(process: Process) -> None:
 
 
 def _executable(name: str) -> str:
-    path = shutil.which(name)
-    assert path, f'{name} is not on the path: run the tests by make'
-    return path
+    # as ros2 run finds it
+    return f'{get_package_prefix("nfo_sinus_driver")}/lib/nfo_sinus_driver/{name}'

@@ -17,6 +17,7 @@ from bench import Bench, Client, wait_until
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 from support.aggregator import Aggregator
+from support.places import MSG_DEFS
 from support.sros2_policy import Policy, allowed
 from ways import Way
 import yaml
@@ -116,7 +117,7 @@ def test_foxglove_names_the_states_as_the_message_does() -> None:
     (states,) = [one['customStates']['states'] for one in panel['paths'] if 'customStates' in one]
     shown = {state['label'].upper().replace(' ', '_'): int(state['value']) for state in states}
     assert shown == {name: getattr(DriveStatus, name) for name in shown}
-    text = (CONFIG.parent / 'msg_defs' / 'msg' / 'DriveStatus.msg').read_text()
+    text = (MSG_DEFS / 'msg' / 'DriveStatus.msg').read_text()
     (listed,) = re.findall(r'# state: the drive.*?\n((?:uint8 .*\n)+)', text)
     assert set(shown) == {*re.findall(r'uint8 (\w+)=', listed), 'UNKNOWN'}
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The container is built by the commands of the README."""
+"""The container is built by the commands for a workspace."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ import yaml
 from nfo_sinus_driver.drive import DriveSettings
 
 ROOT = Path(__file__).resolve().parents[2]
-README = (ROOT / 'README.md').read_text(encoding='utf-8')
 DOCKERFILE = (ROOT / 'Dockerfile').read_text(encoding='utf-8')
 #: Lines of a command that goes on, joined.
 RUN = re.sub(r'\\\n\s*', '', DOCKERFILE)
 
 
-def commands(beginning: str) -> list[str]:
-    """The commands of the README that begin so."""
-    return [line.strip() for line in README.splitlines() if line.strip().startswith(beginning)]
+def commands(page: str, beginning: str) -> list[str]:
+    """The commands of a page that begin so."""
+    lines = (ROOT / page).read_text(encoding='utf-8').splitlines()
+    return [line.strip() for line in lines if line.strip().startswith(beginning)]
 
 
-def test_it_is_built_and_used_as_the_readme_says() -> None:
+def test_it_is_built_and_used_as_the_pages_say() -> None:
     for beginning in ('rosdep install', 'colcon build'):
-        (command,) = commands(beginning)
+        (command,) = commands('docs/releases.md', beginning)
         assert command in RUN
-    build, run = commands('docker')
+    build, run = commands('README.md', 'docker')
     assert f'#   {build}\n' in DOCKERFILE and f'#   {run}\n' in DOCKERFILE
     assert ' --init ' in run
     *_, launch = run.partition('ros2 launch nfo_sinus_driver ')

@@ -13,11 +13,11 @@ import runpy
 from xml.etree import ElementTree
 
 import pytest
+from support.places import MSG_DEFS, ROOT
 
 from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
 from nfo_sinus_driver.simulator.family import every_injection, every_option
 
-ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'nfo_sinus_driver'
 INTERFACE = ROOT / 'docs' / 'interface.md'
 SIMULATOR = ROOT / 'docs' / 'simulator.md'
@@ -214,12 +214,11 @@ def test_simulator_and_make_targets_are_documented() -> None:
 
 
 def test_messages_are_documented() -> None:
-    kinds = [*(ROOT / 'msg_defs').rglob('*.msg'), *(ROOT / 'msg_defs').rglob('*.srv')]
-    names = {path.stem for path in (*kinds, *(ROOT / 'msg_defs').rglob('*.action'))}
+    names = {path.stem for kind in ('msg', 'srv', 'action') for path in MSG_DEFS.rglob(f'*.{kind}')}
     page = read(MESSAGES)
     missing = {name for name in names if not re.search(rf'\b{name}\b', page)}
     for name in ('DriveStatus', 'InvSt', 'Telemetry', 'BusStatistics'):
-        found = fields(read(ROOT / 'msg_defs' / 'msg' / f'{name}.msg'))
+        found = fields(read(MSG_DEFS / 'msg' / f'{name}.msg'))
         assert len(found) > 5, name
         missing |= {f'{name}.{field}' for field in found if f'`{field}`' not in page}
     assert missing - {f'{name}.header' for name in names} == set()

@@ -12,6 +12,7 @@ import re
 import shutil
 
 import pytest
+from support.places import MSG_DEFS
 
 from nfo_sinus_driver.catalog import CatalogError, families, family, load_family
 
@@ -76,7 +77,7 @@ def test_every_folder_is_a_family() -> None:
 
 @pytest.mark.parametrize('name', families())
 def test_every_control_method_has_a_constant_in_the_message(name: str) -> None:
-    message = Path(__file__).parents[3] / 'msg_defs' / 'msg' / 'DriveStatus.msg'
+    message = MSG_DEFS / 'msg' / 'DriveStatus.msg'
     constants = re.findall(r'uint8 (\w+)=', message.read_text(encoding='utf-8'))
     assert {method.upper() for method in load_family(name).profile.methods} <= set(constants)
 

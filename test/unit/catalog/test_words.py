@@ -6,12 +6,12 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from pathlib import Path
 import re
 
 from hypothesis import given, strategies as st
 import pytest
 from support.addresses import packed
+from support.places import MSG_DEFS
 
 from nfo_sinus_driver.catalog import Fact, Family, Kind, Meaning, State, families, load_family
 from nfo_sinus_driver.families.movitrac31 import words as movitrac
@@ -20,7 +20,7 @@ from nfo_sinus_driver.families.sinus_optimal import words as optimal
 
 G2, OPTIMAL = load_family('sinus_g2'), load_family('sinus_optimal')
 MOVITRAC = load_family('movitrac31')
-DRIVE_STATUS = Path(__file__).resolve().parents[3] / 'msg_defs' / 'msg' / 'DriveStatus.msg'
+DRIVE_STATUS = MSG_DEFS / 'msg' / 'DriveStatus.msg'
 WORD = st.integers(0, 0xFFFF)
 KIND = st.sampled_from(Kind)
 #: What firmware before 4.28 of the G2 shows for 37 to 40 [C3].

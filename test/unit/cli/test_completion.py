@@ -12,12 +12,12 @@ import subprocess
 
 from cli_bench import COMMAND
 import pytest
+from support.places import MSG_DEFS, ROOT
 
 from nfo_sinus_driver.cli.main import VERBS, main
 from nfo_sinus_driver.simulator.main import main as simulator
 from nfo_sinus_driver.version import VERSION
 
-ROOT = Path(__file__).resolve().parents[3]
 
 def completed(line: str, folder: Path) -> set[str]:
     """What a shell is offered for the last word of a line."""
@@ -60,11 +60,11 @@ def test_commands_say_their_version(
 def test_all_files_have_the_same_version() -> None:
     found = {
         match
-        for name, pattern in (
-            ('package.xml', '<version>(.*)</version>'),
-            ('msg_defs/package.xml', '<version>(.*)</version>'),
-            ('setup.py', "version='(.*)'"),
+        for path, pattern in (
+            (ROOT / 'package.xml', '<version>(.*)</version>'),
+            (MSG_DEFS / 'package.xml', '<version>(.*)</version>'),
+            (ROOT / 'setup.py', "version='(.*)'"),
         )
-        for match in re.findall(pattern, (ROOT / name).read_text(encoding='utf-8'))
+        for match in re.findall(pattern, path.read_text(encoding='utf-8'))
     }
     assert found == {VERSION}

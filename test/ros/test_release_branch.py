@@ -1,0 +1,112 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The branch of the packages side by side: found, built and tested in an empty workspace."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import subprocess
+
+import pytest
+from support.places import ROOT
+
+packages = pytest.importorskip('catkin_pkg.packages', reason='catkin_pkg is not installed')
+pytest.importorskip('colcon_core', reason='colcon is not installed')
+if not (ROOT / '.git').exists():
+    pytest.skip('this is not a clone of main', allow_module_level=True)
+
+#: Of the driver's own tests, those that look for the other package, and one that runs the driver.
+TESTS = (
+    'test/unit/catalog/test_family.py', 'test/unit/cli/test_completion.py',
+    'test/unit/test_docs.py', 'test/ros/test_calls_logged.py',
+)
+
+
+def run(*command: object, folder: Path) -> str:
+    """Run a command where ROS is sourced and nothing of this clone is."""
+    built = str(ROOT / 'install')
+    environment = {
+        name: ':'.join(part for part in value.split(':') if not part.startswith(built))
+        for name, value in os.environ.items()
+    }
+    # set by tools/run for the processes of the tests
+    environment.pop('PYTHONPATH', None)
+    done = subprocess.run(
+        [*map(str, command)],
+        cwd=folder, env=environment, check=False, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )
+    assert done.returncode == 0, done.stdout[-6000:]
+    return done.stdout
+
+
+@pytest.fixture(scope='module')
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A repository with the branch."""
+    folder = tmp_path_factory.mktemp('source')
+    run('git', 'clone', '--quiet', ROOT, '.', folder=folder)
+    run('git', 'config', 'user.name', 'A test', folder=folder)
+    run('git', 'config', 'user.email', 'test@example.org', folder=folder)
+    run(ROOT / 'tools' / 'release_branch', folder=folder)
+    return folder
+
+
+@pytest.fixture(scope='module')
+def workspace(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace with nothing but the branch."""
+    folder = tmp_path_factory.mktemp('workspace')
+    run('git', 'clone', '--quiet', '--branch', 'jazzy', source, 'src/nfo_sinus', folder=folder)
+    return folder
+
+
+def test_both_packages_are_found(workspace: Path) -> None:
+    found = packages.find_packages(str(workspace / 'src'))
+    assert {package.name for package in found.values()} == {'nfo_sinus_driver', 'nfo_sinus_msgs'}
+
+
+def test_history_goes_on_through_the_branch(source: Path) -> None:
+    for new, old in (
+        ('nfo_sinus_driver/setup.py', 'setup.py'),
+        ('nfo_sinus_msgs/msg/DriveStatus.msg', 'msg_defs/msg/DriveStatus.msg'),
+    ):
+        blame = ('git', 'blame', '--line-porcelain')
+        assert run(*blame, 'jazzy', '--', new, folder=source).replace(new, old) == run(
+            *blame, 'HEAD', '--', old, folder=source
+        )
+
+
+def test_what_would_be_lost_is_refused(source: Path) -> None:
+    tool = ROOT / 'tools' / 'release_branch'
+    run('git', 'branch', 'other', folder=source)
+    for branch, reason in (('jazzy', 'has it already'), ('other', 'name another one')):
+        done = subprocess.run(
+            [tool, branch], cwd=source, check=False, capture_output=True, text=True
+        )
+        assert done.returncode == 1 and reason in done.stderr, done.stderr
+    # the next commit comes on top of the last one
+    last = run('git', 'rev-parse', 'jazzy', folder=source)
+    run('git', 'commit', '--quiet', '--allow-empty', '--message', 'A change', folder=source)
+    run(tool, folder=source)
+    assert run('git', 'rev-parse', 'jazzy^1', folder=source) == last
+    assert run('git', 'rev-parse', 'jazzy^2', folder=source) == run(
+        'git', 'rev-parse', 'HEAD', folder=source
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_a_plain_build_makes_both_packages_and_their_tests_pass(workspace: Path) -> None:
+    run('colcon', 'build', folder=workspace)
+    in_workspace = '. install/local_setup.sh && exec "$@"'
+    for package, tests in (('nfo_sinus_msgs', ()), ('nfo_sinus_driver', TESTS)):
+        # colcon takes what comes after --pytest-args for that, up to the end
+        chosen = ('--pytest-args', *tests) if tests else ()
+        command = ('colcon', 'test', '--packages-select', package, *chosen)
+        run('sh', '-c', in_workspace, 'sh', *command, folder=workspace)
+        report = run(
+            'colcon', 'test-result', '--verbose', '--test-result-base', f'build/{package}',
+            folder=workspace,
+        )
+        assert ', 0 errors, 0 failures' in report and 'Summary: 0 tests' not in report
