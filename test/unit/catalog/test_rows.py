@@ -456,9 +456,8 @@ def test_the_error_log_of_the_movitrac_are_five_codes_and_what_was_kept_of_each(
     assert not area.timed
     assert math.isnan(area.hours(4500))
     for number, first in enumerate((400, 409, 418, 427, 436)):
-        # inverter status and terminals are not decoded [C77]
         kept = [index(key) - first for _, key in area.readings_of(number)]
-        assert kept == [0, 2, 3, 4, 6]
+        assert kept == [0, 2, 3, 4, 6, 7, 8]
         rows = [row for row in MOVITRAC.values() if row.name.startswith(f'Fault t-{number} ')]
         assert [index(row.key) - first for row in rows] == [0, 2, 3, 4, 6, 7, 8]
         names = [row.at('movitrac').codec.name for row in rows]
