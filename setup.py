@@ -35,7 +35,7 @@ setup(
     zip_safe=False,
     maintainer='NFO Sinus driver developers',
     maintainer_email='nfo-sinus-driver@example.org',
-    description='Driver for NFO Sinus and other frequency inverters on a bus',
+    description='Driver for NFO Sinus and other variable-frequency drives (VFDs) on a bus',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
