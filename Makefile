@@ -101,6 +101,7 @@ parameters: setup ## write the tables of parameters in docs/ from those of the d
 	@PYTHONPATH=. .venv/bin/python tools/parameters_page.py > docs/parameters.md.new
 	@mv docs/parameters.md.new docs/parameters.md
 	@PYTHONPATH=. .venv/bin/python tools/settings_page.py
+	@PYTHONPATH=. .venv/bin/python tools/manuals_page.py
 
 build: ## build both packages again
 	@rm -rf build install

@@ -10,7 +10,8 @@ project = 'nfo_sinus_driver'
 copyright = 'the nfo_sinus_driver authors, Apache License 2.0'
 extensions = ['myst_parser', 'sphinxcontrib.mermaid']
 include_patterns = [
-    *('README.md', 'CONTRIBUTING.md', 'CHANGELOG.rst', 'docs/*.md', 'benchmark/results.md'),
+    *('README.md', 'CONTRIBUTING.md', 'CHANGELOG.rst', 'docs/*.md', 'docs/drives/*.md'),
+    'benchmark/results.md',
 ]
 exclude_patterns = ['.*', 'build', 'install', 'log', 'site']
 root_doc = 'docs/README'

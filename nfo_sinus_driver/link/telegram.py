@@ -311,7 +311,7 @@ class Block:
             raise NoPath(
                 f'register {self._start + 4} of unit {self._unit} is {version} and not 1 or 2, '
                 'the version of the layout of the block: check block_address, and that the '
-                'program of the PLC is that of docs/telegram1.md'
+                'program of the PLC is that of docs/plc.md'
             )
         if shown[2] != self._life:
             self._life = shown[2]

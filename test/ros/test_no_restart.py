@@ -92,7 +92,7 @@ def _keypad_stop(bench: Bench, drive: Simulated, client: Client) -> None:
 
 
 def _power_cycle(bench: Bench, drive: Simulated, client: Client) -> None:
-    # a MOVITRAC that forgets nothing, and is back soon, does not tell (docs/movitrac.md)
+    # a MOVITRAC that forgets nothing, and is back soon, does not tell (docs/drives/movitrac31.md)
     drive.inject('power-cycle', *([3.0] if bench.way.model == 'movitrac31' else []))
     client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
     client.wait_for('status', lambda status: status.connected, 'it is back')

@@ -23,7 +23,7 @@ INTERFACE = ROOT / 'docs' / 'interface.md'
 SIMULATOR = ROOT / 'docs' / 'simulator.md'
 MESSAGES = ROOT / 'docs' / 'messages.md'
 DEVELOPMENT = ROOT / 'docs' / 'development.md'
-PAGES = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').glob('*.md')))
+PAGES = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').rglob('*.md')))
 PICTURES = sorted((ROOT / 'docs').glob('*.svg'))
 #: Parameters of another node than the driver's; test/ros/test_config_names.py has those.
 OF_OTHERS = {'diagnostic_aggregator.yaml'}
@@ -254,7 +254,9 @@ def test_every_reading_that_is_cited_is_listed() -> None:
 
 def test_every_page_is_in_the_index() -> None:
     index = {file for file, _ in links(read(ROOT / 'docs' / 'README.md'))}
-    assert {page.name for page in (ROOT / 'docs').glob('*.md')} - index == {'README.md'}
+    docs = ROOT / 'docs'
+    pages = {page.relative_to(docs).as_posix() for page in docs.rglob('*.md')}
+    assert pages - index == {'README.md'}
 
 
 def test_pictures_are_whole_and_shown_and_say_what_they_show() -> None:

@@ -21,7 +21,7 @@ def test_every_page_is_made_and_no_link_leads_nowhere(tmp_path: Path) -> None:
         cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
     )
     assert done.returncode == 0, done.stderr
-    pages = [*(ROOT / 'docs').glob('*.md'), ROOT / 'README.md', ROOT / 'CHANGELOG.rst']
+    pages = [*(ROOT / 'docs').rglob('*.md'), ROOT / 'README.md', ROOT / 'CHANGELOG.rst']
     index = (tmp_path / 'docs' / 'README.html').read_text()
     for page in pages:
         made = tmp_path / page.relative_to(ROOT).with_suffix('.html')

@@ -1,0 +1,116 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""docs/manuals.csv: what serves a row of a manual is there, and the page is current."""
+
+from __future__ import annotations
+
+import fnmatch
+from pathlib import Path
+import re
+import runpy
+
+import pytest
+from test_docs import fields, headings, read, topics_and_services
+
+from nfo_sinus_driver.catalog import Family, load_family
+from nfo_sinus_driver.cli.main import VERBS
+from nfo_sinus_driver.cli.parameter_file import readable
+from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / 'docs'
+_TOOL = runpy.run_path(str(ROOT / 'tools' / 'manuals_page.py'))
+ROWS = _TOOL['rows']()
+#: The drives that each manual is about.
+FAMILIES = {
+    'M0': 'sinus_g2', 'M1': 'sinus_optimal', 'M2': 'sinus_g2', 'M3': 'sinus_h', 'M4': 'movitrac31',
+}
+MESSAGES = {
+    '~/status': 'DriveStatus', '~/inv_st': 'InvSt', '~/telemetry': 'Telemetry',
+    '~/statistics': 'BusStatistics', '~/measured': 'Measured',
+}
+SETTINGS = {**BUS_SETTINGS, **DRIVE_SETTINGS}
+OFFERED = {
+    name
+    for path in (ROOT / 'nfo_sinus_driver' / 'node').glob('*.py')
+    for name in topics_and_services(read(path))
+}
+
+
+def is_there(name: str, family: Family) -> bool:
+    """Whether there is what a row names: topic, field, service, setting, parameter, verb, place."""
+    if name.startswith(('~/', '/')):
+        return _is_offered(*name.split())
+    if name.startswith('nfo-sinus '):
+        return name.split()[1] in VERBS
+    if '.md' in name:
+        file, _, anchor = name.partition('#')
+        return (DOCS / file).is_file() and anchor in headings(read(DOCS / file))
+    setting, _, value = name.partition(': ')
+    if setting in SETTINGS:
+        return not value or value in _choices(setting, family)
+    return bool(fnmatch.filter(readable(family), name))
+
+
+def _is_offered(topic: str, field: str = '') -> bool:
+    if not field:
+        return topic in OFFERED
+    message = read(ROOT / 'msg_defs' / 'msg' / f'{MESSAGES[topic]}.msg')
+    return topic in OFFERED and field in fields(message)
+
+
+def _choices(setting: str, family: Family) -> set[str]:
+    methods = family.profile.methods
+    if setting == 'control_method':
+        return {'monitor', *methods}
+    if setting == 'reference':
+        return {reference for method in methods.values() for reference in method.references}
+    return set(SETTINGS[setting].choices)
+
+
+def missing(row: dict[str, str]) -> list[str]:
+    """What a row names, in either of its last columns, and is not there."""
+    family = load_family(FAMILIES[row['manual']])
+    named = [*_TOOL['served_by'](row), *re.findall('`([^`]+)`', row['why'])]
+    return [name for name in named if not is_there(name, family)]
+
+
+def test_what_a_row_names_is_there() -> None:
+    found = {f'{row["manual"]} {row["place"]} {row["what"]}': missing(row) for row in ROWS}
+    assert {row: names for row, names in found.items() if names} == {}
+
+
+def test_a_row_says_what_serves_it_or_why_it_is_not_served() -> None:
+    assert list(ROWS[0]) == _TOOL['COLUMNS']
+    wrong = [
+        row for row in ROWS
+        if row['status'] not in _TOOL['STATUSES']
+        or bool(row['served_by']) is (row['status'] == 'not')
+        or bool(row['why']) is (row['status'] == 'served')
+        or not row['place'] or not row['what']
+    ]
+    assert wrong == []
+    told = [(row['manual'], row['place'], row['what']) for row in ROWS]
+    assert [one for one in told if told.count(one) > 1] == []
+
+
+def test_the_page_is_current_and_every_manual_has_rows_and_a_page_of_its_drive() -> None:
+    assert read(DOCS / 'manuals.md') == _TOOL['page'](), 'make parameters'
+    assert {row['manual'] for row in ROWS} == _TOOL['MANUALS'].keys() == FAMILIES.keys()
+    for _, drive in _TOOL['MANUALS'].values():
+        text = read(DOCS / 'drives' / f'{drive}.md')
+        assert '(../manuals.md#' in text, drive
+        words = [word for word in text.split() if re.search(r'\w', word)]
+        assert len(words) <= 600, drive
+
+
+@pytest.mark.parametrize(
+    'name',
+    [
+        '~/none', '~/status none', 'nfo-sinus none', 'control_method: none', 'reference: none',
+        'protocol: none', 'motor.none', 'none.*', 'none', 'none.md#at-all', 'interface.md#none',
+    ],
+)
+def test_what_is_not_there_is_found(name: str) -> None:
+    assert missing({'manual': 'M0', 'served_by': name, 'why': f'by `{name}`'}) == [name, name]

@@ -1,0 +1,101 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""docs/manuals.md: what each manual offers and what serves it; ``make parameters``."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+import csv
+from pathlib import Path
+import re
+
+DOCS = Path(__file__).resolve().parents[1] / 'docs'
+TABLE = DOCS / 'manuals.csv'
+COLUMNS = ['manual', 'place', 'what', 'status', 'served_by', 'why']
+STATUSES = ('served', 'in part', 'not')
+#: Title and page of each manual.
+MANUALS = {
+    'M0': ('NFO Sinus G2, communication supplement V2.03', 'sinus_g2'),
+    'M1': ('NFO Sinus Optimal, Modbus and Profinet quick guide', 'sinus_optimal'),
+    'M2': ('NFO Sinus G2, serial interface manual V5.0', 'sinus_g2_older'),
+    'M3': ('Santerno Sinus H, PROFINET module', 'sinus_h'),
+    'M4': ('SEW MOVITRAC 31, communications interfaces', 'movitrac31'),
+}
+
+_INTRODUCTION = """\
+<!-- Made from docs/manuals.csv by `make parameters`: change that. -->
+
+# The manuals
+
+What each manual offers to the owner of a drive, where the driver serves it, or why it does not.
+
+"""
+_HEAD = '| place | what | status | where, or why not |\n|---|---|---|---|\n'
+
+Row = Mapping[str, str]
+
+
+def rows() -> list[Row]:
+    """Return the rows of the table."""
+    with TABLE.open(encoding='utf-8', newline='') as stream:
+        return list(csv.DictReader(stream))
+
+
+def page() -> str:
+    """Return the whole page in Markdown."""
+    table = rows()
+    return _INTRODUCTION + _counts(table) + ''.join(_section(name, table) for name in MANUALS)
+
+
+def _counts(table: Sequence[Row]) -> str:
+    lines = [f'| manual | {" | ".join(STATUSES)} |', '|---|---|---|---|']
+    for name, (title, _) in MANUALS.items():
+        lines.append(f'| [{title}](#{_anchor(title)}) | {_numbers(_of(name, table))} |')
+    return '\n'.join([*lines, f'| all | {_numbers(table)} |', ''])
+
+
+def _numbers(table: Sequence[Row]) -> str:
+    counted = Counter(row['status'] for row in table)
+    return ' | '.join(str(counted[status]) for status in STATUSES)
+
+
+def _section(name: str, table: Sequence[Row]) -> str:
+    title, drive = MANUALS[name]
+    shown = f'\n## {title}\n\n[How to connect and run it](drives/{drive}.md). Cited as {name}.\n\n'
+    return shown + _HEAD + ''.join(_line(row) for row in _of(name, table))
+
+
+def _of(name: str, table: Sequence[Row]) -> list[Row]:
+    return [row for row in table if row['manual'] == name]
+
+
+def _line(row: Row) -> str:
+    answer = '; '.join(filter(None, (', '.join(_served(row)), row['why'])))
+    return f'| {row["place"]} | {row["what"]} | {row["status"]} | {answer} |\n'
+
+
+def _served(row: Row) -> Iterator[str]:
+    for one in served_by(row):
+        file, _, anchor = one.partition('#')
+        yield f'[{_title(file, anchor)}]({one})' if file.endswith('.md') else f'`{one}`'
+
+
+def served_by(row: Row) -> list[str]:
+    """Return each thing by which a row is served: a name that is typed, or a place in the docs."""
+    return [one.strip() for one in row['served_by'].split(';') if one.strip()]
+
+
+def _title(file: str, anchor: str) -> str:
+    """Return the title that an anchor of a page leads to."""
+    titles = re.findall(r'^#+ (.+)$', (DOCS / file).read_text(encoding='utf-8'), re.MULTILINE)
+    return next(title for title in titles if _anchor(title) == anchor)
+
+
+def _anchor(title: str) -> str:
+    return re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-')
+
+
+if __name__ == '__main__':
+    (DOCS / 'manuals.md').write_text(page(), encoding='utf-8')
