@@ -80,6 +80,7 @@ WAYS: Mapping[str, Way] = {
     'optimal ascii': Way('modbus_ascii', 'sinus_optimal'),
     'optimal, control word': Way('modbus_rtu', 'sinus_optimal', 'drive_control', 'terminal'),
     'movitrac': Way('movitrac', 'movitrac31', 'function_bits'),
+    'made up': Way('modbus_rtu', 'acme', 'drive_control'),
     'telegram1 g2': Way('telegram1', method='telegram1'),
     'telegram1 optimal': Way('telegram1', 'sinus_optimal', 'telegram1'),
     'telegram1 g2, drivecontrol': Way(

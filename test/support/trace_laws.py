@@ -203,9 +203,9 @@ def _places(model: str, protocol: str) -> _Places:
     at = {parameter.key: parameter.at(bus).index for parameter in parameters}
     command = at.get('fieldbus.scmd', at.get('fieldbus.smode', -1))
     mask = at.get('fieldbus.drv_ctrl_write_mask', -1)
-    word = at['fieldbus.drive_control']
+    word = at.get('fieldbus.drive_control', -1)
     return _Places(
-        mode=at['fieldbus.mode'],
+        mode=at.get('fieldbus.mode', -1),
         command=command,
         # the control word of the Optimal has other bits
         mask=mask,

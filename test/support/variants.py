@@ -23,6 +23,7 @@ _RAMPS = {
     'sinus_g2': ('control.accel', 'control.retard'),
     'sinus_optimal': ('control.accel', 'control.retard'),
     'movitrac31': ('ramp.t11_up', 'ramp.t11_down'),
+    'acme': ('ramp.up', 'ramp.up'),
     'sinus_h': ('drv.acc_time', 'drv.dec_time'),
 }
 

@@ -35,6 +35,7 @@ _NO_OTHER_WAY = {
     'optimal ascii': 'fieldbus.smode',
     'optimal, control word': 'fieldbus.drive_control',
     'movitrac': 'fieldbus.function_bits',
+    'made up': 'bus.word',
 }
 
 

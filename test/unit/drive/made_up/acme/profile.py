@@ -23,7 +23,7 @@ from nfo_sinus_driver.catalog.profile import (
     one,
     taken,
 )
-from nfo_sinus_driver.catalog.status import Fact, State, StatusCode, StatusWord
+from nfo_sinus_driver.catalog.status import Fact, Role, State, StatusCode, StatusWord
 
 _WORD, _TURN, _SIZE, _TOLD = 'bus.word', 'bus.turn', 'bus.size', 'bus.told'
 
@@ -93,10 +93,10 @@ class DriveControl(ControlMethod):
         yield Write(_WORD, Word.REMOTE | Word.RUN, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
-        """Take the run command back, and write set-point 0."""
-        if (yield from self.in_control()):
-            yield Write(_WORD, Word.REMOTE, retry=False)
-            yield from _FREQUENCY.zero(retry=False)
+        """Take the run command back, and write set-point 0, each by itself."""
+        if (yield from self.perhaps_in_control()):
+            command = one(Write(_WORD, Word.REMOTE, retry=False))
+            yield from self._stop_by(command, _FREQUENCY.zero(retry=False))
 
     def release(self) -> Steps[None]:
         """Give control back."""
@@ -104,10 +104,12 @@ class DriveControl(ControlMethod):
             yield Write(_WORD, 0)
 
     def remove(self, control_mode: str) -> Steps[Removal]:
-        """Take the run command back."""
-        if (yield from taken(one(Write(_WORD, Word.REMOTE)))):
+        """Take the run command back, and write set-point 0, each by itself."""
+        command = yield from taken(one(Write(_WORD, Word.REMOTE)))
+        setpoint = yield from taken(self.zero_setpoint(control_mode))
+        if command:
             return Removal.COMMAND
-        return Removal.NOTHING
+        return Removal.SETPOINT if setpoint else Removal.NOTHING
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
         """Acknowledge by an edge."""
@@ -143,4 +145,5 @@ PROFILE = Profile(
     setpoints={'Freque': _FREQUENCY},
     in_charge=_in_charge,
     told_by='bus.kind',
+    most={Role.ACTUAL_FREQUENCY: 480.0, Role.ACTUAL_SPEED: 24000.0},
 )

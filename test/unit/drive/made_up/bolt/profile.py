@@ -102,20 +102,23 @@ class FunctionBits(ControlMethod):
         yield Write(_BITS, Bit.RUN, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
-        """Take the run command back, and write set-point 0."""
-        if (yield from self.in_control()):
-            yield Write(_BITS, 0, retry=False)
-            yield from _FREQUENCY.zero(retry=False)
+        """Take the run command back, and write set-point 0, each by itself."""
+        if (yield from self.perhaps_in_control()):
+            yield from self._stop_by(
+                one(Write(_BITS, 0, retry=False)), _FREQUENCY.zero(retry=False)
+            )
 
     def release(self) -> Steps[None]:
         """Leave control where it is."""
         yield Write(_BITS, 0)
 
     def remove(self, control_mode: str) -> Steps[Removal]:
-        """Take the run command back."""
-        if (yield from taken(one(Write(_BITS, 0)))):
+        """Take the run command back, and write set-point 0, each by itself."""
+        command = yield from taken(one(Write(_BITS, 0)))
+        setpoint = yield from taken(self.zero_setpoint(control_mode))
+        if command:
             return Removal.COMMAND
-        return Removal.NOTHING
+        return Removal.SETPOINT if setpoint else Removal.NOTHING
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
         """Acknowledge by an edge."""
