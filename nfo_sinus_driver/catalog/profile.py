@@ -243,7 +243,7 @@ class SetpointTarget:
         return float(values[self.key])
 
     def zero(self, *, retry: bool) -> Steps[None]:
-        """Write set-point 0; ``once``: do not repeat a request without a response."""
+        """Write set-point 0; ``retry``: repeat a request without a response."""
         for write in self.writes(0.0):
             yield Write(write.key, write.value, at=write.at, retry=retry)
 
@@ -318,7 +318,7 @@ class ControlMethod(abc.ABC):
         there is no PLC between.
     :cvar caution: what of the drive itself decides whether it stops when the line is gone, and
         cannot be read; ``''``: nothing.
-    :cvar keeps_control: why :meth:`release` leaves control to the bus, and how a person gets it
+    :cvar control_retained: why :meth:`release` leaves control to the bus, and how a person gets it
         back; ``''`` where it does not.
     """
 

@@ -41,7 +41,7 @@ class ParameterAccess:
 
     :param addressing: how they are addressed; ``''``: as the line does.
     :param block_address: where the block of registers begins that they stand in, behind a PLC.
-    :param retries: how often a request without an answer is sent again, where ``once`` is false.
+    :param retries: how often a request without an answer is sent again, where ``retry`` is true.
     :raises LinkError: reading or writing fails, as the link does.
     :raises ValueError: a value that the drive cannot have, or bytes that mean none.
     """
