@@ -69,14 +69,17 @@ def test_one_impossible_value_stops_nothing_and_is_not_published(way: str) -> No
         assert rig.drive.following
         assert not rig.notes.events
         assert {shown(one) for one in found} <= usual
-        assert all(abs(one.frequency) < 50 and abs(one.speed) < 3000 for one in found)
+        assert all(abs(one.frequency) < 50 for one in found)
+        tells_speed = rig.drive.model.key(Role.ACTUAL_SPEED)
+        assert all(abs(one.speed) < 3000 for one in found if tells_speed)
 
 
 @every_way
 def test_measured_values_that_stay_impossible_are_nan_and_reported_once(way: str) -> None:
     with Rig(way) as rig:
         rig.turn()
-        spoilers = [Spoiler(rig, role, 0x66) for role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)]
+        measured = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
+        spoilers = [Spoiler(rig, role, 0x66) for role in measured if rig.drive.model.key(role)]
         rig.pass_time(1.0)
         before = len(rig.notes.snapshots)
         rig.pass_time(1.0)
@@ -85,7 +88,7 @@ def test_measured_values_that_stay_impossible_are_nan_and_reported_once(way: str
         assert len(found) > 5
         assert all(math.isnan(one.frequency) and math.isnan(one.speed) for one in found)
         warned = [one.text for one in rig.notes.events if one.severity is Severity.WARNING]
-        assert len(warned) == 2
+        assert len(warned) == len(spoilers)
         assert all(any(one.key in text for text in warned) for one in spoilers)
 
 
