@@ -343,7 +343,7 @@ class Cause(enum.Enum):
     # --- the error log
     LOG_ENTRY = 'error log: {entry}'
     LOG_ENTRY_UNSEEN = 'error log: {entry}; no poll saw it'
-    LOG_UNDOCUMENTED = 'the error log of this model ({model}) is not documented [M1]'
+    LOG_UNDOCUMENTED = 'the error log of this model ({model}) is not documented'
     LOG_NOT_WATCHED = 'its error log is not watched: {error}'
     LOG_CHANGES = 'the drive writes into its error log all the time: try again'
     # --- the settings of the drive
