@@ -241,9 +241,8 @@ def _read_family(name: str, method: str = '') -> Family:
     for needed in _needed_roles(profile):
         if needed not in roles:
             raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the {needed.value}')
-    if not 0 <= profile.status_word.shown <= _WIDEST_WORD:
-        where = folder / 'profile.py'
-        raise table.CatalogError(f'{where}: shown is wider than a status word, 32 bits')
+    for wrong in _wrong_in(profile, keys):
+        raise table.CatalogError(f'{folder / "profile.py"}: {wrong}')
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
 
     def area(row: table.Row) -> ErrorLogArea:
@@ -297,6 +296,14 @@ def _roles(folder: Path, keys: Collection[str]) -> Mapping[Role, str]:
         return Role(row['role']), _known(row['parameter'], keys)
 
     return dict(table.read(folder / 'roles.csv', role, lambda row: [row[0].value, row[1]]))
+
+
+def _wrong_in(profile: Profile, keys: Collection[str]) -> Iterator[str]:
+    if not 0 <= profile.status_word.shown <= _WIDEST_WORD:
+        yield 'shown is wider than a status word, 32 bits'
+    for key in (profile.told_by, *(target.key for target in profile.setpoints.values())):
+        if key and key not in keys:
+            yield f'no parameter is {key}'
 
 
 def _needed_roles(profile: Profile) -> Iterator[Role]:

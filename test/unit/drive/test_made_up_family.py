@@ -252,3 +252,14 @@ def test_a_family_without_a_status_code_is_none(bare: str, tmp_path: Path) -> No
     roles.write_text('role,parameter\nstatus_word,bus.told\n', encoding='utf-8')
     with pytest.raises(CatalogError, match='status_code'):
         load_family(bare)
+
+
+@pytest.mark.parametrize('key', ['bus.size', 'bus.kind'])
+def test_a_profile_names_no_parameter_that_the_tables_lack(
+    bare: str, tmp_path: Path, key: str
+) -> None:
+    profile = tmp_path / bare / 'profile.py'
+    text = profile.read_text(encoding='utf-8')
+    profile.write_text(text.replace(key, f'{key}_x'), encoding='utf-8')
+    with pytest.raises(CatalogError, match=f'profile.py: no parameter is {key}_x'):
+        load_family(bare)
