@@ -234,6 +234,8 @@ class Role(_LookedUp):
     PROCESS_UNIT = 'process_unit'
     STOP_MODE = 'stop_mode'
     START_DELAY = 'start_delay'
+    #: How long the motor is braked by direct current before it starts.
+    START_BRAKING = 'start_braking'
 
     ACTUAL_FREQUENCY = 'actual_frequency'
     ACTUAL_SPEED = 'actual_speed'

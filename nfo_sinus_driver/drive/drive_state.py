@@ -456,6 +456,13 @@ class DriveState:
             return await self.params.read_number(key, Priority.SERVICE)
         return _LONGEST_START_DELAY
 
+    async def read_start_braking(self) -> float:
+        """Read how long the drive brakes the motor before it starts, s; 0 if it does not tell."""
+        key = self.model.key(Role.START_BRAKING)
+        if not self.nameplate.has(key):
+            return 0.0
+        return await self.params.read_number(key, Priority.SERVICE)
+
     @property
     def kind(self) -> Kind:
         """How grave the inverter status is."""

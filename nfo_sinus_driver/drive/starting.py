@@ -18,8 +18,42 @@ from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError
 from nfo_sinus_driver.link import Refused
 
-#: How long all that a start waits for may take together, s, the start delay of the drive aside.
+#: How long all that a start waits for may take together, s, what the drive itself waits for aside.
 _START_TIMEOUT = 4.0
+
+
+class _StepTime:
+    """
+    How long a step of a start may take, with what the drive itself waits for.
+
+    :param deadline: when it would have to be over without that, s of the clock of the bus.
+    """
+
+    def __init__(self, state: DriveState, deadline: float) -> None:
+        self._state = state
+        self._deadline = deadline
+        self._delay: float | None = None
+        self._braking: float | None = None
+
+    @property
+    def added(self) -> float:
+        """How long the drive waits itself, as far as that was asked for, s."""
+        return (self._delay or 0.0) + (self._braking or 0.0)
+
+    async def is_over(self, status: InverterStatus) -> bool:
+        """Tell whether a drive with this status has had its time."""
+        if self._delay is None and status.means(Meaning.START_DELAY):
+            self._delay = await self._state.read_start_delay()
+        if self._braking is None and self._is_late(status):
+            # what it shows while it brakes the motor before the start is not printed [C122]
+            self._braking = await self._state.read_start_braking()
+        return self._is_late(status)
+
+    def _is_late(self, status: InverterStatus) -> bool:
+        # in standby after the start delay it has forgotten the start, and must not wait for
+        # another one
+        forgotten = self._delay is not None and status.standby and not self._braking
+        return forgotten or self._state.bus.now() > self._deadline + self.added
 
 
 class StartSequence:
@@ -75,27 +109,18 @@ class StartSequence:
 
     async def _await_start(self, wanted: Callable[[InverterStatus], bool]) -> None:
         """Wait until the drive has made a step on its way to run."""
-        deadline = min(self._state.bus.now() + drive_state.TIMEOUT, self._deadline)
-        delayed = False
-        while True:
-            status = await self._state.read_status(Priority.SERVICE)
-            if wanted(status):
-                return
+        state = self._state
+        step = _StepTime(state, min(state.bus.now() + drive_state.TIMEOUT, self._deadline))
+        while not wanted(status := await state.read_status(Priority.SERVICE)):
             if status.faulted:
-                raise DriveError(self._state.report(Cause.START_FAULTED))
-            # in standby after the start delay it has forgotten the start, and must not wait for
-            # another one
-            if Fact.RUN_INPUT_MISSING in status.facts or (delayed and status.standby):
-                raise DriveError(self._state.report(Cause.NO_RUN_INPUT))
-            if status.means(Meaning.START_DELAY) and not delayed:
-                delayed = True
-                delay = await self._state.read_start_delay()
-                self._deadline += delay
-                deadline += delay
-            if self._state.bus.now() > deadline:
+                raise DriveError(state.report(Cause.START_FAULTED))
+            if Fact.RUN_INPUT_MISSING in status.facts:
+                raise DriveError(state.report(Cause.NO_RUN_INPUT))
+            if await step.is_over(status):
                 cause = Cause.NO_RUN_INPUT if status.standby else Cause.NOT_STARTED
-                raise DriveError(self._state.report(cause))
-            await self._state.bus.sleep(drive_state.LOOK_PERIOD)
+                raise DriveError(state.report(cause))
+            await state.bus.sleep(drive_state.LOOK_PERIOD)
+        self._deadline += step.added
 
     async def take_control(self, control_mode: str) -> None:
         """

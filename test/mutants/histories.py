@@ -127,8 +127,8 @@ HISTORIES = (
         2,
         'in any order: a start that the RUN input ended waits for it',
         STARTING,
-        ' or (delayed and status.standby):',
-        ':',
+        'return forgotten or ',
+        'return ',
         ('test/unit/drive/test_any_order_found.py',),
     ),
     Mutant(

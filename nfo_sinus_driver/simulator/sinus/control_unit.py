@@ -452,6 +452,11 @@ class SinusControlUnit(ControlUnit):
         )
 
     @property
+    def preparing(self) -> bool:
+        """Whether it shows standby although the start has begun."""
+        return False
+
+    @property
     @abc.abstractmethod
     def stopping(self) -> bool:
         """Whether the motor is on its way to a stop."""
@@ -518,7 +523,7 @@ class SinusControlUnit(ControlUnit):
         motor = self.motor
         if self._delay_left:
             return self.delayed
-        if not motor.driven:
+        if not motor.driven or self.preparing:
             return standby
         if motor.chopper:
             return _BRAKE_CHOPPER

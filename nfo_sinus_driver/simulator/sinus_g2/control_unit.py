@@ -27,7 +27,7 @@ from nfo_sinus_driver.simulator.sinus.control_unit import (
 )
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules, SinusFaults
 from nfo_sinus_driver.simulator.sinus_g2 import ds402
-from nfo_sinus_driver.simulator.sinus_g2.firmware import G2Variant, firmware_of
+from nfo_sinus_driver.simulator.sinus_g2.firmware import AS_STANDBY, G2Variant, firmware_of
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import (
     FAILURES,
     PROCEDURES,
@@ -377,9 +377,18 @@ class G2ControlUnit(SinusControlUnit):
     def settled(self) -> bool:
         """Whether all stays as it is: state machine, DC braking, tuning, faults."""
         phase = self.machine.phase
-        braking = self._dc_brake_left > 0 and phase is Phase.OPERATION_ENABLED
-        waits = braking or self.tuning is not None or self.self_restart.waiting
+        waits = self._dc_brakes or self.tuning is not None or self.self_restart.waiting
         return super().settled and not waits and phase not in _PASSING
+
+    @property
+    def _dc_brakes(self) -> bool:
+        """Whether the motor is braked before it starts: DC-Brk."""
+        return self._dc_brake_left > 0 and self.machine.phase is Phase.OPERATION_ENABLED
+
+    @property
+    def preparing(self) -> bool:
+        """Whether it shows standby although the start has begun [C122]."""
+        return self._dc_brakes and self.variant.shown_in_dc_brk == AS_STANDBY
 
     def settle(self) -> None:
         """Carry out what stands: control word, state machine, power stage, demand."""
@@ -446,11 +455,14 @@ class G2ControlUnit(SinusControlUnit):
         if self.tuning is not None:
             return _TUNING_STATUS
         status = self.machine.status()
+        if self.preparing:
+            status &= ~(Status.OP_ENABLED | Status.REV_OP_ENABLED)
         if self.on_bus:
             status |= Status.CTRL_FROM_NET
             if self.word & Control.NET_REF:
                 status |= Status.REF_FROM_NET
-        if self.machine.phase is Phase.OPERATION_ENABLED and self.motor.reached:
+        running = self.machine.phase is Phase.OPERATION_ENABLED and not self.preparing
+        if running and self.motor.reached:
             status |= Status.SETPOINT_REACHED
         if self.motor.limited:
             status |= Status.LIMIT_ACTIVE
@@ -509,8 +521,7 @@ class G2ControlUnit(SinusControlUnit):
         motor = self.motor
         self._ramps()
         regulation = _REGULATION_OF[self.memory.raw('control.mode')]
-        braking = self.machine.phase is not Phase.OPERATION_ENABLED or self._dc_brake_left > 0
-        if braking:
+        if self.machine.phase is not Phase.OPERATION_ENABLED or self._dc_brakes:
             # a stop goes down the ramp in every control mode
             motor.regulation = (
                 Regulation.SPEED if regulation is Regulation.SPEED else Regulation.FREQUENCY

@@ -32,6 +32,8 @@ SW_VER = 'fieldbus.sw_ver'
 _OLD_FORMAT_CODES = {'7E1': 0, '8N1': 1}
 #: The words of telegram 1.
 PROFIDRIVE, DRIVECONTROL = 'profidrive', 'drivecontrol'
+#: What it shows while it brakes a motor before the start.
+AS_RUNNING, AS_STANDBY = 'running', 'standby'
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class G2Variant(SinusVariant):
     One way to read the manuals, and the chapter on CANopen ([M0 §6.4], [C102]).
 
     :ivar dialect: the manual that describes its firmware; ``''``: as SWVer says.
+    :ivar shown_in_dc_brk: what status word and inverter status show while DC-Brk goes on [C122].
     :ivar telegram_words: which words telegram 1 has.
     :ivar canopen_profile: what there is of the communication profile, which the manual leaves
         "TBD". ``full``: identity, texts, heartbeats, guarding; ``minimal``: device type, error
@@ -67,6 +70,11 @@ class G2Variant(SinusVariant):
         '5.0',
         text='the manual that describes the Classic protocol of the drives (default: as their '
         'firmware, fieldbus.sw_ver, says)',
+    )
+    shown_in_dc_brk: str = choice(
+        AS_RUNNING,
+        AS_STANDBY,
+        text='what it shows during the DC braking before a start, DC-Brk',
     )
     telegram_words: str = choice(
         PROFIDRIVE,

@@ -104,6 +104,30 @@ def test_two_at_a_time_cannot_enable_and_a_start_delay_of_the_drive_is_waited_fo
         assert rig.far.motor.driven
 
 
+@pytest.mark.parametrize('way', ['rtu', 'classic v5.0', 'rtu, control word', 'canopen'])
+@pytest.mark.parametrize('delay', [0, 3])
+def test_dc_braking_before_a_start_is_waited_for(way: str, delay: int) -> None:
+    brakes = {'control.run_dly': delay, 'control.dc_brk': 6}
+    with Rig(way, parameters=brakes, options={'shown_in_dc_brk': 'standby'}).connect() as rig:
+        begun = rig.clock.now
+        rig.enable()
+        assert rig.far.motor.driven and rig.clock.now - begun > delay + 5.0
+        rig.answer(rig.drive.stop())
+        # a stop ends it
+        rig.pass_time(1.0)
+        waiting = rig.drive.enable()
+        rig.pass_time(delay + 1.0)
+        rig.answer(rig.drive.stop())
+        assert rig.answer(waiting) == 'it was stopped while it was being enabled'
+        assert not rig.turns
+
+
+def test_an_open_run_input_is_told_although_the_drive_could_be_braking() -> None:
+    brakes = {'control.dc_brk': 6}
+    with Rig(options={'run_input': False}, parameters=brakes).connect() as rig:
+        assert 'its RUN input (DIN1) is not active' in rig.answer(rig.drive.enable(), 10.0)
+
+
 def test_run_input_is_missing() -> None:
     with Rig(options={'run_input': False}).connect() as rig:
         assert 'its RUN input (DIN1) is not active' in rig.answer(rig.drive.enable())

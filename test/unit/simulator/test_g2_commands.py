@@ -237,6 +237,14 @@ def test_start_delay_and_dc_braking_before_the_start(make_bench):
     assert (bench.running, bench.read('status.frq_act')) == (True, 0)
     bench.drive.advance(1)
     assert bench.read('status.frq_act') > 5
+    bench = make_bench(shown_in_dc_brk='standby')
+    bench.write('control.dc_brk', 2)
+    bench.run(20, 1.9)
+    shown = bench.inv_st, bench.read('fieldbus.drive_status') & 0x4004
+    assert (bench.running, *shown) == (True, 37, 0)
+    bench.drive.advance(1)
+    shown = bench.inv_st, bench.read('fieldbus.drive_status') & 0x4004
+    assert (bench.running, *shown) == (True, 39, 4)
 
 
 # ---- the RUN input, the keypad, the mains ----
