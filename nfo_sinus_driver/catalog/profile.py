@@ -310,6 +310,8 @@ class ControlMethod(abc.ABC):
     :cvar means: what takes its commands.
     :cvar references: those that there are.
     :cvar coasts: it can release the motor at once.
+    :cvar quick_stop_by: the setting of the drive that a quick stop goes by, where it may be a ramp;
+        ``''``: it releases the motor.
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
     :cvar procedures: what begins each procedure that it has.
     :cvar addressing: how it reaches the parameters of its tables, where that is another way than
@@ -325,6 +327,7 @@ class ControlMethod(abc.ABC):
     means: ClassVar[str]
     references: ClassVar[Sequence[str]]
     coasts: ClassVar[bool] = False
+    quick_stop_by: ClassVar[str] = ''
     older: ClassVar[bool] = True
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
     control_retained: ClassVar[str] = ''
@@ -374,7 +377,11 @@ class ControlMethod(abc.ABC):
         """
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
-        """Release the motor at once; control may be given back by it. Else stop as usual."""
+        """
+        Release the motor at once, or stop it by :attr:`quick_stop_by`. Else stop as usual.
+
+        Control may be given back by it.
+        """
         return self.stop(control_mode)
 
     def force_stop(self, control_mode: str) -> Steps[bool]:

@@ -201,6 +201,11 @@ class Commands:
         return self._method.coasts
 
     @property
+    def quick_stop_by(self) -> str:
+        """The setting of the drive that a quick stop goes by; ``''``: it releases the motor."""
+        return self._method.quick_stop_by
+
+    @property
     def plc_time(self) -> float:
         """After so long without a word of the driver a PLC stops the drive, s; 0: no PLC."""
         return self._method.plc_time
@@ -249,7 +254,7 @@ class Commands:
         await carry_out(self._method.stop(control_mode), self._params, Priority.STOP)
 
     async def quick_stop(self, control_mode: str) -> None:
-        """Release the motor at once, if the drive has a way; control may be given back by it."""
+        """Do the quick stop of the drive, if it has one; control may be given back by it."""
         await carry_out(self._method.quick_stop(control_mode), self._params, Priority.STOP)
 
     async def force_stop(self, control_mode: str) -> bool:

@@ -302,7 +302,8 @@ class Controller:
         """
         Release the motor at once: it coasts; by MODE and SCMD control is given back, too.
 
-        Where the drive has no way to do that, stop as usual [C96].
+        Where the quick stop of the drive goes by a setting, the motor may ramp down; where there is
+        none, stop as usual [C96].
         """
         if not self.method.coasts:
             return Report(Cause.NO_QUICK_STOP, stop=await self.stop())
@@ -313,11 +314,7 @@ class Controller:
                 may_run = may_run or (await self._state.read_status(Priority.LOOK)).tuning
                 if may_run:
                     await self.method.quick_stop(self._state.control_mode)
-                    told_at = self._bus.now()
-                    # a PLC whose data stand still goes on showing what was before
-                    await self._state.wait_until(
-                        lambda status: status.at >= told_at and not status.driven, Priority.LOOK
-                    )
+                    await self._await_quick_stop(self._bus.now())
             except Exception as error:
                 # even after a mistake of ours the motor is not left as it is
                 self._sequence.start()
@@ -334,7 +331,27 @@ class Controller:
                 return self._no_control(self._state.status)
             self._sequence.start()
             await self._settle()
+            return self._quick_stopped()
+
+    async def _await_quick_stop(self, told_at: float) -> None:
+        """Wait until the motor is released, or on its way to a stop where a setting decides."""
+        by = self.method.quick_stop_by
+
+        def stops(status: InverterStatus) -> bool:
+            return not (status.keeps_running_since(told_at) if by else status.driven)
+
+        # a PLC whose data stand still goes on showing what was before
+        await self._state.wait_until(
+            lambda status: status.at >= told_at and stops(status), Priority.LOOK
+        )
+
+    def _quick_stopped(self) -> Report:
+        """Return what a quick stop has done, as far as the drive shows it."""
+        by, status = self.method.quick_stop_by, self._state.status
+        if not by:
             return Report(Cause.QUICK_STOPPED)
+        ramps = status is not None and status.driven
+        return Report(Cause.QUICK_STOP_RAMPS if ramps else Cause.QUICK_STOP_OFF, by=by)
 
     async def acknowledge(self) -> Report:
         """Acknowledge a fault, run command and set-point first, where the drive lets us."""

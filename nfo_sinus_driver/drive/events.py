@@ -117,6 +117,8 @@ class Cause(enum.Enum):
     COASTING = 'stopping: it coasts'
     RAMPING = 'stopping: it ramps down'
     QUICK_STOPPED = 'released: the motor coasts'
+    QUICK_STOP_RAMPS = 'stopping: it ramps down (quick stop by {by})'
+    QUICK_STOP_OFF = 'stopped: the output is at 0 Hz (quick stop by {by})'
     NO_QUICK_STOP = '{stop} (this drive has no quick stop)'
     QUICK_STOP_UNCONFIRMED = 'the quick stop is NOT confirmed: {why} ({status}); trying a stop'
     NO_CONTROL = 'the bus has no control of this drive ({status}), and it does not run'

@@ -125,7 +125,7 @@ def _stop_service(bench: Bench, drive: Simulated, client: Client) -> None:
 
 
 def _quick_stop_service(bench: Bench, drive: Simulated, client: Client) -> None:
-    assert client.call('quick_stop').message == bench.drives.quick_stopped()
+    assert client.call('quick_stop').message == bench.drives.quick_stopped
 
 
 def _disable(bench: Bench, drive: Simulated, client: Client) -> None:

@@ -98,11 +98,7 @@ def test_a_ride_and_what_ends_it(bench: Bench) -> None:
         stays(bench, drive)
         enable(client)
         turns(client, 20.0)
-        answer = client.call('quick_stop').message
-        assert answer == (
-            'stopping: it ramps down (this drive has no quick stop)'
-            if model == 'sinus_optimal' else 'released: the motor coasts'
-        )
+        assert client.call('quick_stop').message == bench.drives.quick_stopped
         stays(bench, drive)
         enable(client)
         turns(client, 20.0)

@@ -47,7 +47,7 @@ class Drives(abc.ABC):
     :ivar nominal: what its motor is made for, Hz; `most` where the drive does not tell it.
     :ivar without_run_input: what is said where the input that has to be closed is open.
     :ivar tells_run_input: it is read whether that input is closed, before anything is enabled.
-    :ivar coasts: a quick stop releases the motor.
+    :ivar quick_stopped: what is answered to a quick stop of a motor that runs.
     """
 
     control_method: str
@@ -65,17 +65,12 @@ class Drives(abc.ABC):
     without_run_input: str
     no_timeout: tuple[str, ...] = ()
     tells_run_input: bool = False
-    coasts: bool = True
+    quick_stopped: str = 'released: the motor coasts'
 
     def ramps(self, up: float, down: float | None = None) -> tuple[str, ...]:
         """Return the options of a simulated drive with these ramps, s; one says both."""
         down = up if down is None else down
         return '--set', f'{self.up}={up:g}', '--set', f'{self.down}={down:g}'
-
-    def quick_stopped(self) -> str:
-        """Return what is answered to a quick stop of a motor that runs."""
-        ramps = 'stopping: it ramps down (this drive has no quick stop)'
-        return 'released: the motor coasts' if self.coasts else ramps
 
     @abc.abstractmethod
     def commanded(self, state: State) -> bool:
@@ -265,6 +260,7 @@ _SINUS = {
     'most': 150.0,
     'without_run_input': 'RUN input (DIN1) is not active',
 }
+_NO_QUICK_STOP = 'stopping: it ramps down (this drive has no quick stop)'
 _G2 = {
     **_SINUS,
     'overvoltage': Fault(8, 'DC High', ('control.retard',)),
@@ -292,9 +288,11 @@ DRIVES = {
         nominal=150.0,
         overvoltage=Fault(8, 'DC High', ('Lengthen the retardation time',)),
         hot_motor=Fault(4, 'PTC Temp', ('temperature sensor', 'Let the motor cool')),
-        coasts=False,
+        quick_stopped=_NO_QUICK_STOP,
     ),
-    'sinus_optimal telegram1': BehindPlc(**_PLC, run=0x0001, nominal=150.0, coasts=False),
+    'sinus_optimal telegram1': BehindPlc(
+        **_PLC, run=0x0001, nominal=150.0, quick_stopped=_NO_QUICK_STOP
+    ),
     'sinus_g2 telegram1': BehindPlc(**_PLC, run=0x0001, nominal=150.0),
     # its ramps are set at its keypad alone
     'sinus_h': BehindPlc(
@@ -308,6 +306,7 @@ DRIVES = {
             'hot_motor': Fault(11, **_SOME_FAULT),
         },
         run=0x0008, nominal=60.0,
+        quick_stopped='stopping: it ramps down (quick stop by ADV-8 Stop Mode)',
     ),
     'movitrac31': Movitrac(
         control_method='function_bits',

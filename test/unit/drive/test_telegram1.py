@@ -156,6 +156,41 @@ def test_what_a_plc_goes_on_showing_confirms_no_stop(way: str, command: str) -> 
         assert not rig.drive.stop_unconfirmed
 
 
+@pytest.mark.parametrize(
+    ('stop_mode', 'answer'),
+    [
+        ('Dec', 'stopping: it ramps down (quick stop by ADV-8 Stop Mode)'),
+        ('Free-Run', 'stopped: the output is at 0 Hz (quick stop by ADV-8 Stop Mode)'),
+    ],
+)
+@pytest.mark.parametrize('echo_bits', ['state', 'word'])
+def test_quick_stop_of_a_sinus_h_is_adv_8(stop_mode: str, answer: str, echo_bits: str) -> None:
+    ramp = {'adv.stop_mode': stop_mode, 'drv.dec_time': 10.0}
+    with Rig(SINUS_H, parameters=ramp, options={'echo_bits': echo_bits}) as rig:
+        rig.turn()
+        assert rig.answer(rig.drive.quick_stop()) == answer
+        # bit 2 alone is taken back from SwitchOFF: out of S4 to S1 [M3 §6]
+        assert words(rig.line.frames)[-1] == 0x0472
+        assert rig.far.control_unit.report()['state'] == 'S1'
+        assert rig.far.motor.driven == (stop_mode == 'Dec')
+        rig.pass_time(12.0)
+        assert not rig.far.motor.driven
+        rig.assert_only_enable_helps()
+
+
+def test_a_sinus_h_that_ignores_its_stops_is_released() -> None:
+    with Rig(SINUS_H) as rig:
+        rig.turn()
+        machine = rig.far.control_unit.machine
+        for exit in [exit for exit in machine._exits if exit[1].name != 'COAST_STOP']:
+            machine._exits.pop(exit)
+        assert 'NOT confirmed' in rig.answer(rig.drive.quick_stop())
+        rig.wait_until(lambda: not rig.far.motor.driven, 15.0)
+        assert 0x0474 in words(rig.line.frames)
+        rig.pass_time(1.0)
+        assert not rig.drive.stop_unconfirmed and rig.notes.said('an ordinary stop did not do')
+
+
 @every_family
 def test_a_stop_is_the_next_word_in_the_block(way: str) -> None:
     run = telegram_laws.JUDGES[Rig(way).way.model].run
