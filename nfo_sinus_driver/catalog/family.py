@@ -24,7 +24,7 @@ from nfo_sinus_driver.catalog import table
 from nfo_sinus_driver.catalog.codec import Number, codec_of
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.parameter import Access, Address, Parameter, Value
-from nfo_sinus_driver.catalog.profile import Profile
+from nfo_sinus_driver.catalog.profile import Profile, SetpointTarget
 from nfo_sinus_driver.catalog.status import Kind, Meaning, Role, StatusCode
 
 _FAMILIES = 'nfo_sinus_driver.families'
@@ -32,6 +32,8 @@ _FAMILIES = 'nfo_sinus_driver.families'
 _HIGHEST_CODE = 0xFF
 #: Wider ones have no place in a message.
 _WIDEST_WORD = 0xFFFFFFFF
+#: A motor may be overhauled by so much, as a share of the greatest set-point.
+_BEYOND_SETPOINTS = 1.1
 
 
 @dataclass(frozen=True)
@@ -197,22 +199,50 @@ def load_profile(name: str, method: str = '') -> Profile:
     return profile
 
 
-def load_family(name: str, method: str = '', words: str = '') -> Family:
+def load_family(
+    name: str, method: str = '', words: str = '', nominal_speed: float = 0.0
+) -> Family:
     """
     Read and check the tables of one drive family.
 
     :param method: as for :func:`load_profile`.
     :param words: which of the ``words`` of its profile a PLC maps; ``''``: the first.
+    :param nominal_speed: of a motor in Speed mode, rpm, where the profile has a ``speed_mode``; 0:
+        it is in another one.
     :raises ValueError: there is no such family; the message lists those there are.
     :raises CatalogError: a table contradicts itself, or another one.
     """
     # the same family for all the methods that share its tables
-    return _speaking(_read_family(name, method if _has_tables(name, method) else ''), words)
+    family = _speaking(_read_family(name, method if _has_tables(name, method) else ''), words)
+    return _in_speed_mode(family, nominal_speed) if nominal_speed else family
 
 
 @functools.cache
 def _speaking(family: Family, words: str) -> Family:
     return replace(family, profile=family.profile.words[words]) if words else family
+
+
+@functools.cache
+def _in_speed_mode(family: Family, nominal_speed: float) -> Family:
+    """Return a family whose drives tell and take speeds where others do frequencies."""
+    profile = family.profile
+    mode = profile.speed_mode
+    assert mode is not None
+    count, most = mode.count(Fraction(str(nominal_speed))), mode.most(nominal_speed)
+    speeds = {key: family[key].in_rpm(count) for key in mode.keys}
+    role_of = {Role.ACTUAL_FREQUENCY: Role.ACTUAL_SPEED}
+    target = SetpointTarget(mode.keys[-1], most, nominal=float(nominal_speed))
+    return replace(
+        family,
+        parameters={**family.parameters, **speeds},
+        roles={role_of.get(role, role): key for role, key in family.roles.items()},
+        profile=replace(
+            profile,
+            setpoints={'Speed': target},
+            # as much above as of frequencies
+            most={Role.ACTUAL_SPEED: most * _BEYOND_SETPOINTS},
+        ),
+    )
 
 
 @functools.cache

@@ -193,6 +193,13 @@ class Parameter:
         address = replace(address, factor=address.factor * factor)
         return replace(self, addresses={**self.addresses, protocol: address})
 
+    def in_rpm(self, count: Fraction) -> Parameter:
+        """Return the same as a speed, of which one raw count is so many rpm on every bus."""
+        addresses = {
+            name: replace(address, factor=count) for name, address in self.addresses.items()
+        }
+        return replace(self, unit='rpm', scale='', addresses=addresses)
+
     def decode(self, data: bytes, protocol: str = 'modbus') -> Value:
         """
         Turn the bytes read from the drive into a value in :attr:`unit`.

@@ -485,6 +485,21 @@ class OlderDialect:
 
 
 @dataclass(frozen=True)
+class SpeedMode:
+    """
+    What the parameters that are frequencies are in Speed mode, where the same have both.
+
+    :ivar keys: those parameters; the last one takes the set-point.
+    :ivar count: gives what one count of them is, rpm, for a nominal speed of the motor, rpm.
+    :ivar most: gives the greatest set-point, rpm, likewise.
+    """
+
+    keys: tuple[str, ...]
+    count: Callable[[Fraction], Fraction]
+    most: Callable[[float], float]
+
+
+@dataclass(frozen=True)
 class Profile:
     """
     What is to be known of a family beside its tables.
@@ -509,6 +524,8 @@ class Profile:
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
     :ivar words: behind a PLC that can map either of several sets of words, the profile of each, by
         its name; this one is the first.
+    :ivar speed_mode: how it means its values in Speed mode, where it does not tell the mode and
+        has no parameters of their own for it; ``None``: it is otherwise, or has none.
     :ivar start_settings: what :meth:`ControlMethod.require_startable` depends on: none of these
         settings changes while the motor is enabled.
     :ivar line_check: what to look at, in this order, while a drive of it has never answered, by the
@@ -540,6 +557,7 @@ class Profile:
     holds_control: Mapping[str, str] = field(default_factory=dict)
     measured: tuple[str, ...] = ()
     words: Mapping[str, Profile] = field(default_factory=dict)
+    speed_mode: SpeedMode | None = None
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:
         """Return the control methods that have a procedure."""

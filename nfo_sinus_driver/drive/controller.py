@@ -547,10 +547,11 @@ class Controller:
     def _why_slower(self, status: InverterStatus, before: InverterStatus | None) -> Report | None:
         if before is None or before.at < self._control.since:
             return None
-        if self._setpoint.control_mode != 'Freque':
+        turning = self._state.turning
+        if self._setpoint.control_mode != turning.control_mode:
             return None
         least = self._setpoint.least_since(before.at, reverse=before.frequency < 0)
-        return explain_fall(self._state, before, status, least)
+        return explain_fall(self._state, before, status, least * turning.hertz)
 
     def _no_control(self, status: InverterStatus | None) -> Report:
         if status is not None and status.driven:

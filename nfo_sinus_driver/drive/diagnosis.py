@@ -130,7 +130,10 @@ def explain_fall(
     if not (silent and was >= _LEAST_FALL and abs(status.frequency) < most):
         return None
     return state.report(
-        Cause.SLOWER_AFTER_SILENCE, before=abs(before.frequency), now=abs(status.frequency)
+        Cause.SLOWER_AFTER_SILENCE,
+        before=abs(before.frequency) / state.turning.hertz,
+        now=abs(status.frequency) / state.turning.hertz,
+        unit=state.turning.unit,
     )
 
 

@@ -11,10 +11,12 @@ import contextlib
 from dataclasses import replace
 import logging
 import math
+from typing import NamedTuple
 
 from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.catalog import (
     Fact,
+    Family,
     Holder,
     InverterStatus,
     Kind,
@@ -56,6 +58,27 @@ _FIXED = (
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 
+class Turning(NamedTuple):
+    """
+    What tells how fast a motor turns.
+
+    :ivar role: what is measured, in ``unit``; :ivar control_mode: that has set-points in it.
+    :ivar hertz: what one of it is, Hz: of a speed, turns a second.
+    """
+
+    role: Role
+    unit: str
+    control_mode: str
+    hertz: float
+
+
+def _turning(model: Family) -> Turning:
+    """Return what tells it: the frequency, but the speed where the telegram has that alone."""
+    if Role.ACTUAL_FREQUENCY not in model.roles and model.profile.speed_mode is not None:
+        return Turning(Role.ACTUAL_SPEED, 'rpm', 'Speed', 1 / 60)
+    return Turning(Role.ACTUAL_FREQUENCY, 'Hz', 'Freque', 1.0)
+
+
 class DriveState:
     """The driver's knowledge of one drive; used on the bus alone, readable from anywhere."""
 
@@ -63,7 +86,10 @@ class DriveState:
         self.bus = bus
         self.settings = settings
         #: What the catalog knows of its family.
-        self.model = load_family(settings.model, settings.method, settings.telegram_words)
+        self.model = load_family(
+            settings.model, settings.method, settings.telegram_words, settings.telegram_speed
+        )
+        self.turning = _turning(self.model)
         method = settings.method_class
         #: A PLC stops the drive after so long without a word of the driver, s; 0: there is none.
         self.plc_time = method.plc_time
@@ -210,13 +236,13 @@ class DriveState:
         """Complete a status by the frequency, where its word alone tells no stop, or it is free."""
         if not (status.by_frequency or self.model.profile.status_word.frequency_beside):
             return self._note_status(status)
+        role, hertz = self.turning.role, self.turning.hertz
         try:
-            key = self.model.key(Role.ACTUAL_FREQUENCY)
-            frequency = await self._measure(key, priority, retry, status)
+            value = await self._measure(self.model.key(role), priority, retry, status)
         except Refused:
-            frequency = math.nan
-        self.polled(Role.ACTUAL_FREQUENCY, frequency)
-        return self._note_status(status.with_frequency(frequency, self.status))
+            value = math.nan
+        self.polled(role, value)
+        return self._note_status(status.with_frequency(value * hertz, self.status))
 
     async def _read_int(self, key: str, priority: Priority, retry: bool) -> tuple[int, float]:
         reply = await self.params.read_reply(key, priority, retry=retry)
@@ -344,6 +370,8 @@ class DriveState:
         for name in _FIXED:
             if getattr(settings, name) != getattr(self.settings, name):
                 raise ValueError(f'{name} cannot change within a session: make another Drive')
+        if settings.telegram_speed != self.settings.telegram_speed:
+            raise ValueError('what a telegram means cannot change within a session')
         self.settings = settings
 
     @contextlib.contextmanager
@@ -362,12 +390,14 @@ class DriveState:
         :param key: of its parameter; ``''``: there is none.
         :raises LinkError: it does not answer, or refuses.
         """
-        return await self._measure(key, priority, False, self.status) if key else math.nan
+        return await self._measure(key, priority, False, self.status)
 
     async def _measure(
         self, key: str, priority: Priority, retry: bool, status: InverterStatus | None
     ) -> float:
         """Measure; a status tells the direction of what turns, where the value does not."""
+        if not key:
+            return math.nan
         data = await self.params.read_data(key, priority, retry=retry)
         value = self.params.number(key, data)
         if not self.params.is_odd(key):
@@ -408,6 +438,12 @@ class DriveState:
     def last_polled(self, role: Role | None) -> Measured:
         """Return what a poll has measured last."""
         return NOT_MEASURED if role is None else self._polled.get(role, NOT_MEASURED)
+
+    @property
+    def turned(self) -> Measured:
+        """How fast the motor turns, as a poll has measured it last, Hz."""
+        value, at = self.last_polled(self.turning.role)
+        return Measured(value * self.turning.hertz, at)
 
     @property
     def frequency(self) -> float:

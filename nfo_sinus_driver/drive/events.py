@@ -186,17 +186,17 @@ class Cause(enum.Enum):
     )
     SLOWER_AFTER_SILENCE = (
         'the drive did not answer for a moment, and the motor turns slower than it was told to '
-        '({now:g} Hz, before {before:g} Hz; {status}). It may have been switched off and on: '
-        'check its mains and the line'
+        '({now:.4g} {unit}, before {before:.4g} {unit}; {status}). It may have been switched off '
+        'and on: check its mains and the line'
     )
     TURNS_BACKWARDS = (
-        'the motor turns in the other direction than its set-points say ({now:.4g} Hz, {status}). '
-        'Another master may command the drive: find out which'
+        'the motor turns in the other direction than its set-points say ({now:.4g} {unit}, '
+        '{status}). Another master may command the drive: find out which'
     )
     NOT_SLOWER_AFTER_TIME_OUT = (
-        'no set-points arrive, and the motor does not slow down at set-point 0 ({now:.4g} Hz, '
-        '{status}). Check the least frequency that the drive is set to, and whether another '
-        'master commands it'
+        'no set-points arrive, and the motor does not slow down at set-point 0 ({now:.4g} '
+        '{unit}, {status}). Check the least frequency that the drive is set to, and whether '
+        'another master commands it'
     )
     CONTROL_LOST = (
         'the bus has lost control ({status}). STOP was pressed at the keypad, or another '

@@ -11,7 +11,6 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, Report, Severity
 from nfo_sinus_driver.drive.setpoint import Setpoint
-from nfo_sinus_driver.drive.snapshot import NOT_MEASURED
 
 #: By more than this a size has to fall, Hz, within so long, s: the slowest ramp, of 2000 s, falls
 #: by 0.1 in 4 s, and no drive tells it in greater steps.
@@ -65,10 +64,10 @@ class Following:
 
     def judge(self) -> Report | None:
         """Return why the motor has to be stopped, for what was measured last; tell what else is."""
-        measured = self._state.last_polled(Role.ACTUAL_FREQUENCY)
+        measured = self._state.turned
         role, unit = _COMPARED.get(self._setpoint.control_mode, (None, 1.0))
         actual = self._state.last_polled(role)
-        if measured is NOT_MEASURED or measured.at <= max(self._at, self._setpoint.following_since):
+        if measured.at <= max(self._at, self._setpoint.following_since):
             return None
         self._at = measured.at
         least, most = self._setpoint.range_since(measured.at - _REACTION)
@@ -81,7 +80,9 @@ class Following:
             cause = Cause.TURNS_BACKWARDS
         elif role is not None:
             self._look_beyond(actual.value, measured.at, max(-least, most), unit)
-        return cause and self._state.report(cause, now=frequency)
+        turning = self._state.turning
+        now = frequency / turning.hertz
+        return cause and self._state.report(cause, now=now, unit=turning.unit)
 
     def _goes_on(self, frequency: float, at: float) -> bool:
         """Tell whether it does not slow down, although no set-point comes any more."""

@@ -366,9 +366,9 @@ class Poller:
         """Measure a value anew; NaN if it is not to be had from a drive that answers."""
         state = self._state
         status = state.status
-        if role is Role.ACTUAL_FREQUENCY and status and not math.isnan(status.frequency):
+        if role is state.turning.role and status and not math.isnan(status.frequency):
             # it came with the status
-            return state.frequency
+            return state.last_polled(role).value
         requested_at = self._bus.now()
         value = await self._read_measured(role)
         state.polled(role, value)

@@ -55,7 +55,13 @@ def _references(model: str, control_method: str) -> tuple[str, ...]:
 def _control_modes(model: str, method: str = '') -> tuple[str, ...]:
     """Return the control modes of a model, as far as a control method knows them."""
     profiles = _profiles(model) if model == AUTO else [load_profile(model, method)]
-    return tuple(dict.fromkeys(mode for profile in profiles for mode in profile.setpoints))
+    modes = dict.fromkeys(mode for profile in profiles for mode in profile.setpoints)
+    return (*modes, 'Speed') if _has_speed_mode(model, method) else tuple(modes)
+
+
+def _has_speed_mode(model: str, method: str) -> bool:
+    """Tell whether nothing but the settings tells Speed mode of a model, by a control method."""
+    return model != AUTO and load_profile(model, method).speed_mode is not None
 
 
 def _telegram_words(model: str, method: str) -> tuple[str, ...]:
@@ -177,6 +183,12 @@ class DriveSettings:
         'enable is refused when the drive is in another control mode',
         choices=CONTROL_MODES, zero='any',
     )
+    nominal_speed: float = setting(
+        0.0,
+        'with control_method telegram1 and expected_control_mode Speed: the nominal speed of the '
+        'motor, which the telegram does not tell',
+        0, 30000, unit='rpm', zero='not given', change=UNCONFIGURED,
+    )
     drive_timeout: float = setting(
         0.0, "the drive's own time-out: it stops the motor when this driver dies", 0,
         LONGEST_DRIVE_TIMEOUT, unit='s', zero='leave it as it is',
@@ -224,6 +236,12 @@ class DriveSettings:
             Role.ACTUAL_TORQUE: self.torque_scale,
             Role.ACTUAL_PROCESS_VALUE: self.process_scale,
         }
+
+    @functools.cached_property
+    def telegram_speed(self) -> float:
+        """The nominal speed, rpm, where a telegram has speeds for frequencies; 0: it has not."""
+        in_speed = self.expected_control_mode == 'Speed'
+        return self.nominal_speed if in_speed and _has_speed_mode(self.model, self.method) else 0.0
 
     @property
     def follows_setpoints(self) -> bool:
@@ -283,11 +301,21 @@ class DriveSettings:
         modes = _control_modes(self.model, self.method)
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
         self._require_measured()
+        if self.expected_control_mode == 'Speed' and not self.nominal_speed:
+            self._require_no_speed_mode()
         self._check_drive_timeout()
         for name, one in settings.items():
             # what a family decides was checked above
             if one.low is not None:
                 one.check(getattr(self, name))
+
+    def _require_no_speed_mode(self) -> None:
+        if _has_speed_mode(self.model, self.method):
+            raise ValueError(
+                f'expected_control_mode Speed with control_method {self.method}: set '
+                'nominal_speed first, in rpm, such as 1500 of a four-pole motor; the telegram '
+                'does not tell it'
+            )
 
     def _check_drive_timeout(self) -> None:
         # a drive that has none refuses any, with the reason

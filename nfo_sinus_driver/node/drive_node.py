@@ -268,12 +268,18 @@ class DriveNode(LifecycleNodeMixin, Node):
         if changed.get('autostart', autostart) != autostart:
             raise ValueError('autostart is read when the driver starts: give it then')
         for name in ONLY_UNCONFIGURED:
-            if changed.get(name, values[name]) != values[name] and not self.managed.may_be_another:
-                raise ValueError(
-                    f'{name} can only be changed while the node is unconfigured: '
-                    'deactivate it and clean it up first'
-                )
-        return self._drive_settings({**values, **changed})
+            self._require_same(name, changed.get(name, values[name]) == values[name])
+        settings = self._drive_settings({**values, **changed})
+        means_the_same = settings.telegram_speed == self.managed.settings.telegram_speed
+        self._require_same('expected_control_mode, by telegram 1,', means_the_same)
+        return settings
+
+    def _require_same(self, name: str, is_same: bool) -> None:
+        if not (is_same or self.managed.may_be_another):
+            raise ValueError(
+                f'{name} can only be changed while the node is unconfigured: '
+                'deactivate it and clean it up first'
+            )
 
     def _require_same_scale(self, changed: Mapping[str, object]) -> None:
         # a set-point that goes on arriving would mean another speed

@@ -11,6 +11,7 @@ A ride is over each of them, and every other case over one: over all it is teste
 from __future__ import annotations
 
 from collections.abc import Iterator
+import math
 from pathlib import Path
 import signal
 from typing import Any
@@ -109,6 +110,29 @@ def test_a_ride_and_what_ends_it(bench: Bench) -> None:
         stays(bench, drive)
         enable(client)
         turns(client, 20.0)
+
+
+@pytest.mark.parametrize('behind', ['sinus_optimal', 'sinus_g2'], indirect=True)
+def test_in_speed_mode_the_speed_is_published(bench: Bench) -> None:
+    in_speed = ('-p', 'expected_control_mode:=Speed', '-p', 'nominal_speed:=1500')
+    _, client = start(bench, '--set', 'control.mode=Speed', settings=(*PATIENT, *in_speed))
+    enable(client)
+    with client.setpoints(600.0):
+        turns(client, 600.0)
+        status = client.latest('status')
+        assert status.control_mode == DriveStatus.SPEED and status.unit == 'rpm'
+        client.wait_for('actual_speed', lambda speed: abs(speed.data - 600) < 5, 'it is published')
+        assert math.isnan(client.latest('actual_frequency').data)
+        refused = client.set_parameters(expected_control_mode='Freque')
+        assert 'while the node is unconfigured' in refused.reason
+        assert client.call('stop').message == 'stopping: it ramps down'
+
+
+@pytest.mark.parametrize('behind', ['sinus_optimal'], indirect=True)
+def test_without_its_nominal_speed_speed_mode_is_refused(bench: Bench) -> None:
+    bench.simulator(paced=False)
+    bench.driver('-p', 'expected_control_mode:=Speed')
+    wait_until(lambda: 'set nominal_speed first, in rpm, such as 1500' in bench.log, 'the reason')
 
 
 @pytest.mark.parametrize(

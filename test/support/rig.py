@@ -53,6 +53,8 @@ class Way:
 
     :ivar protocol: of the line, as the simulator calls it; ``telegram1`` goes through a PLC.
     :ivar options: of the simulated drive; :ivar driver: other settings of the driver.
+    :ivar parameters: of the simulated drive, other than factory.
+    :ivar hertz: what a set-point is that turns the motor with 1 Hz.
     """
 
     protocol: str
@@ -61,10 +63,18 @@ class Way:
     reference: str = 'fieldbus'
     options: Mapping[str, str] = field(default_factory=dict)
     driver: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    hertz: float = 1.0
 
 
 _OLD = {'classic_dialect': 'v5.0'}
 _DRIVECONTROL = {'telegram_words': 'drivecontrol'}
+#: In Speed mode with a motor of four poles.
+_SPEED: Mapping[str, Any] = {
+    'driver': {'expected_control_mode': 'Speed', 'nominal_speed': 1500.0},
+    'parameters': {'control.mode': 'Speed'},
+    'hertz': 30.0,
+}
 #: A law that is new is tested over all of them, and a way that is new with every law.
 WAYS: Mapping[str, Way] = {
     'rtu': Way('modbus_rtu'),
@@ -83,6 +93,8 @@ WAYS: Mapping[str, Way] = {
     'made up': Way('modbus_rtu', 'acme', 'drive_control'),
     'telegram1 g2': Way('telegram1', method='telegram1'),
     'telegram1 optimal': Way('telegram1', 'sinus_optimal', 'telegram1'),
+    'telegram1 g2, speed': Way('telegram1', method='telegram1', **_SPEED),
+    'telegram1 optimal, speed': Way('telegram1', 'sinus_optimal', 'telegram1', **_SPEED),
     'telegram1 g2, drivecontrol': Way(
         'telegram1', method='telegram1', options=_DRIVECONTROL, driver=_DRIVECONTROL
     ),
@@ -182,7 +194,7 @@ class Rig:
             way.model,
             self.clock,
             range(1, drives + 1),
-            settings={**quick, **(parameters or {})},
+            settings={**quick, **way.parameters, **(parameters or {})},
             options={**hardest(way.model), **way.options, **(options or {})},
             **(line or {}),
         )
@@ -312,12 +324,12 @@ class Rig:
         return future.result()
 
     def send(self, value: float | None, *addresses: int) -> None:
-        """Have a program give a set-point again and again from now on; ``None``: it ends."""
+        """Have a program give a set-point, Hz, again and again from now on; ``None``: it ends."""
         chosen = addresses or tuple(self.drives)
 
         def give() -> None:
             for address in chosen if value is not None else ():
-                self.drives[address].set_setpoint(value)
+                self.drives[address].set_setpoint(self.way.hertz * value)
 
         self.keep(give)
 

@@ -346,7 +346,7 @@ def test_6_the_control_method_of_a_session_never_changes(way: str) -> None:
 def test_7_what_is_not_known_any_more_is_shown_as_such(way: str) -> None:
     with Rig(way) as rig:
         rig.turn()
-        assert rig.notes.snapshot.connected and not math.isnan(rig.notes.snapshot.frequency)
+        assert rig.notes.snapshot.connected and not math.isnan(rig.notes.snapshot.actual)
         rig.line.state = 'silent'
         rig.pass_time(rig.drive.settings.lost_after + _SOON)
         lost = rig.notes.snapshot

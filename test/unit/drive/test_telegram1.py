@@ -84,6 +84,50 @@ def test_status_and_direction_are_those_of_the_motor(way: str) -> None:
         assert 'not documented' in rig.answer(rig.drive.error_log())
 
 
+#: 750 rpm in the block: by 8192 for 1500 on an Optimal [M1]; counts of SpdSet [M0 §6.3 table 9].
+BLOCK_AT_750 = {'telegram1 optimal, speed': 4096, 'telegram1 g2, speed': 750}
+
+
+@pytest.mark.parametrize('way', BLOCK_AT_750)
+def test_in_speed_mode_the_telegram_has_speeds(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect()
+        rig.enable()
+        for rpm in (750, -750):
+            rig.send(rpm / 30)
+            rig.pass_time(1.5)
+            last = list(telegram_laws.exchanges(rig.line.frames, 1))[-1].setpoint
+            assert last == math.copysign(BLOCK_AT_750[way], rpm) % 0x10000
+            assert rig.far.motor.speed == pytest.approx(rpm, abs=3)
+            told = rig.drive.snapshot
+            assert (told.control_mode, told.unit, told.setpoint) == ('Speed', 'rpm', rpm)
+            assert told.actual == told.speed == pytest.approx(rpm, abs=3)
+            # nothing tells how many Hz they are
+            assert math.isnan(told.frequency)
+        rig.send(60.0)
+        rig.pass_time(1.0)
+        assert rig.notes.said('set-point 1800 is limited to 1500 rpm, which is nominal')
+        assert rig.far.motor.speed == pytest.approx(1500, abs=5)
+        assert rig.answer(rig.drive.stop()) == 'stopping: it ramps down'
+        rig.pass_time(1.5)
+        assert rig.drive.snapshot.speed == 0 and not rig.far.motor.driven
+
+
+@pytest.mark.parametrize('model', ['sinus_optimal', 'sinus_g2'])
+def test_speed_mode_of_a_telegram_needs_the_nominal_speed(model: str) -> None:
+    chosen = {'model': model, 'control_method': 'telegram1', 'expected_control_mode': 'Speed'}
+    with pytest.raises(ValueError, match='set nominal_speed first, in rpm, such as 1500'):
+        DriveSettings(**chosen)
+    settings = DriveSettings(nominal_speed=1500.0, **chosen)
+    way = f'telegram1 {model.removeprefix("sinus_")}'
+    with Rig(way) as rig, pytest.raises(ValueError, match='cannot change within a session'):
+        rig.drive.state.use(settings)
+    # over Modbus both read it, and a Sinus H has no such mode
+    DriveSettings(model=model, expected_control_mode='Speed')
+    with pytest.raises(ValueError, match="expected_control_mode 'Speed'"):
+        DriveSettings(model='sinus_h', expected_control_mode='Speed', nominal_speed=1500.0)
+
+
 @every_family
 def test_a_drive_that_tells_nothing_nominal_has_its_own_limit(way: str) -> None:
     with Rig(way) as rig:

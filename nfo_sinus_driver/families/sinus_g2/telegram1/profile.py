@@ -12,8 +12,9 @@ place [M0 §7.3, tables 14 to 16] is chosen by name: :data:`PROFILE` has it amon
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
-from nfo_sinus_driver.catalog.profile import Profile, Steps, Until
+from nfo_sinus_driver.catalog.profile import Profile, SpeedMode, Steps, Until
 from nfo_sinus_driver.catalog.status import Fact, Role, State
 from nfo_sinus_driver.families._telegram1 import method, profidrive
 from nfo_sinus_driver.families._telegram1.method import Telegram1, Words
@@ -139,6 +140,12 @@ PROFILE = Profile(
     writes_and_reads=True,
     # a tenth above what a set-point may be, for a motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 165.0},
+    # those of SpdSet and SpdAct, by the factory's SpdScl ([M0 §6.3 table 9, §8.3.2], [M2 table 2])
+    speed_mode=SpeedMode(
+        (method.ACTUAL, method.SETPOINT),
+        count=lambda nominal: Fraction(1),
+        most=lambda nominal: 9000.0,
+    ),
 )
 PROFILE = replace(
     PROFILE,

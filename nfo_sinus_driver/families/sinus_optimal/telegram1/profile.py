@@ -14,6 +14,7 @@ from __future__ import annotations
 from nfo_sinus_driver.catalog.profile import (
     Profile,
     Read,
+    SpeedMode,
     Status as InverterStatus,
     Steps,
     Until,
@@ -94,4 +95,10 @@ PROFILE = Profile(
     writes_and_reads=True,
     # a tenth above what a set-point may be, for a motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 165.0},
+    # 8192 are the nominal speed, and 24576 the most [M1]
+    speed_mode=SpeedMode(
+        (method.ACTUAL, method.SETPOINT),
+        count=lambda nominal: nominal / 8192,
+        most=lambda nominal: 3 * nominal,
+    ),
 )
