@@ -85,7 +85,7 @@ _VALID = 1 << 0
 _MORE_VALID = 1 << 2
 _NO_MAILBOX = (
     'the block of the PLC has layout 1, which has no mailbox for parameters: see layout 2 in '
-    'docs/telegram1.md'
+    'docs/plc.md'
 )
 _NO_MORE = 'the PLC does not show the longer telegram (bit 2 of register +3 of its block is 0)'
 _NOTHING_STANDS = (
