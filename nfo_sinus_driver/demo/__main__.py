@@ -24,8 +24,9 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.bench import Bench, handle_signals, own_domain
-from nfo_sinus_driver.demo.record import why_missing
+from nfo_sinus_driver.demo.record import why_no_picture
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
 from nfo_sinus_driver.demo.sequence import HEADING, PATIENCE, DemoSequence, StepError
 from nfo_sinus_driver.node.executor import spinning
@@ -40,11 +41,12 @@ def main() -> int:
     """Start everything, go through the sequence, end everything, and draw."""
     handle_signals(signal.default_int_handler)
     folder = _output_folder()
-    missing = why_missing('rosbags', 'matplotlib')
-    bag = None if 'rosbags' in missing else folder / 'ride'
+    no_bag = bags.why_none()
+    missing = [why for why in (no_bag, why_no_picture()) if why]
+    bag = None if no_bag else folder / 'ride'
     if missing:
         what = 'no plot' if bag else 'neither a bag nor a plot'
-        print(f'There will be {what} of the ride: {", ".join(missing.values())}', flush=True)
+        print(f'There will be {what} of the ride: {", ".join(missing)}', flush=True)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     with own_domain() as domain, tempfile.TemporaryFile() as log, Bench(log) as bench:
         os.environ['ROS_DOMAIN_ID'] = str(domain)

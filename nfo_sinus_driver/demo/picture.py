@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Draws a recorded run: reads it back from its bag as curves and spans; needs no ROS."""
+"""Draws a recorded run: reads it back from its bag as curves and spans."""
 
 from __future__ import annotations
 
@@ -22,11 +22,13 @@ from matplotlib.patches import Patch
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Transform, blended_transform_factory
-from rosbags.highlevel import AnyReader
-import yaml
+
+from nfo_sinus_driver.demo import bags
 
 _EVENT = '/_service_event'
 _STATUS = 'nfo_sinus_msgs/msg/DriveStatus'
+#: The topics of a drive that are drawn, besides its service events.
+_DRAWN = ('status', 'setpoint', 'actual_speed', 'telemetry', 'inv_st')
 #: What the states of DriveStatus mean for the motor.
 _PHASE_OF_STATE = {
     'OPERATION_ENABLED': 'running',
@@ -142,10 +144,8 @@ class Recording:
 def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
     """Read the run of a drive from a bag; a ValueError if it was never connected."""
     messages: dict[str, list[tuple[int, Any]]] = {}
-    with AnyReader([folder]) as reader:
-        for connection, stamp, data in reader.messages():
-            message = reader.deserialize(data, connection.msgtype)
-            messages.setdefault(connection.topic, []).append((stamp, message))
+    for topic, stamp, message in bags.read(folder, lambda topic: _is_of(drive, topic)):
+        messages.setdefault(topic, []).append((stamp, message))
     connected = [m for _, m in messages.get(f'{drive}/status', ()) if m.connected]
     if not connected:
         raise ValueError(f'{drive} was never connected')
@@ -170,13 +170,13 @@ def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
     shown = _spans([(time, m.text) for time, m in texts], length)
     # a fault is named a moment before the drive's state is one
     faults = {m.text: m.code for _, m in texts if m.kind == m.FAULT}
-    described = yaml.safe_load((folder / 'metadata.yaml').read_text())
+    described = bags.metadata(folder)
     return Recording(
         began=datetime.fromtimestamp(start / 1e9),
         length=length,
-        remarks=dict(described['rosbag2_bagfile_information'].get('custom_data') or {}),
-        source=f'{folder.name}: {sum(map(len, messages.values()))} messages on '
-        f'{len(messages)} topics',
+        remarks=dict(described.get('custom_data') or {}),
+        source=f'{folder.name}: {described["message_count"]} messages on '
+        f'{len(bags.topics(folder))} topics',
         unit=next((m.unit for m in reversed(connected) if m.unit), 'Hz'),
         identity=_identity((m for _, m in messages.get('/diagnostics', ())), drive),
         setpoint=received('setpoint'),
@@ -201,19 +201,24 @@ def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
 
 def only_drive(folder: Path) -> str:
     """Return the name of the drive that is in a bag; a ValueError if there is none, or several."""
-    if not (folder / 'metadata.yaml').is_file():
-        raise ValueError('it is no bag: a folder with a metadata.yaml is one')
-    with AnyReader([folder]) as reader:
-        drives = sorted(
-            connection.topic.removesuffix('/status')
-            for connection in reader.connections
-            if connection.msgtype == _STATUS and connection.topic.endswith('/status')
-        )
+    drives = sorted(
+        topic.removesuffix('/status')
+        for topic, type_ in bags.topics(folder)
+        if type_ == _STATUS and topic.endswith('/status')
+    )
     if len(drives) == 1:
         return drives[0]
     if drives:
         raise ValueError(f'it has several drives: choose one by --drive: {", ".join(drives)}')
     raise ValueError('it has no drive: no topic ~/status was recorded')
+
+
+def _is_of(drive: str, topic: str) -> bool:
+    """Tell whether a topic is one of those that are drawn."""
+    if topic == '/diagnostics':
+        return True
+    name = topic.removeprefix(f'{drive}/')
+    return name != topic and (topic.endswith(_EVENT) or name in _DRAWN)
 
 
 def _calls(

@@ -28,6 +28,7 @@ from rclpy.signals import SignalHandlerOptions
 import rclpy.utilities
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
+from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.bench import handle_signals
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
 from nfo_sinus_driver.node.executor import spinning
@@ -51,9 +52,8 @@ def main(args: Sequence[str] | None = None) -> int:
     bag = folder / 'ride'
     if bag.exists():
         parser.error(f'{bag} is there already, and is not written over')
-    missing = why_missing('rosbags', 'matplotlib')
-    if 'rosbags' in missing:
-        print(f'record: cannot write a bag: {missing["rosbags"]}', file=sys.stderr)
+    if no_bag := bags.why_none():
+        print(f'record: cannot write a bag: {no_bag}', file=sys.stderr)
         return 1
     handle_signals(signal.default_int_handler)
     try:
@@ -67,8 +67,8 @@ def main(args: Sequence[str] | None = None) -> int:
         # before there was anything to be kept
         return 130
     print(f'record: the bag is {bag}; {replay_warning(options.drive)}')
-    if missing:
-        print(f'record: no picture: {missing["matplotlib"]}', file=sys.stderr)
+    if no_picture := why_no_picture():
+        print(f'record: no picture: {no_picture}', file=sys.stderr)
         return 0
     return _draw('record', bag, options.drive, folder / 'ride.png')
 
@@ -76,34 +76,29 @@ def main(args: Sequence[str] | None = None) -> int:
 def plot(args: Sequence[str] | None = None) -> int:
     """Draw the run of a drive that is in a bag; return the exit status."""
     options = _plot_parser().parse_args(args)
-    missing = why_missing('rosbags', 'matplotlib')
-    if missing:
-        print(f'plot: {"; ".join(missing.values())}', file=sys.stderr)
+    if missing := [why for why in (bags.why_none(), why_no_picture()) if why]:
+        print(f'plot: {"; ".join(missing)}', file=sys.stderr)
         return 1
     bag: Path = options.bag.resolve()
     return _draw('plot', bag, options.drive, options.output or bag.with_name(f'{bag.name}.png'))
 
 
-def why_missing(*libraries: str) -> dict[str, str]:
-    """Return which libraries cannot be imported, and why."""
-    found = {}
-    for name in libraries:
-        try:
-            importlib.import_module(name)
-        except ImportError as error:
-            found[name] = f'{error} (pip install {name})'
-    return found
+def why_no_picture() -> str:
+    """Return why none can be drawn here, and what to do; empty: it can."""
+    try:
+        importlib.import_module('matplotlib')
+    except ImportError as error:
+        return f'{error} (apt install python3-matplotlib)'
+    return ''
 
 
 def _draw(command: str, bag: Path, drive: str | None, picture: Path) -> int:
-    # here and not above: a recorder has use for neither library before
-    from rosbags.highlevel import AnyReaderError
-
+    # here and not above: a recorder has no use for it before
     from nfo_sinus_driver.demo.picture import draw, only_drive
 
     try:
         draw(bag, picture, drive or only_drive(bag))
-    except (AnyReaderError, OSError, ValueError) as error:
+    except (OSError, ValueError) as error:
         print(f'{command}: cannot draw {bag}: {error}', file=sys.stderr)
         return 1
     print(f'{command}: the picture is {picture}')

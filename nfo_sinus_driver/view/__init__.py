@@ -10,6 +10,9 @@ import sys
 
 from nfo_sinus_driver.view.picture import Source
 
+#: Ubuntu 24.04 has no such version, and there `pip` refuses to install beside its packages.
+_INSTALL = 'pip install "textual>=3" (on Ubuntu in an environment of its own: docs/monitor.md)'
+
 
 def is_terminal() -> bool:
     """Return whether there is one; what draws the view writes to the standard error."""
@@ -26,9 +29,9 @@ def why_not() -> str:
     try:
         version = importlib.metadata.version('textual')
     except importlib.metadata.PackageNotFoundError:
-        return 'the view needs the library textual: pip install "textual>=3"'
+        return f'the view needs the library textual, 3 or newer: {_INSTALL}'
     if int(version.split('.')[0]) < 3:
-        return f'the view needs textual 3 or newer, not {version}: pip install "textual>=3"'
+        return f'the view needs the library textual, 3 or newer, not {version}: {_INSTALL}'
     return ''
 
 

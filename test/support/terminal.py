@@ -17,7 +17,7 @@ import termios
 import threading
 import time
 
-import pyte
+import pytest
 
 #: Machines are shared and slow, s.
 _PATIENCE = 90.0
@@ -34,7 +34,9 @@ class Terminal(contextlib.ExitStack):
         environment: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__()
+        pyte = pytest.importorskip('pyte', reason='pyte is not installed')
         self._screen = pyte.Screen(columns, rows)
+        self._stream = pyte.ByteStream(self._screen)
         self._lock = threading.Lock()
         self._end, other = pty.openpty()
         fcntl.ioctl(other, termios.TIOCSWINSZ, struct.pack('4H', rows, columns, 0, 0))
@@ -95,7 +97,6 @@ class Terminal(contextlib.ExitStack):
         return self._process.wait(_PATIENCE)
 
     def _read(self) -> None:
-        stream = pyte.ByteStream(self._screen)
         while True:
             try:
                 data = os.read(self._end, 65536)
@@ -104,7 +105,7 @@ class Terminal(contextlib.ExitStack):
             if not data:
                 return
             with self._lock:
-                stream.feed(data)
+                self._stream.feed(data)
 
     def _close(self) -> None:
         if self._process.poll() is None:

@@ -7,14 +7,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from types import SimpleNamespace
 
-import canopen
-from canopen import objectdictionary
 from hypothesis import given, strategies as st
 import pytest
 
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.interface import Address, LineSettings, Refused
+
+canopen = pytest.importorskip('canopen', reason='canopen is not installed')
+objectdictionary = canopen.objectdictionary
 
 UNIT = 5
 NUMBERS = {

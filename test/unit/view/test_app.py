@@ -12,9 +12,7 @@ import math
 import time
 
 import pytest
-from textual.pilot import Pilot
 
-from nfo_sinus_driver.view.app import MonitorApp, natural, short_names
 from nfo_sinus_driver.view.picture import (
     Condition,
     DriveView,
@@ -24,6 +22,10 @@ from nfo_sinus_driver.view.picture import (
     Note,
     Picture,
 )
+
+Pilot = pytest.importorskip('textual.pilot', reason='textual is not installed').Pilot
+# only now: it is made with that library
+from nfo_sinus_driver.view.app import MonitorApp, natural, short_names  # noqa: E402
 
 #: Machines are shared and slow, s.
 _PATIENCE = 60.0

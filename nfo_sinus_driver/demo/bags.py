@@ -1,0 +1,102 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Bags (rosbag2, MCAP): by rosbag2_py where ROS has it, otherwise by the library rosbags.
+
+Either writes the same bag, and reads that of the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import importlib
+import os
+from pathlib import Path
+from typing import Any, Protocol
+
+from rclpy.qos import QoSProfile
+import yaml
+
+#: Each imports its library; the first one that can be imported is taken.
+_MODULES = ('bags_rosbag2', 'bags_rosbags')
+_INFORMATION = 'rosbag2_bagfile_information'
+
+
+class Writer(Protocol):
+    """A bag that is being written; an OSError where that fails."""
+
+    def add_topic(self, topic: str, type_: type, offered: QoSProfile) -> None:
+        """Announce a topic, and the quality of service that its publishers offer."""
+
+    def write(self, topic: str, stamp: int, data: bytes) -> None:
+        """Write a message as it came, with the time of its receipt, ns."""
+
+    def close(self) -> None:
+        """Make the bag whole."""
+
+
+def why_none() -> str:
+    """Return why no bag can be written or read here, and what to do; empty: it can."""
+    if _module() is not None:
+        return ''
+    distribution = os.environ.get('ROS_DISTRO', 'jazzy')
+    return (
+        'neither rosbag2_py nor rosbags is installed '
+        f'(apt install ros-{distribution}-rosbag2-py; without apt: pip install rosbags)'
+    )
+
+
+def create(folder: Path, remarks: dict[str, str]) -> Writer:
+    """
+    Return a new bag.
+
+    :param folder: the bag, a folder that does not exist.
+    :param remarks: what the bag is to say of itself.
+    :raises OSError: it cannot be made.
+    """
+    writer: Writer = _module().Writer(folder, remarks)
+    return writer
+
+
+def read(folder: Path, is_wanted: Callable[[str], bool]) -> Iterator[tuple[str, int, Any]]:
+    """
+    Yield topic, time of receipt (ns) and message, in the order of receipt.
+
+    :param is_wanted: tells of a topic whether it is read.
+    :raises ValueError: it is no bag, or one that cannot be read.
+    """
+    wanted = {topic for topic, _ in topics(folder) if is_wanted(topic)}
+    found: Iterator[tuple[str, int, Any]] = _module().read(folder, wanted)
+    return found
+
+
+def metadata(folder: Path) -> dict[str, Any]:
+    """Return what a bag says of itself; a ValueError where it is none."""
+    path = folder / 'metadata.yaml'
+    if not path.is_file():
+        raise ValueError('it is no bag: a folder with a metadata.yaml is one')
+    found = yaml.safe_load(path.read_text())
+    if not isinstance(found, dict) or _INFORMATION not in found:
+        raise ValueError(f'it is no bag: its metadata.yaml has no {_INFORMATION}')
+    described: dict[str, Any] = found[_INFORMATION]
+    return described
+
+
+def topics(folder: Path) -> list[tuple[str, str]]:
+    """Return the topics of a bag that have messages, with their types."""
+    counted = metadata(folder)['topics_with_message_count']
+    return [
+        (one['topic_metadata']['name'], one['topic_metadata']['type'])
+        for one in counted
+        if one['message_count']
+    ]
+
+
+def _module() -> Any:
+    # only when it is needed: the demo runs where there is neither
+    for name in _MODULES:
+        with contextlib.suppress(ImportError):
+            return importlib.import_module(f'nfo_sinus_driver.demo.{name}')
+    return None
