@@ -22,7 +22,14 @@ setup(
     name=NAME,
     version='0.1.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['families/*/*.csv', 'families/*/*/*.csv']},
+    package_data={
+        NAME: [
+            'catalog/declared/*.json',
+            'families/*/*.csv',
+            'families/*/*.vfd.yaml',
+            'families/*/*/*.csv',
+        ]
+    },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

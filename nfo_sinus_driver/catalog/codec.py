@@ -8,7 +8,8 @@ Between the bytes of a bus and a raw number or a text.
 A codec is named in a table as ``uint16_be``, ``sint32_ws``, ``uint16_le[4:7]``, ``bcd32`` or
 ``string16``: a type with its length in bits (of a string: in characters), then how its bytes stand:
 
-- ``be``, ``le``: the high or the low byte first; one byte needs neither.
+- ``be``, ``le``: the high or the low byte first; one byte needs neither. Whole words up to 128
+  bits, where a status has several registers.
 - ``ws``: 16-bit words, the low word first, the high byte of each first (Modbus, Classic).
 - ``hb``: half-bytes, the high one first, each in a byte of its own (MOVITRAC's 8-byte format).
 
@@ -205,7 +206,7 @@ _ORDERS: Mapping[str, tuple[_Order, _Order, int]] = {
     'hb': (_halves, _joined, 2),
 }
 _INTEGER = re.compile(
-    r'(?P<type>[us]int)(?P<bits>8|16|32)(_(?P<order>be|le|(?<=32_)ws|hb))?'
+    r'(?P<type>[us]int)(?P<bits>8|16|32|48|64|80|96|112|128)(_(?P<order>be|le|(?<=32_)ws|hb))?'
     r'(\[(?P<low>\d+):(?P<high>\d+)\])?'
 )
 _BCD = re.compile(r'bcd(8|16|32)')

@@ -30,6 +30,8 @@ from nfo_sinus_driver.catalog.status import Kind, Meaning, Role, StatusCode
 _FAMILIES = 'nfo_sinus_driver.families'
 #: The message InvSt has one byte for a status code.
 _HIGHEST_CODE = 0xFF
+#: What the name of a file ends with that describes a family.
+_DESCRIBED = '.vfd.yaml'
 #: Wider ones have no place in a message.
 _WIDEST_WORD = 0xFFFFFFFF
 #: A motor may be overhauled by so much, as a share of the greatest set-point.
@@ -132,6 +134,9 @@ class Family(Mapping[str, Parameter]):
             return told and status_word.may_say(word)
         if isinstance(value, str):
             return not parameter.labels or value in parameter.labels.values()
+        if math.isnan(value):
+            # the drive says that there is none
+            return True
         low, high = parameter.minimum, parameter.maximum
         most = math.inf if role is None else self.profile.most.get(role, math.inf)
         in_range = (low is None or value >= float(low)) and (high is None or value <= float(high))
@@ -147,6 +152,11 @@ def _folders() -> Mapping[str, Path]:
 def families() -> tuple[str, ...]:
     """Return the names of the families that there are folders of."""
     return tuple(sorted(_folders()))
+
+
+def is_described(name: str) -> bool:
+    """Tell whether a family is one that a file describes: its name is the path of the file."""
+    return name.endswith(_DESCRIBED)
 
 
 def usual_family() -> str:
@@ -188,6 +198,8 @@ def load_profile(name: str, method: str = '') -> Profile:
     :raises ValueError: there is no such family; the message lists those there are.
     :raises CatalogError: its folder is no package.
     """
+    if is_described(name):
+        return _described(name).profile
     folders = _folders()
     if name not in folders:
         raise ValueError(f'unknown model {name!r}: choose one of {", ".join(families())}')
@@ -254,6 +266,9 @@ def load_parameter(name: str, role: Role) -> Parameter | None:
     :raises ValueError: there is no such family; the message lists those there are.
     :raises CatalogError: what is said of this parameter contradicts itself.
     """
+    if is_described(name):
+        family = _described(name)
+        return family.get(family.key(role))
     load_profile(name)
     _, folder = _place(name, '')
     keys = _keys(folder)
@@ -262,7 +277,19 @@ def load_parameter(name: str, role: Role) -> Parameter | None:
 
 
 @functools.cache
+def _described(path: str) -> Family:
+    """Read the family that a file describes; its parser is loaded for such a file alone."""
+    declared = importlib.import_module('nfo_sinus_driver.catalog.declared')
+    drive = declared.read(Path(path))
+    profile = importlib.import_module(f'{_FAMILIES}._declared.profile').profile_of(drive)
+    codes = declared.status_codes(drive)
+    return Family(drive.name, drive.parameters, drive.roles, codes, {}, profile)
+
+
+@functools.cache
 def _read_family(name: str, method: str = '') -> Family:
+    if is_described(name):
+        return _described(name)
     profile = load_profile(name, method)
     _, folder = _place(name, method)
     keys = _keys(folder)

@@ -100,6 +100,7 @@ class Parameter:
     :ivar name: the manual's name.
     :ivar addresses: where it stands, by protocol; a protocol that lacks it is absent.
     :ivar scale: the drive's scale parameter that may change the factor (``FrqScl`` …), or ``''``;
+        the key of one whose value the factor is multiplied by; else
         the addresses of all but SpdScl are unknown [C16], so the factory's factors are assumed.
         TrqScl stands for T-nom / 100, so torque is in percent of the nominal torque [C13].
     :ivar unit: the unit of its values.
@@ -115,6 +116,7 @@ class Parameter:
         is a fault.
     :ivar option: the option cards of which the drive needs one for it to do anything, or ``''``.
     :ivar source: where in the manuals it stands.
+    :ivar none: the raw number by which the drive says that there is no value, or ``None``.
     """
 
     key: str
@@ -135,6 +137,7 @@ class Parameter:
     option: str
     description: str
     source: str
+    none: int | None = None
 
     @functools.cached_property
     def kind(self) -> type[bool] | type[int] | type[float] | type[str]:
@@ -213,6 +216,8 @@ class Parameter:
         raw = address.codec.decode(data)
         if isinstance(raw, str):
             return raw
+        if raw == self.none:
+            return math.nan
         factor = address.factor
         if self.labels:
             return self._meaning(raw * factor)

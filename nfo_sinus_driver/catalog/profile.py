@@ -132,7 +132,14 @@ class Hold:
     seconds: float
 
 
-Step = Read | Write | Acknowledge | AcknowledgeThenWrite | Until | Hold
+@dataclass(frozen=True)
+class Wait:
+    """Let time pass, s; a stop that waits has written its first step."""
+
+    seconds: float
+
+
+Step = Read | Write | Acknowledge | AcknowledgeThenWrite | Until | Hold | Wait
 Steps = Generator[Step, Any, _T]
 
 
@@ -532,6 +539,11 @@ class Profile:
         protocol; where one is not there, what the protocol says itself.
     :ivar measured: the measured values that matter beside the telemetry: the usual ones of
         ``~/measured``.
+    :ivar refusals: what exception codes mean that say something of their own; by the code.
+    :ivar busy: exception codes by which it says that it may take the request the next moment.
+    :ivar stops_at_timeout: the value of the parameter that has the role ``stop_at_timeout`` by
+        which the motor stops.
+    :ivar after_write: what makes settings take effect that were written, or keeps them.
     :ivar holds_control: why the bus gets control as soon as anybody asks anything, and keeps it, by
         the protocol over which that is so.
     """
@@ -558,6 +570,10 @@ class Profile:
     measured: tuple[str, ...] = ()
     words: Mapping[str, Profile] = field(default_factory=dict)
     speed_mode: SpeedMode | None = None
+    refusals: Mapping[int, str] = field(default_factory=dict)
+    busy: frozenset[int] = frozenset()
+    stops_at_timeout: Value = True
+    after_write: Sequence[Write] = ()
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:
         """Return the control methods that have a procedure."""

@@ -106,6 +106,8 @@ async def carry_out(
                 brought = await params.acknowledge(step.key, priority)
             elif isinstance(step, profile.AcknowledgeThenWrite):
                 await params.acknowledge_and_write(step.key, step.write)
+            elif isinstance(step, profile.Wait):
+                await params.sleep(step.seconds)
             elif isinstance(step, profile.Hold):
                 brought = await held(after_write(step.condition), step.seconds)
             else:

@@ -25,6 +25,7 @@ class CommunicationTimeout:
         self._params = params
         self._seconds_key = model.key(Role.COMMUNICATION_TIMEOUT)
         self._stop_key = model.key(Role.STOP_AT_TIMEOUT)
+        self._stops = model.profile.stops_at_timeout
         self._has = has
         #: SioTot, s; 0 turns it off.
         self.seconds = 0.0
@@ -65,7 +66,7 @@ class CommunicationTimeout:
             return
         data = await self._params.read_data(self._stop_key, Priority.SERVICE)
         # a code that means neither ON nor OFF is not relied upon
-        self.stops_motor = data == self._params.encode(self._stop_key, True)
+        self.stops_motor = data == self._params.encode(self._stop_key, self._stops)
 
     def take(self, keys: Collection[str], values: Mapping[str, Value]) -> bool:
         """
@@ -76,5 +77,5 @@ class CommunicationTimeout:
         if self._seconds_key in keys:
             self.seconds = float(values[self._seconds_key])
         if self._stop_key in keys:
-            self.stops_motor = bool(values.get(self._stop_key))
+            self.stops_motor = values.get(self._stop_key) == self._stops
         return self._seconds_key in keys

@@ -79,7 +79,7 @@ class CommunicationWatchdog:
                 raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
             wanted[key(Role.COMMUNICATION_TIMEOUT)] = seconds
         if state.nameplate.has(key(Role.STOP_AT_TIMEOUT)):
-            wanted[key(Role.STOP_AT_TIMEOUT)] = True
+            wanted[key(Role.STOP_AT_TIMEOUT)] = state.model.profile.stops_at_timeout
         try:
             changes = await self._change(wanted)
         except DriveError as error:

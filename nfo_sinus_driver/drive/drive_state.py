@@ -467,7 +467,7 @@ class DriveState:
         if self.params.reaches(key):
             mode = str(await self.params.read(key, priority, retry=retry))
         else:
-            mode = self.settings.expected_control_mode or 'Freque'
+            mode = self.settings.expected_control_mode or next(iter(self.model.profile.setpoints))
         unit = _UNITS.get(mode, '')
         if mode == 'PI-Reg':
             key = self.model.key(Role.PROCESS_UNIT)

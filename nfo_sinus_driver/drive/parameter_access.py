@@ -58,7 +58,7 @@ class ParameterAccess:
         self.model = model
         self._bus = bus
         #: The clock of the bus.
-        self.now = bus.now
+        self.now, self.sleep = bus.now, bus.sleep
         self._unit = unit
         self._retries = retries
         #: How many requests got no answer.
@@ -252,6 +252,14 @@ class ParameterAccess:
         """Count a request that got no answer, of this object or another."""
         self.unanswered += isinstance(error, NoAnswer)
 
+    def _meant(self, refusal: Refused) -> Refused:
+        """Return a refusal with what its code means to this family."""
+        profile, code = self.model.profile, refusal.code
+        if code in profile.busy:
+            return Refused(Refused.BUSY, profile.refusals.get(code, ''))
+        text = profile.refusals.get(code)
+        return refusal if text is None else Refused(code, f'{text} (exception {code})')
+
     async def _ask(
         self,
         address: Address,
@@ -273,9 +281,10 @@ class ParameterAccess:
                 tries -= 1
                 if not tries:
                     raise
-            except Refused as error:
-                if error.code != Refused.BUSY or not busy:
-                    raise
+            except Refused as refusal:
+                meant = self._meant(refusal)
+                if meant.code != Refused.BUSY or not busy:
+                    raise meant from None
                 busy -= 1
                 await self._bus.sleep(_BUSY_PERIOD)
             self._bus.recorder.retry(self._unit)

@@ -187,6 +187,7 @@ class ParameterWriter:
             raise not_changed(key, explain_failure(error, self._state)) from error
         self._require_not_enabled(key)
         failure = await self._send(key, data)
+        await self._keep()
         kept: bytes | None = None
         try:
             kept = await self._params.read_data(key, _SERVICE)
@@ -208,6 +209,12 @@ class ParameterWriter:
         if kept is None:
             stuck.insert(0, Report(Cause.PERHAPS_CHANGED, value=self._show(key, data)))
         raise refused.followed_by(*stuck, left=left) from failure
+
+    async def _keep(self) -> None:
+        """Have what was written take effect, and be kept, where that takes writes of its own."""
+        for step in self._state.model.profile.after_write:
+            with contextlib.suppress(LinkError):
+                await self._params.write(step, _SERVICE)
 
     async def _send(self, key: str, data: bytes) -> LinkError | None:
         """Write; return why the drive may not have taken it: reading it back tells."""

@@ -43,6 +43,10 @@ class Scales:
             role: Fraction(str(value)) / FACTORY[role] for role, value in chosen.items()
         }
         self._dialect: Mapping[str, Fraction] = {}
+        #: Parameters by whose value others are multiplied, and those values.
+        model = params.model
+        self._named = frozenset(one.scale for one in model.values() if one.scale in model)
+        self._own: Mapping[str, Fraction] = {}
         self.speed = _ONE
         self._apply()
 
@@ -58,6 +62,7 @@ class Scales:
         :raises LinkError: the drive does not answer.
         """
         before, self.speed = self.speed, await self._read_speed()
+        self._own = {key: await self._read_own(key) for key in self._named}
         self._apply()
         return self.speed != before
 
@@ -76,9 +81,12 @@ class Scales:
         # what cannot be a scale is none [C114]
         return Fraction(above, below) if above > 0 and below > 0 else _ONE
 
+    async def _read_own(self, key: str) -> Fraction:
+        return Fraction(str(await self._params.read_number(key, Priority.SERVICE)))
+
     def _apply(self) -> None:
         model = self._params.model
-        scales = {}
+        scales = dict(self._own)
         for role, factor in {**self._chosen, Role.ACTUAL_SPEED: self.speed}.items():
             key = model.key(role)
             if key and model[key].scale:

@@ -17,6 +17,7 @@ from nfo_sinus_driver.catalog import (
     Role,
     families,
     load_family,
+    is_described,
     load_parameter,
     load_profile,
     usual_family,
@@ -284,7 +285,8 @@ class DriveSettings:
 
     def __post_init__(self) -> None:
         settings = settings_of(DriveSettings)
-        _one_of('model', self.model, (*families(), AUTO))
+        if not is_described(self.model):
+            _one_of('model', self.model, (*families(), AUTO))
         if self.control_method:
             _one_of('control_method', self.control_method, _control_methods(self.model))
         settings['reference'].check(self.reference)

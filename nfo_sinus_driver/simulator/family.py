@@ -16,7 +16,7 @@ import functools
 import importlib
 import importlib.util
 
-from nfo_sinus_driver.catalog import Family, Value, families, load_family
+from nfo_sinus_driver.catalog import Family, Value, families, is_described, load_family
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator.control_unit import ControlUnit, Option, Variant
@@ -62,6 +62,10 @@ def simulated() -> tuple[str, ...]:
 @functools.cache
 def load(name: str) -> SimulatedFamily:
     """Return what the folder of a family says; a ValueError lists the families there are."""
+    if is_described(name):
+        made = importlib.import_module(f'{__package__}._declared.family').family_of(name)
+        assert isinstance(made, SimulatedFamily)
+        return made
     if name not in simulated():
         raise ValueError(f'unknown model {name!r}: choose one of {", ".join(simulated())}')
     family = importlib.import_module(f'{__package__}.{name}.family').FAMILY

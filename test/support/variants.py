@@ -6,6 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
+
+from nfo_sinus_driver.catalog.declared import read
 
 _HARDEST = {
     'sinus_g2': {'run_command_in_fault': 'keeps', 'refuses_in_fault': 'all'},
@@ -34,5 +37,8 @@ def hardest(model: str = 'sinus_g2') -> Mapping[str, str]:
 
 
 def ramps(model: str, up: float, down: float) -> dict[str, float]:
-    """Return the settings of a drive family for its ramps, s."""
+    """Return the settings of a drive family for its ramps, s; of a file those that it names."""
+    if model.endswith('.vfd.yaml'):
+        file = read(Path(model))
+        return {key: time for key, time in ((file.accel, up), (file.decel, down)) if key}
     return dict(zip(_RAMPS[model], (up, down), strict=True))

@@ -23,6 +23,7 @@ PACKAGE = 'nfo_sinus_driver'
 WITH_ROS = {'demo', 'node'}
 #: What the others may import beside the standard library.
 MAY_USE = {
+    'catalog': {'yaml'},
     'cli': {'argcomplete', 'tqdm', 'yaml'},
     'link': {'serial'},
     'simulator': {'pymodbus'},

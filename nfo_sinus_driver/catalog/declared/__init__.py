@@ -1,0 +1,42 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Drives that a file describes, ``NAME.vfd.yaml``: what it says, and what is wrong in it."""
+
+from nfo_sinus_driver.catalog.declared.description import (
+    Assign,
+    Await,
+    Change,
+    Condition,
+    Description,
+    Direction,
+    Pause,
+    Put,
+    SetpointPlace,
+    Step,
+    Steps,
+)
+from nfo_sinus_driver.catalog.declared.places import STATUS_KEY
+from nfo_sinus_driver.catalog.declared.reader import SUFFIX, read
+from nfo_sinus_driver.catalog.declared.tables import Code, status_codes
+from nfo_sinus_driver.catalog.declared.yaml_file import DescriptionError
+
+__all__ = [
+    'STATUS_KEY',
+    'SUFFIX',
+    'Assign',
+    'Await',
+    'Change',
+    'Code',
+    'Condition',
+    'Description',
+    'DescriptionError',
+    'Direction',
+    'Pause',
+    'Put',
+    'SetpointPlace',
+    'Step',
+    'Steps',
+    'read',
+    'status_codes',
+]

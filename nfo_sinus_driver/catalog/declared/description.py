@@ -1,0 +1,281 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What a file says of a drive, as data: the declared profile and the simulated drive both go by it.
+
+Registers and coils are as they are sent, words as they stand in one register, 0 to FFFFh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from nfo_sinus_driver.catalog.parameter import Parameter, Value
+from nfo_sinus_driver.catalog.status import Role
+
+#: Status codes that say what the drive does; faults with such a number are moved behind.
+STATES = range(190, 200)
+_MOVED_BY = 1000
+
+
+def status_code(number: int) -> int:
+    """Return the status code of a fault with a number of the drive's own."""
+    return number + _MOVED_BY if number in STATES else number
+
+
+@dataclass(frozen=True)
+class Condition:
+    """
+    A condition on the status.
+
+    :ivar mask: the bits of the status word that count.
+    :ivar values: what they are, where the condition holds.
+    :ivar inverted: it holds with any other.
+    """
+
+    mask: int
+    values: frozenset[int]
+    inverted: bool = False
+
+    def holds(self, status: int) -> bool:
+        """Tell whether it holds with a status word."""
+        return (status & self.mask in self.values) is not self.inverted
+
+
+@dataclass(frozen=True)
+class Put:
+    """Write a value, raw, to a register, several or a coil: to the parameter with a key."""
+
+    key: str
+    raw: int
+
+
+@dataclass(frozen=True)
+class Change:
+    """Set some bits of a register, clear others, and keep the rest."""
+
+    key: str
+    set: int
+    clear: int
+
+
+@dataclass(frozen=True)
+class Assign:
+    """Write a value to a parameter of the table."""
+
+    key: str
+    value: Value
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Let time pass, s."""
+
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Await:
+    """Wait until a condition holds, s at most."""
+
+    condition: Condition
+    seconds: float
+
+
+Step = Put | Change | Assign | Pause | Await
+Steps = Sequence[Step]
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """
+    What a parameter has to be before the line has control.
+
+    :ivar write: it is written where it differs, and reported.
+    :ivar text: what else to do, for an operator.
+    """
+
+    key: str
+    value: Value
+    write: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class Direction:
+    """
+    The word, or the coil, that gives the direction; both go with the run command.
+
+    :ivar key: where it is written.
+    """
+
+    key: str
+    forward: int
+    reverse: int
+
+
+@dataclass(frozen=True)
+class SetpointPlace:
+    """
+    Where set-points go.
+
+    :ivar key: the parameter that takes them; :ivar read_key: the one that tells them, or ``''``.
+    :ivar mode: the control mode of their unit.
+    :ivar most: the greatest one; :ivar limit: the parameter that limits it, or ``''``.
+    :ivar nominal: what the motor is made for: a value, the parameter that tells it, or ``None``.
+    :ivar signed: a negative one is reverse.
+    :ivar direction: what else gives the direction; with neither there is no reverse.
+    """
+
+    key: str
+    read_key: str
+    mode: str
+    most: float
+    limit: str = ''
+    nominal: float | str | None = None
+    signed: bool = False
+    direction: Direction | None = None
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault: its status code and texts; ``line``: a silence of the line leaves it."""
+
+    code: int
+    text: str
+    description: str = ''
+    remedy: str = ''
+    line: bool = False
+
+
+@dataclass(frozen=True)
+class FaultCodes:
+    """
+    The number of a fault in the status word.
+
+    :ivar mask: its bits; :ivar shift: the lowest of them.
+    :ivar none: the number that means none.
+    """
+
+    mask: int
+    shift: int
+    none: int
+
+    def number(self, status: int) -> int:
+        """Return the number that a status word has."""
+        return (status & self.mask) >> self.shift
+
+    def code(self, status: int) -> int:
+        """Return the status code of the fault that a status word has; 0 if it has none."""
+        number = self.number(status)
+        return 0 if number == self.none else status_code(number)
+
+
+@dataclass(frozen=True)
+class StatusPlace:
+    """
+    Where the status stands; it is read as one number, the first register in its highest bits.
+
+    :ivar registers: as they stand in it, or one coil for each bit, the lowest first.
+    :ivar coils: they are coils.
+    """
+
+    registers: Sequence[int]
+    coils: bool = False
+
+    def shift(self, register: int) -> int:
+        """Return at which bit a register, or a coil, begins."""
+        at = self.registers.index(register)
+        return at if self.coils else 16 * (len(self.registers) - 1 - at)
+
+
+@dataclass(frozen=True)
+class LineDefaults:
+    """
+    The line as the drive leaves the factory.
+
+    :ivar write: the functions by which it takes writes.
+    :ivar exceptions: what its exception codes mean; :ivar busy: those that mean to try again.
+    """
+
+    baud_rate: int = 0
+    char_format: str = ''
+    address: int = 0
+    check: str = ''
+    write: tuple[int, ...] = (6, 16)
+    most_registers: int = 123
+    exceptions: Mapping[int, str] = field(default_factory=dict)
+    busy: frozenset[int] = frozenset()
+
+    @property
+    def shown(self) -> str:
+        """What is said, for an operator."""
+        speed = f'{self.baud_rate} bit/s' if self.baud_rate else ''
+        address = f'address {self.address}' if self.address else ''
+        found = ', '.join(filter(None, (f'{speed} {self.char_format}'.strip(), address)))
+        factory = f'{found} from the factory' if found else ''
+        return '; '.join(filter(None, (self.check, factory)))
+
+
+@dataclass(frozen=True)
+class Timeout:
+    """The drive's own time-out: its parameter, and what it does then, if that can be chosen."""
+
+    key: str
+    action: str = ''
+    stops: Value = True
+
+
+@dataclass(frozen=True)
+class Description:
+    """
+    A drive, as its file describes it.
+
+    :ivar name: the name of the file without ``.vfd.yaml``; :ivar path: the file.
+    :ivar parameters: all, by key, those of commands and status among them.
+    :ivar registers: of each key of a command, set-point or parameter, its first register or coil.
+    :ivar facts: the conditions of the status, by the names of the file.
+    :ivar flags: faults that are bits, the gravest first.
+    :ivar holder: the parameter that tells who has control, and its values for the line.
+    :ivar stop_mode: the parameter that says how it stops, and its value for coasting.
+    :ivar defaults: with what value a parameter leaves the factory, by key.
+    """
+
+    name: str
+    path: str
+    title: str
+    source: str
+    tested: str
+    line: LineDefaults
+    parameters: Mapping[str, Parameter]
+    roles: Mapping[Role, str]
+    status: StatusPlace
+    facts: Mapping[str, Condition]
+    setpoint: SetpointPlace
+    run: Steps
+    stop: Steps
+    prepare: Steps = ()
+    coast: Steps = ()
+    quick_stop: Steps = ()
+    reset: Steps = ()
+    release: Steps = ()
+    after_write: Sequence[Put] = ()
+    requires: Sequence[Requirement] = ()
+    holder: tuple[str, tuple[Value, ...]] | None = None
+    stop_mode: tuple[str, Value] | None = None
+    enable_input: str = 'enable input'
+    codes: FaultCodes | None = None
+    faults: Mapping[int, Fault] = field(default_factory=dict)
+    flags: Sequence[tuple[Condition, Fault]] = ()
+    alarm: Fault = Fault(0, 'Warning', remedy='Look at its keypad which one it is')
+    timeout: Timeout | None = None
+    defaults: Mapping[str, Value] = field(default_factory=dict)
+    accel: str = ''
+    decel: str = ''
+
+    @property
+    def tells_control(self) -> bool:
+        """The status tells who has control."""
+        return 'remote' in self.facts or 'local' in self.facts

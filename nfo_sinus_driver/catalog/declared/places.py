@@ -1,0 +1,317 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Registers and coils of a description: what makes parameters of them, and finds what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from nfo_sinus_driver.catalog.codec import codec_of
+from nfo_sinus_driver.catalog.declared.description import Condition, LineDefaults, StatusPlace
+from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
+from nfo_sinus_driver.catalog.parameter import Access, Address, Parameter
+
+WORD = 0xFFFF
+#: The group of all that commands the drive and tells its status.
+_FIELDBUS = 'Fieldbus'
+STATUS_KEY = 'line.status'
+_TYPES = {
+    'uint16': 'uint16_be', 'int16': 'sint16_be', 'bcd16': 'bcd16', 'bcd32': 'bcd32',
+    'uint32': 'uint32_be', 'int32': 'sint32_be',
+}
+_LOW_FIRST = {'uint32': 'uint32_ws', 'int32': 'sint32_ws'}
+#: More registers are no status that is read as one.
+_MOST_OF_STATUS = 8
+
+
+@dataclass(frozen=True)
+class Told:
+    """A condition as the file has it: the bits of one register, or one coil."""
+
+    register: int
+    coil: bool
+    mask: int
+    values: frozenset[int]
+    inverted: bool
+    line: int
+
+    def in_place(self, status: StatusPlace) -> Condition:
+        """Return the condition on the status word."""
+        shift = status.shift(self.register)
+        values = frozenset(value << shift for value in self.values)
+        return Condition(self.mask << shift, values, self.inverted)
+
+
+class Places:
+    """
+    Makes parameters of what a file says of registers and coils.
+
+    :ivar made: those of commands and status, by key.
+    """
+
+    def __init__(self, file: Node, line: LineDefaults, problems: Problems) -> None:
+        self._problems = problems
+        self._numbering = file.get('line').integer('numbering')
+        self._coil_numbering = file.get('line').integer('coil_numbering')
+        self._line = line
+        self._status_register = file.get('status').get('register')
+        self.made: dict[str, Parameter] = {}
+
+    @property
+    def functions(self) -> tuple[int, ...]:
+        """The functions by which registers are written."""
+        return self._line.write
+
+    @property
+    def most_registers(self) -> int:
+        """How many there may be in one message."""
+        return self._line.most_registers
+
+    # --- numbers ---
+
+    def register(self, node: Node) -> int:
+        """Return the register as it is sent."""
+        return self._sent(node, self._numbering, 'register')
+
+    def coil(self, node: Node) -> int:
+        """Return the coil as it is sent."""
+        return self._sent(node, self._coil_numbering, 'coil')
+
+    def _sent(self, node: Node, numbering: int, what: str) -> int:
+        printed = node.scalar if isinstance(node.scalar, int) else 0
+        sent = printed - numbering
+        if not 0 <= sent <= WORD:
+            self._problems.add(
+                node.line,
+                f'{what} {printed} cannot be sent: with numbering {numbering} they go from '
+                f'{numbering} to {numbering + WORD}',
+            )
+            return 0
+        return sent
+
+    # --- conditions ---
+
+    def condition(self, node: Node, what: str) -> Told | None:
+        """Return what a condition says; ``None`` if it is none."""
+        try:
+            return self._condition(node, what)
+        except ValueError as error:
+            self._problems.add(node.line, str(error))
+            return None
+
+    def _condition(self, node: Node, what: str) -> Told:
+        coil = 'coil' in node
+        place = node.get('coil') if coil else node.get('register')
+        if place.scalar is None and not coil:
+            place = self._status_register
+        if coil and 'register' in node:
+            raise ValueError(f'{what} names a register and a coil: remove one of both')
+        if place.scalar is None:
+            raise ValueError(
+                f'{what} says not where: add register (or register under status), or coil'
+            )
+        mask, values, inverted = self._bits(node, what, coil=coil)
+        number = self.coil(place) if coil else self.register(place)
+        return Told(number, coil, mask, values, inverted, node.line)
+
+    def _bits(
+        self, node: Node, what: str, *, coil: bool
+    ) -> tuple[int, frozenset[int], bool]:
+        chosen = [name for name in ('bit', 'bits', 'mask') if name in node]
+        if len(chosen) > 1 or (coil and chosen):
+            raise ValueError(f'{what}: one of bit, bits and mask is enough')
+        given = [name for name in ('is', 'value', 'values', 'except') if name in node]
+        if len(given) > 1:
+            raise ValueError(f'{what}: one of is, value, values and except is enough')
+        shift, mask = self._mask(node)
+        if coil or 'bit' in node:
+            if given and given != ['is']:
+                raise ValueError(f'{what}: of one bit say "is: 0" or "is: 1"')
+            bit = 1 if coil else mask
+            return bit, frozenset((bit if node.integer('is', 1) else 0,)), False
+        if not given or given == ['is']:
+            raise ValueError(f'{what} says not what the bits are: add value')
+        return self._values(node, what, shift, mask)
+
+    def _mask(self, node: Node) -> tuple[int, int]:
+        if 'bit' in node:
+            return 0, 1 << node.integer('bit')
+        if 'bits' in node:
+            low, high = (int(one.scalar or 0) for one in node['bits'].items)
+            return low, ((1 << max(high - low + 1, 0)) - 1) << low
+        return 0, node.integer('mask', WORD)
+
+    def _values(
+        self, node: Node, what: str, shift: int, mask: int
+    ) -> tuple[int, frozenset[int], bool]:
+        if not 0 < mask <= WORD:
+            raise ValueError(f'{what}: a register has the bits 0 to 15')
+        inverted = 'except' in node
+        listed = node.get('except') if inverted else node.get('values')
+        numbers = [node.get('value'), *listed.items]
+        raw = [int(one.scalar) for one in numbers if isinstance(one.scalar, int)]
+        values = {(value & WORD) << shift for value in raw}
+        outside = [value for value in values if value & ~mask]
+        if outside:
+            wrong = f'{outside[0] >> shift:X}h has bits that the mask {mask:X}h leaves out'
+            raise ValueError(f'{what} can never be true: {wrong}')
+        if len(values) == 1 << mask.bit_count():
+            raise ValueError(f'{what} is always the same: it lists every value')
+        return mask, frozenset(values), inverted
+
+    # --- parameters of commands and status ---
+
+    def word(self, register: int, count: int = 1) -> str:
+        """Return the key of what writes a register, or several in one message."""
+        key = f'line.r{register:04x}' + (f'_{count}' if count > 1 else '')
+        self._make(key, self._writes, register, f'uint{16 * count}_be')
+        return key
+
+    def coil_key(self, coil: int) -> str:
+        """Return the key of a coil."""
+        key = f'line.coil_{coil}'
+        self._make(key, 'coil', coil, 'uint8')
+        return key
+
+    @property
+    def _writes(self) -> str:
+        return 'register' if 6 in self._line.write else 'register_16'
+
+    def _make(self, key: str, space: str, index: int, codec: str) -> None:
+        if key not in self.made:
+            address = Address('modbus', space, index, None, codec_of(codec), Fraction(1), '')
+            self.made[key] = internal(key, address, Access.READ_WRITE)
+
+    def status(self, told: Iterable[Told], block: Node, registers: Iterable[int]) -> StatusPlace:
+        """Return where the status stands, with a parameter that reads it as one."""
+        found = list(told)
+        wanted = {one.register for one in found} | set(registers)
+        if any(one.coil for one in found):
+            return self._coils(found, block)
+        if 'register' in block:
+            first = self.register(block['register'])
+            blocks = [list(range(first, first + block.integer('count', 1)))]
+            rest = sorted(wanted - set(blocks[0]))
+            blocks += runs(rest)
+        else:
+            blocks = runs(sorted(wanted))
+        return self._registers(sorted(blocks, key=len), block)
+
+    def _registers(self, blocks: list[list[int]], block: Node) -> StatusPlace:
+        count = sum(map(len, blocks))
+        if not blocks:
+            return StatusPlace((0,))
+        if len(blocks) > 2 or len(blocks[0]) > 1 < len(blocks) or count > _MOST_OF_STATUS:
+            where = ', '.join(f'{run[0]:04X}h to {run[-1]:04X}h' for run in blocks)
+            self._problems.add(
+                block.line,
+                f'the status stands at {where}: registers in one row, and one register elsewhere, '
+                f'are possible, {_MOST_OF_STATUS} at most; say with block: what may be read in one '
+                'message; such a drive needs a profile in Python otherwise',
+            )
+        first, *others = blocks
+        sub_index = others[0][0] if others else None
+        codec = codec_of(f'uint{16 * min(count, _MOST_OF_STATUS)}_be')
+        address = Address('modbus', 'register', first[0], sub_index, codec, Fraction(1), '')
+        self.made[STATUS_KEY] = internal(STATUS_KEY, address, Access.READ)
+        return StatusPlace(tuple(one for run in blocks for one in run))
+
+    def _coils(self, told: Sequence[Told], block: Node) -> StatusPlace:
+        if not all(one.coil for one in told):
+            self._problems.add(
+                block.line, 'the status stands in registers and in coils: only one of both is read'
+            )
+        coils = [one.register for one in told if one.coil]
+        first = min(coils)
+        count = 16 if max(coils) - first < 16 else 32
+        if max(coils) - first >= count:
+            self._problems.add(block.line, 'the coils of the status are more than 32 apart')
+        codec = codec_of(f'uint{count}_le')
+        address = Address('modbus', 'coil', first, None, codec, Fraction(1), '')
+        self.made[STATUS_KEY] = internal(STATUS_KEY, address, Access.READ)
+        registers = [one.register for one in told]
+        return StatusPlace((*range(first, first + count), *registers), coils=True)
+
+    # --- values ---
+
+    def address(self, node: Node, what: str, *, writable: bool = False) -> Address:
+        """Return where a value stands."""
+        factor = self._factor(node, what)
+        if 'coil' in node:
+            coil = self.coil(node['coil'])
+            return Address('modbus', 'coil', coil, None, codec_of('uint8'), factor, '')
+        if 'register' not in node:
+            self._problems.add(node.line, f'{what} says not where: add register or coil')
+            return Address('modbus', 'register', 0, None, codec_of('uint16_be'), factor, '')
+        kind, register = node.text('type', 'uint16'), self.register(node['register'])
+        codec = _LOW_FIRST.get(kind, '') if node.text('order') == 'low_first' else ''
+        codec = codec or _TYPES[kind]
+        if node.text('order') == 'low_first' and kind not in _LOW_FIRST:
+            self._problems.add(node.line, f'{what}: order is for the types uint32 and int32')
+        made = codec_of(self._with_bits(node, what, codec, writable=writable))
+        if made.size == 4:
+            self._check_wide(node, what, register, writable=writable)
+        space = 'input' if node.text('table') == 'input' else self._writes
+        if space == 'input' and writable:
+            self._problems.add(node.line, f'{what}: an input register cannot be written')
+        return Address('modbus', space, register, None, made, factor, '')
+
+    def _check_wide(self, node: Node, what: str, register: int, *, writable: bool) -> None:
+        if register == WORD:
+            self._problems.add(node.line, f'{what} takes two registers, and this is the last one')
+        if self._line.most_registers < 2:
+            self._problems.add(node.line, f'{what} takes two registers, and most_registers is 1')
+        if writable and 16 not in self._line.write:
+            self._problems.add(
+                node.line, f'{what} takes two registers, and the line has no function 16'
+            )
+
+    def _with_bits(self, node: Node, what: str, codec: str, *, writable: bool) -> str:
+        if 'bits' not in node:
+            return codec
+        low, high = (int(one.scalar or 0) for one in node['bits'].items)
+        if not codec.startswith('uint') or not low <= high < codec_of(codec).size * 8:
+            self._problems.add(node.line, f'{what} has no bits {low} to {high}')
+            return codec
+        if writable:
+            self._problems.add(
+                node.line, f'{what}: some bits of a register cannot be written; add access: r'
+            )
+        return f'{codec}[{low}:{high}]'
+
+    def _factor(self, node: Node, what: str) -> Fraction:
+        found = node.get('factor').scalar
+        if isinstance(found, str):
+            return Fraction(found)
+        factor = node.number('factor')
+        factor = Fraction(1) if factor is None else factor
+        if factor <= 0:
+            self._problems.add(
+                node.get('factor').line, f'the factor of {what} has to be more than 0'
+            )
+            return Fraction(1)
+        return factor
+
+
+def runs(numbers: Sequence[int]) -> list[list[int]]:
+    """Return numbers in order, as rows without a hole."""
+    found: list[list[int]] = []
+    for number in numbers:
+        if found and found[-1][-1] == number - 1:
+            found[-1].append(number)
+        else:
+            found.append([number])
+    return found
+
+
+def internal(key: str, address: Address, access: Access, unit: str = '') -> Parameter:
+    """Return a parameter that is no setting."""
+    group = {'measured': 'Status'}.get(key.partition('.')[0], _FIELDBUS)
+    return Parameter(
+        key=key, name=key, group=group, addresses={'modbus': address}, scale='', unit=unit,
+        minimum=None, maximum=None, steps=(), decimals=0, labels={}, access=access, stopped=False,
+        since=None, older=False, option='', description='', source='',
+    )

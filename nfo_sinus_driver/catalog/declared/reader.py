@@ -1,0 +1,348 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Reads a file into a :class:`Description`; every problem is named with file and line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+from nfo_sinus_driver.catalog.declared import schema
+from nfo_sinus_driver.catalog.declared.commands import Commands, StepReader
+from nfo_sinus_driver.catalog.declared.description import (
+    Condition,
+    Description,
+    Direction,
+    Fault,
+    FaultCodes,
+    LineDefaults,
+    Put,
+    Requirement,
+    SetpointPlace,
+    StatusPlace,
+    Timeout,
+    status_code,
+)
+from nfo_sinus_driver.catalog.declared.places import WORD, Places, Told, internal
+from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters
+from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
+from nfo_sinus_driver.catalog.parameter import Access, Parameter, Value
+from nfo_sinus_driver.catalog.status import Role
+
+#: What the name of a file ends with.
+SUFFIX = '.vfd.yaml'
+SETPOINT_KEY = 'line.setpoint'
+SETPOINT_READ_KEY = 'line.setpoint_read'
+_MODES = {'Hz': 'Freque', 'rpm': 'Speed'}
+#: Where faults that are bits begin to be counted.
+_FLAGS_FROM = 100
+_MOST_FAULTS = 64
+_OF_STATUS = ('register', 'block')
+
+
+def read(path: Path) -> Description:
+    """
+    Read and check a file.
+
+    :raises DescriptionError: it is no description of a drive; it lists all that is wrong.
+    """
+    root, problems = load(path)
+    schema.check(root, problems)
+    problems.require_none()
+    made = _Reader(path, root, problems).description()
+    problems.require_none()
+    return made
+
+
+class _Reader:
+    """Reads one file whose schema is right."""
+
+    def __init__(self, path: Path, root: Node, problems: Problems) -> None:
+        self._path = path
+        self._root = root
+        self._problems = problems
+        self._line = _line(root.get('line'))
+        self._places = Places(root, self._line, problems)
+        self._told: dict[str, Told] = {}
+
+    def description(self) -> Description:
+        """Return what the file says; what is wrong goes to the problems."""
+        root, control = self._root, self._root['control']
+        settings = Settings(root, self._places, self._problems)
+        flags = list(self._flags())
+        self._told = dict(self._facts())
+        steps = StepReader(root, self._places, settings, self._problems)
+        codes_at = self._codes_register()
+        told = [*self._told.values(), *(one for one, _ in flags), *steps.awaited()]
+        registers = [] if codes_at is None else [codes_at]
+        status = self._places.status(told, root['status'].get('block'), registers)
+        self._problems.require_none()
+        facts = {name: one.in_place(status) for name, one in self._told.items()}
+        self._require_apart(facts)
+        steps.use(status)
+        setpoint = self._setpoint(settings)
+        commands = Commands(control, steps, setpoint.direction, self._problems)
+        measured, roles = self._measured(facts)
+        self._require_control_told(control, settings)
+        parameters = {**settings.parameters, **measured, **self._places.made}
+        return Description(
+            name=self._path.name.removesuffix(SUFFIX),
+            path=str(self._path),
+            title=root.text('title'),
+            source=root.text('source'),
+            tested=root.text('tested'),
+            line=self._line,
+            parameters=parameters,
+            roles={**settings.roles, **roles, **role_parameters(root)},
+            status=status,
+            facts=facts,
+            setpoint=setpoint,
+            **commands.lists(),
+            after_write=tuple(self._after_write(steps)),
+            requires=tuple(self._requires(control, settings)),
+            holder=settings.holder(control.get('holder')),
+            stop_mode=self._stop_mode(control.get('stop_mode'), settings),
+            enable_input=control.text('enable_input', 'enable input'),
+            codes=self._codes(codes_at, status),
+            faults={fault.code: fault for fault in self._faults(root.get('faults'))},
+            flags=tuple((one.in_place(status), fault) for one, fault in flags),
+            alarm=self._alarm(root.get('alarms')),
+            timeout=self._timeout(settings),
+            defaults=settings.defaults,
+            accel=settings.known(root.get('simulated').get('accel')),
+            decel=settings.known(root.get('simulated').get('decel')),
+        )
+
+    # --- status ---
+
+    def _facts(self) -> Iterator[tuple[str, Told]]:
+        for name, node in self._root['status'].mapping.items():
+            if name not in _OF_STATUS:
+                told = self._places.condition(node, f'status {name}')
+                if told is not None:
+                    yield name, told
+
+    def _require_apart(self, facts: Mapping[str, Condition]) -> None:
+        seen: dict[Condition, str] = {}
+        for name, fact in facts.items():
+            line = self._told[name].line
+            other = seen.setdefault(fact, name)
+            if other != name:
+                self._problems.add(
+                    line, f'{name} and {other} mean the same bits: one of both is something else'
+                )
+            opposite = Condition(fact.mask, fact.values, not fact.inverted)
+            bit = fact.mask & (fact.mask - 1) == 0
+            turned = Condition(fact.mask, frozenset({fact.mask, 0} - fact.values)) if bit else None
+            for one in (opposite, turned):
+                if one in seen and {name, seen[one]} != {'remote', 'local'}:
+                    self._problems.add(
+                        line, f'{name} is true whenever {seen[one]} is not: say only what is told'
+                    )
+
+    def _require_control_told(self, control: Node, settings: Settings) -> None:
+        told = [name for name in ('remote', 'local') if name in self._told]
+        if 'holder' in control and told:
+            self._problems.add(
+                control['holder'].line,
+                f'who has control is told by status {told[0]}, too: remove one of both',
+            )
+
+    # --- faults ---
+
+    def _codes_register(self) -> int | None:
+        node = self._root.get('faults')
+        if 'register' not in node:
+            if 'codes' in node:
+                self._problems.add(node.line, 'faults has codes, but no register that tells them')
+            return None
+        return self._places.register(node['register'])
+
+    def _codes(self, register: int | None, status: StatusPlace) -> FaultCodes | None:
+        if register is None or status.coils:
+            return None
+        node = self._root['faults']
+        low, high = 0, 15
+        if 'bits' in node:
+            low, high = (int(one.scalar or 0) for one in node['bits'].items)
+            if not low <= high < 16:
+                self._problems.add(node['bits'].line, f'a register has no bits {low} to {high}')
+                return None
+        shift = status.shift(register) + low
+        mask = ((1 << high - low + 1) - 1) << shift
+        return FaultCodes(mask, shift, node.integer('none'))
+
+    def _faults(self, node: Node) -> Iterator[Fault]:
+        none = node.integer('none')
+        for text, fault in node.get('codes').mapping.items():
+            try:
+                number = number_of(text)
+            except ValueError as error:
+                self._problems.add(fault.line, f'{error}: write it without zeros in front')
+                continue
+            if number == none or number > WORD:
+                self._problems.add(fault.line, f'fault {text} cannot be: {none} means no fault')
+            yield _fault(fault, status_code(number))
+
+    def _flags(self) -> Iterator[tuple[Told, Fault]]:
+        flags = self._root.get('faults').get('flags')
+        if len(flags.items) > _MOST_FAULTS:
+            self._problems.add(flags.line, f'faults has more than {_MOST_FAULTS} flags')
+        for number, node in enumerate(flags.items):
+            told = self._places.condition(node, f'fault flag {node.text("text")!r}')
+            if told is not None:
+                yield told, _fault(node, status_code(_FLAGS_FROM + number))
+
+    def _alarm(self, node: Node) -> Fault:
+        usual = Description.alarm
+        text = node.text('text', usual.text)
+        return Fault(0, text, usual.description, node.text('remedy', usual.remedy))
+
+    # --- set-point ---
+
+    def _setpoint(self, settings: Settings) -> SetpointPlace:
+        node = self._root['setpoint']
+        address = self._places.address(node, 'the set-point', writable=True)
+        write_only = node.text('access') == 'w'
+        access = Access.WRITE if write_only or 'read_register' in node else Access.READ_WRITE
+        unit, most = node.text('unit'), node.number('most') or Fraction(1)
+        made = self._places.made
+        made[SETPOINT_KEY] = settings.scaled(node, internal(SETPOINT_KEY, address, access, unit))
+        read_key = '' if write_only else SETPOINT_KEY
+        if 'read_register' in node:
+            read_key = SETPOINT_READ_KEY
+            index = self._places.register(node['read_register'])
+            shifted = replace(address, index=index)
+            made[read_key] = settings.scaled(node, internal(read_key, shifted, Access.READ, unit))
+        codec, carried = address.number, most / address.factor
+        if carried > codec.maximum and 'scaled_by' not in node:
+            self._problems.add(
+                node['most'].line,
+                f'{shown(most)} {unit} is {shown(carried)} counts: the register carries '
+                f'{codec.maximum} at most',
+            )
+        nominal = node.get('nominal')
+        return SetpointPlace(
+            SETPOINT_KEY, read_key, _MODES[unit], float(most),
+            limit=settings.known(node.get('limit')),
+            nominal=settings.known(nominal) if nominal.kind == 'string' else _float(nominal),
+            signed=self._signed(node, signed=codec.signed),
+            direction=self._direction(node),
+        )
+
+    def _signed(self, node: Node, *, signed: bool) -> bool:
+        wanted = node.flag('signed')
+        if wanted and not signed:
+            self._problems.add(
+                node['signed'].line, 'signed: the type of the set-point has to be int16 or int32'
+            )
+        if wanted and 'direction' in node:
+            self._problems.add(
+                node['direction'].line, 'the direction is the sign or a word: remove one of both'
+            )
+        return wanted
+
+    def _direction(self, setpoint: Node) -> Direction | None:
+        node = setpoint.get('direction')
+        if 'forward' not in node:
+            return None
+        coil = 'coil' in node
+        if coil == ('register' in node):
+            self._problems.add(node.line, 'direction needs a register or a coil, one of both')
+            return None
+        forward, reverse = node.integer('forward') & WORD, node.integer('reverse') & WORD
+        if forward == reverse or (coil and {forward, reverse} != {0, 1}):
+            self._problems.add(
+                node.line, 'forward and reverse have to differ; of a coil they are 0 and 1'
+            )
+        if coil:
+            key = self._places.coil_key(self._places.coil(node['coil']))
+            return Direction(key, forward, reverse)
+        key = self._places.word(self._places.register(node['register']))
+        return Direction(key, forward, reverse)
+
+    # --- the rest ---
+
+    def _measured(
+        self, facts: Mapping[str, Condition]
+    ) -> tuple[dict[str, Parameter], dict[Role, str]]:
+        made: dict[str, Parameter] = {}
+        roles: dict[Role, str] = {Role.STATUS_WORD: 'line.status'}
+        settings = Settings.scales(self._root)
+        for name, node in self._root.get('measured').mapping.items():
+            role, key = Role(name), f'measured.{name}'
+            address = self._places.address(node, name)
+            parameter = internal(key, address, Access.READ, _UNITS.get(name, ''))
+            made[key] = settings(node, parameter)
+            roles[role] = key
+        return made, roles
+
+    def _requires(self, control: Node, settings: Settings) -> Iterator[Requirement]:
+        for node in control.get('requires').items:
+            key = settings.known(node['parameter'])
+            if key:
+                value = settings.value(key, node['value'])
+                if value is not None:
+                    yield Requirement(key, value, node.flag('write'), node.text('text'))
+
+    def _after_write(self, steps: StepReader) -> Iterator[Put]:
+        node = self._root.get('after_write')
+        for step in steps.read(node, 'after_write'):
+            if isinstance(step, Put):
+                yield step
+            else:
+                self._problems.add(node.line, 'after_write takes steps with value, values or on')
+
+    @staticmethod
+    def _stop_mode(node: Node, settings: Settings) -> tuple[str, Value] | None:
+        key = settings.known(node.get('parameter'))
+        value = settings.value(key, node['coasts']) if key else None
+        return None if value is None else (key, value)
+
+    def _timeout(self, settings: Settings) -> Timeout | None:
+        node = self._root.get('timeout')
+        key = settings.known(node.get('parameter'))
+        if not key:
+            return None
+        if settings.parameters[key].access is not Access.READ_WRITE:
+            self._problems.add(node.line, f'{key} has to be written and read (access: rw)')
+        action = node.get('action')
+        what = settings.known(action.get('parameter'))
+        if not what:
+            return Timeout(key)
+        stops: Value | None = settings.value(what, action['stops'])
+        return Timeout(key, what, True if stops is None else stops)
+
+
+_UNITS = {
+    'actual_frequency': 'Hz', 'actual_speed': 'rpm', 'actual_torque': '%', 'output_voltage': 'V',
+    'output_current': 'A', 'output_power': 'W', 'dc_link_voltage': 'V', 'motor_temperature': '%',
+    'operating_time': 'h', 'running_time': 'h', 'energy': 'kWh', 'total_energy': 'kWh',
+}
+
+
+def _fault(node: Node, code: int) -> Fault:
+    return Fault(
+        code, node.text('text'), node.text('description'), node.text('remedy'), node.flag('line')
+    )
+
+
+def _float(node: Node) -> float | None:
+    found = node.scalar
+    return float(found) if isinstance(found, (int, Fraction)) else None
+
+
+def _line(node: Node) -> LineDefaults:
+    write = {6: (6,), 16: (16,)}.get(node.integer('write'), (6, 16))
+    exceptions = {
+        int(code, 0): str(text.scalar) for code, text in node.get('exceptions').mapping.items()
+        if not (code.startswith('0') and code.isdecimal() and code != '0')
+    }
+    busy = frozenset(one.scalar for one in node.get('busy').items if isinstance(one.scalar, int))
+    return LineDefaults(
+        node.integer('baud_rate'), node.text('char_format'), node.integer('address'),
+        node.text('check'), write, node.integer('most_registers', 123), exceptions, busy,
+    )

@@ -1,0 +1,77 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The status codes of a described drive: its faults by their own numbers, and what it does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import enum
+
+from nfo_sinus_driver.catalog.declared.description import STATES, Description, Fault
+from nfo_sinus_driver.catalog.status import Kind, Meaning, StatusCode
+
+
+class Code(enum.IntEnum):
+    """The status codes of a drive without a fault."""
+
+    READY = STATES.start
+    RUNNING = enum.auto()
+    STOPPING = enum.auto()
+    INHIBITED = enum.auto()
+    LOCAL = enum.auto()
+    LOCAL_RUNNING = enum.auto()
+    ALARM = enum.auto()
+    ALARM_RUNNING = enum.auto()
+    #: A fault whose number the file does not have.
+    FAULT = enum.auto()
+
+
+_STANDS, _RUNS = frozenset({Meaning.BUS_STANDBY}), frozenset({Meaning.BUS_RUNNING})
+_TEXTS: Mapping[Code, tuple[str, frozenset[Meaning]]] = {
+    Code.READY: ('Ready', _STANDS),
+    Code.RUNNING: ('Running', _RUNS),
+    Code.STOPPING: ('Stopping', _RUNS | {Meaning.SLOWING}),
+    Code.INHIBITED: ('Not ready', _STANDS),
+    Code.LOCAL: ('Local', frozenset({Meaning.KEYPAD})),
+    Code.LOCAL_RUNNING: ('Local, running', frozenset({Meaning.KEYPAD, Meaning.LOCAL_RUNNING})),
+    Code.ALARM: ('', _STANDS),
+    Code.ALARM_RUNNING: ('', _RUNS),
+}
+_DRIVEN = (Code.RUNNING, Code.STOPPING, Code.LOCAL_RUNNING, Code.ALARM_RUNNING)
+
+
+def status_codes(drive: Description) -> Mapping[int, StatusCode]:
+    """Return the status codes of a drive, by number."""
+    unlisted = Fault(
+        int(Code.FAULT), 'Fault', 'A fault that the file of the drive does not list',
+        'Look at its keypad which one it is, and remove its cause',
+    )
+    faults = [*drive.faults.values(), *(fault for _, fault in drive.flags), unlisted]
+    codes = [_of_state(drive, code) for code in _TEXTS] + [_of_fault(drive, one) for one in faults]
+    return {one.code: one for one in codes}
+
+
+def _of_state(drive: Description, code: Code) -> StatusCode:
+    text, meanings = _TEXTS[code]
+    if drive.holder is not None:
+        meanings = frozenset({Meaning.ANONYMOUS, *({Meaning.RUNNING} if code in _DRIVEN else ())})
+    if text:
+        return StatusCode(int(code), text, meanings=meanings)
+    alarm = drive.alarm
+    return StatusCode(
+        int(code), alarm.text, kind=Kind.ALARM, meanings=meanings,
+        description=alarm.description, remedy=alarm.remedy,
+    )
+
+
+def _of_fault(drive: Description, fault: Fault) -> StatusCode:
+    meanings = {Meaning.ANONYMOUS} if drive.holder is not None else set()
+    if not (drive.tells_control or meanings):
+        meanings.add(Meaning.BUS_STANDBY)
+    if fault.line:
+        meanings.add(Meaning.SERIAL_FAILURE)
+    return StatusCode(
+        fault.code, fault.text, kind=Kind.FAULT, requires_ack=True, meanings=frozenset(meanings),
+        description=fault.description or fault.text, remedy=fault.remedy,
+    )

@@ -1,0 +1,305 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The part of a described drive that decides: commands, status, faults, time-out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from nfo_sinus_driver.catalog import Kind, Role
+from nfo_sinus_driver.catalog.declared import STATUS_KEY, Description
+from nfo_sinus_driver.simulator._declared.orders import Place, orders_of
+from nfo_sinus_driver.simulator._declared.status import Wish, compose
+from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
+from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused
+from nfo_sinus_driver.simulator.motor import Nameplate, nearest
+
+#: How much it counts that a condition of the status is right.
+_WEIGHTS = {'fault': 100, 'running': 50, 'remote': 50, 'local': 50, 'stopping': 20}
+_AWAITED = 30
+#: A motor that ramps slower than this is one that stands (s).
+_QUICKEST = 0.05
+#: By how much a quick stop is quicker than the ramp.
+_QUICKER = 0.25
+#: What unsigned registers show without a sign.
+_SIZES = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED, Role.ACTUAL_TORQUE, Role.OUTPUT_POWER)
+#: The number of a fault of which the file says nothing but that it is one.
+_UNNAMED = 1
+_MOVED = 1000
+
+
+@dataclass(frozen=True)
+class DeclaredVariant(Variant):
+    """What files leave open."""
+
+    run_command_in_fault: str = choice(
+        'keeps', 'drops', text='what becomes of a run command in a fault'
+    )
+    in_local: str = choice(
+        'ignores', 'refuses', text='what it does with commands while the line has no control'
+    )
+
+
+class DeclaredControlUnit(ControlUnit):
+    """Takes the words of the file; what they mean it knows from the lists of the file alone."""
+
+    def __init__(
+        self, memory: Memory, address: int, variant: DeclaredVariant, drive: Description
+    ) -> None:
+        self._drive = drive
+        super().__init__(memory, address, variant)
+        self._variant = variant
+        self._orders = orders_of(drive)
+        self._words: dict[Place, int] = {}
+        self._run = self._reverse = self._coasts = self._quick = False
+        self._silent_for = 0.0
+        self.local = False
+
+    # ---- commands ----
+
+    @property
+    def command_places(self) -> set[Place]:
+        """Where commands are written."""
+        places = {place for order in self._orders.values() for place in order.places}
+        if self._direction is not None:
+            places.add(self._direction)
+        return places
+
+    @property
+    def _direction(self) -> Place | None:
+        direction = self._drive.setpoint.direction
+        if direction is None:
+            return None
+        address = self._drive.parameters[direction.key].at('modbus')
+        return address.index, address.space == 'coil'
+
+    def take(self, place: Place, word: int) -> None:
+        """Take a word, or a coil, that is a command."""
+        if not self.obeys:
+            if self._variant.in_local == 'refuses':
+                raise Refused(Reason.STATE, 'the line has no control')
+            return
+        self._words[place] = word
+        done = {name for name, order in self._orders.items() if order.take(place, word)}
+        self._turn(place, word)
+        for name in ('run', 'stop', 'quick_stop', 'coast', 'release', 'reset'):
+            if name in done:
+                self._act(name)
+
+    def _turn(self, place: Place, word: int) -> None:
+        direction = self._drive.setpoint.direction
+        if direction is None or place != self._direction:
+            return
+        if word in (direction.forward, direction.reverse):
+            self._reverse = word == direction.reverse
+            run = self._orders['run'].last
+            if run is not None and run[0] == place:
+                # the word of the direction is a run command, too
+                self._act('run')
+
+    def _act(self, name: str) -> None:
+        if name == 'run':
+            self._run, self._coasts, self._quick = True, False, False
+        elif name in ('stop', 'quick_stop', 'coast'):
+            self._run, self._quick = False, name == 'quick_stop'
+            mode = self._drive.stop_mode
+            released = mode is not None and self.memory.get(mode[0]) == mode[1]
+            self._coasts = name == 'coast' or (name == 'stop' and released)
+        elif name == 'release':
+            self._run = False
+        elif name == 'reset':
+            self.faults.acknowledge()
+
+    def word(self, place: Place) -> int:
+        """Return what was written last."""
+        return self._words.get(place, 0)
+
+    @property
+    def obeys(self) -> bool:
+        """The line has control: nothing local, and each parameter is as it has to be."""
+        drive, get = self._drive, self.memory.get
+        if drive.holder is not None and get(drive.holder[0]) not in drive.holder[1]:
+            return False
+        return not self.local and all(get(one.key) == one.value for one in drive.requires)
+
+    # ---- what it shows ----
+
+    def show(self, key: str) -> int | None:
+        """Return status, read-back and what is measured without a sign."""
+        if key == STATUS_KEY:
+            return self.status_word
+        if key == self._drive.setpoint.read_key != self._drive.setpoint.key:
+            return self.memory.raw(self._drive.setpoint.key)
+        parameter = self._drive.parameters[key]
+        role = self.memory.model.role_of.get(key)
+        address = parameter.at('modbus')
+        if key.startswith('line.r') and address.codec.size == 2:
+            return self.word((address.index, False))
+        if key.startswith('line.coil_'):
+            return self.word((address.index, True))
+        measured = self._measured(role)
+        if measured is None:
+            return None
+        if role in _SIZES and not address.number.signed:
+            measured = abs(measured)
+        return nearest(parameter, measured / self.scale(key), 'modbus')
+
+    def _measured(self, role: Role | None) -> float | None:
+        motor = self.motor
+        if role is Role.ACTUAL_FREQUENCY:
+            return motor.frequency
+        if role is Role.ACTUAL_SPEED:
+            return motor.speed
+        if role is Role.ACTUAL_TORQUE:
+            return 100 * motor.torque
+        return motor.power if role is Role.OUTPUT_POWER else None
+
+    def scale(self, key: str) -> float:
+        """Return by what the factor of a parameter is multiplied."""
+        scale = self._drive.parameters[key].scale
+        return self.memory.number(scale, 1.0) or 1.0 if scale else 1.0
+
+    @property
+    def status_word(self) -> int:
+        """Return the status as one number, by the conditions of the file."""
+        drive, fault = self._drive, self.faults.shown
+        is_fault = bool(self.faults)
+        wishes: list[Wish] = [
+            (drive.facts[name], truth, _WEIGHTS.get(name, 1))
+            for name, truth in self._truths().items()
+            if name in drive.facts
+        ]
+        wishes += [
+            (condition, is_fault and one.code == fault, 10) for condition, one in drive.flags
+        ]
+        for order in self._orders.values():
+            if order.shows is not None:
+                wishes.append((order.shows, True, _AWAITED))
+        codes = drive.codes
+        if codes is None:
+            return compose(wishes, 0, 0)
+        number = self._number(fault) if is_fault else codes.none
+        return compose(wishes, codes.mask, number << codes.shift)
+
+    def _number(self, code: int) -> int:
+        known = code in self._drive.faults
+        return (code - _MOVED if code > _MOVED + 100 and known else code) if known else _UNNAMED
+
+    def _truths(self) -> dict[str, bool]:
+        motor, fault = self.motor, bool(self.faults)
+        commanded = self._run or 'stopping' not in self._drive.facts
+        return {
+            'fault': fault,
+            'running': motor.driven and commanded,
+            'stopping': motor.driven and not self._run,
+            'quick_stop': motor.driven and self._quick and not self._run,
+            'ready': not fault and self.run_input,
+            'reverse': motor.ramp < 0 or (motor.ramp == 0 and self._reverse and motor.driven),
+            'at_setpoint': motor.driven and motor.reached,
+            'alarm': bool(self.faults.alarms),
+            'remote': self.obeys,
+            'local': not self.obeys,
+            'inhibited': fault or not self.run_input,
+            'enable_missing': not self.run_input,
+            'sleeping': False,
+        }
+
+    # ---- what it does ----
+
+    def settle(self) -> None:
+        """Run the motor, ramp it to a stop, or let it go."""
+        motor = self.motor
+        if self.faults:
+            self._run = self._run and self._variant.run_command_in_fault == 'keeps'
+            motor.release()
+            return
+        self._set_ramps()
+        if self._run and self.run_input and self.obeys:
+            motor.energise()
+            motor.demand = self._demand
+        elif motor.driven:
+            motor.demand = 0.0
+            if self._coasts or not self.run_input or motor.at_zero:
+                motor.release()
+
+    @property
+    def _demand(self) -> float:
+        """The frequency of the set-point (Hz), no greater than the drive allows."""
+        place, drive = self._drive.setpoint, self._drive
+        value = self.memory.number(place.key) * self.scale(place.key)
+        most = self.memory.number(place.limit, place.most) if place.limit else place.most
+        value = max(-most, min(most, value))
+        if place.mode == 'Speed':
+            value = value * self.motor.plate.pole_pairs / 60
+        assert drive.setpoint is place
+        return -abs(value) if self._reverse and place.direction is not None else value
+
+    def _set_ramps(self) -> None:
+        number, drive, motor = self.memory.number, self._drive, self.motor
+        motor.accel = max(_QUICKEST, number(drive.accel, 5.0) if drive.accel else 5.0)
+        motor.retard = max(_QUICKEST, number(drive.decel, 5.0) if drive.decel else 5.0)
+        if self._quick and not self._run:
+            motor.retard = max(_QUICKEST, motor.retard * _QUICKER)
+
+    @property
+    def settled(self) -> bool:
+        """Nothing is left to do: no ramp to a stop ends, and no time-out runs."""
+        return not self._time_out and (self._run or not self.motor.driven)
+
+    def restart(self) -> None:
+        """Forget commands and set-point."""
+        self._words.clear()
+        self._orders = orders_of(self._drive)
+        self._run = self._reverse = self._coasts = self._quick = False
+        self.memory.put(self._drive.setpoint.key, 0)
+
+    # ---- the line ----
+
+    @property
+    def _time_out(self) -> float:
+        """After how long a silence something happens (s); 0: nothing."""
+        timeout = self._drive.timeout
+        if timeout is None:
+            return 0.0
+        acts = not timeout.action or self.memory.get(timeout.action) == timeout.stops
+        return self.memory.number(timeout.key) if acts else 0.0
+
+    def wait(self, dt: float) -> None:
+        """Count how long the line is silent; stop when that is too long."""
+        self._silent_for += dt
+        if self._time_out and self._silent_for > self._time_out and (self._run or self.faults):
+            self._silent_for = 0.0
+            self._run = False
+            lost = [one.code for one in self._drive.faults.values() if one.line]
+            if lost and not self.faults:
+                self.trip(lost[0])
+            self.settle()
+
+    def heard(self) -> None:
+        """Begin to count anew."""
+        self._silent_for = 0.0
+
+    def admit(self, key: str) -> None:
+        """Refuse the set-point where the line has no control."""
+        refuses = self._variant.in_local == 'refuses' and not self.obeys
+        if key == self._drive.setpoint.key and refuses:
+            raise Refused(Reason.STATE, 'the line has no control')
+
+    def nameplate(self) -> Nameplate:
+        """Return the motor's data, as far as parameters tell it."""
+        get, roles = self.memory.number, self.memory.model.roles
+        usual = Nameplate()
+        frequency = get(roles.get(Role.NOMINAL_FREQUENCY, ''), usual.frequency) or usual.frequency
+        speed = get(roles.get(Role.NOMINAL_SPEED, ''), 0.0) or usual.speed * frequency / 50
+        return Nameplate(frequency=frequency, speed=speed)
+
+    def report(self) -> dict[str, Any]:
+        """Return what it shows."""
+        return {
+            'run_command': self._run,
+            'obeys': self.obeys,
+            'status_word': self.status_word,
+            'fault_kind': (Kind.FAULT if self.faults else Kind.STATUS).value,
+        }

@@ -1,0 +1,45 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Makes a simulated drive of a file that describes it."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import Annotated, Literal
+
+from nfo_sinus_driver.catalog.declared import read
+from nfo_sinus_driver.simulator._declared.control_unit import (
+    DeclaredControlUnit,
+    DeclaredVariant,
+)
+from nfo_sinus_driver.simulator._declared.server import Server
+from nfo_sinus_driver.simulator.family import SimulatedFamily
+from nfo_sinus_driver.simulator.injections import Injections
+
+
+class DeclaredInjections(Injections):
+    """What else can be made to happen to it."""
+
+    def local(self, state: Annotated[Literal['on', 'off'], 'on or off']) -> None:
+        """Let keypad or terminals take control, or give it back."""
+        unit = self._drive.control_unit
+        assert isinstance(unit, DeclaredControlUnit)
+        unit.local = state == 'on'
+
+
+def family_of(path: str) -> SimulatedFamily:
+    """
+    Return the family that a file describes.
+
+    :raises CatalogError: the file is none, or wrong.
+    """
+    file = read(Path(path))
+    return SimulatedFamily(
+        control_unit=functools.partial(DeclaredControlUnit, drive=file),
+        variant=DeclaredVariant,
+        factory=file.defaults,
+        servers={'modbus': functools.partial(Server, file=file)},
+        injections=DeclaredInjections,
+    )

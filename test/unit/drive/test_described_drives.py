@@ -1,0 +1,103 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Each shipped file is driven against the drive that is simulated from it."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from support.described import SHIPPED, DescribedRig
+
+from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.simulator._declared.control_unit import DeclaredControlUnit
+
+#: Whole rides, each over both lines of Modbus.
+RIDES = list(itertools.product(SHIPPED, ('modbus_rtu', 'modbus_tcp')))
+
+
+def reverses(rig: DescribedRig) -> bool:
+    """Tell whether the drive turns in reverse, by its file."""
+    place = rig.file.setpoint
+    return place.signed or place.direction is not None
+
+
+def fault_of(rig: DescribedRig) -> int:
+    """Return a fault of the drive, by its file."""
+    listed = [*rig.file.faults, *(fault.code for _, fault in rig.file.flags)]
+    return listed[0] if listed else 198
+
+
+@pytest.mark.parametrize(('name', 'protocol'), RIDES)
+def test_a_ride(name: str, protocol: str) -> None:
+    with DescribedRig(SHIPPED[name], protocol) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        assert not rig.turns and rig.far.motor.driven
+
+        rig.follow(20.0)
+        if reverses(rig):
+            rig.follow(-15.0)
+            assert rig.drive.snapshot.setpoint == pytest.approx(rig.unit(-15.0))
+
+        ramp = rig.file.accel
+        if ramp:
+            rig.result(rig.drive.parameters.change({ramp: 1.0}))
+            assert rig.far.peek(ramp) == 1.0
+
+        assert 'stop' in rig.answer(rig.drive.stop())
+        rig.wait_until(lambda: not rig.far.motor.turning, 20.0)
+        rig.assert_only_enable_helps(rig.unit(20.0))
+
+        rig.far.trip(fault_of(rig))
+        rig.pass_time(1.0)
+        assert not rig.drive.following
+        rig.wait_until(lambda: not rig.far.motor.turning, 20.0)
+        if rig.file.reset:
+            answer = rig.answer(rig.drive.acknowledge())
+            assert 'acknowledged' in answer, answer
+            assert not rig.far.faults
+            rig.assert_only_enable_helps(rig.unit(20.0))
+            rig.lose_the_line()
+            rig.assert_only_enable_helps(rig.unit(20.0))
+            rig.kill()
+            rig.begin()
+            rig.connect()
+            rig.pass_time(1.0)
+            assert not rig.turns
+
+
+@pytest.mark.parametrize('name', SHIPPED)
+def test_no_run_command_outlives_a_fault(name: str) -> None:
+    with DescribedRig(SHIPPED[name]) as rig:
+        rig.connect()
+        rig.enable()
+        rig.follow(20.0)
+        rig.far.trip(fault_of(rig))
+        rig.pass_time(0.5)
+        rig.far.faults.acknowledge()
+        rig.send(rig.unit(20.0))
+        rig.pass_time(3.0)
+        assert not rig.turns and not rig.drive.following
+
+
+@pytest.mark.parametrize('name', SHIPPED)
+def test_a_local_drive_is_not_run(name: str) -> None:
+    with DescribedRig(SHIPPED[name]) as rig:
+        rig.connect()
+        if rig.file.tells_control:
+            assert isinstance(rig.far.control_unit, DeclaredControlUnit)
+            rig.far.control_unit.local = True
+            answer = rig.answer(rig.drive.enable())
+            assert 'enabled' not in answer or 'not' in answer, answer
+        for one in rig.file.requires:
+            labels = rig.far.memory.model[one.key].labels.values()
+            other = next((label for label in labels if label != one.value), None)
+            if other is not None and not one.write:
+                rig.far.set_from_keypad(one.key, other)
+                answer = rig.answer(rig.drive.enable())
+                assert one.key in answer, answer
+                rig.far.set_from_keypad(one.key, one.value)
+        assert not rig.turns
+        assert not rig.notes.said(Cause.DRIVER_ERROR)
