@@ -228,7 +228,7 @@ class _Reader:
         return SetpointPlace(
             SETPOINT_KEY, read_key, _MODES[unit], float(most),
             limit=settings.known(node.get('limit')),
-            nominal=settings.known(nominal) if nominal.kind == 'string' else _float(nominal),
+            nominal=settings.known(nominal) if nominal.json_type == 'string' else _float(nominal),
             signed=self._signed(node, signed=codec.signed),
             direction=self._direction(node),
         )

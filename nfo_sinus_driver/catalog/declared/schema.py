@@ -58,9 +58,9 @@ class _Checker:
             rule = schema()['$defs'][rule['$ref'].rpartition('/')[2]]
         if not self._has_kind(node, rule, where):
             return
-        if node.kind == 'object':
+        if node.json_type == 'object':
             self._check_object(node, rule, where)
-        elif node.kind == 'array':
+        elif node.json_type == 'array':
             self._check_array(node, rule, where)
         else:
             self._check_scalar(node, rule, where)
@@ -68,7 +68,7 @@ class _Checker:
     def _has_kind(self, node: Node, rule: Mapping[str, Any], where: str) -> bool:
         wanted = rule.get('type', list(_KINDS))
         kinds = [wanted] if isinstance(wanted, str) else wanted
-        if node.kind in kinds or (node.kind == 'integer' and 'number' in kinds):
+        if node.json_type in kinds or (node.json_type == 'integer' and 'number' in kinds):
             return True
         said = ' or '.join(_KINDS[kind] for kind in kinds)
         self._problems.add(node.line, f'{where} has to be {said}')

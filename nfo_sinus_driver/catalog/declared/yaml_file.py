@@ -96,7 +96,7 @@ class Node:
         return None if isinstance(found, (Mapping, Sequence)) else found
 
     @property
-    def kind(self) -> str:
+    def json_type(self) -> str:
         """What it is, as a JSON schema calls it."""
         content = self.content
         if isinstance(content, Mapping):
@@ -214,7 +214,7 @@ class _Converter:
                 )
             seen[name] = line
             made = self.node(value, name, depth + 1)
-            yield name, Node(made.content, line if made.kind != 'object' else made.line, name)
+            yield name, Node(made.content, line if made.json_type != 'object' else made.line, name)
 
     def _scalar(self, node: yaml.Node, line: int) -> Scalar:
         text = str(node.value)
