@@ -19,7 +19,7 @@ from nfo_sinus_driver.link.interface import (
     Remarks,
     Reply,
 )
-from nfo_sinus_driver.link.modbus_pdu import Request, Write, read_of, write_and_read_of
+from nfo_sinus_driver.link.modbus_pdu import Request, read_of, write_and_read_of, write_of
 
 _T = TypeVar('_T')
 
@@ -31,17 +31,20 @@ class ModbusLink(ABC):
     remarks: Remarks
     supervision = None
 
-    def parts(self, address: Address) -> tuple[Address]:
-        """Return the whole: registers that belong together are read together."""
-        return (address,)
+    def parts(self, address: Address) -> tuple[Address, ...]:
+        """Return the whole; where the first register stands apart, it and then the others."""
+        if address.sub_index is None:
+            return (address,)
+        first = address._replace(sub_index=None, size=2)
+        return first, first._replace(index=address.sub_index, size=address.size - 2)
 
     def read(self, unit: int, address: Address) -> Reply:
-        """Read one parameter (function 03)."""
+        """Read one parameter (function 03; 04 and 01 for what is no holding register)."""
         return Reply(*self._ask(read_of(unit, address)))
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
-        """Write one parameter (function 06 for one register, 16 for several)."""
-        return Reply(*self._ask(Write(unit, address.index, data)))
+        """Write one parameter (function 06 for one register, 16 for several, 05 for a coil)."""
+        return Reply(*self._ask(write_of(unit, address, data)))
 
     def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """Write one parameter and read another, in one transaction (function 23)."""

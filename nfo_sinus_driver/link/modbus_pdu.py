@@ -19,12 +19,22 @@ from typing import Generic, Protocol, TypeVar
 
 from nfo_sinus_driver.link.interface import Address, Refused
 
+READ_COILS = 1
 READ_HOLDING_REGISTERS = 3
+READ_INPUT_REGISTERS = 4
+WRITE_SINGLE_COIL = 5
 WRITE_SINGLE_REGISTER = 6
 WRITE_MULTIPLE_REGISTERS = 16
 WRITE_AND_READ_REGISTERS = 23
 
+#: The spaces of addresses beside that of registers, which are read by 03 and written by 06 and 16:
+#: those that are written by 16 alone, those that are read by 04, and coils, by 01 and 05.
+WRITTEN_BY_16 = 'register_16'
+INPUT = 'input'
+COIL = 'coil'
+
 _EXCEPTION = 0x80
+_ON = 0xFF00
 #: Unit, function, code.
 REFUSAL_LENGTH = 3
 
@@ -110,6 +120,51 @@ class Read(_TellsRegisters):
         return struct.pack('>HH', self.register, self.count)
 
 
+class ReadInput(Read):
+    """Read ``count`` input registers of ``unit``, from ``register`` on (function 04)."""
+
+    function = READ_INPUT_REGISTERS
+
+
+@dataclass(frozen=True)
+class ReadCoils:
+    """Read ``count`` coils of ``unit``, from ``coil`` on (function 01): the first in bit 0."""
+
+    unit: int
+    coil: int
+    count: int
+
+    function = READ_COILS
+
+    @property
+    def body(self) -> bytes:
+        """The request without unit and function."""
+        return struct.pack('>HH', self.coil, self.count)
+
+    @property
+    def answer_head(self) -> bytes:
+        """What of the answer is known beforehand."""
+        return bytes((self.unit, self.function, self._bytes))
+
+    @property
+    def answer_length(self) -> int:
+        """Bytes of the answer."""
+        return 3 + self._bytes
+
+    @property
+    def _bytes(self) -> int:
+        return -(-self.count // 8)
+
+    def measure(self, beginning: bytes) -> int:
+        """Bytes of the answer: always the same."""
+        return self.answer_length
+
+    def decode(self, message: bytes) -> bytes:
+        """Return the bits, eight in a byte; what is beyond the last is 0."""
+        bits = int.from_bytes(message[3:], 'little') & ((1 << self.count) - 1)
+        return bits.to_bytes(self._bytes, 'little')
+
+
 @dataclass(frozen=True)
 class Write:
     """
@@ -161,6 +216,22 @@ class Write:
         return b''
 
 
+class WriteCoil(Write):
+    """Write one coil of ``unit`` (function 05): it is off where ``data`` is 0."""
+
+    function = WRITE_SINGLE_COIL
+
+    @property
+    def body(self) -> bytes:
+        """The request without unit and function."""
+        return struct.pack('>HH', self.register, _ON if any(self.data) else 0)
+
+    @property
+    def answer_head(self) -> bytes:
+        """What of the answer is known beforehand: all of it."""
+        return bytes((self.unit, self.function)) + self.body
+
+
 @dataclass(frozen=True)
 class WriteAndRead(_TellsRegisters):
     """
@@ -187,9 +258,19 @@ class WriteAndRead(_TellsRegisters):
 
 
 @functools.lru_cache(PREPARED)
-def read_of(unit: int, address: Address) -> Read:
+def read_of(unit: int, address: Address) -> Request[bytes]:
     """Return the request that reads; one that comes again is the same."""
-    return Read(unit, address.index, address.size // 2)
+    if address.space == COIL:
+        return ReadCoils(unit, address.index, 1 if address.size == 1 else 8 * address.size)
+    kind = ReadInput if address.space == INPUT else Read
+    return kind(unit, address.index, address.size // 2)
+
+
+def write_of(unit: int, address: Address, data: bytes) -> Write:
+    """Return the request that writes."""
+    if address.space == COIL:
+        return WriteCoil(unit, address.index, data)
+    return Write(unit, address.index, data, multiple=address.space == WRITTEN_BY_16)
 
 
 def write_and_read_of(unit: int, address: Address, data: bytes, source: Address) -> WriteAndRead:

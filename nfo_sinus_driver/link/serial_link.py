@@ -32,6 +32,7 @@ from nfo_sinus_driver.link.modbus_pdu import (
     read_of,
     refusal_head,
     write_and_read_of,
+    write_of,
 )
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.request_link import WRITE_WAIT, RequestLink
@@ -95,11 +96,12 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
-        self._resync_addresses[unit] = tuple(addresses)
+        parts = (part for address in addresses for part in self.parts(address))
+        self._resync_addresses[unit] = tuple(parts)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
-        """Write one parameter (function 06 for one register, 16 for several)."""
-        request = Write(unit, address.index, data)
+        """Write one parameter (function 06 for one register, 16 for several, 05 for a coil)."""
+        request = write_of(unit, address, data)
         self._await_gap(request, is_write=True)
         # a write answer names what was written, and it is not believed without reading back
         return Reply(*self._believed(request))

@@ -1,0 +1,317 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Files that describe drives: what is wrong in one is said with its line, and nothing else ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+import copy
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from hypothesis import given, settings, strategies as st
+import pytest
+from support.described import SHIPPED
+import yaml
+
+from nfo_sinus_driver.catalog import Role, load_family
+from nfo_sinus_driver.catalog.declared import DescriptionError, read, schema
+from nfo_sinus_driver.catalog.declared.yaml_file import load
+
+#: A drive in which nothing is wrong.
+GOOD = """
+vfd: 1
+title: Made up
+source: made up
+line: {baud_rate: 9600, char_format: '8N1', address: 5, write: 6 and 16}
+control:
+  requires:
+    - {parameter: source.command, value: Bus}
+  run: [{register: 10, value: 1}]
+  stop: [{register: 10, value: 0}]
+  reset: [{register: 10, set: 8}, {wait: 0.1}, {register: 10, clear: 8}]
+setpoint: {register: 11, type: int16, factor: 0.1, unit: Hz, most: 60, signed: true}
+status:
+  register: 20
+  running: {bit: 0}
+  fault: {bit: 3}
+measured:
+  actual_frequency: {register: 22, type: int16, factor: 0.1}
+faults:
+  register: 21
+  codes: {1: {text: hot, remedy: Let it cool}}
+parameters:
+  ramp.accel: {register: 30, factor: 0.1, unit: s, minimum: 0.1, maximum: 60, default: 5}
+  source.command: {register: 31, choices: {0: Keypad, 1: Bus}}
+  serial.timeout: {register: 32, factor: 0.1, unit: s}
+timeout: {parameter: serial.timeout}
+simulated: {accel: ramp.accel}
+"""
+
+
+def complaints(tmp_path: Path, text: str) -> list[str]:
+    """Return what is wrong in a file."""
+    path = tmp_path / 'made_up.vfd.yaml'
+    path.write_text(text, encoding='utf-8')
+    try:
+        read(path)
+    except DescriptionError as error:
+        return list(error.problems)
+    return []
+
+
+def test_the_good_one_is(tmp_path: Path) -> None:
+    assert complaints(tmp_path, GOOD) == []
+
+
+#: What is replaced by what, and what is said of it.
+BAD = {
+    'no YAML': ('vfd: 1', 'vfd: [1', 'is no YAML'),
+    'another version': ('vfd: 1', 'vfd: 2', 'choose one of 1'),
+    'no title': ('title: Made up', '', "needs 'title'"),
+    'unknown key': ('setpoint: {register', 'setpoint: {regsiter: 1, register', "'register' may be"),
+    'missing register': ('setpoint: {register: 11, ', 'setpoint: {', "needs 'register'"),
+    'register out of range': ('{register: 10, value: 1}', '{register: 70000, value: 1}', 'be sent'),
+    'register below the numbering': ('write: 6', 'numbering: 40001, write: 6', 'cannot be sent'),
+    'a word too wide': ('{register: 10, value: 1}', '{register: 10, value: 70000}', 'no word'),
+    'factor 0': ('signed: true}', 'signed: true}', ''),
+    'factor none': ('factor: 0.1, unit: Hz', 'factor: 0, unit: Hz', 'more than 0'),
+    'a factor that is text': ('factor: 0.1, unit: Hz', 'factor: ten, unit: Hz', 'a fraction'),
+    'zeros in front': ('{register: 30,', '{register: 0030,', 'begins with 0'),
+    'twice the same key': ('title: Made up', 'title: Made up\ntitle: Again', 'already'),
+    'two meanings of a bit': ('fault: {bit: 3}', 'fault: {bit: 0}', 'mean the same bits'),
+    'the contrary': ('fault: {bit: 3}', 'fault: {bit: 3}\n  ready: {bit: 3, is: 0}', 'whenever'),
+    'never running': ('running: {bit: 0}', 'running: {mask: 1, value: 2}', 'never be true'),
+    'always running': ('running: {bit: 0}', 'running: {mask: 1, values: [0, 1]}', 'the same'),
+    'running says nothing': ('running: {bit: 0}', 'running: {mask: 1}', 'add value'),
+    'no running': ('running: {bit: 0}', '', "needs 'running'"),
+    'bit 16': ('fault: {bit: 3}', 'fault: {bit: 16}', '15 at most'),
+    'bit and mask': ('fault: {bit: 3}', 'fault: {bit: 3, mask: 8}', 'is enough'),
+    'status in three places': (
+        'fault: {bit: 3}', 'fault: {register: 40, bit: 3}\n  alarm: {register: 50, bit: 1}',
+        'needs a profile in Python',
+    ),
+    'register and coil': ('fault: {bit: 3}', 'fault: {register: 1, coil: 2}', 'one of both'),
+    'a stop that stops nothing': ('stop: [{register: 10, value: 0}]',
+                                  'stop: [{register: 10, value: 1}]', 'neither stops nor coasts'),
+    'a stop elsewhere': ('stop: [{register: 10, value: 0}]',
+                         'stop: [{register: 12, value: 0}]', 'neither stops nor coasts'),
+    'an empty stop': ('stop: [{register: 10, value: 0}]', 'stop: []', 'writes nothing'),
+    'a coast that runs': ('  reset:', '  coast: [{register: 10, value: 1}]\n  reset:', 'neither'),
+    'a stop that waits': ('stop: [{register', 'stop: [{wait: 0.1}, {register', 'never delayed'),
+    'a stop that awaits': ('stop: [{register', 'stop: [{until: {bit: 1}}, {register', 'delayed'),
+    'a pause too long': ('{wait: 0.1}', '{wait: 30}', 'pauses for more than'),
+    'a step of two things': ('{register: 10, value: 1}', '{register: 10, value: 1, set: 2}',
+                             'does one thing'),
+    'a step nowhere': ('run: [{register: 10, value: 1}]', 'run: [{value: 1}]', 'needs a register'),
+    'the same bits set and cleared': ('{register: 10, set: 8}', '{register: 10, set: 8, clear: 8}',
+                                      'the same bits'),
+    'more than the line carries': ('write: 6 and 16', 'write: 6', ''),
+    'two registers without 16': (
+        '{register: 32, factor: 0.1, unit: s}', '{register: 32, type: uint32, unit: s}', '',
+    ),
+    'unsigned and signed': ('type: int16, factor: 0.1, unit: Hz', 'factor: 0.1, unit: Hz', 'int16'),
+    'direction twice': (
+        'signed: true}', 'signed: true, direction: {register: 10, forward: 1, reverse: 2}}',
+        'remove one of both',
+    ),
+    'a direction that is none': (
+        'signed: true}', 'direction: {register: 10, forward: 1, reverse: 1}}', 'have to differ',
+    ),
+    'a set-point too great': ('most: 60', 'most: 6000', 'carries 32767 at most'),
+    'a unit of another kind': ('unit: Hz, most', 'unit: km/h, most', 'choose one of Hz, rpm'),
+    'a parameter that is none': ('timeout: {parameter: serial.timeout}',
+                                 'timeout: {parameter: serial.tiemout}', 'none of the parameters'),
+    'a choice that is none': ('value: Bus}', 'value: Panel}', 'none of Keypad, Bus'),
+    'minimum above maximum': ('minimum: 0.1, maximum: 60', 'minimum: 60, maximum: 1', 'below'),
+    'a maximum too great': ('maximum: 60', 'maximum: 7000', 'does not fit'),
+    'a default out of range': ('default: 5', 'default: 500', 'out of range'),
+    'two in one register': ('{register: 31,', '{register: 30,', 'in the same register'),
+    'a name that is none': ('ramp.accel: {register', 'Ramp: {register', 'group.name'),
+    'a group that is taken': ('  ramp.accel: {', '  line.speed: {register: 90}\n  ramp.accel: {',
+                              'are taken'),
+    'choices with a factor': ('{register: 31, choices', '{register: 31, factor: 0.1, choices',
+                              'numbers that the register carries'),
+    'a choice twice': ('{0: Keypad, 1: Bus}', '{0: Bus, 1: Bus}', 'stands twice'),
+    'fault 0': ('codes: {1: {', 'codes: {0: {', 'means no fault'),
+    'codes nowhere': ('faults:\n  register: 21', 'faults:', 'no register that tells them'),
+    'a list for a mapping': ('status:\n  register: 20', 'status:\n  - register: 20', 'no YAML'),
+    'a text for a number': ('most: 60', 'most: fast', 'a number'),
+    'a loop': ('line: {', 'line: &line {check: *line, ', 'no YAML'),
+    'a parity that is none': ("char_format: '8N1'", 'char_format: 8N7', 'choose one of'),
+    'address 0': ('address: 5', 'address: 0', '1 at least'),
+    'read-only time-out': ('{register: 32, factor: 0.1, unit: s}',
+                           '{register: 32, factor: 0.1, unit: s, access: r}', 'access: rw'),
+}
+
+
+@pytest.mark.parametrize('name', [name for name, (_, _, said) in BAD.items() if said])
+def test_a_bad_file_is_refused_with_its_line_and_a_sentence(tmp_path: Path, name: str) -> None:
+    old, new, said = BAD[name]
+    assert old in GOOD
+    text = GOOD.replace(old, new, 1)
+    found = complaints(tmp_path, text)
+    assert any(said in one for one in found), found
+    for one in found:
+        assert re.match(r'.*made_up\.vfd\.yaml(, line \d+)?: \S.*', one), one
+    # all of them are named at once, at the right place
+    line = int(re.findall(r', line (\d+):', '\n'.join(one for one in found if said in one))[0])
+    assert 1 <= line <= text.count('\n') + 1
+
+
+def test_all_that_is_wrong_is_told_at_once(tmp_path: Path) -> None:
+    text = GOOD.replace('bit: 3', 'bit: 0').replace('default: 5', 'default: 500')
+    text = text.replace('value: Bus}', 'value: Panel}')
+    assert len(complaints(tmp_path, text)) == 3
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(DescriptionError, match='No such file'):
+        read(tmp_path / 'nothing.vfd.yaml')
+    (tmp_path / 'empty.vfd.yaml').write_text('')
+    with pytest.raises(DescriptionError, match='is empty'):
+        read(tmp_path / 'empty.vfd.yaml')
+    (tmp_path / 'bytes.vfd.yaml').write_bytes(b'\xff\xfe\x00')
+    with pytest.raises(DescriptionError):
+        read(tmp_path / 'bytes.vfd.yaml')
+
+
+# --- what is right ---
+
+
+def test_the_lines_of_yaml_are_kept() -> None:
+    for path in SHIPPED.values():
+        root, _ = load(path)
+        lines = path.read_text(encoding='utf-8').splitlines()
+        for key, node in root.mapping.items():
+            assert key in lines[node.line - 1] or key in lines[node.line - 2], (path, key)
+
+
+def test_shipped_files_are_short_and_say_where_from() -> None:
+    for path in SHIPPED.values():
+        text = path.read_text(encoding='utf-8')
+        body = text.split('\nparameters:')[0]
+        assert body.count('\n') <= 60, path
+        assert text.startswith('# From the manual, not yet on a drive.'), path
+        assert read(path).source
+
+
+def test_the_schema_is_one_that_editors_understand() -> None:
+    found = json.loads(schema.PATH.read_text(encoding='utf-8'))
+    assert found['$schema'].endswith('2020-12/schema')
+    refs = set(re.findall(r'"\$ref": "#/\$defs/(\w+)"', json.dumps(found)))
+    assert refs == set(found['$defs'])
+
+
+def test_what_the_file_does_not_give_the_drive_does_not_have(tmp_path: Path) -> None:
+    path = tmp_path / 'bare.vfd.yaml'
+    text = GOOD[: GOOD.index('measured:')].replace('  requires:\n', '')
+    path.write_text(text.replace('    - {parameter: source.command, value: Bus}\n', ''))
+    family = load_family(str(path))
+    assert set(family.roles) == {Role.STATUS_WORD}
+    assert family.settings == () and family.name == 'bare'
+    assert not family.profile.status_word.by_frequency
+
+
+# --- fuzz ---
+
+_SCALARS = st.one_of(
+    st.none(), st.booleans(), st.integers(-70000, 70000), st.sampled_from([0, 1, 8, 10, 0xFFFF]),
+    st.floats(allow_nan=True), st.text(max_size=8),
+    st.sampled_from(['ramp.accel', 'Bus', 'int16', 'Hz', '1/0', '1/3', 'register', 'rw', 'w']),
+)
+
+
+def _spots(node: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Return where something stands in a document."""
+    found = [path] if path else []
+    if isinstance(node, Mapping):
+        for key, value in node.items():
+            found += _spots(value, (*path, key))
+    elif isinstance(node, list):
+        for number, value in enumerate(node):
+            found += _spots(value, (*path, number))
+    return found
+
+
+def _words() -> list[str]:
+    """Return every key that the schema has."""
+    return sorted(set(re.findall(r'"(\w+)": \{', schema.PATH.read_text(encoding='utf-8'))))
+
+
+WHOLE = yaml.safe_load(GOOD)
+SPOTS = _spots(WHOLE)
+
+
+def _changed(change: Callable[[Any, Any], None], spot: tuple[Any, ...], document: Any) -> None:
+    *way, last = spot
+    for key in way:
+        try:
+            document = document[key]
+        except (KeyError, IndexError, TypeError):
+            return
+    if isinstance(document, (dict, list)):
+        try:
+            change(document, last)
+        except (KeyError, IndexError, TypeError):
+            return
+
+
+@settings(max_examples=400, deadline=None)
+@given(st.data())
+def test_whatever_is_changed_nothing_but_a_sentence_comes(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    document = copy.deepcopy(WHOLE)
+    for _ in range(data.draw(st.integers(1, 4))):
+        spot = data.draw(st.sampled_from(SPOTS))
+        value = data.draw(
+            st.one_of(
+                _SCALARS,
+                st.lists(_SCALARS, max_size=3),
+                st.dictionaries(st.sampled_from(_words()), _SCALARS, max_size=3),
+                st.sampled_from(SPOTS).map(lambda other: _at(WHOLE, other)),
+            )
+        )
+        what = data.draw(st.sampled_from(['put', 'remove', 'add']))
+        key = data.draw(st.sampled_from(_words()))
+
+        def change(
+            found: Any, last: Any, what: str = what, value: Any = value, key: str = key
+        ) -> None:
+            if what == 'remove':
+                del found[last]
+            elif what == 'add' and isinstance(found[last], dict):
+                found[last][key] = value
+            else:
+                found[last] = value
+
+        _changed(change, spot, document)
+    path = tmp_path_factory.mktemp('fuzz') / 'fuzzed.vfd.yaml'
+    path.write_text(yaml.safe_dump(document, allow_unicode=True), encoding='utf-8')
+    try:
+        family = load_family(str(path))
+    except DescriptionError as error:
+        assert all(re.search(r'fuzzed\.vfd\.yaml(, line \d+)?: \S', one) for one in error.problems)
+    else:
+        assert family.profile.methods
+
+
+def _at(document: Any, spot: tuple[Any, ...]) -> Any:
+    for key in spot:
+        document = document[key]
+    return document
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(alphabet='ab:{}[]-&*!|>\n \t"\'%@#0x1.', max_size=80))
+def test_any_text_is_refused_with_a_sentence(
+    tmp_path_factory: pytest.TempPathFactory, text: str
+) -> None:
+    path = tmp_path_factory.mktemp('text') / 'text.vfd.yaml'
+    path.write_text(text, encoding='utf-8')
+    with pytest.raises(DescriptionError):
+        read(path)
