@@ -101,7 +101,8 @@ async def consistent_read(unit: int, parts: Sequence[Address], priority: Priorit
         low = await Transfer(unit, low_part, priority)
         again = await Transfer(unit, high_part, priority)
         if again.data == high.data:
-            return Reply(low.data + high.data, again.arrived)
+            # the drive had both at the moment in between; the last answer may be from after a write
+            return Reply(low.data + high.data, low.arrived)
         high = again
     raise DamagedAnswer(f'unit {unit}: {high_part.space} {high_part.index:04X}h never stood still')
 

@@ -86,11 +86,13 @@ class Scales:
 
     def _apply(self) -> None:
         model = self._params.model
-        scales = dict(self._own)
+        scales: dict[str, Fraction] = {}
         for role, factor in {**self._chosen, Role.ACTUAL_SPEED: self.speed}.items():
             key = model.key(role)
             if key and model[key].scale:
                 scales[model[key].scale] = factor
+        # what the drive itself tells counts
+        scales |= self._own
         found = {
             parameter.key: scales[parameter.scale] * self._dialect.get(parameter.key, _ONE)
             for parameter in model.values()

@@ -198,7 +198,9 @@ class Places:
             blocks += runs(rest)
         else:
             blocks = runs(sorted(wanted))
-        return self._registers(sorted(blocks, key=len), block)
+        # what tells most stands in the lowest bits, which are published
+        first = found[0].register if found else 0
+        return self._registers(sorted(blocks, key=lambda run: (len(run), first in run)), block)
 
     def _registers(self, blocks: list[list[int]], block: Node) -> StatusPlace:
         count = sum(map(len, blocks))

@@ -76,7 +76,8 @@ class _Reader:
         self._told = dict(self._facts())
         steps = StepReader(root, self._places, settings, self._problems)
         codes_at = self._codes_register()
-        told = [*self._told.values(), *(one for one, _ in flags), *steps.awaited()]
+        running = [one for name, one in self._told.items() if name == 'running']
+        told = [*running, *self._told.values(), *(one for one, _ in flags), *steps.awaited()]
         registers = [] if codes_at is None else [codes_at]
         status = self._places.status(told, root['status'].get('block'), registers)
         self._problems.require_none()

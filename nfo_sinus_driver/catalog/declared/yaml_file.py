@@ -29,7 +29,7 @@ _DEEPEST = 20
 _MOST_NODES = 50_000
 _INTEGER = re.compile(r'[+-]?(0|[1-9][0-9]*|0x[0-9a-fA-F]+|0b[01]+)')
 _ZEROS = re.compile(r'[+-]?0[0-9]+')
-_NUMBER = re.compile(r'[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?')
+_NUMBER = re.compile(r'[+-]?([0-9]+|[0-9]*\.[0-9]+([eE][+-]?[0-9]{1,3})?|[0-9]+\.)')
 _WORDS = {'true': True, 'false': False, 'null': None, '~': None, '': None}
 
 

@@ -21,6 +21,8 @@ _WEIGHTS = {'fault': 100, 'running': 50, 'remote': 50, 'local': 50, 'stopping': 
 _AWAITED = 30
 #: A motor that ramps slower than this is one that stands (s).
 _QUICKEST = 0.05
+#: The ramps of a drive whose file names no parameters for them (s).
+_RAMP = 2.0
 #: By how much a quick stop is quicker than the ramp.
 _QUICKER = 0.25
 #: What unsigned registers show without a sign.
@@ -238,8 +240,8 @@ class DeclaredControlUnit(ControlUnit):
 
     def _set_ramps(self) -> None:
         number, drive, motor = self.memory.number, self._drive, self.motor
-        motor.accel = max(_QUICKEST, number(drive.accel, 5.0) if drive.accel else 5.0)
-        motor.retard = max(_QUICKEST, number(drive.decel, 5.0) if drive.decel else 5.0)
+        motor.accel = max(_QUICKEST, number(drive.accel) if drive.accel else _RAMP)
+        motor.retard = max(_QUICKEST, number(drive.decel) if drive.decel else _RAMP)
         if self._quick and not self._run:
             motor.retard = max(_QUICKEST, motor.retard * _QUICKER)
 
