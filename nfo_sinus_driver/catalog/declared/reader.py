@@ -80,7 +80,6 @@ class _Reader:
         told = [*running, *self._told.values(), *(one for one, _ in flags), *steps.awaited()]
         registers = [] if codes_at is None else [codes_at]
         status = self._places.status(told, root['status'].get('block'), registers)
-        self._problems.require_none()
         facts = {name: one.in_place(status) for name, one in self._told.items()}
         self._require_apart(facts)
         steps.use(status)

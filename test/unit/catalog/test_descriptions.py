@@ -140,7 +140,7 @@ BAD = {
     'codes nowhere': ('faults:\n  register: 21', 'faults:', 'no register that tells them'),
     'a list for a mapping': ('status:\n  register: 20', 'status:\n  - register: 20', 'no YAML'),
     'a text for a number': ('most: 60', 'most: fast', 'a number'),
-    'a loop': ('line: {', 'line: &line {check: *line, ', 'no YAML'),
+    'a loop': ('line: {', 'line: &line {check: *line, ', 'leads to itself'),
     'a parity that is none': ("char_format: '8N1'", 'char_format: 8N7', 'choose one of'),
     'address 0': ('address: 5', 'address: 0', '1 at least'),
     'read-only time-out': ('{register: 32, factor: 0.1, unit: s}',
