@@ -329,7 +329,7 @@ HISTORIES = (
         (
             (
                 MAIN,
-                '            elif node.managed.drive.heard:',
+                '            elif node.managed.drive.ever_responded:',
                 '            elif node.managed.drive.identity is not None:',
             ),
         ),
