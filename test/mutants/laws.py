@@ -40,7 +40,7 @@ LAWS = (
         'polling acknowledges faults',
         'nfo_sinus_driver/drive/drive_state.py',
         'read_reply(key, priority, retry=retry',
-        "read_reply('fieldbus.inv_st_with_ack', priority, retry=retry",
+        "read_reply(key.replace('inv_st', 'inv_st_with_ack'), priority, retry=retry",
         (TRACE,),
     ),
     Mutant(
@@ -284,8 +284,8 @@ LAWS = (
         5,
         'a request reaches over its parameter',
         'nfo_sinus_driver/drive/parameter_access.py',
-        'Address(*self.model[key].at(self.protocol).place)',
-        'Address(*self.model[key].at(self.protocol).place[:3], 4)',
+        'address._replace(block=self._block)',
+        "address._replace(size=4 if key == 'status.dc_link' else address.size)",
         (TRACE,),
     ),
     Mutant(
