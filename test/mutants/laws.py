@@ -276,9 +276,14 @@ LAWS = (
         4,
         'a monitor writes',
         DRIVE,
-        "        if settings.method != 'monitor':",
-        '        if True:',
+        '            await self._watchdog.prepare()',
+        '        await self._watchdog.prepare()',
         (INTERFACE, '-k', 'monitor'),
+        # the watchdog refuses a monitor, and so does every write of a setting
+        (
+            (DRIVE, 'commanded=self._controller is not None', 'commanded=True'),
+            (WRITER, "    if settings.method == 'monitor':", '    if False:'),
+        ),
     ),
     Mutant(
         5,
