@@ -14,7 +14,8 @@ A codec is named in a table as ``uint16_be``, ``sint32_ws``, ``uint16_le[4:7]``,
 - ``hb``: half-bytes, the high one first, each in a byte of its own (MOVITRAC's 8-byte format).
 
 ``[low:high]`` are the bits of an unsigned number that count, both included. ``bcd`` has two decimal
-digits in each byte, the high ones first; two decimals are a factor of 0.01.
+digits in each byte, the high ones first; two decimals are a factor of 0.01. In ``sbcd`` the first
+digit is a sign, which is only read.
 """
 
 from __future__ import annotations
@@ -137,6 +138,33 @@ class Bcd(Number):
         return bytes.fromhex(f'{raw:0{2 * self.size}}')
 
 
+class SignedBcd(Number):
+    """
+    Packed decimal digits behind a sign: 0 of a positive number, F, 8 or 1 of a negative one.
+
+    Which of the three, the drive shows by the number itself: with no other sign it has so many
+    digits. It is not known before there is one, so none is written [C105].
+    """
+
+    def __init__(self, name: str, bits: int) -> None:
+        self._whole = Bcd(f'bcd{bits}', bits)
+        most = 10 ** (bits // 4 - 1) - 1
+        super().__init__(name, bits // 8, -most, most)
+
+    def fits(self, raw: int) -> bool:
+        """Tell whether it is within the ends, and not negative."""
+        return 0 <= raw <= self.maximum
+
+    def _unpack(self, data: bytes) -> int:
+        sign, digits = data.hex()[0], data.hex()[1:]
+        if sign not in _SIGNS or not digits.isdecimal():
+            raise ValueError(f'{data.hex()} is no {self.name}')
+        return _SIGNS[sign] * int(digits)
+
+    def _pack(self, raw: int) -> bytes:
+        return self._whole.encode(raw)
+
+
 class Text(Codec[str]):
     """ASCII characters, filled up with zeros; blanks at the end do not count."""
 
@@ -159,7 +187,8 @@ class Text(Codec[str]):
 def codec_of(name: str) -> Number | Text:
     """Return the codec that a table names (ValueError: there is none of that name)."""
     if found := _BCD.fullmatch(name):
-        return Bcd(name, int(found[1]))
+        bits = int(found['bits'])
+        return SignedBcd(name, bits) if found['sign'] else Bcd(name, bits)
     if found := _STRING.fullmatch(name):
         return Text(name, int(found[1]))
     found = _INTEGER.fullmatch(name)
@@ -209,5 +238,7 @@ _INTEGER = re.compile(
     r'(?P<type>[us]int)(?P<bits>8|16|32|48|64|80|96|112|128)(_(?P<order>be|le|(?<=32_)ws|hb))?'
     r'(\[(?P<low>\d+):(?P<high>\d+)\])?'
 )
-_BCD = re.compile(r'bcd(8|16|32)')
+_BCD = re.compile(r'(?P<sign>s)?bcd(?P<bits>8|16|32)')
+#: What the first digit of a signed number says.
+_SIGNS = {'0': 1, 'f': -1, '8': -1, '1': -1}
 _STRING = re.compile(r'string([1-9]\d*)')

@@ -7,7 +7,7 @@ The ends of each setting of the MOVITRAC 31, from the text of [M4 §4].
 A second witness beside the catalog: names are those of the public interface, P numbers and indices,
 ranges and steps those of the manual, and nothing is read or computed from the tables of the driver.
 The raw numbers are the four bytes of the frame: eight decimal digits, two of them decimals
-[M4 §3.1]. An enumeration has its code times 100 [C106].
+[M4 §3.1], or the eight of a long one. An enumeration has its code times 100 [C106].
 
 Without an option card a drive has 149 settings. The others are those of the cards that the
 simulated drive can have.
@@ -56,6 +56,8 @@ _HYSTERESIS = (1.0, '00000100', 9.0, '00000900', 0.0, 10.0, 1.5, (1.0, 2.0))
 _DELAY = (0.0, '00000000', 9.0, '00000900', -1.0, 10.0, 0.5, (0.0, 1.0))
 _SLIP = (0.0, '00000000', 10.0, '00001000', -0.05, 10.05, 0.025, (0.0, 0.05))
 _BOOST = (0.0, '00000000', 200.0, '00020000', -1.0, 201.0, 0.5, (0.0, 1.0))
+#: In the 8-byte format, a half-byte in each [M4 §3.3].
+_GEAR_RATIO = (1, '0000000000000001', 3_999_999_999, '0E0E060B02070F0F', 0, 4_000_000_000)
 _MAGNETIZATION = (0.0, '00000000', 300.0, '00030000', -10.0, 310.0, 5.0, (0.0, 10.0))
 _RESPONSE = (0.1, '00000010', 9.0, '00000900', 0.0, 9.1, 0.15, (0.1, 0.2))
 _CURRENT = (0.0, '00000000', 50.0, '00005000', -1.0, 51.0, 0.5, (0.0, 1.0))
@@ -168,6 +170,10 @@ _NUMBERS: tuple[tuple[Any, ...], ...] = (
     ('P513', 'monitoring.motor_response_time_2', 144, '', *_RESPONSE),
     ('P521', 'monitoring.regenerative_response_time_1', 146, '', *_RESPONSE),
     ('P523', 'monitoring.regenerative_response_time_2', 148, '', *_RESPONSE),
+    ('P550', 'monitoring.frs_alert', 302, 'frs', 50, '0000000000000302', 99_999_999,
+     '00050F050E000F0F', 49, 100_000_000),
+    ('P551', 'monitoring.frs_lag_error', 304, 'frs', 100, '0000000000000604', 99_999_999,
+     '00050F050E000F0F', 99, 100_000_000),
     ('P552', 'monitoring.frs_hold_time', 260, 'frs', 1.0, '00000100', 99.0, '00009900', 0.0,
      100.0, 1.5, (1.0, 2.0)),
     ('P554', 'monitoring.frs_positional_tolerance', 247, 'frs', 10.0, '00001000', 32768.0,
@@ -215,6 +221,8 @@ _NUMBERS: tuple[tuple[Any, ...], ...] = (
      5.0, (0.0, 10.0)),
     ('P861', 'special.restart_time', 167, '', 3.0, '00000300', 30.0, '00003000', 2.0, 31.0, 3.5,
      (3.0, 4.0)),
+    ('P762', 'control.frs_master_gear_ratio', 263, 'frs', *_GEAR_RATIO),
+    ('P763', 'control.frs_slave_gear_ratio', 265, 'frs', *_GEAR_RATIO),
     ('P882', 'special.master_slave_weighting', 226, 'fio', 0.1, '00000010', 10.0, '00001000', 0.09,
      10.01, 0.105, (0.1, 0.11)),
     ('', 'serial.pc_timeout', 285, '', 0.0, '00000000', 10.0, '00001000', -0.1, 10.1, 0.05,
@@ -238,6 +246,8 @@ _NUMBERS: tuple[tuple[Any, ...], ...] = (
      (0.0, 0.02)),
     ('', 'ipos.travel_speed_cw', 718, 'fpi', *_SPEED),
     ('', 'ipos.travel_speed_ccw', 719, 'fpi', *_SPEED),
+    ('', 'ipos.lag_error_window', 1003, 'fpi', 0, '0000000000000000', 2_147_483_647,
+     '070F0F0F0F0F0F0F', -1, 2_147_483_648),
 )
 #: 0.00 = No, 1.00 = Yes, or Off and On.
 _SWITCHES = (
@@ -429,4 +439,4 @@ ENDS = (
     *(_list(*row) for row in _LISTS),
 )
 #: How many settings there are with a card, and without one.
-COUNTS = {'': 149, 'frs': 10, 'fio': 16, 'fea': 5, 'fen': 8, 'fpi': 19, 'ffi': 9}
+COUNTS = {'': 149, 'frs': 14, 'fio': 16, 'fea': 5, 'fen': 8, 'fpi': 20, 'ffi': 9}

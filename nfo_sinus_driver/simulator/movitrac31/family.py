@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import Annotated, Literal
 
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
-from nfo_sinus_driver.catalog.codec import Bcd, codec_of
+from nfo_sinus_driver.catalog.codec import SignedBcd, codec_of
 from nfo_sinus_driver.simulator import movitrac
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
@@ -31,16 +31,10 @@ _LOCK = 'special.parameter_lock'
 _NEVER_LOCKED = frozenset({_LOCK, FUNCTION_BITS, SETPOINT})
 #: What only the keypad can switch on: "On only with FBG 31".
 _KEYPAD_ONLY = 'special.user_menu'
-#: The first half-byte of a negative number [C70].
-_NEGATIVE = 0xF
 #: What [M4 §4] lets a master write though the tables do not: they say what a driver may.
 _WRITTEN = frozenset(
     {
         'setpoint.n2_offset',
-        'monitoring.frs_alert',
-        'monitoring.frs_lag_error',
-        'control.frs_master_gear_ratio',
-        'control.frs_slave_gear_ratio',
         'control.frs_slave_counter',
         'control.frs_offset_1',
         'control.frs_offset_2',
@@ -49,7 +43,6 @@ _WRITTEN = frozenset(
         'ipos.reference_offset',
         'ipos.limit_switch_cw',
         'ipos.limit_switch_ccw',
-        'ipos.lag_error_window',
         'ipos.x_setpoint',
         'ipos.code_value',
         'ipos.data_value',
@@ -93,15 +86,12 @@ def _machine(model: Family) -> Family:
     Return the model with what a drive itself allows.
 
     A drive has negative numbers and writes all that [M4 §4] says; of the line's own codec, which
-    has no sign [C70], only the server knows.
+    writes no sign [C70], only the server knows.
     """
     own = {}
     for key, parameter in model.items():
         address = parameter.at(_PROTOCOL)
-        negative = parameter.minimum is not None and parameter.minimum < 0
-        # the fault memory prints no ranges
-        negative = negative or key.endswith('heat_sink_temperature')
-        if negative and isinstance(address.codec, Bcd):
+        if isinstance(address.codec, SignedBcd):
             address = replace(address, codec=codec_of('sint32_be'))
         access = Access.READ_WRITE if key in _WRITTEN else parameter.access
         own[key] = replace(parameter, access=access, addresses={_PROTOCOL: address})
@@ -116,6 +106,8 @@ class Server(movitrac.Server):
         self._drive = drive
         self._unit = drive.control_unit
         self._memory = drive.memory
+        #: The first half-byte of a negative number [C70].
+        self._sign = int(self._unit.variant.negative_sign, 16)
         self.any_address = self._unit.variant.interface == 'rs232'
         self._by_index = {one.at(_PROTOCOL).index: one for one in drive.memory.model.values()}
 
@@ -124,10 +116,10 @@ class Server(movitrac.Server):
         parameter = self._find(index)
         raw = self._drive.read_raw(parameter.key)
         table = self._drive.model[parameter.key].at(_PROTOCOL).number
-        if not isinstance(table, Bcd) or raw >= 0:
+        if not isinstance(table, SignedBcd) or raw >= 0:
             return table.encode(raw)
         data = table.encode(-raw)
-        return bytes([_NEGATIVE << 4 | data[0]]) + data[1:]
+        return bytes([self._sign << 4 | data[0]]) + data[1:]
 
     def select(self, index: int, value: bytes) -> None:
         """Set a parameter."""
@@ -162,8 +154,7 @@ class Server(movitrac.Server):
     def _number(self, parameter: Parameter, value: bytes) -> int:
         """Return the raw number of bytes (Nack: they mean none)."""
         table = self._drive.model[parameter.key].at(_PROTOCOL).number
-        codec = parameter.at(_PROTOCOL).number
-        negative = codec.signed and isinstance(table, Bcd) and value[0] >> 4 == _NEGATIVE
+        negative = isinstance(table, SignedBcd) and value[0] >> 4 == self._sign
         try:
             size = table.decode(bytes([value[0] & 0x0F]) + value[1:] if negative else value)
         except ValueError as error:

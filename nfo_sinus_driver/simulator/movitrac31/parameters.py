@@ -173,6 +173,9 @@ class MovitracVariant(Variant):
     settings_need: str = choice(
         'nothing', 'output_off', 'inhibit', text='what has to be so for a setting to be written'
     )
+    negative_sign: str = choice(
+        'f', '8', '1', text='the first half-byte of a negative number in BCD'
+    )
     bits_after_power_on: str = choice(
         'cleared', 'kept', text='what becomes of function bits and set-point by power-off'
     )

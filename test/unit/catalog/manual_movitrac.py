@@ -35,9 +35,8 @@ REFERENCES = {'286': '329'}
 #: Of these the unit belongs to the labels, or is uncertain [C78].
 NO_UNIT = {272, 273, 298, 299, 300, 301}
 UNITS = {'1/min': 'rpm', '%IN': '%', '% IN': '%', 'kHz': ''}
-#: The manual lets a master write them; how a sign stands is not known, nor tried are 8 bytes.
-ONLY_READ = {98, 254, 256, 257, 258, 723} | {263, 265, 302, 304, *range(1000, 1005)}
-ONLY_READ |= {1010, 1011, 1012}
+#: The manual lets a master write them; how a sign stands is not known, and by some the motor turns.
+ONLY_READ = {98, 254, 256, 257, 258, 723} | {1000, 1001, 1002, 1004, 1010, 1011, 1012}
 #: Words, and what is printed as a list of codes but has its texts in status_codes.csv.
 NO_RANGE = {8, 9, 10, 11, 12, 13, 197, 214, 215, 237, 281, 284}
 SIGNS = {'\\times': '\N{MULTIPLICATION SIGN}', '\\pm': '±', '\\neq': '≠'}

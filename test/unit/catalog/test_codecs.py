@@ -144,6 +144,23 @@ def test_bytes_that_are_no_number() -> None:
     assert said == '00 10 00 00 are no half-bytes'
 
 
+def test_a_sign_is_read_where_the_drive_shows_how_it_codes_it_and_never_written() -> None:
+    # -237.0 mV, the value of figure 20, each way that its missing digits may have been [C105]
+    codec = number('sbcd32')
+    for printed, raw in (
+        ('00 02 37 00', 23_700), ('F0 02 37 00', -23_700), ('80 02 37 00', -23_700),
+        ('10 02 37 00', -23_700), ('09 99 99 99', 9_999_999), ('F9 99 99 99', -9_999_999),
+    ):
+        assert codec.decode(bytes.fromhex(printed)) == raw
+    for printed in ('20 02 37 00', '99 97 63 00', 'FF FF A3 6C', '00 0A 00 00', 'F0 0A 00 00'):
+        data = bytes.fromhex(printed)
+        assert refused(codec.decode, data) == f'{data.hex()} is no sbcd32'
+    assert codec.encode(23_700) == bytes.fromhex('00 02 37 00')
+    assert codec.signed
+    for raw in (-1, 10_000_000):
+        assert not codec.fits(raw)
+
+
 @given(st.text(st.characters(max_codepoint=127, exclude_characters='\0'), max_size=12))
 def test_text_there_and_back(text: str) -> None:
     codec = codec_of('string12')

@@ -107,4 +107,4 @@ def test_everything_that_a_drive_keeps_or_measures_is_read_by_the_tool_and_by_ro
         assert told - as_text <= {one.key for one in (*family.kept, *family.measured)}
     only_read = [one for one in load_family('movitrac31').kept if not one.is_setting]
     part = page().split('### Only read\n')[1].split('### ')[0]
-    assert part.count('\n| ') == 2 + len(only_read) == 26
+    assert part.count('\n| ') == 2 + len(only_read) == 21

@@ -128,7 +128,7 @@ GOLDEN = {
     """,
     # the examples of the manual: §2.4.3, §2.4.4, figure 23 [C106]
     ('movitrac31', 'movitrac'): """
-        status.heat_sink_temperature 0004 bcd32 °C 00002550 25.5
+        status.heat_sink_temperature 0004 sbcd32 °C 00002550 25.5
         ramp.t11_up 0019 bcd32 s 00000370 3.7
         control.frs_master_gear_ratio 0107 uint32_hb - 0000000108060A00 100000
         special.software_system 00D7 uint32_be - 211234A1 0x211234A1
@@ -183,11 +183,11 @@ def test_how_many_parameters_each_family_has() -> None:
         'sinus_g2': (180, 120),
         'sinus_optimal': (17, 0),
         'sinus_h': (6, 0),
-        'movitrac31': (315, 216),
+        'movitrac31': (315, 221),
     }
-    # 239 are printed as writable: of those 13 have eight bytes and 5 more can be negative
+    # 239 are printed as writable: of those 13 can be negative, of which 8 have eight bytes
     access = Counter(row.access for row in MOVITRAC.values())
-    assert access == {Access.READ_WRITE: 239 - 13 - 5, Access.READ: 76 + 13 + 5}
+    assert access == {Access.READ_WRITE: 239 - 13, Access.READ: 76 + 13}
 
 
 def test_every_row_is_one_that_may_be() -> None:
@@ -257,12 +257,12 @@ def test_what_commands_or_resets_is_no_setting_and_what_disturbs_the_line_is_gua
     assert guarded == {196, 205, 206, 207, 212, 285}
 
 
-def test_what_may_be_negative_or_has_eight_bytes_is_only_read() -> None:
+def test_what_may_be_negative_is_only_read() -> None:
     for row in MOVITRAC.values():
-        eight = row.at('movitrac').codec.size == 8
-        if eight or (row.minimum is not None and row.minimum < 0):
+        if row.minimum is not None and row.minimum < 0:
             assert row.access is Access.READ, row.key
-    assert sum(row.at('movitrac').codec.size == 8 for row in MOVITRAC.values()) == 15
+    eight = [row for row in MOVITRAC.values() if row.at('movitrac').codec.size == 8]
+    assert len(eight) == 15 and sum(row.is_setting for row in eight) == 5
 
 
 def test_what_needs_no_option_card() -> None:
@@ -461,4 +461,5 @@ def test_the_error_log_of_the_movitrac_are_five_codes_and_what_was_kept_of_each(
         rows = [row for row in MOVITRAC.values() if row.name.startswith(f'Fault t-{number} ')]
         assert [index(row.key) - first for row in rows] == [0, 2, 3, 4, 6, 7, 8]
         names = [row.at('movitrac').codec.name for row in rows]
-        assert names == ['bcd32'] * 5 + ['uint32_be'] * 2
+        # inverter status and terminals are not decoded [C77]
+        assert names == ['bcd32', 'sbcd32', *['bcd32'] * 3, *['uint32_be'] * 2]

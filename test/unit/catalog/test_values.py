@@ -78,7 +78,9 @@ def mistakes(row: Parameter, protocol: str, raw: int) -> Iterator[str]:
 def raw_of(row: Parameter, protocol: str, bits: int) -> int:
     """A raw number that a parameter can have."""
     codec = row.at(protocol).number
-    return codec.minimum + bits % (codec.maximum - codec.minimum + 1)
+    raw = codec.minimum + bits % (codec.maximum - codec.minimum + 1)
+    # a sign in BCD is only read
+    return raw if codec.fits(raw) else -raw
 
 
 @settings(max_examples=8, deadline=None)

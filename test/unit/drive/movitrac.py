@@ -45,13 +45,17 @@ def make(switch: str = 'as the manual says', **more: Any) -> Rig:
 
 
 def switched(
-    switch: Mapping[str, str], parameters: Mapping[str, Any] | None = None, **more: Any
+    switch: Mapping[str, str],
+    parameters: Mapping[str, Any] | None = None,
+    options: Mapping[str, str] | None = None,
+    **more: Any,
 ) -> Rig:
     """Return a rig with these switches turned, and no others."""
     if 'settings_need' in switch:
         parameters = {**REMOTE, **(parameters or {})}
     plain = {option.name: option.choices[0] for option in _OPTIONS}
-    return Rig('movitrac', options={**plain, **switch}, parameters=parameters, **more)
+    options = {**plain, **switch, **(options or {})}
+    return Rig('movitrac', options=options, parameters=parameters, **more)
 
 
 def bits(rig: Rig) -> int:

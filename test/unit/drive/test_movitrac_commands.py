@@ -171,6 +171,35 @@ def test_a_fault_code_with_decimals_is_an_unknown_code() -> None:
         assert [(one.code, one.text) for one in log] == [(255, 'unknown code (raw 45)')]
 
 
+# --- 8 bytes, and a sign --------------------------------------------------------------------------
+
+
+def test_a_setting_of_8_bytes_is_read_and_written() -> None:
+    key = 'control.frs_master_gear_ratio'
+    with make(options={'option_card': 'frs'}) as rig:
+        rig.connect(parameters=True)
+        assert rig.drive.parameters.values[key] == 1
+        rig.result(rig.drive.parameters.change({key: 100_000}))
+        assert rig.far.memory.get(key) == rig.drive.parameters.values[key] == 100_000
+        # the example of [M4 §3.3] in a LONG_SELECT [C106]
+        sent = [frame['hex'].upper() for frame in rig.line.frames]
+        assert [one for one in sent if one.startswith('AD')] == ['AD0101070000000108060A00CF']
+        assert '0 is out of range' in rig.answer(rig.drive.parameters.change({key: 0}))
+
+
+@pytest.mark.parametrize('sign', ['f', '8', '1'])
+def test_a_negative_value_is_read_however_the_drive_shows_its_sign(sign: str) -> None:
+    with make(options={'negative_sign': sign}) as rig:
+        rig.connect()
+        for ambient in (-15.0, 0.0, 25.0):
+            rig.far.control_unit.ambient = ambient
+            assert rig.result(rig.drive.measure('status.heat_sink_temperature')) == ambient
+        rig.far.control_unit.ambient = -15.0
+        rig.far.trip(OVERCURRENT)
+        (entry,) = rig.result(rig.drive.error_log())
+        assert 'heat sink -15 °C' in entry.readings
+
+
 # --- the PC time-out ------------------------------------------------------------------------------
 
 

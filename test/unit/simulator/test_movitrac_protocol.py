@@ -251,6 +251,17 @@ def test_a_negative_number_has_its_sign_in_the_first_half_byte():
     assert bench.ask(m.HEAT_SINK) == bytes.fromhex('F0001500')
 
 
+@pytest.mark.parametrize(('choice', 'data'), [
+    ('f', 'F0001500'), ('8', '80001500'), ('1', '10001500'),
+])
+def test_the_sign_of_a_negative_number_is_a_choice(choice: str, data: str) -> None:
+    bench = MovitracBench(negative_sign=choice)
+    bench.unit.ambient = -15.0
+    assert bench.ask(m.HEAT_SINK) == bytes.fromhex(data)
+    bench.unit.ambient = 15.0
+    assert bench.ask(m.HEAT_SINK) == bytes.fromhex('00001500')
+
+
 def test_every_setting_has_both_its_ends(bench):
     # but those that end the conversation, and those that stand against each other or change others
     aside = {m.LOCK, m.SAVE_TO_EEPROM, USER_MENU, m.ADDRESS, 170, 172, 194, 195}
