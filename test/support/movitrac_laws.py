@@ -13,8 +13,10 @@ from support.wire import Request, understand
 
 #: Remote set-point, function bits and P841 [M4 §4].
 _SIZE, _BITS, _CONTROL_MODE = 223, 281, 205
-#: P841 as Remote control, and as Remote setpoint.
-_REMOTE_CONTROL, _REMOTE_SETPOINT = (0x0000, 0x0200), (0x0000, 0x0100)
+#: P841 as Remote control, as Remote setpoint, and as Standard.
+_REMOTE_CONTROL, _REMOTE_SETPOINT, _STANDARD = (0x0000, 0x0200), (0x0000, 0x0100), (0, 0)
+#: What is looked at before P841 is put back: the frequency, and the terminals.
+_STANDS = frozenset((0, 13))
 #: The factory setting, and an action of IPOS: never without a person.
 _NEVER = frozenset((203, 704))
 #: Of the function bits: CW and CCW, and reset.
@@ -30,8 +32,9 @@ class MovitracJudge:
         #: Of each unit: the set-point that was written last, and the function bits; none before.
         self._sizes: dict[int, int] = {}
         self._bits: dict[int, int] = {}
-        #: Those on their way to Remote control by Remote setpoint, where the bits do not count.
-        self._between: set[int] = set()
+        #: Those on their way to Remote control by Remote setpoint, where the bits do not count, and
+        #: what was read of them since.
+        self._between: dict[int, set[int]] = {}
 
     def complaints(self, data: bytes) -> Iterator[str]:
         """Take a request; yield what is wrong with it."""
@@ -48,15 +51,18 @@ class MovitracJudge:
             yield f'index {request.place} has {size} bytes'
         if request.words is not None:
             yield from self._judge_write(request, request.words)
+        elif request.unit in self._between:
+            self._between[request.unit].add(request.place)
 
     def _judge_write(self, request: Request, words: tuple[int, ...]) -> Iterator[str]:
         if request.place in _NEVER:
             yield f'index {request.place} is written, which starts what nobody asked for'
         if request.place == _CONTROL_MODE:
-            self._between.discard(request.unit)
+            looked = self._between.pop(request.unit, set())
+            put_back = words == _STANDARD and looked >= _STANDS
             if words == _REMOTE_SETPOINT:
-                self._between.add(request.unit)
-            elif words != _REMOTE_CONTROL:
+                self._between[request.unit] = set()
+            elif words != _REMOTE_CONTROL and not put_back:
                 yield 'another P841 than Remote control can start the motor'
         elif request.unit in self._between and any(words):
             # bits without a direction are a stop: an enable that fails half-way is followed by one

@@ -206,19 +206,34 @@ class FunctionBits(ControlMethod):
 
         :raises NotPossible: it keeps other function bits, or another set-point.
         """
-        if not (yield from self.in_control()):
+        found = yield Read(CONTROL_MODE)
+        if found != words.REMOTE_CONTROL:
             for write in (Write(BITS, 0), Write(SIZE, 0.0)):
                 with contextlib.suppress(Refusal):
                     yield write
             if (yield from _would_turn()):
-                yield Write(CONTROL_MODE, words.REMOTE_SETPOINT, stored=True)
-                yield from self.zero_setpoint('')
-            yield Write(CONTROL_MODE, words.REMOTE_CONTROL, stored=True)
+                yield from self._pass_remote_setpoint(found)
+            else:
+                yield Write(CONTROL_MODE, words.REMOTE_CONTROL, stored=True)
         yield Write(BITS, 0, head=True)
         yield from self.zero_setpoint('')
         kept = int((yield Read(BITS)))
         if kept:
             raise NotPossible(f'the drive keeps function bits {kept:04X}h where 0 was written')
+
+    def _pass_remote_setpoint(self, found: Value) -> Steps[None]:
+        """
+        Set P841 to Remote setpoint, remove the set-point, and go on to Remote control.
+
+        Where that fails P841 is put back, unless the motor could start by it.
+        """
+        yield Write(CONTROL_MODE, words.REMOTE_SETPOINT, stored=True)
+        try:
+            yield from self.zero_setpoint('')
+            yield Write(CONTROL_MODE, words.REMOTE_CONTROL, stored=True)
+        except (NotPossible, Refusal):
+            yield from taken(_put_back(found))
+            raise
 
     def zero_setpoint(self, control_mode: str) -> Steps[None]:
         """
@@ -293,6 +308,15 @@ def _take_direction() -> Steps[None]:
     with contextlib.suppress(Refusal):
         kept = Bits(int((yield Read(BITS, retry=False))))
     yield Write(BITS, int(kept & (Bits.ENABLE | Bits.CONTROLLER_INHIBIT)), retry=False)
+
+
+def _put_back(found: Value) -> Steps[None]:
+    """Set P841 to what it was, where neither a terminal nor a fieldbus can start the motor then."""
+    if found != words.STANDARD:
+        return
+    _require_no_direction((yield from _assignments()), int((yield Read(TERMINALS))))
+    if not (yield Read(FREQUENCY)):
+        yield Write(CONTROL_MODE, found, stored=True)
 
 
 def _would_turn() -> Steps[bool]:

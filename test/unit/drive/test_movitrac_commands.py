@@ -15,7 +15,7 @@ from support.rig import Rig
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE
-from nfo_sinus_driver.simulator.movitrac31.parameters import Mode
+from nfo_sinus_driver.simulator.movitrac31.parameters import Bit, Mode
 
 KEY = 'serial.pc_timeout'
 #: P600 to P609 of terminals that only an option card has, P760 and P880 likewise.
@@ -97,6 +97,32 @@ def test_an_enable_is_refused_with_the_reason() -> None:
             if found != (True, False, False, Mode.STANDARD, False):
                 wrong[reason] = answer, found
     assert not wrong
+
+
+@pytest.mark.parametrize(('closed', 'left'), [(False, Mode.STANDARD), (True, Mode.REMOTE_SETPOINT)])
+def test_an_enable_that_fails_half_way_leaves_p841_as_it_was_unless_the_motor_could_start(
+    closed: bool, left: Mode
+) -> None:
+    with make() as rig:
+        rig.connect()
+        # left behind by another master, and ignored with P841 = Standard
+        rig.far.memory.put('fieldbus.function_bits', Bit.ENABLE | Bit.CW)
+        rig.far.memory.put('fieldbus.remote_setpoint', 2000)
+
+        def meet(key: str, data: bytes | None) -> str | None:
+            if key == CONTROL_MODE and data is not None and closed:
+                rig.far.control_unit.switch(41, True)
+            sets = key == 'fieldbus.remote_setpoint' and data is not None
+            return 'refused' if sets else None
+
+        rig.meet = meet
+        assert not succeeded(rig, rig.drive.enable())
+        rig.meet = lambda key, data: None
+        rig.far.control_unit.switch(41, False)
+        rig.pass_time(3.0)
+        assert round(rig.far.memory.number(CONTROL_MODE)) == left
+        assert not rig.turns
+        assert rig.notes.said(Cause.STORED)
 
 
 @pytest.mark.parametrize(('settings', 'most'), [

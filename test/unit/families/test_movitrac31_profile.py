@@ -149,10 +149,12 @@ CLEARED = ((Write(BITS, 0, head=True), None), *SIZE_0, (Read(BITS), 0))
 TO_REMOTE = Write(MODE, REMOTE, stored=True)
 
 
-def begun(bits: Any, *size: tuple[Any, Any], early: Refusal | None = None) -> Any:
+def begun(
+    bits: Any, *size: tuple[Any, Any], early: Refusal | None = None, found: str = STANDARD
+) -> Any:
     """Control is not with the line: bits and set-point are cleared and read first."""
     cleared = (Write(BITS, 0), early), (Write(SIZE, 0.0), early)
-    return (Read(MODE), STANDARD), *cleared, (Read(BITS), bits), *size
+    return (Read(MODE), found), *cleared, (Read(BITS), bits), *size
 
 
 def test_control_is_taken_where_the_line_has_it() -> None:
@@ -172,8 +174,34 @@ def test_a_set_point_that_is_left_behind_turns_nothing(early: Refusal | None) ->
         (Write(MODE, 'Remote setpoint', stored=True), None),
     )
     play(method.take_control(), *script, *SIZE_0, (TO_REMOTE, None), *CLEARED)
-    with pytest.raises(NotPossible, match='keeps a set-point of 20'):
-        play(method.take_control(), *script, (Write(SIZE, 0.0), None), (Read(SIZE), 20.0))
+
+
+#: How it goes on where control is not taken although P841 was changed for it: what is seen to.
+STANDS = (*assigned(), (Read(TERMINALS), CLOSED_43), (Read(FREQUENCY), 0.0))
+BACK = Write(MODE, STANDARD, stored=True)
+
+
+@pytest.mark.parametrize(('failing', 'error'), [
+    (((Write(SIZE, 0.0), None), (Read(SIZE), 20.0)), NotPossible),
+    (((Write(SIZE, 0.0), REFUSED),), Refusal),
+    ((*SIZE_0, (TO_REMOTE, REFUSED)), Refusal),
+])
+@pytest.mark.parametrize(('found', 'seen'), [
+    (STANDARD, (*STANDS, (BACK, None))),
+    (STANDARD, (*STANDS, (BACK, REFUSED))),
+    # neither where the motor could start by that, nor where it turns
+    (STANDARD, (*assigned(), (Read(TERMINALS), CLOSED_43 | 1))),
+    (STANDARD, (*STANDS[:-1], (Read(FREQUENCY), 3.0))),
+    (STANDARD, (*STANDS[:-2], (Read(TERMINALS), REFUSED))),
+    (FIELDBUS, ()),
+])
+def test_where_control_is_not_taken_p841_is_put_back_unless_the_motor_could_start(
+    failing: Any, error: type[Exception], found: str, seen: Any
+) -> None:
+    script = begun(FORWARD, (Read(SIZE), 20.0), found=found)
+    to_setpoint = Write(MODE, 'Remote setpoint', stored=True), None
+    with pytest.raises(error):
+        play(method.take_control(), *script, to_setpoint, *failing, *seen)
 
 
 def test_what_is_left_behind_may_turn_nothing() -> None:

@@ -34,6 +34,9 @@ def _complaints(*requests: str) -> list[str]:
 
 def test_a_good_ride_has_nothing_to_complain_of() -> None:
     assert _complaints(*_GOOD) == []
+    # an enable that failed half-way, with no direction at the terminals and the motor at rest
+    put_back = 'a9 01 00cd 00000100', _ZERO, 'b5 01 000d', 'b5 01 0000', 'a9 01 00cd 00000000'
+    assert _complaints(*put_back) == []
 
 
 @pytest.mark.parametrize(
@@ -48,6 +51,8 @@ def test_a_good_ride_has_nothing_to_complain_of() -> None:
         ([_ZERO, 'a9 01 0119 00000044'], 'a reset beside other bits'),
         (['a9 01 0119 01000000'], 'bits that have no meaning'),
         (['a9 01 00cd 00000000'], 'another P841'),
+        (['b5 01 000d', 'b5 01 0000', 'a9 01 00cd 00000000'], 'another P841'),
+        (['a9 01 00cd 00000100', 'b5 01 0000', 'a9 01 00cd 00000000'], 'another P841'),
         (['a9 01 00cd 00000100', _ZERO, _TWENTY], 'while P841 is Remote setpoint'),
         (['a9 01 00cb 00000100'], 'index 203 is written'),
         (['a9 01 02c0 00000100'], 'index 704 is written'),
