@@ -224,14 +224,17 @@ def load_family(
     :raises ValueError: there is no such family; the message lists those there are.
     :raises CatalogError: a table contradicts itself, or another one.
     """
-    # the same family for all the methods that share its tables
-    family = _speaking(_read_family(name, method if _has_tables(name, method) else ''), words)
+    # the same tables for all the methods that share them
+    family = _read_family(name, method if _has_tables(name, method) else '')
+    family = _speaking(family, words, method)
     return _in_speed_mode(family, nominal_speed) if nominal_speed else family
 
 
 @functools.cache
-def _speaking(family: Family, words: str) -> Family:
-    return replace(family, profile=family.profile.words[words]) if words else family
+def _speaking(family: Family, words: str, method: str) -> Family:
+    profile = family.profile.words[words] if words else family.profile
+    seen = profile.seen_by(method)
+    return family if seen is family.profile else replace(family, profile=seen)
 
 
 @functools.cache

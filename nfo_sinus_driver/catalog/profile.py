@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import enum
 from fractions import Fraction
 import math
@@ -184,6 +184,7 @@ class SetpointTarget:
     :ivar most: the greatest set-point in either direction, in the unit of the control mode.
     :ivar at: the parameter in whose place it is written, as for :class:`Write`.
     :ivar forward_only: the drive takes none below 0.
+    :ivar directed: its sign is the direction of the motor; else something else gives that.
     :ivar nominal: what the motor is made for, in the same unit: the parameter that tells it, or the
         value itself; infinite where nothing tells it.
     :ivar ends: the two parameters between which the drive takes set-points, if it has such.
@@ -194,6 +195,7 @@ class SetpointTarget:
     most: float
     at: str = ''
     forward_only: bool = False
+    directed: bool = True
     nominal: str | float = math.inf
     ends: tuple[str, str] | None = None
     older_most: float = math.inf
@@ -321,6 +323,8 @@ class ControlMethod(abc.ABC):
         ``''``: it releases the motor.
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
     :cvar procedures: what begins each procedure that it has.
+    :cvar holders: who has control, where this method sees that otherwise than its :class:`Profile`.
+    :cvar setpoints: where its set-points go, likewise.
     :cvar addressing: how it reaches the parameters of its tables, where that is another way than
         that of the line; ``''``: that of the line.
     :cvar plc_time: who is between stops the drive after so long without a word of ours, s; 0:
@@ -338,6 +342,8 @@ class ControlMethod(abc.ABC):
     older: ClassVar[bool] = True
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
     control_retained: ClassVar[str] = ''
+    holders: ClassVar[Mapping[Value, Holder]] = {}
+    setpoints: ClassVar[Mapping[str, SetpointTarget]] = {}
     addressing: ClassVar[str] = ''
     plc_time: ClassVar[float] = 0.0
     caution: ClassVar[str] = ''
@@ -574,6 +580,17 @@ class Profile:
     busy: frozenset[int] = frozenset()
     stops_at_timeout: Value = True
     after_write: Sequence[Write] = ()
+
+    def seen_by(self, method: str) -> Profile:
+        """Return the same as one of its control methods sees it."""
+        own = self.methods.get(method)
+        if own is None or not (own.holders or own.setpoints):
+            return self
+        return replace(
+            self,
+            holders=own.holders or self.holders,
+            setpoints=own.setpoints or self.setpoints,
+        )
 
     def methods_with(self, procedure: Procedure | Reset) -> Sequence[str]:
         """Return the control methods that have a procedure."""

@@ -550,7 +550,8 @@ class Controller:
         turning = self._state.turning
         if self._setpoint.control_mode != turning.control_mode:
             return None
-        least = self._setpoint.least_since(before.at, reverse=before.frequency < 0)
+        reverse = self._setpoint.directed and before.frequency < 0
+        least = self._setpoint.least_since(before.at, reverse=reverse)
         return explain_fall(self._state, before, status, least * turning.hertz)
 
     def _no_control(self, status: InverterStatus | None) -> Report:

@@ -97,6 +97,8 @@ class Following:
 
         One that has begun to, through standstill, has been told by another master.
         """
+        if not self._setpoint.directed:
+            return False
         way = 0
         if least >= 0 and most > 0:
             way = 1

@@ -122,6 +122,11 @@ class Setpoint:
         return self._following_since
 
     @property
+    def directed(self) -> bool:
+        """The sign of a set-point is the direction of the motor."""
+        return self._target is None or self._target.directed
+
+    @property
     def expired(self) -> bool:
         """No set-point has come for so long that the drive was given 0."""
         return self._expired

@@ -39,6 +39,7 @@ _METHODS = {
     'function_bits': DriveStatus.FUNCTION_BITS,
     'telegram1': DriveStatus.TELEGRAM1,
     'ds402': DriveStatus.DS402,
+    'remote_setpoint': DriveStatus.REMOTE_SETPOINT,
 }
 _STATES = {state: getattr(DriveStatus, state.name) for state in State}
 #: The facts have the names and the bits that the message has; plain numbers, for this is done with

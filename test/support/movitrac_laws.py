@@ -26,9 +26,14 @@ _MOST = 40000
 
 
 class MovitracJudge:
-    """Hears the requests on one line, one after another."""
+    """
+    Hears the requests on one line, one after another.
 
-    def __init__(self) -> None:
+    :param by_terminals: terminals start the motors, while P841 is Remote setpoint.
+    """
+
+    def __init__(self, *, by_terminals: bool = False) -> None:
+        self._by_terminals = by_terminals
         #: Of each unit: the set-point that was written last, and the function bits; none before.
         self._sizes: dict[int, int] = {}
         self._bits: dict[int, int] = {}
@@ -60,9 +65,9 @@ class MovitracJudge:
         if request.place == _CONTROL_MODE:
             looked = self._between.pop(request.unit, set())
             put_back = words == _STANDARD and looked >= _STANDS
-            if words == _REMOTE_SETPOINT:
+            if words == _REMOTE_SETPOINT and not self._by_terminals:
                 self._between[request.unit] = set()
-            elif words != _REMOTE_CONTROL and not put_back:
+            elif words not in self._modes and not put_back:
                 yield 'another P841 than Remote control can start the motor'
         elif request.unit in self._between and any(words):
             # bits without a direction are a stop: an enable that fails half-way is followed by one
@@ -73,6 +78,10 @@ class MovitracJudge:
             yield from self._judge_size(request.unit, words)
         if request.place == _BITS:
             yield from self._judge_bits(request.unit, words)
+
+    @property
+    def _modes(self) -> tuple[tuple[int, int], ...]:
+        return (_REMOTE_CONTROL, _REMOTE_SETPOINT) if self._by_terminals else (_REMOTE_CONTROL,)
 
     def _judge_size(self, unit: int, words: tuple[int, ...]) -> Iterator[str]:
         digits = ''.join(f'{word:04x}' for word in words)
@@ -87,6 +96,8 @@ class MovitracJudge:
         direction = bits & _DIRECTIONS
         if words[0]:
             yield 'bits that have no meaning'
+        if direction and self._by_terminals:
+            yield 'a direction, which the terminals give'
         if direction == _DIRECTIONS:
             yield 'both directions at once are no direction'
         if bits & _RESET and bits & ~_RESET:

@@ -55,6 +55,7 @@ class Way:
     :ivar options: of the simulated drive; :ivar driver: other settings of the driver.
     :ivar parameters: of the simulated drive, other than factory.
     :ivar hertz: what a set-point is that turns the motor with 1 Hz.
+    :ivar closed: the terminals that start it.
     """
 
     protocol: str
@@ -65,6 +66,7 @@ class Way:
     driver: Mapping[str, Any] = field(default_factory=dict)
     parameters: Mapping[str, Any] = field(default_factory=dict)
     hertz: float = 1.0
+    closed: tuple[int, ...] = ()
 
 
 _OLD = {'classic_dialect': 'v5.0'}
@@ -90,6 +92,10 @@ WAYS: Mapping[str, Way] = {
     'optimal ascii': Way('modbus_ascii', 'sinus_optimal'),
     'optimal, control word': Way('modbus_rtu', 'sinus_optimal', 'drive_control', 'terminal'),
     'movitrac': Way('movitrac', 'movitrac31', 'function_bits'),
+    'movitrac, by terminals': Way(
+        'movitrac', 'movitrac31', 'remote_setpoint', closed=(41,),
+        parameters={'serial.control_mode': 'Remote setpoint'},
+    ),
     'made up': Way('modbus_rtu', 'acme', 'drive_control'),
     'telegram1 g2': Way('telegram1', method='telegram1'),
     'telegram1 optimal': Way('telegram1', 'sinus_optimal', 'telegram1'),
@@ -200,6 +206,9 @@ class Rig:
         )
         self.line.passed = self._passed
         self.fars = self.line.drives
+        for far in self.fars.values():
+            for terminal in way.closed:
+                far.control_unit.switch(terminal, True)
         usual = {
             'model': way.model, 'control_method': way.method, 'reference': way.reference,
             'poll_rate': 20.0, **way.driver, **settings,
@@ -267,7 +276,7 @@ class Rig:
             words = self.way.options.get('telegram_words', self.way.model)
             return telegram_laws.violations(self.line.frames, words)
         return trace_laws.violations(
-            self.line.frames, -math.inf, self.way.model, self.way.protocol
+            self.line.frames, -math.inf, self.way.model, self.way.protocol, self.way.method
         )
 
     # --- the first drive ---

@@ -56,13 +56,19 @@ def violations(
     frame_gap: float,
     model: str = 'sinus_g2',
     protocol: str = 'modbus_rtu',
+    method: str = '',
 ) -> list[str]:
     """
     Return what breaks the laws of the house in a trace; nothing is as it should be.
 
     :param frame_gap: the least silence before a request, t3.5, s; counts for Modbus RTU alone.
     """
-    judge = MovitracJudge() if protocol == 'movitrac' else _Judge(model, protocol)
+    by_terminals = method == 'remote_setpoint'
+    judge = (
+        MovitracJudge(by_terminals=by_terminals)
+        if protocol == 'movitrac'
+        else _Judge(model, protocol)
+    )
     return [
         f'frame {number}: {complaint} ({frame["hex"]})'
         for number, frame in enumerate(frames)

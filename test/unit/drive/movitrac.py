@@ -48,6 +48,7 @@ def switched(
     switch: Mapping[str, str],
     parameters: Mapping[str, Any] | None = None,
     options: Mapping[str, str] | None = None,
+    way: str = 'movitrac',
     **more: Any,
 ) -> Rig:
     """Return a rig with these switches turned, and no others."""
@@ -55,7 +56,7 @@ def switched(
         parameters = {**REMOTE, **(parameters or {})}
     plain = {option.name: option.choices[0] for option in _OPTIONS}
     options = {**plain, **switch, **(options or {})}
-    return Rig('movitrac', options=options, parameters=parameters, **more)
+    return Rig(way, options=options, parameters=parameters, **more)
 
 
 def bits(rig: Rig) -> int:

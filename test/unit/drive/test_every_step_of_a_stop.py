@@ -95,10 +95,12 @@ def test_no_step_of_a_stop_ends_it(way: str) -> None:
 @pytest.mark.parametrize('way', WAYS)
 def test_a_refused_stop_of_a_motor_that_stands_is_no_alarm_until_it_turns(way: str) -> None:
     # one that shows a run command after a stop does not show that it stands
-    options = {'stop_status': 'no_enable'} if way == 'movitrac' else {}
+    options = {'stop_status': 'no_enable'} if way.startswith('movitrac') else {}
     with Rig(way, line=QUICK, options=options) as rig:
         rig.turn()
         assert rig.answer(rig.drive.stop())
+        for terminal in rig.way.closed:
+            rig.far.control_unit.switch(terminal, False)
         rig.pass_time(6.0)
         rig.meet = lambda key, data: None if data is None else 'refused'
         rig.drive.stop()

@@ -23,8 +23,8 @@ from nfo_sinus_driver.link import Refused
 ROUND = 10.0
 READ = {
     'rtu': 119, 'ascii': 119, 'tcp': 119, 'canopen': 119, 'classic': 120, 'classic v5.0': 116,
-    # without option cards
-    'movitrac': 149,
+    # without option cards; three of them are only read
+    'movitrac': 149 + 3,
 }  # fmt: skip
 ACCEL, RETARD, SWITCH = 'control.accel', 'control.retard', 'control.energy_save'
 

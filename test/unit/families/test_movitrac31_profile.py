@@ -26,6 +26,7 @@ WORD, TERMINALS, MODE = 'fieldbus.inverter_status', 'status.terminals', 'serial.
 FREQUENCY = 'status.frequency'
 FORWARD, BACKWARD, ENABLE, RESET, INHIBIT = 0b101, 0b110, 0b100, 1 << 6, 1 << 8
 STANDARD, REMOTE, FIELDBUS = 'Standard', 'Remote control', 'Fieldbus'
+REMOTE_SETPOINT = 'Remote setpoint'
 #: Terminal 43.
 CLOSED_43 = 0b100
 TIMED_OUT = MOVITRAC.status_code(145)
@@ -70,9 +71,13 @@ def test_who_has_control() -> None:
         assert play(method.in_control(), (Read(MODE), mode)) is (holder is Holder.BUS)
 
 
-def test_there_is_one_control_method() -> None:
-    assert list(MOVITRAC.profile.methods) == ['function_bits']
-    assert play(MOVITRAC.profile.in_charge(None)) == 'function_bits'
+def test_p841_says_which_control_method_is_in_charge() -> None:
+    assert list(MOVITRAC.profile.methods) == ['function_bits', 'remote_setpoint']
+    for mode, name in (
+        (REMOTE, 'function_bits'), (STANDARD, 'function_bits'), (FIELDBUS, 'function_bits'),
+        (REMOTE_SETPOINT, 'remote_setpoint'),
+    ):
+        assert play(MOVITRAC.profile.in_charge(None), (Read(MODE), mode)) == name
 
 
 # --- before an enable -----------------------------------------------------------------------------
@@ -307,12 +312,17 @@ def acknowledged(*script: tuple[Any, Any], closed: int = CLOSED_43) -> object:
 
 
 def test_a_fault_is_acknowledged_by_an_edge_without_run_bits() -> None:
-    edge = (Write(BITS, 0), None), *SIZE_0, (Write(BITS, RESET), None), (Write(BITS, 0), None)
-    assert acknowledged(*edge, (Read(MODE), REMOTE)) == ''
-    elsewhere = (*edge, (Read(MODE), STANDARD))
-    acknowledged(*elsewhere, (Read(WORD), 0x00010000))
-    with pytest.raises(NotPossible, match='P841 is not Remote control'):
-        acknowledged(*elsewhere, (Read(WORD), 0x2D010000))
+    cleared = (Write(BITS, 0), None), *SIZE_0
+    for late in (None, REFUSED):
+        edge = (Write(BITS, RESET), late), (Write(BITS, 0), late)
+        elsewhere = *cleared, (Read(MODE), STANDARD), *edge
+        acknowledged(*elsewhere, (Read(WORD), 0x00010000))
+        with pytest.raises(NotPossible, match='P841 is not Remote control'):
+            acknowledged(*elsewhere, (Read(WORD), 0x2D010000))
+    mine = *cleared, (Read(MODE), REMOTE)
+    assert acknowledged(*mine, (Write(BITS, RESET), None), (Write(BITS, 0), None)) == ''
+    with pytest.raises(Refusal):
+        acknowledged(*mine, (Write(BITS, RESET), REFUSED))
 
 
 def test_no_fault_is_acknowledged_where_the_motor_would_start() -> None:
