@@ -322,6 +322,7 @@ class ControlMethod(abc.ABC):
     :cvar quick_stop_by: the setting of the drive that a quick stop goes by, where it may be a ramp;
         ``''``: it releases the motor.
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
+    :cvar needs: parameters without which a drive cannot be commanded by it.
     :cvar procedures: what begins each procedure that it has.
     :cvar holders: who has control, where this method sees that otherwise than its :class:`Profile`.
     :cvar setpoints: where its set-points go, likewise.
@@ -340,6 +341,7 @@ class ControlMethod(abc.ABC):
     coasts: ClassVar[bool] = False
     quick_stop_by: ClassVar[str] = ''
     older: ClassVar[bool] = True
+    needs: ClassVar[Sequence[str]] = ()
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
     control_retained: ClassVar[str] = ''
     holders: ClassVar[Mapping[Value, Holder]] = {}
@@ -535,6 +537,8 @@ class Profile:
     :ivar older: its firmware that lacks parameters.
     :ivar most: beyond which size a measured value is none of this drive, by its role.
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
+    :ivar may_lack: parameters that not every drive has, by the protocol; what lacks is found out
+        whenever it is connected.
     :ivar words: behind a PLC that can map either of several sets of words, the profile of each, by
         its name; this one is the first.
     :ivar speed_mode: how it means its values in Speed mode, where it does not tell the mode and
@@ -570,6 +574,7 @@ class Profile:
     older: OlderDialect | None = None
     most: Mapping[Role, float] = field(default_factory=dict)
     uncertain: Mapping[str, float] = field(default_factory=dict)
+    may_lack: Mapping[str, Sequence[str]] = field(default_factory=dict)
     start_settings: frozenset[str] = frozenset()
     line_check: Mapping[str, str] = field(default_factory=dict)
     holds_control: Mapping[str, str] = field(default_factory=dict)

@@ -156,6 +156,7 @@ _CALLS = Calls(
     set_setpoint_max='give --setpoint-max',
     set_control_mode='give another --control-mode',
     set_model='give the right --model',
+    set_method='give another --method',
 )
 
 

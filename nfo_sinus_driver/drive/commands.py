@@ -189,6 +189,9 @@ class Commands:
     """
 
     def __init__(self, state: DriveState) -> None:
+        self._name = state.settings.method
+        #: The other control methods that this line carries.
+        self._others = state.settings.other_methods(state.bus.protocol)
         method = state.model.profile.methods[state.settings.method]
         self._method = method(state.settings.reference, state.params.reaches)
         self._params = state.params
@@ -216,6 +219,19 @@ class Commands:
     def control_retained(self) -> str:
         """Why control may stay with the bus at :meth:`release`; ``''`` where it does not."""
         return self._method.control_retained or self._held
+
+    def require_fitted(self) -> None:
+        """
+        See to it that the drive has what the control method needs.
+
+        :raises DriveError: it lacks something, and which control methods there are.
+        """
+        lacking = [key for key in self._method.needs if not self._params.reaches(key)]
+        if lacking:
+            names = ' and '.join(self._params.model[key].name for key in lacking)
+            raise DriveError(
+                Cause.METHOD_NEEDS, names=names, method=self._name, others=self._others
+            )
 
     async def kept(self) -> bool:
         """Tell whether control has stayed with the bus; so it is where the drive does not tell."""

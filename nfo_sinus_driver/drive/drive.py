@@ -398,6 +398,8 @@ class Drive:
             raise DriveError(
                 Cause.OTHER_MODEL, error=str(error), model=state.model.name
             ) from error
+        if self._controller is not None:
+            self._controller.method.require_fitted()
         # nothing is written to a drive of another family; one that was connected is stopped first
         if early := not self._recognised and state.model.profile.product is not None:
             await self._read_nameplate()

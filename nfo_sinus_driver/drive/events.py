@@ -60,6 +60,10 @@ class Cause(enum.Enum):
     HELD_BY_LINE = 'only watched, and yet {why}: a motor that the terminals ran has stopped'
     OTHER_MODEL = '{error}: every {model} has it; is this another model? {call.set_model}'
     NOT_THE_MODEL = '{drive} answers, but not as a {model} does ({why}): is --model right?'
+    METHOD_NEEDS = (
+        'this drive has no {names}, which control_method {method} needs: {call.set_method} '
+        '({others})'
+    )
     UNEXPECTED_IDENTITY = (
         'this drive says that it is a {model}; no {title} says anything: {call.set_model}'
     )
@@ -473,6 +477,7 @@ class Calls:
     :ivar set_setpoint_max: how to let set-points go beyond what is nominal.
     :ivar set_control_mode: how to expect another control mode.
     :ivar set_model: how to correct the model.
+    :ivar set_method: how to choose another control method.
     """
 
     acknowledge: str
@@ -484,6 +489,7 @@ class Calls:
     set_setpoint_max: str
     set_control_mode: str
     set_model: str
+    set_method: str
 
 
 class _Formatter(string.Formatter):

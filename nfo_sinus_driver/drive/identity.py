@@ -90,6 +90,7 @@ class Nameplate:
         # anything will do that every drive answers, whichever dialect it knows
         priority = Priority.SERVICE if retry else Priority.POLL
         await self._params.read(self._model.key_of_status, priority, retry=retry)
+        await self._params.find_lacking()
         dialect = self._dialect
         before, was_older = self.identity, self.is_older
         self._be_older(dialect is not None and self._settings.classic_dialect == dialect.name)

@@ -65,6 +65,8 @@ class ParameterAccess:
         self.unanswered = 0
         #: What cannot be, and what the drive says all the same, read more than once.
         self._odd: dict[str, bytes] = {}
+        #: What this drive does not have.
+        self._lacking: frozenset[str] = frozenset()
         #: What it has refused because no option card for it is there, each time in a row.
         self._denials: dict[str, list[Refused]] = {}
         self._addresses: dict[str, Address] = {}
@@ -128,7 +130,20 @@ class ParameterAccess:
 
     def reaches(self, key: str) -> bool:
         """Tell whether the drive has a parameter and it can be reached over this line."""
-        return key in self.model and self.protocol in self.model[key].addresses
+        there = key in self.model and self.protocol in self.model[key].addresses
+        return there and key not in self._lacking
+
+    async def find_lacking(self) -> None:
+        """Find out which parameters this drive lacks of those that not every drive has."""
+        lacking = set()
+        for key in self.model.profile.may_lack.get(self.protocol, ()):
+            try:
+                await self.read_data(key, Priority.SERVICE)
+            except Refused as error:
+                if error.code not in _NONE_SUCH:
+                    raise
+                lacking.add(key)
+        self._lacking = frozenset(lacking)
 
     def limits(self, key: str) -> tuple[float, float, float]:
         """Return the least value of a number, the greatest, and the step between two."""

@@ -262,6 +262,14 @@ class DriveSettings:
         methods = load_profile(self.model).methods
         return methods.get(self.method) or next(iter(methods.values()))
 
+    def other_methods(self, protocol: LineProtocol) -> tuple[str, ...]:
+        """Return the other control methods that a line carries."""
+        return tuple(
+            name
+            for name, method in load_profile(self.model).methods.items()
+            if name != self.method and protocol.reaches_by(method.addressing)
+        )
+
     def require_line(self, protocol: LineProtocol) -> None:
         """
         Make sure that the drive can be reached over a line.
@@ -272,13 +280,13 @@ class DriveSettings:
         if self.model == AUTO:
             return
         needed = self.method_class.addressing
-        if needed and needed not in protocol.carries:
-            able = ' or '.join(one.name for one in PROTOCOLS.values() if needed in one.carries)
+        if not protocol.reaches_by(needed):
+            able = ' or '.join(one.name for one in PROTOCOLS.values() if one.reaches_by(needed))
             raise ValueError(
-                f'control_method {needed} of {self.model} goes through a PLC: '
+                f'control_method {self.method} of {self.model} needs another line: '
                 f'set protocol to {able} (it is {protocol.name})'
             )
-        if self.block_address and not needed:
+        if self.block_address and needed not in protocol.carries:
             raise ValueError(
                 f'block_address {self.block_address}: it is for control_method telegram1 alone'
             )

@@ -220,6 +220,10 @@ class LineProtocol:
     rates_disturb: bool = False
     check: str = _CHECK
 
+    def reaches_by(self, addressing: str) -> bool:
+        """Tell whether parameters are reached by these addresses; ``''``: as the line does."""
+        return addressing in ('', self.addressing, *self.carries)
+
     def require_unit(self, address: int) -> None:
         """
         Make sure that a drive may have an address.

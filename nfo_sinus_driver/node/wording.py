@@ -31,6 +31,7 @@ class Wording:
             set_setpoint_max=f'set setpoint_max of {name}',
             set_control_mode=f'expected_control_mode of {name}',
             set_model=f'set model of {name} to auto or to what it is',
+            set_method=f'set control_method of {name} to another one',
         )
 
     def say(self, what: Report | Exception | None) -> str:

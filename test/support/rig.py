@@ -85,6 +85,7 @@ WAYS: Mapping[str, Way] = {
     'classic': Way('classic'),
     'classic v5.0': Way('classic', options={'dialect': '5.0'}, driver=_OLD),
     'canopen': Way('canopen'),
+    'canopen, no DriveStatus': Way('canopen', options={'canopen_state_machine': 'absent'}),
     'rtu, control word': Way('modbus_rtu', method='drive_control'),
     'classic, control word': Way('classic', method='drive_control'),
     'canopen, control word': Way('canopen', method='drive_control'),

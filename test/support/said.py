@@ -24,6 +24,7 @@ CALLS = Calls(
     set_setpoint_max='set setpoint_max',
     set_control_mode='expected_control_mode in the driver',
     set_model='set model to auto or to what it is',
+    set_method='set control_method to another one',
 )
 
 

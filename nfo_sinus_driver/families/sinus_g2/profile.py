@@ -313,6 +313,7 @@ class DriveControl(_G2):
     references = ('fieldbus', 'terminal')
     coasts = True
     older = False
+    needs = (CONTROL_WORD, STATUS_WORD)
 
     def __init__(self, reference: str, reaches: Callable[[str], bool]) -> None:
         super().__init__(reference, reaches)
@@ -493,6 +494,8 @@ PROFILE = Profile(
         factors={'status.trq_act': Fraction(1, 10)},
     ),
     most=MOST,
+    # a module with a drive profile need not have them [M0 §7]
+    may_lack={'canopen': (CONTROL_WORD, STATUS_WORD)},
     # before it code 1 is another format ([C3], [C5])
     uncertain={'serial.si_prot': 4.28},
     # [C93]

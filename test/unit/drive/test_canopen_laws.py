@@ -204,3 +204,32 @@ def test_another_sdo_client_is_reported_and_nothing_of_it_is_published() -> None
         (remark,) = rig.bus.remarks
         assert 'another SDO client asks node 1' in remark
         assert not rig.notes.said(Cause.LOST_IN_USE)
+
+
+# --- objects that a module need not have ----------------------------------------------------------
+
+
+@pytest.mark.parametrize('way', ['canopen, control word', 'canopen'])
+def test_without_drive_control_what_needs_it_is_refused_and_names_the_others(way: str) -> None:
+    rig = Rig(way, options={'canopen_state_machine': 'absent'})
+    answer = rig.answer(rig.drive.connect(retry=False))
+    if way == 'canopen':
+        assert rig.drive.identity is not None and rig.drive.identity.firmware == 4.38
+    else:
+        assert 'this drive has no DriveControl and DriveStatus' in answer
+        assert 'set control_method to another one (mode_scmd' in answer
+        assert all(data is None for _, _, data in rig.asked)
+    rig.close()
+
+
+def test_a_drive_that_is_exchanged_has_what_it_has() -> None:
+    with Rig('canopen') as rig:
+        rig.connect()
+        assert rig.notes.snapshot.status.word is not None
+        entries = server_of(rig)._entries
+        status = entries.pop((0x2013, 0))
+        rig.far.power_cycle()
+        rig.wait_until(lambda: not rig.drive.snapshot.connected)
+        rig.wait_until(lambda: rig.drive.snapshot.connected)
+        assert rig.notes.snapshot.status.word is None
+        entries[0x2013, 0] = status

@@ -321,5 +321,5 @@ def test_each_drive_has_its_own_block() -> None:
 
 def test_a_line_that_has_no_plc_is_refused() -> None:
     link = open_link('modbus_rtu', '/dev/x', LineSettings())
-    with pytest.raises(ValueError, match='goes through a PLC: set protocol to modbus_tcp'):
+    with pytest.raises(ValueError, match='needs another line: set protocol to modbus_tcp'):
         Drive(Bus(link), DriveSettings(model='sinus_h'), None)
