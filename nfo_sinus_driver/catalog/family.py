@@ -164,19 +164,19 @@ def usual_family() -> str:
     return str(importlib.import_module(_FAMILIES).USUAL)
 
 
-def _has_tables(name: str, method: str) -> bool:
-    """Tell whether a control method has tables of its own."""
+def _has_profile(name: str, method: str) -> bool:
+    """Tell whether a control method has a profile of its own."""
     folders = _folders()
     if not method or name not in folders:
         return False
-    return (folders[name] / method / 'parameters.csv').exists()
+    return (folders[name] / method / 'profile.py').exists()
 
 
 def _place(name: str, method: str) -> tuple[str, Path]:
-    """Return package and folder of the tables that a control method has, if some of its own."""
+    """Return package and folder of a family, or those that a control method of it has."""
     folder = _folders()[name]
     package = f'{_FAMILIES}.{name}'
-    if _has_tables(name, method):
+    if _has_profile(name, method):
         return f'{package}.{method}', folder / method
     return package, folder
 
@@ -193,7 +193,7 @@ def load_profile(name: str, method: str = '') -> Profile:
     Load the profile of one drive family, without its tables.
 
     :param method: a control method; one that speaks to the drive in another way than all others
-        has tables and a profile of its own, in a folder of its name.
+        has a profile of its own in a folder of its name, and tables, or only roles.
 
     :raises ValueError: there is no such family; the message lists those there are.
     :raises CatalogError: its folder is no package.
@@ -225,7 +225,7 @@ def load_family(
     :raises CatalogError: a table contradicts itself, or another one.
     """
     # the same tables for all the methods that share them
-    family = _read_family(name, method if _has_tables(name, method) else '')
+    family = _read_family(name, method if _has_profile(name, method) else '')
     family = _speaking(family, words, method)
     return _in_speed_mode(family, nominal_speed) if nominal_speed else family
 
@@ -295,14 +295,15 @@ def _read_family(name: str, method: str = '') -> Family:
         return _described(name)
     profile = load_profile(name, method)
     _, folder = _place(name, method)
+    if method and not (folder / 'parameters.csv').exists():
+        shared = _read_family(name)
+        own = {**shared.roles, **_roles(folder, shared.parameters)}
+        _require_fitting(folder, profile, shared.parameters, own)
+        return replace(shared, roles=own, profile=profile)
     keys = _keys(folder)
     parameters = _parameters(folder, keys)
     roles = _roles(folder, keys)
-    for needed in _needed_roles(profile):
-        if needed not in roles:
-            raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the {needed.value}')
-    for wrong in _wrong_in(profile, keys):
-        raise table.CatalogError(f'{folder / "profile.py"}: {wrong}')
+    _require_fitting(folder, profile, keys, roles)
     codes = table.read(folder / 'status_codes.csv', _status_code, lambda row: [f'code {row.code}'])
 
     def area(row: table.Row) -> ErrorLogArea:
@@ -356,6 +357,16 @@ def _roles(folder: Path, keys: Collection[str]) -> Mapping[Role, str]:
         return Role(row['role']), _known(row['parameter'], keys)
 
     return dict(table.read(folder / 'roles.csv', role, lambda row: [row[0].value, row[1]]))
+
+
+def _require_fitting(
+    folder: Path, profile: Profile, keys: Collection[str], roles: Mapping[Role, str]
+) -> None:
+    for needed in _needed_roles(profile):
+        if needed not in roles:
+            raise table.CatalogError(f'{folder / "roles.csv"}: no parameter is the {needed.value}')
+    for wrong in _wrong_in(profile, keys):
+        raise table.CatalogError(f'{folder / "profile.py"}: {wrong}')
 
 
 def _wrong_in(profile: Profile, keys: Collection[str]) -> Iterator[str]:

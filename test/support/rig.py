@@ -77,6 +77,8 @@ _SPEED: Mapping[str, Any] = {
     'parameters': {'control.mode': 'Speed'},
     'hertz': 30.0,
 }
+_ABSENT = {'canopen_state_machine': 'absent'}
+_ALONE = {**_ABSENT, 'canopen_ramp': 'ready', 'canopen_bus_mode': 'free'}
 #: A law that is new is tested over all of them, and a way that is new with every law.
 WAYS: Mapping[str, Way] = {
     'rtu': Way('modbus_rtu'),
@@ -85,10 +87,12 @@ WAYS: Mapping[str, Way] = {
     'classic': Way('classic'),
     'classic v5.0': Way('classic', options={'dialect': '5.0'}, driver=_OLD),
     'canopen': Way('canopen'),
-    'canopen, no DriveStatus': Way('canopen', options={'canopen_state_machine': 'absent'}),
+    'canopen, no DriveStatus': Way('canopen', options=_ABSENT),
     'rtu, control word': Way('modbus_rtu', method='drive_control'),
     'classic, control word': Way('classic', method='drive_control'),
     'canopen, control word': Way('canopen', method='drive_control'),
+    'canopen, ds402': Way('canopen', method='ds402', hertz=30.0),
+    'canopen, ds402 alone': Way('canopen', method='ds402', options=_ALONE, hertz=30.0),
     'optimal': Way('modbus_rtu', 'sinus_optimal'),
     'optimal ascii': Way('modbus_ascii', 'sinus_optimal'),
     'optimal, control word': Way('modbus_rtu', 'sinus_optimal', 'drive_control', 'terminal'),

@@ -14,7 +14,7 @@ from typing import Any
 from nfo_sinus_driver.catalog import Access, load_family
 from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd
 from support.movitrac_laws import MovitracJudge
-from support.wire import WITH_GAP, Request, understand
+from support.wire import PROFILE, WITH_GAP, Request, understand
 
 #: The Classic address that every drive obeys [M0 §6.1].
 _EVERYBODY = 95
@@ -23,6 +23,9 @@ _SETPOINTS = {
     'modbus': frozenset((0x03FC, 0x025C, 0x0408, 0x0410)),
     'classic': frozenset((0x001E,)),
 }
+#: ControlWord of the drive profile, "enable operation"; target velocity and torque (CiA 402).
+_CONTROL_WORD, _ENABLED = 0x6040, 0x0F
+_TARGETS = frozenset((0x6042, 0x6071))
 
 #: A master waits at least so long for an answer, s; a later one may meet the next request, and
 #: so many frames behind it are looked at.
@@ -151,7 +154,7 @@ class _Judge:
                 yield 'a run command without set-point 0 before it'
             self._zero[unit] = False
             self._running.add(unit)
-        elif place in (places.command, places.control, places.mode):
+        elif place in (places.command, places.control, places.mode, _CONTROL_WORD):
             self._running.discard(unit)
 
     def _call(self, request: Request) -> Iterator[str]:
@@ -182,6 +185,8 @@ def _runs(request: Request, places: _Places) -> bool:
     if request.place == places.control:
         wanted = Control.SWITCH_ON | Control.ENABLE_OP | Control.NET_REF
         return request.words[0] & wanted == wanted
+    if request.place == _CONTROL_WORD:
+        return request.words[0] & _ENABLED == _ENABLED
     return request.place == places.command and request.words[0] == Scmd.FIELDBUS
 
 
@@ -217,7 +222,12 @@ def _places(model: str, protocol: str) -> _Places:
         mask=mask,
         control=word if model == 'sinus_g2' else -1,
         acknowledging=acknowledging,
-        setpoints=_SETPOINTS[bus],
-        methods={command: 'SCMD', mask: 'the control word', word: 'the control word'},
-        whole=frozenset(whole),
+        setpoints=_SETPOINTS[bus] | _TARGETS,
+        methods={
+            command: 'SCMD',
+            mask: 'the control word',
+            word: 'the control word',
+            _CONTROL_WORD: 'ControlWord',
+        },
+        whole=frozenset(whole | set(PROFILE.items())),
     )

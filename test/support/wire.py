@@ -41,7 +41,8 @@ class Request(NamedTuple):
 
     :ivar place: the register or the Classic id of the first word; the index. Of CANopen it is the
         register of the same parameter, and its words are those of Modbus: one instance has all of
-        its addresses by formula [M0 §6.2.5], [M0 §6.4.3].
+        its addresses by formula [M0 §6.2.5], [M0 §6.4.3]; an object of the drive profile, which
+        only CANopen has, is its own place.
     :ivar count: how many registers, else 1.
     :ivar words: what is written, ``None`` for a read.
     :ivar source: place and count of what is read in the same transaction as the write.
@@ -52,6 +53,15 @@ class Request(NamedTuple):
     count: int
     words: tuple[int, ...] | None
     source: tuple[int, int] | None = None
+
+
+#: The objects of the drive profile [M0 table 11], and how many words of 16 bits each of its values
+#: has at most (CiA 402).
+PROFILE: Mapping[int, int] = {
+    **dict.fromkeys((*range(0x603F, 0x6045), 0x605B, 0x605C, 0x6060, 0x6061, 0x6071, 0x6077), 1),
+    **dict.fromkeys((0x6046, 0x6048, 0x6049, 0x604C, 0x6075, 0x6076, 0x6087, 0x6502), 2),
+    0x6402: 1,
+}
 
 
 def understand(data: bytes, protocol: str) -> Request | None:
@@ -189,6 +199,8 @@ def _register(index: int, sub_index: int) -> tuple[int, int]:
     for first in _LOGS:
         if index - first in range(_LOG_ENTRIES):
             return _LOG_REGISTER + 4 * (index - first), 2
+    if index in PROFILE:
+        return index, PROFILE[index]
     if index not in _OF_THE_DRIVE:
         raise ValueError(f'is about object {index:04X}h, which is no parameter')
     base = 0x210 + 4 * (index - 0x2001)

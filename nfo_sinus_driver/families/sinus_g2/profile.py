@@ -14,7 +14,6 @@ import contextlib
 from fractions import Fraction
 from typing import ClassVar
 
-from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import (
     Acknowledge,
     AcknowledgeThenWrite,
@@ -38,6 +37,7 @@ from nfo_sinus_driver.catalog.profile import (
 )
 from nfo_sinus_driver.catalog.status import Meaning, Role, State, StatusCode
 from nfo_sinus_driver.families.sinus_g2 import words
+from nfo_sinus_driver.families.sinus_g2.ds402.method import Ds402
 from nfo_sinus_driver.families.sinus_g2.telegram1.profile import G2Telegram1
 from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd
 
@@ -49,12 +49,6 @@ INV_ST_WITH_ACK = 'fieldbus.inv_st_with_ack'
 _MASK = 'fieldbus.drv_ctrl_write_mask'
 _SIO_ERR = 'fieldbus.sio_err'
 
-_HOLDERS: Mapping[Value, Holder] = {
-    Mode.INHIBIT: Holder.INHIBITED,
-    Mode.STOP: Holder.NOBODY,
-    Mode.EXT: Holder.LOCAL,
-    Mode.BUS: Holder.BUS,
-}
 #: Over Classic all are written there, in the unit of the control mode ([C11], [C12]).
 _COMMON = 'fieldbus.setpoint'
 #: The greatest ones are those over a bus [M2 table 2].
@@ -130,7 +124,7 @@ class _G2(ControlMethod):
 
     def holder(self) -> Steps[Holder]:
         """Tell who has control of the drive."""
-        return _HOLDERS.get((yield Read(MODE)), Holder.UNKNOWN)
+        return words.HOLDERS.get((yield Read(MODE)), Holder.UNKNOWN)
 
     def zero_setpoint(self, control_mode: str) -> Steps[None]:
         """
@@ -461,10 +455,11 @@ PROFILE = Profile(
     title='NFO Sinus G2',
     enable_input='RUN input (DIN1)',
     status_word=words.STATUS_WORD,
-    holders=_HOLDERS,
+    holders=words.HOLDERS,
     methods={
         'mode_scmd': ModeScmd,
         'drive_control': DriveControl,
+        'ds402': Ds402,
         'telegram1': G2Telegram1,
     },
     setpoints=_SETPOINTS,

@@ -5,9 +5,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import enum
 import functools
 
+from nfo_sinus_driver.catalog.parameter import Value
+from nfo_sinus_driver.catalog.profile import Holder
 from nfo_sinus_driver.catalog.status import Fact, State, StatusWord
 
 
@@ -19,6 +22,15 @@ class Mode(enum.IntEnum):
     #: Never written: with RUN active it starts the motor [C43, C51].
     EXT = 2
     BUS = 3
+
+
+#: Who has control, by MODE.
+HOLDERS: Mapping[Value, Holder] = {
+    Mode.INHIBIT: Holder.INHIBITED,
+    Mode.STOP: Holder.NOBODY,
+    Mode.EXT: Holder.LOCAL,
+    Mode.BUS: Holder.BUS,
+}
 
 
 class Scmd(enum.IntEnum):

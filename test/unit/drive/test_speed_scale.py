@@ -37,7 +37,7 @@ def test_speeds_are_in_rpm_whatever_the_scale(way: str, scale: tuple[int, int]) 
         rig.connect()
         rig.enable()
         for speed in (300.0, -300.0):
-            rig.send(speed)
+            rig.send(speed / rig.way.hertz)
             rig.pass_time(1.5)
             shown = rig.drive.snapshot
             assert [rig.far.motor.speed, shown.speed, shown.actual, shown.setpoint] == (
