@@ -296,7 +296,7 @@ def _read_family(name: str, method: str = '') -> Family:
     profile = load_profile(name, method)
     _, folder = _place(name, method)
     if method and not (folder / 'parameters.csv').exists():
-        shared = _read_family(name)
+        shared = _read_family(name, '')
         own = {**shared.roles, **_roles(folder, shared.parameters)}
         _require_fitting(folder, profile, shared.parameters, own)
         return replace(shared, roles=own, profile=profile)

@@ -239,7 +239,8 @@ class G2ControlUnit(SinusControlUnit):
         if key == 'fieldbus.profidrive_status':
             return int(self.status_word)
         if key == ds402.STATUS_WORD:
-            return ds402.status_word(self.status_word, self.variant.canopen_ramp)
+            ramp = self.variant.canopen_ramp
+            return ds402.status_word(self.status_word, self.machine.phase, ramp)
         if key in ds402.ALIASES:
             return self.memory.raw(ds402.ALIASES[key])
         if key == 'status.spd_act':

@@ -16,6 +16,7 @@ from nfo_sinus_driver.families.sinus_g2.words import Control, Status
 from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused
 from nfo_sinus_driver.simulator.motor import Motor
+from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
 
 CONTROL_WORD = 'fieldbus.control_word'
 STATUS_WORD = 'fieldbus.status_word'
@@ -38,7 +39,11 @@ _TOLD = (
     | Status.SETPOINT_REACHED
     | Status.LIMIT_ACTIVE
 )
-_DRIVEN = Status.OP_ENABLED | Status.SWITCHED_ON
+#: What a motor that ramps to a stop has left already, where that is shown at once.
+_LEFT = {
+    Phase.DISABLE: Status.OP_ENABLED,
+    Phase.SHUTDOWN: Status.OP_ENABLED | Status.SWITCHED_ON,
+}
 _VELOCITY, _TORQUE, _NO_MODE = 2, 4, 0
 #: Both of them, a bit each.
 _SUPPORTED = 0b1010
@@ -66,7 +71,7 @@ def control(word: int) -> Control:
     return Control(word & _SHARED) | Control.NET_CTRL | Control.NET_REF
 
 
-def status_word(status: Status, ramp: str) -> int:
+def status_word(status: Status, phase: Phase, ramp: str) -> int:
     """
     Return the StatusWord for the status of the state machine; reverse is no state of its own.
 
@@ -75,11 +80,7 @@ def status_word(status: Status, ramp: str) -> int:
     word = status & _TOLD
     if status & Status.REV_OP_ENABLED:
         word |= Status.OP_ENABLED
-    # neither a quick stop nor a fault
-    ramps = status & Status.STOPPING and status & Status.QUICK_STOP_DISABLED
-    if ramps and ramp == READY:
-        word &= ~_DRIVEN
-    return int(word)
+    return int(word & ~_LEFT.get(phase, Status(0)) if ramp == READY else word)
 
 
 class DriveProfile:

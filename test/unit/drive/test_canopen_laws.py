@@ -57,7 +57,7 @@ def be_gone(rig: Rig, seconds: float) -> None:
 
 
 @pytest.mark.parametrize('shape', SHAPES)
-@pytest.mark.parametrize('way', ['canopen', 'canopen, control word'])
+@pytest.mark.parametrize('way', ['canopen', 'canopen, control word', 'canopen, ds402'])
 def test_every_shape_of_the_node_is_commanded_and_left_as_it_was_found(
     way: str, shape: str
 ) -> None:
@@ -86,10 +86,11 @@ def test_every_shape_of_the_node_is_commanded_and_left_as_it_was_found(
 
 @pytest.mark.parametrize('shape', ['full', 'guarded', 'wide'])
 @pytest.mark.parametrize('turns', [True, False])
+@pytest.mark.parametrize('way', ['canopen', 'canopen, ds402'])
 def test_the_drive_stops_when_the_driver_is_gone_also_before_the_motor_starts(
-    shape: str, turns: bool
+    way: str, shape: str, turns: bool
 ) -> None:
-    with shaped(shape, drive_timeout=4.0) as rig:
+    with shaped(shape, way, drive_timeout=4.0) as rig:
         rig.connect()
         rig.enable()
         rig.send(20.0 if turns else None)

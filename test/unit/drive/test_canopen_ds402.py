@@ -1,0 +1,216 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A G2 by the drive profile of its CANopen module: what is on the line, and what DS402 asks."""
+
+from __future__ import annotations
+
+import pytest
+from support.rig import Rig
+
+from nfo_sinus_driver.drive import Cause
+
+#: By hand: what a client writes, each a whole SDO message. 603Fh to 6042h are the objects of
+#: [M0 table 11]; set-point 0 and 600 rpm, and the commands of CiA 402.
+ZERO, RPM_600 = '2b42600000000000', '2b42600058020000'
+SHUTDOWN, SWITCH_ON, ENABLE = '2b40600076000000', '2b40600077000000', '2b4060007f000000'
+NO_VOLTAGE, FAULT_RESET = '2b40600000000000', '2b40600080000000'
+TO_NOBODY = '2b22200001000000'
+CONTROL_WORD, MODE = 'fieldbus.control_word', 'fieldbus.mode'
+SHAPES = ['canopen, ds402', 'canopen, ds402 alone']
+every_shape = pytest.mark.parametrize('way', SHAPES)
+OVERVOLTAGE, SIO_FAIL = 8, 14
+
+
+def written(rig: Rig, begun: int = 0) -> list[str]:
+    """Return the SDO messages that have written something since; the same again once."""
+    found: list[str] = []
+    for frame in rig.line.frames[begun:]:
+        message = frame['hex'][4:]
+        downloads = frame['direction'] == 'request' and message[:2] in ('2b', '2f', '23')
+        if downloads and message[2:] != (found[-1][2:] if found else ''):
+            found.append(message)
+    return found
+
+
+@every_shape
+def test_the_messages_of_a_ride(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect()
+        begun = len(rig.line.frames)
+        rig.enable()
+        handed_over = ['2b22200003000000'] if way == SHAPES[1] else []
+        assert written(rig, begun) == [
+            ZERO, *handed_over, SHUTDOWN, ZERO, SWITCH_ON, ENABLE
+        ]
+        begun = len(rig.line.frames)
+        rig.send(20.0)
+        rig.pass_time(1.0)
+        assert written(rig, begun) == [RPM_600]
+        assert rig.far.motor.frequency == pytest.approx(20.0, abs=0.1)
+        shown = rig.drive.snapshot
+        assert (shown.control_mode, shown.unit) == ('Speed', 'rpm')
+        assert shown.actual == pytest.approx(600, abs=15)
+        begun = len(rig.line.frames)
+        rig.answer(rig.drive.stop())
+        # again and again until it is confirmed
+        assert written(rig, begun)[:2] == [SHUTDOWN, ZERO]
+        assert set(written(rig, begun)) == {SHUTDOWN, ZERO}
+        rig.enable()
+        rig.pass_time(0.5)
+        begun = len(rig.line.frames)
+        rig.answer(rig.drive.quick_stop())
+        assert written(rig, begun)[:2] == [NO_VOLTAGE, ZERO] and not rig.far.motor.driven
+
+
+@every_shape
+def test_a_fault_is_acknowledged_by_an_edge_without_voltage_and_its_error_code_is_said(
+    way: str,
+) -> None:
+    with Rig(way) as rig:
+        rig.turn()
+        rig.far.trip(OVERVOLTAGE)
+        rig.pass_time(2.0)
+        begun = len(rig.line.frames)
+        answer = rig.answer(rig.drive.acknowledge())
+        assert 'error code 3210h (voltage)' in answer
+        reset = [NO_VOLTAGE, FAULT_RESET, NO_VOLTAGE]
+        assert written(rig, begun)[: len(reset)] == reset
+        rig.assert_only_enable_helps()
+
+
+def test_a_refused_control_word_leaves_the_reading_that_acknowledges() -> None:
+    with Rig('canopen, ds402') as rig:
+        rig.turn()
+        rig.far.trip(OVERVOLTAGE)
+        rig.pass_time(1.0)
+        rig.spoil('refused', CONTROL_WORD, 1000)
+        rig.acknowledged += 1
+        assert 'acknowledged' in rig.answer(rig.drive.acknowledge())
+        rig.pass_time(1.0)
+        assert not rig.far.faults and not rig.turns
+
+
+def test_a_serial_fault_is_acknowledged_by_mode_stop() -> None:
+    with Rig('canopen, ds402') as rig:
+        rig.turn()
+        rig.far.trip(SIO_FAIL)
+        rig.pass_time(1.0)
+        begun = len(rig.line.frames)
+        rig.acknowledged += 1
+        assert 'acknowledged' in rig.answer(rig.drive.acknowledge())
+        assert written(rig, begun)[0] == TO_NOBODY and not rig.far.faults
+        rig.assert_only_enable_helps()
+
+
+@every_shape
+def test_a_stop_down_a_long_ramp_is_confirmed_and_is_not_forced(way: str) -> None:
+    with Rig(way, parameters={'control.retard': 8.0}) as rig:
+        rig.turn(25.0)
+        begun = len(rig.line.frames)
+        assert 'stop' in rig.answer(rig.drive.stop(), 2.0)
+        assert rig.far.motor.driven
+        rig.pass_time(8.0)
+        assert set(written(rig, begun)) == {SHUTDOWN, ZERO}
+        assert not rig.far.motor.turning
+
+
+@every_shape
+def test_it_is_enabled_again_while_it_ramps_to_a_stop(way: str) -> None:
+    with Rig(way, parameters={'control.retard': 8.0}) as rig:
+        rig.turn(25.0)
+        rig.send(None)
+        rig.answer(rig.drive.stop(), 2.0)
+        assert abs(rig.far.motor.frequency) > 10.0
+        rig.enable()
+        rig.pass_time(0.5)
+        assert rig.drive.following
+        rig.pass_time(8.0)
+        assert rig.far.motor.frequency == pytest.approx(0.0, abs=0.1)
+        rig.send(10.0)
+        rig.wait_until(lambda: rig.far.motor.frequency > 9.5, 5.0)
+
+
+@every_shape
+def test_reverse_is_the_sign(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect()
+        rig.enable()
+        rig.send(-20.0)
+        rig.wait_until(lambda: rig.far.motor.frequency < -19.5, 5.0)
+        rig.pass_time(1.0)
+        assert rig.drive.following and rig.drive.snapshot.actual == pytest.approx(-600, abs=15)
+
+
+@every_shape
+def test_torque_is_a_mode_of_operation_and_the_process_is_none(way: str) -> None:
+    with Rig(way, parameters={'control.mode': 'Torque'}) as rig:
+        rig.connect()
+        rig.enable()
+        rig.keep(lambda: rig.drive.set_setpoint(40.0))
+        rig.pass_time(1.0)
+        assert rig.drive.following and rig.drive.snapshot.unit == '%'
+        # target torque of 400 per mille
+        assert '2b71600090010000' in written(rig)
+        assert rig.far.motor.torque == pytest.approx(0.4, abs=0.05)
+    with Rig(way, parameters={'control.mode': 'PI-Reg'}) as rig:
+        rig.connect()
+        answer = rig.answer(rig.drive.enable())
+        assert 'its mode of operation (object 6061h) is 0' in answer
+        assert not rig.turns and not rig.drive.following
+
+
+def test_a_set_point_that_is_not_in_rpm_is_refused() -> None:
+    factor = {'fieldbus.vl_dimension_factor_numerator': 2}
+    with Rig('canopen, ds402', parameters=factor) as rig:
+        rig.connect()
+        begun = len(rig.line.frames)
+        answer = rig.answer(rig.drive.enable())
+        assert 'vl dimension factor (object 604Ch) is 2/1' in answer
+        assert written(rig, begun) == [] and not rig.drive.following
+
+
+@every_shape
+def test_control_that_goes_ends_the_run(way: str) -> None:
+    for key in ('stop', 'ext'):
+        with Rig(way) as rig:
+            rig.turn()
+            rig.far.control_unit.press(key)
+            rig.wait_until(lambda: not rig.drive.following, 2.0)
+            rig.far.set_run_input(False)
+            rig.wait_until(lambda: not rig.drive.stop_unconfirmed, 5.0)
+            rig.far.set_run_input(True)
+            if key == 'stop':
+                rig.assert_only_enable_helps()
+
+
+def test_a_stop_that_is_refused_ends_in_mode_stop() -> None:
+    with Rig('canopen, ds402') as rig:
+        rig.turn()
+        rig.spoil('refused', CONTROL_WORD, 1000)
+        rig.answer(rig.drive.stop())
+        rig.wait_until(lambda: not rig.drive.stop_unconfirmed, 5.0)
+        assert not rig.turns and rig.written(MODE)[-1] == 1
+
+
+def test_without_status_word_it_is_refused_and_names_the_others() -> None:
+    rig = Rig('canopen, ds402')
+    server = rig.far.servers['canopen']
+    del server._entries[0x6041, 0]
+    answer = rig.answer(rig.drive.connect(retry=False))
+    assert 'this drive has no StatusWord, which control_method ds402 needs' in answer
+    assert '(mode_scmd, drive_control)' in answer
+    rig.close()
+
+
+def test_it_goes_by_canopen_alone() -> None:
+    with pytest.raises(ValueError, match='set protocol to canopen'):
+        Rig('rtu', control_method='ds402')
+
+
+def test_tuning_is_by_scmd_alone() -> None:
+    with Rig('canopen, ds402') as rig:
+        rig.connect()
+        answer = rig.answer(rig.drive.erase_error_log())
+        assert 'mode_scmd' in answer
+        assert not rig.notes.said(Cause.DRIVER_ERROR)
