@@ -20,5 +20,10 @@ PROFILE = replace(
     profile.PROFILE,
     status_word=WORD,
     setpoints=SETPOINTS,
+    measured=(
+        *(target.key for target in SETPOINTS.values()),
+        'fieldbus.vl_velocity_demand',
+        'status.reg_act',
+    ),
     may_lack={'canopen': (CONTROL_WORD, STATUS_WORD)},
 )
