@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from any_order_machine import BOOT_TIMES, DRIVEN, WAITS, WHOLE, AnyOrder
-from any_order_shown import MODE_BUS, MODE_STOP, RUN_FIELDBUS
+from any_order_shown import CONTROL_WORD, MODE_BUS, MODE_STOP, RUN_FIELDBUS, TARGETS
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 
@@ -173,6 +173,9 @@ class SinusOrder(AnyOrder):
         if self.method == 'drive_control':
             words = (0xC076, 0xC077, 0xC07F)
             self.by_another(*((_CONTROL, word) for word in words), (setpoint, 100))
+        elif self.method == 'ds402':
+            commands = [(CONTROL_WORD, word) for word in (0x76, 0x77, 0x7F)]
+            self.by_another(*commands, *((target, 100) for target in TARGETS))
         else:
             command = 'fieldbus.smode' if self.model == 'sinus_optimal' else 'fieldbus.scmd'
             mode = ('fieldbus.mode', MODE_BUS)
@@ -185,8 +188,10 @@ class SinusOrder(AnyOrder):
     @rule(mode=st.sampled_from(('Freque', 'Speed', 'Torque')), wait=WAITS)
     def set_control_mode_at_keypad(self, mode: str, wait: float = 1.0) -> None:
         self.until_noticed()
+        before = self.laws.shown.facts()['control mode']
         if self.rig.far.peek('control.mode') != mode:
             self.rig.far.set_from_keypad('control.mode', mode)
+        if self.laws.shown.facts()['control mode'] != before:
             self.laws.control_mode_changed()
         # it is not read with every poll
         self.let(max(wait, 2.5))
@@ -458,6 +463,10 @@ class Canopen(SinusOrder):
     protocol = 'canopen'
 
 
+class CanopenDs402(Canopen):
+    method = 'ds402'
+
+
 class G2Monitor(SinusOrder):
     method = 'monitor'
 
@@ -483,6 +492,7 @@ MACHINES = (
     Classic,
     ClassicDriveControl,
     Canopen,
+    CanopenDs402,
     G2Monitor,
     OptimalMonitor,
     Movitrac,

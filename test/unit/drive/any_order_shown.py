@@ -28,6 +28,11 @@ from nfo_sinus_driver.simulator.sinus.control_unit import ALL, NOTHING, Source
 #: What commands a drive of NFO [M0 §7], [M1]; of the mask and its word, the latter comes last.
 MODE, CONTROL, MASK = 'fieldbus.mode', 'fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'
 SCMD = ('fieldbus.scmd', 'fieldbus.smode')
+#: By the drive profile of CANopen (CiA 402): the control word, the set-points, and the mode of
+#: operation by the parameter Mode.
+CONTROL_WORD = 'fieldbus.control_word'
+TARGETS = ('fieldbus.vl_target_velocity', 'fieldbus.target_torque')
+_OPERATION_MODES = {'Freque': 'Speed', 'Speed': 'Speed', 'Torque': 'Torque', 'PI-Reg': '0'}
 MODE_STOP, MODE_BUS = 1, 3
 RUN_FIELDBUS = 0x101
 FORWARD, REVERSE = 1 << 3, 1 << 13
@@ -205,9 +210,13 @@ class ShownSinus(Shown):
         if key == MODE and number not in (MODE_STOP, MODE_BUS):
             yield f'MODE = {number}'
         if controls and self._method != 'drive_control':
-            yield 'a control word in mode_scmd'
+            yield f'a control word in {self._method}'
         if key in SCMD and self._method != 'mode_scmd':
-            yield 'SCMD in drive_control'
+            yield f'SCMD in {self._method}'
+        if key in (CONTROL_WORD, *TARGETS) and self._method != 'ds402':
+            yield f'{key} in {self._method}'
+        if key in _SETPOINTS and self._method == 'ds402':
+            yield f'{key} in ds402'
         if key == MODE and self._method == 'drive_control' and number != MODE_STOP:
             yield 'MODE = 3 in drive_control'
 
@@ -215,9 +224,9 @@ class ShownSinus(Shown):
         return (
             (key in SCMD and number == 0)
             or (key == MODE and number == MODE_STOP)
-            or (key in (CONTROL, MASK) and not number & SWITCH_ON)
+            or (key in (CONTROL, MASK, CONTROL_WORD) and not number & SWITCH_ON)
             # a stop that a fault keeps the drive from taking goes on with the set-point
-            or (key in _SETPOINTS and not number and bool(self._far.faults))
+            or (key in (*_SETPOINTS, *TARGETS) and not number and bool(self._far.faults))
         )
 
 
@@ -261,6 +270,17 @@ class ShownG2(ShownSinus):
         yield from super().wrong(key, number)
         if key in (CONTROL, MASK) and number & FORWARD and number & REVERSE:
             yield 'both directions at once'
+
+
+class ShownDs402(ShownG2):
+    """What a G2 shows by the drive profile of its CANopen module."""
+
+    def facts(self) -> dict[str, Any]:
+        facts = super().facts()
+        if self._unit.state in ('DISABLE', 'SHUTDOWN'):
+            # while it ramps to a stop, it may show that it runs
+            facts['running'] = None
+        return {**facts, 'control mode': _OPERATION_MODES[facts['control mode']]}
 
 
 class ShownOptimal(ShownSinus):
@@ -396,4 +416,6 @@ _FAMILIES: Mapping[str, type[Shown]] = {
 
 def shown_by(rig: Rig) -> Shown:
     """Return what the drive of a rig shows."""
+    if rig.drive.settings.method == 'ds402':
+        return ShownDs402(rig)
     return _FAMILIES[rig.drive.settings.model](rig)
