@@ -52,7 +52,7 @@ types: setup ## mypy, on all that is not ROS
 	@.venv/bin/mypy
 
 # More workers than processors: these tests wait more than they work.
-unit: setup ## tests without ROS, with the current and with the oldest pymodbus (FULL=1: all there is)
+unit: setup ## tests without ROS, with the oldest and the newest libraries (FULL=1: all there is)
 	@echo '== unit: without rclpy, with the oldest pymodbus'
 	@# by one process, so that the workers have it compiled already; what is wrong they say again
 	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) --collect-only -qq test/unit \
@@ -61,6 +61,11 @@ unit: setup ## tests without ROS, with the current and with the oldest pymodbus 
 	@echo '== unit again, what uses pymodbus: the current one'
 	@FULL=$(FULL) $(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 9 $(if $(FULL), \
 		test/unit/link test/unit/simulator, $(USES_PYMODBUS))
+	@if [ -d .venv/noble ]; then \
+		echo '== unit again, what uses libraries: those of Ubuntu 24.04, Python 3.12'; \
+		FULL=$(FULL) $(WITHOUT_ROS) .venv/noble/bin/python $(PYTEST) -n 9 $(if $(FULL), \
+			test/unit, $(USES_PYMODBUS) test/unit/cli test/unit/node); \
+	fi
 
 ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'

@@ -75,11 +75,9 @@ def read(folder: Path, is_wanted: Callable[[str], bool]) -> Iterator[tuple[str, 
 def metadata(folder: Path) -> dict[str, Any]:
     """Return what a bag says of itself; a ValueError where it is none."""
     path = folder / 'metadata.yaml'
-    if not path.is_file():
-        raise ValueError('it is no bag: a folder with a metadata.yaml is one')
-    found = yaml.safe_load(path.read_text())
+    found = yaml.safe_load(path.read_text()) if path.is_file() else None
     if not isinstance(found, dict) or _INFORMATION not in found:
-        raise ValueError(f'it is no bag: its metadata.yaml has no {_INFORMATION}')
+        raise ValueError('it is no bag: a folder with a metadata.yaml is one')
     described: dict[str, Any] = found[_INFORMATION]
     return described
 

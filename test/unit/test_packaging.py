@@ -41,6 +41,7 @@ OPTIONAL = {
     'nfo_sinus_driver/demo/bags_rosbags.py': {'rosbags'},
     'nfo_sinus_driver/view/app.py': {'rich', 'textual'},
     'test/ros/stand_ins/rosbag2_py.py': {'rosbags'},
+    'test/unit/view/test_app.py': {'textual'},
 }
 
 

@@ -23,9 +23,10 @@ from nfo_sinus_driver.view.picture import (
     Picture,
 )
 
-Pilot = pytest.importorskip('textual.pilot', reason='textual is not installed').Pilot
-# only now: it is made with that library
-from nfo_sinus_driver.view.app import MonitorApp, natural, short_names  # noqa: E402
+pytest.importorskip('textual', minversion='3')
+from textual.pilot import Pilot
+
+from nfo_sinus_driver.view.app import MonitorApp, natural, short_names
 
 #: Machines are shared and slow, s.
 _PATIENCE = 60.0
