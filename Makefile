@@ -22,11 +22,11 @@ USES_PYMODBUS = $(addprefix test/unit/simulator/test_, \
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench docs parameters
-.PHONY: build clean
+.PHONY: bench-gate build clean coverage
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
 
 setup: ## set up .venv, and build into install
 	@tools/setup
@@ -71,6 +71,13 @@ ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
 	@tools/run python $(PYTEST) -n $$(tools/workers 8) $(if $(WAY),--way $(WAY)) test/ros
 
+coverage: setup ## which lines and branches of the driver the tests go through, unit and ros
+	@rm -rf .venv/coverage && mkdir .venv/coverage
+	@$(WITHOUT_ROS) .venv/bin/python -m coverage run $(PYTEST) -n 9 test/unit
+	@tools/run python -m coverage run $(PYTEST) -n $$(tools/workers 8) test/ros
+	@.venv/bin/python -m coverage combine --quiet
+	@.venv/bin/python -m coverage report
+
 mutants: setup ## break each law in a copy and see that a test fails (half an hour)
 	@tools/run python test/mutants/run.py
 
@@ -90,6 +97,11 @@ bench: setup ## measure speed, stops and noise, and a peer (two hours; BENCH=--q
 	@env -u PYTHONPATH .venv/bin/python -m pip install --quiet --no-input --no-cache-dir \
 		--disable-pip-version-check --requirement=benchmark/requirements.txt
 	@tools/run python benchmark/run.py $(BENCH)
+
+bench-gate: setup ## fail where the driver is slower than its last release (ten minutes)
+	@env -u PYTHONPATH .venv/bin/python -m pip install --quiet --no-input --no-cache-dir \
+		--disable-pip-version-check --requirement=benchmark/requirements.txt
+	@tools/run python benchmark/gate.py $(GATE)
 
 # An environment of its own: what it needs and what colcon needs exclude each other.
 .venv/docs/installed: docs/requirements.txt | setup

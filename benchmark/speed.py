@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 import time
 
 from rig import DRIVER, PEER, Rig, memory
@@ -37,10 +37,12 @@ COLUMNS = (
 )
 
 
-def measure(seconds: float) -> Iterator[tuple[str, dict[str, float]]]:
+def measure(
+    seconds: float, cases: Sequence[tuple[str, int, int]] = CASES
+) -> Iterator[tuple[str, dict[str, float]]]:
     """Yield the title and the figures of each row; windows last so many seconds at least."""
     of_one = {}
-    for protocol, baud_rate, drives in CASES:
+    for protocol, baud_rate, drives in cases:
         # the peer first: the driver is compared with it
         for master in (PEER, DRIVER) if protocol == 'modbus_rtu' else (DRIVER,):
             with Rig(master, baud_rate, drives, protocol) as rig:

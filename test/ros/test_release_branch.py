@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import re
 import subprocess
 
 import pytest
-from support.places import ROOT
+from support.places import MSG_DEFS, ROOT
 
 packages = pytest.importorskip('catkin_pkg.packages', reason='catkin_pkg is not installed')
+changelog = pytest.importorskip('catkin_pkg.changelog')
 pytest.importorskip('colcon_core', reason='colcon is not installed')
 if not (ROOT / '.git').exists():
     pytest.skip('this is not a clone of main', allow_module_level=True)
@@ -64,6 +66,19 @@ def workspace(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_both_packages_are_found(workspace: Path) -> None:
     found = packages.find_packages(str(workspace / 'src'))
     assert {package.name for package in found.values()} == {'nfo_sinus_driver', 'nfo_sinus_msgs'}
+
+
+@pytest.mark.parametrize('folder', [ROOT, MSG_DEFS], ids=['driver', 'messages'])
+def test_the_changelog_has_the_form_that_the_tools_of_a_release_read(folder: Path) -> None:
+    text = (folder / 'CHANGELOG.rst').read_text(encoding='utf-8')
+    title = '1.0.0 (2026-01-01)'
+    released = text.replace(f'Forthcoming\n{"-" * 11}\n', f'{title}\n{"-" * len(title)}\n')
+    assert released != text
+    log = changelog.Changelog(folder.name)
+    changelog.populate_changelog_from_rst(log, released)
+    ((version, _, (items, *more)), *_) = log.foreach_version()
+    assert version == '1.0.0' and not more, 'one list'
+    assert len(items.bullets) == len(re.findall(r'^\* ', text, re.MULTILINE))
 
 
 def test_history_goes_on_through_the_branch(source: Path) -> None:

@@ -17,13 +17,19 @@ from support.places import MSG_DEFS, ROOT
 
 from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
 from nfo_sinus_driver.simulator.family import every_injection, every_option
+from nfo_sinus_driver.version import VERSION
 
 PACKAGE = ROOT / 'nfo_sinus_driver'
 INTERFACE = ROOT / 'docs' / 'interface.md'
 SIMULATOR = ROOT / 'docs' / 'simulator.md'
 MESSAGES = ROOT / 'docs' / 'messages.md'
 DEVELOPMENT = ROOT / 'docs' / 'development.md'
-PAGES = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').rglob('*.md')))
+DECLARATION = ROOT / 'QUALITY_DECLARATION.md'
+PAGES = (
+    *(ROOT / f'{name}.md' for name in ('README', 'CONTRIBUTING', 'SECURITY')),
+    DECLARATION,
+    *sorted((ROOT / 'docs').rglob('*.md')),
+)
 PICTURES = sorted((ROOT / 'docs').glob('*.svg'))
 #: Parameters of another node than the driver's; test/ros/test_config_names.py has those.
 OF_OTHERS = {'diagnostic_aggregator.yaml'}
@@ -257,6 +263,16 @@ def test_every_page_is_in_the_index() -> None:
     docs = ROOT / 'docs'
     pages = {page.relative_to(docs).as_posix() for page in docs.rglob('*.md')}
     assert pages - index == {'README.md'}
+
+
+def test_every_claim_of_the_quality_declaration_has_its_place_or_is_not_met() -> None:
+    rows = re.findall(r'^\| (.+?) \| ((?:not )?met) \| (.*?) ?\|$', read(DECLARATION), re.MULTILINE)
+    tables = re.findall(r'^\| requirement \| state', read(DECLARATION), re.MULTILINE)
+    # [5] has one more, of libraries
+    assert len(tables) == 7 and len(rows) > 25
+    assert [what for what, state, where in rows if state == 'met' and not where] == []
+    # the version is what it says it waits for
+    assert ('level 4' in read(DECLARATION)) is VERSION.startswith('0.')
 
 
 def test_pictures_are_whole_and_shown_and_say_what_they_show() -> None:
