@@ -20,10 +20,8 @@ The driver is not respawned. When it ended, somebody ended it or something is wr
 should look at; and a new one lets no motor turn before it is enabled anyway.
 """
 
-import json
 import os
 from pathlib import Path
-import tempfile
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
@@ -31,7 +29,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
-from nfo_sinus_driver.launch_arguments import number, parameter_file
+from nfo_sinus_driver.launch_arguments import number, parameter_file, written
 
 #: Launch arguments that overrule a parameter of the same name in the parameter file: for which
 #: nodes, and what it is.
@@ -111,10 +109,4 @@ def _overrides(context):
             section = sections.setdefault(nodes, {'ros__parameters': {}})
             value = number(name, given, whole=True) if type_ is int else given
             section['ros__parameters'][name] = value
-    if not sections:
-        return []
-    # not a dictionary: launch_ros puts that under '/**', which a section for the bus node in the
-    # parameter file would overrule; JSON, for in plain YAML 8E1 is a number
-    with tempfile.NamedTemporaryFile('w', prefix='nfo_sinus_', delete=False) as file:
-        json.dump(sections, file)
-    return [file.name]
+    return written(sections)

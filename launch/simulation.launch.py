@@ -2,16 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Start a simulated drive and the driver for it, to try things without hardware.
+Start simulated drives and the driver for them, to try things without hardware.
 
     ros2 launch nfo_sinus_driver simulation.launch.py
     ros2 run nfo_sinus_driver simulator inject --link /tmp/nfo_sinus fault 5
 
+    ros2 launch nfo_sinus_driver simulation.launch.py drives:=8
+    ros2 topic echo /drive_8/status
+
     ros2 launch nfo_sinus_driver simulation.launch.py protocol:=movitrac model:=movitrac31 \
         baud_rate:=9600
 
-The driver needs not wait for the simulated drive: it tries the port until it is there. At the end
-the drive has to outlast the driver, which stops the motor first; see below.
+The driver needs not wait for the simulated drives: it tries the port until it is there. At the end
+they have to outlast the driver, which stops the motors first; see below.
 """
 
 import os
@@ -33,7 +36,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.substitutions import ExecutableInPackage
 
-from nfo_sinus_driver.launch_arguments import number
+from nfo_sinus_driver.launch_arguments import number, simulated_drives, written
 
 _EXIT_TIMEOUT = '15'
 #: Runs a command that Ctrl-C does not end, whether terminal or launch pass it on; SIGTERM does.
@@ -46,23 +49,21 @@ _OUTLASTS_INTERRUPTS = (
 
 def generate_launch_description():
     """Return the launch description."""
-    link = LaunchConfiguration('link')
-    baud_rate = LaunchConfiguration('baud_rate')
-    protocol = LaunchConfiguration('protocol')
-    model = LaunchConfiguration('model')
     # no node, so not to be given ROS arguments
     simulator = ExecuteProcess(
         cmd=[
             *_OUTLASTS_INTERRUPTS,
             ExecutableInPackage('simulator', 'nfo_sinus_driver'),
             '--link',
-            link,
+            LaunchConfiguration('link'),
             '--protocol',
-            protocol,
+            LaunchConfiguration('protocol'),
             '--model',
-            model,
+            LaunchConfiguration('model'),
             '--baud-rate',
-            baud_rate,
+            LaunchConfiguration('baud_rate'),
+            '--address',
+            ['1-', LaunchConfiguration('drives')],
             '--paced',
         ],
         name='simulator',
@@ -70,32 +71,6 @@ def generate_launch_description():
         sigterm_timeout=_EXIT_TIMEOUT,
         sigkill_timeout=_EXIT_TIMEOUT,
         on_exit=Shutdown(reason='the simulated drive has ended'),
-    )
-    driver = Node(
-        package='nfo_sinus_driver',
-        executable='driver',
-        namespace=LaunchConfiguration('namespace'),
-        # a launch that fails or is killed leaves nobody to stop the motor
-        arguments=['--end-with', str(os.getpid())],
-        parameters=[
-            {
-                'port': link,
-                'baud_rate': baud_rate,
-                'protocol': protocol,
-                'model': model,
-                'drive_timeout': 2.0,
-            }
-        ],
-        output='screen',
-        respawn=False,
-        sigterm_timeout=_EXIT_TIMEOUT,
-        sigkill_timeout=_EXIT_TIMEOUT,
-        on_exit=Shutdown(reason='the driver has ended'),
-    )
-    end_simulator = EmitEvent(
-        event=SignalProcess(
-            signal_number=signal.SIGTERM, process_matcher=matches_action(simulator)
-        )
     )
     return LaunchDescription(
         [
@@ -114,14 +89,53 @@ def generate_launch_description():
             DeclareLaunchArgument(
                 'namespace', default_value='', description='namespace of all nodes'
             ),
+            DeclareLaunchArgument(
+                'drives',
+                default_value='1',
+                description='how many; one is nfo_sinus, several are drive_1, drive_2 and so on',
+            ),
             OpaqueFunction(function=_require_numbers),
             simulator,
-            driver,
-            RegisterEventHandler(OnProcessExit(target_action=driver, on_exit=[end_simulator])),
+            OpaqueFunction(function=_start_driver, args=[simulator]),
         ]
     )
+
+
+def _start_driver(context, simulator):
+    """Return the driver, with whose end the simulated drives end."""
+    sections = simulated_drives(LaunchConfiguration('drives').perform(context))
+    driver = Node(
+        package='nfo_sinus_driver',
+        executable='driver',
+        namespace=LaunchConfiguration('namespace'),
+        # a launch that fails or is killed stops no motor
+        arguments=['--end-with', str(os.getpid())],
+        parameters=[
+            {
+                **{name: LaunchConfiguration(name) for name in ('baud_rate', 'protocol', 'model')},
+                'port': LaunchConfiguration('link'),
+                'drive_timeout': 2.0,
+            },
+            *written(sections),
+        ],
+        output='screen',
+        respawn=False,
+        sigterm_timeout=_EXIT_TIMEOUT,
+        sigkill_timeout=_EXIT_TIMEOUT,
+        on_exit=Shutdown(reason='the driver has ended'),
+    )
+    end_simulator = EmitEvent(
+        event=SignalProcess(
+            signal_number=signal.SIGTERM, process_matcher=matches_action(simulator)
+        )
+    )
+    return [
+        driver,
+        RegisterEventHandler(OnProcessExit(target_action=driver, on_exit=[end_simulator])),
+    ]
 
 
 def _require_numbers(context):
     """Refuse what is no number before anything is started."""
     number('baud_rate', LaunchConfiguration('baud_rate').perform(context), whole=True)
+    simulated_drives(LaunchConfiguration('drives').perform(context))

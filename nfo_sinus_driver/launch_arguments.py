@@ -10,7 +10,16 @@ Without ROS: the launch files give what they have been given.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+import json
 from pathlib import Path
+import tempfile
+from typing import Any
+
+Sections = dict[str, dict[str, dict[str, Any]]]
+
+
+#: As many as a line with RS-485 has addresses for.
+MOST_DRIVES = 247
 
 
 def number(name: str, given: str, *, whole: bool = False) -> float:
@@ -48,6 +57,43 @@ def parameter_file(given: str, config: Path) -> str:
         names = ', '.join(sorted(one.name for one in config.glob('*.yaml')))
         looked.append(f'{config}, which has {names}')
     raise ValueError(f'params_file:={given}: there is no such file; looked in {"; ".join(looked)}')
+
+
+def simulated_drives(given: str) -> Sections:
+    """
+    Return the sections of a parameter file for so many drives, named as ``nfo-sinus scan`` does.
+
+    One drive needs none: it has the default name and address.
+
+    :raises ValueError: it is not a number of drives; the message names the argument.
+    """
+    count = int(number('drives', given, whole=True))
+    if not 1 <= count <= MOST_DRIVES:
+        raise ValueError(f'drives:={given}: write a number from 1 to {MOST_DRIVES}')
+    if count == 1:
+        return {}
+    names = {f'drive_{address}': address for address in range(1, count + 1)}
+    return {
+        '/**/nfo_sinus_bus': {'ros__parameters': {'drives': list(names)}},
+        **{
+            f'/**/{name}': {'ros__parameters': {'address': address}}
+            for name, address in names.items()
+        },
+    }
+
+
+def written(sections: Sections) -> list[str]:
+    """
+    Return the name of a new parameter file with these sections, in a list; empty if there are none.
+
+    Not a dictionary for launch_ros: it puts that under ``/**``, which a section for a node in
+    another parameter file would overrule. And JSON: in plain YAML 8E1 is a number.
+    """
+    if not sections:
+        return []
+    with tempfile.NamedTemporaryFile('w', prefix='nfo_sinus_', delete=False) as file:
+        json.dump(sections, file)
+    return [file.name]
 
 
 def require_packages(needed: Mapping[str, str], find: Callable[[str], object]) -> None:

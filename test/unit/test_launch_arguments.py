@@ -8,8 +8,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 
-from nfo_sinus_driver.launch_arguments import number, parameter_file, require_packages
+from nfo_sinus_driver.launch_arguments import (
+    MOST_DRIVES,
+    number,
+    parameter_file,
+    require_packages,
+    simulated_drives,
+    written,
+)
 
 
 def test_a_number_is_taken_and_what_is_none_refused_by_name() -> None:
@@ -21,6 +29,22 @@ def test_a_number_is_taken_and_what_is_none_refused_by_name() -> None:
     ):
         with pytest.raises(ValueError, match=f'{name}:={given}: write a .*number, such as'):
             number(name, given, whole=whole)
+
+
+def test_many_drives_have_names_and_addresses_of_their_own_and_one_the_default() -> None:
+    assert simulated_drives('1') == {} and written({}) == []
+    sections = simulated_drives('8')
+    names = sections['/**/nfo_sinus_bus']['ros__parameters']['drives']
+    assert names == [f'drive_{number}' for number in range(1, 9)]
+    assert [sections[f'/**/{name}']['ros__parameters'] for name in names] == [
+        {'address': number} for number in range(1, 9)
+    ]
+    (name,) = written(sections)
+    assert yaml.safe_load(Path(name).read_text(encoding='utf-8')) == sections
+    Path(name).unlink()
+    for given in ('0', '-1', 'x', '1.5', str(MOST_DRIVES + 1)):
+        with pytest.raises(ValueError, match=f'drives:={given}: write a'):
+            simulated_drives(given)
 
 
 def test_a_parameter_file_is_found_by_path_or_is_one_of_the_package(
