@@ -47,6 +47,7 @@ setup(
     entry_points={
         'console_scripts': [
             f'driver = {NAME}.node.__main__:main',
+            f'families = {NAME}.cli.families:main',
             f'monitor = {NAME}.node.monitor:main',
             f'nfo-sinus = {NAME}.cli.main:main',
             f'plot = {NAME}.demo.record:plot',

@@ -31,7 +31,7 @@ _FAMILIES = 'nfo_sinus_driver.families'
 #: The message InvSt has one byte for a status code.
 _HIGHEST_CODE = 0xFF
 #: What the name of a file ends with that describes a family.
-_DESCRIBED = '.vfd.yaml'
+DESCRIBED = '.vfd.yaml'
 #: Wider ones have no place in a message.
 _WIDEST_WORD = 0xFFFFFFFF
 #: A motor may be overhauled by so much, as a share of the greatest set-point.
@@ -156,7 +156,7 @@ def families() -> tuple[str, ...]:
 
 def is_described(name: str) -> bool:
     """Tell whether a family is one that a file describes: its name is the path of the file."""
-    return name.endswith(_DESCRIBED)
+    return name.endswith(DESCRIBED)
 
 
 def usual_family() -> str:

@@ -549,6 +549,8 @@ class Profile:
         protocol; where one is not there, what the protocol says itself.
     :ivar measured: the measured values that matter beside the telemetry: the usual ones of
         ``~/measured``.
+    :ivar line: how its line leaves the factory, where its manual says it: ``baud_rate``,
+        ``char_format`` and ``address``.
     :ivar refusals: what exception codes mean that say something of their own; by the code.
     :ivar busy: exception codes by which it says that it may take the request the next moment.
     :ivar stops_at_timeout: the value of the parameter that has the role ``stop_at_timeout`` by
@@ -581,6 +583,7 @@ class Profile:
     measured: tuple[str, ...] = ()
     words: Mapping[str, Profile] = field(default_factory=dict)
     speed_mode: SpeedMode | None = None
+    line: Mapping[str, int | str] = field(default_factory=dict)
     refusals: Mapping[int, str] = field(default_factory=dict)
     busy: frozenset[int] = frozenset()
     stops_at_timeout: Value = True

@@ -14,8 +14,16 @@ import signal
 import sys
 
 from nfo_sinus_driver.cli.console import CliError, UsageError, put, remark, say, signals_handled
+from nfo_sinus_driver.cli.families import Family
 from nfo_sinus_driver.cli.monitor import Monitor
-from nfo_sinus_driver.cli.options import DEFAULTS, LINE_AND_DRIVE, Verb, add_flag, add_setting
+from nfo_sinus_driver.cli.options import (
+    DEFAULTS,
+    LINE_AND_DRIVE,
+    Verb,
+    add_flag,
+    add_setting,
+    take_family,
+)
 from nfo_sinus_driver.cli.read import Errors, Get, Info, List, Set
 from nfo_sinus_driver.cli.run import Run
 from nfo_sinus_driver.cli.scan import Scan
@@ -60,7 +68,7 @@ VERBS: dict[str, Verb] = {
     type(verb).__name__.lower(): verb
     for verb in (
         Scan(), Info(), List(), Get(), Set(), Dump(), Load(), Diff(), Errors(), Monitor(),
-        Completion(), Ack(), Run(), Stop(), Tune(),
+        Family(), Completion(), Ack(), Run(), Stop(), Tune(),
     )
 }
 
@@ -101,6 +109,10 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
         argcomplete.autocomplete(parser)
     options = parser.parse_args(arguments)
+    try:
+        take_family(options)
+    except ValueError as error:
+        parser.error(str(error))
     VERBS[options.verb].complete(options)
     for name, default in DEFAULTS.items():
         if not hasattr(options, name):

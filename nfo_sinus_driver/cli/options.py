@@ -11,6 +11,7 @@ import math
 import shlex
 from typing import Any, TypeVar
 
+from nfo_sinus_driver.catalog import load_profile
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.settings import AUTO, MONITOR
 from nfo_sinus_driver.link import BIT_RATES, BusSettings
@@ -21,8 +22,8 @@ _N = TypeVar('_N', int, float)
 #: Where the line and the drive are: settings as the nodes have them.
 SETTINGS = {**settings_of(BusSettings), **settings_of(DriveSettings)}
 LINE_AND_DRIVE = (
-    'port', 'protocol', 'address', 'model', 'baud_rate', 'char_format', 'response_timeout',
-    'retries',
+    'port', 'protocol', 'address', 'model', 'family', 'baud_rate', 'char_format',
+    'response_timeout', 'retries',
 )
 DEFAULTS = {name: SETTINGS[name].default for name in LINE_AND_DRIVE}
 #: What is as short as it can be for each of 247 addresses.
@@ -51,12 +52,28 @@ class Verb:
         raise NotImplementedError
 
 
+def take_family(options: argparse.Namespace) -> None:
+    """
+    Take the model that ``--family`` means, and how its line leaves the factory.
+
+    :raises ValueError: there is no such family, or it cannot be used.
+    """
+    family = getattr(options, 'family', '')
+    if not family:
+        return
+    given = {'family': family, 'model': getattr(options, 'model', DEFAULTS['model'])}
+    options.model = DriveSettings(**given).model
+    for name, value in load_profile(options.model).line.items():
+        if not hasattr(options, name):
+            setattr(options, name, value)
+
+
 def command_line(options: argparse.Namespace, *words: str) -> str:
     """Return how to call this tool for the same drive, as it can be typed."""
     given = [
         text
         for name, default in DEFAULTS.items()
-        if getattr(options, name) != default
+        if getattr(options, name) != default and not (name == 'model' and options.family)
         for text in (f'--{name.replace("_", "-")}', str(getattr(options, name)))
     ]
     return shlex.join(('nfo-sinus', *given, *words))

@@ -183,6 +183,7 @@ class Session:
         usual: dict[str, Any] = {
             'address': address,
             'model': options.model,
+            'family': options.family,
             'control_method': '' if self._writes else MONITOR,
             'retries': options.retries,
             'allow_communication_changes': getattr(options, 'allow_communication_changes', False),

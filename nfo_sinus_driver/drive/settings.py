@@ -12,6 +12,7 @@ import functools
 import math
 
 from nfo_sinus_driver.catalog import (
+    CatalogError,
     ControlMethod,
     Profile,
     Role,
@@ -22,6 +23,7 @@ from nfo_sinus_driver.catalog import (
     load_profile,
     usual_family,
 )
+from nfo_sinus_driver.catalog.finding import find
 from nfo_sinus_driver.link import ADDRESSES, PROTOCOLS, LineProtocol
 from nfo_sinus_driver.setting import UNCONFIGURED, setting, settings_of
 
@@ -131,6 +133,12 @@ class DriveSettings:
         'the drive family; a drive that contradicts it is reported',
         choices=(*families(), AUTO), also='auto: ask the drive at configure',
         change=UNCONFIGURED,
+    )
+    family: str = setting(
+        '',
+        'the drive family in place of model: a shipped name, the path of a file NAME.vfd.yaml that '
+        'describes the drive, or package://name/path',
+        zero='model says it', change=UNCONFIGURED,
     )
     control_method: str = setting(
         '',
@@ -293,7 +301,9 @@ class DriveSettings:
 
     def __post_init__(self) -> None:
         settings = settings_of(DriveSettings)
-        if not is_described(self.model):
+        if self.family:
+            object.__setattr__(self, 'model', self._model_of_family())
+        elif not is_described(self.model):
             _one_of('model', self.model, (*families(), AUTO))
         if self.control_method:
             _one_of('control_method', self.control_method, _control_methods(self.model))
@@ -326,6 +336,18 @@ class DriveSettings:
                 'nominal_speed first, in rpm, such as 1500 of a four-pole motor; the telegram '
                 'does not tell it'
             )
+    def _model_of_family(self) -> str:
+        """Return the model that :attr:`family` means; it is loaded, so that it is right."""
+        found = find(self.family)
+        if self.model not in (usual_family(), found):
+            raise ValueError(
+                f'family is {self.family} and model is {self.model}: leave one of both away'
+            )
+        try:
+            load_family(found)
+        except CatalogError as error:
+            raise ValueError(f'family {self.family} cannot be used: {error}') from error
+        return found
 
     def _check_drive_timeout(self) -> None:
         # a drive that has none refuses any, with the reason

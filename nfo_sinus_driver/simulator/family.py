@@ -114,11 +114,17 @@ def simulated_drive(
     )
 
 
+def _kinds() -> Mapping[str, SimulatedFamily]:
+    """Return all families, and what those have in common that files describe."""
+    described = importlib.import_module(f'{__package__}._declared.family').ANY
+    return {**{name: load(name) for name in simulated()}, 'a file': described}
+
+
 def every_injection() -> Mapping[str, Injection]:
     """Return what can be made to happen to a drive of any family."""
     found: dict[str, Injection] = {}
-    for model in simulated():
-        for name, one in injections_of(load(model).injections).items():
+    for family in _kinds().values():
+        for name, one in injections_of(family.injections).items():
             found[name] = found[name].joined(one) if name in found else one
     return found
 
@@ -127,8 +133,8 @@ def every_option() -> Mapping[str, tuple[str, tuple[str, ...]]]:
     """Return what can be chosen of a drive of any family by name: a text, and the choices."""
     found: dict[str, Option] = {}
     usual: dict[str, dict[str, str]] = {}
-    for model in simulated():
-        for option in load(model).options:
+    for model, family in _kinds().items():
+        for option in family.options:
             found.setdefault(option.name, option)
             usual.setdefault(option.name, {})[option.choices[0]] = model
     return {

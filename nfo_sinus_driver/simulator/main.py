@@ -13,7 +13,8 @@ import json
 import signal
 import sys
 
-from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.catalog import CatalogError, Value
+from nfo_sinus_driver.catalog.finding import find
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator.control import Client, ControlError, control_path
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, PROTOCOLS
@@ -179,6 +180,15 @@ def _tcp(text: str) -> int:
     return port
 
 
+def _family(text: str) -> str:
+    try:
+        found = find(text)
+        machine_of(found)
+    except (ValueError, CatalogError) as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return found
+
+
 def _seconds(text: str) -> float:
     seconds = float(text)
     if not 0 <= seconds < 1e6:
@@ -210,6 +220,14 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
     add('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
     add('--protocol', default='modbus_rtu', choices=PROTOCOLS, help='default: modbus_rtu')
     add('--model', default=USUAL, choices=simulated(), help=f'default: {USUAL}')
+    add(
+        '--family',
+        type=_family,
+        dest='model',
+        metavar='FILE',
+        help='in place of --model: a drive that a file describes, NAME.vfd.yaml; its name, its '
+        'path, or package://name/path',
+    )
     add(
         '--address',
         type=_addresses,

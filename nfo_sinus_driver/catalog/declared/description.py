@@ -210,6 +210,14 @@ class LineDefaults:
     busy: frozenset[int] = frozenset()
 
     @property
+    def factory(self) -> Mapping[str, int | str]:
+        """What of speed, format and address the file has."""
+        found: dict[str, int | str] = {
+            'baud_rate': self.baud_rate, 'char_format': self.char_format, 'address': self.address,
+        }
+        return {name: value for name, value in found.items() if value}
+
+    @property
     def shown(self) -> str:
         """What is said, for an operator."""
         speed = f'{self.baud_rate} bit/s' if self.baud_rate else ''

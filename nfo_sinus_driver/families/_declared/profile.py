@@ -282,6 +282,7 @@ def profile_of(drive: Description) -> Profile:
         releases='' if drive.stop_mode is None else drive.stop_mode[1],
         in_charge=_in_charge,
         most={of_speed: most},
+        line=drive.line.factory,
         refusals=drive.line.exceptions,
         busy=drive.line.busy,
         stops_at_timeout=True if drive.timeout is None else drive.timeout.stops,

@@ -29,6 +29,12 @@ class DeclaredInjections(Injections):
         unit.local = state == 'on'
 
 
+#: What all of them have in common.
+ANY = SimulatedFamily(
+    control_unit=DeclaredControlUnit, variant=DeclaredVariant, injections=DeclaredInjections
+)
+
+
 def family_of(path: str) -> SimulatedFamily:
     """
     Return the family that a file describes.

@@ -1,0 +1,89 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The verb ``family``, and the command ``families``: drives that files describe."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import sys
+
+from nfo_sinus_driver import catalog
+from nfo_sinus_driver.catalog.finding import Found, every
+from nfo_sinus_driver.cli.console import columns, put
+from nfo_sinus_driver.cli.options import Verb
+
+
+class Family(Verb):
+    """Check files that describe drives (NAME.vfd.yaml), or list the families that are found."""
+
+    json = False
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Take what to do, and the files."""
+        parser.add_argument('action', choices=('check', 'list'), help='what to do')
+        parser.add_argument('files', nargs='*', metavar='FILE', help='with check: NAME.vfd.yaml')
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Do it; check fails where a file is wrong."""
+        if options.action == 'list':
+            put_families()
+            return 0
+        right = [check(name) for name in options.files]
+        return int(not all(right))
+
+
+def check(name: str) -> bool:
+    """Check a file, print what is wrong in it or what it describes; tell whether it is right."""
+    try:
+        family = catalog.load_family(str(Path(name).absolute()))
+    except (catalog.CatalogError, ValueError) as error:
+        put(str(error))
+        return False
+    profile = family.profile
+    has = f'{len(family.settings)} settings, {len(family.measured)} measured values'
+    put(f'{name}: {profile.title}, {has}')
+    for note in notes(family):
+        put(f'  {note}')
+    return True
+
+
+def notes(family: catalog.Family) -> list[str]:
+    """Return what an operator has to know of a drive that is described so."""
+    profile = family.profile
+    found = []
+    (target,) = profile.setpoints.values()
+    (method,) = profile.methods.values()
+    if target.forward_only:
+        found.append('it turns forward only: neither signed nor direction')
+    if not method.coasts:
+        found.append('it has no coast: quick_stop is an ordinary stop, or a quick ramp')
+    if not family.key(catalog.Role.COMMUNICATION_TIMEOUT):
+        found.append('it has no time-out of its own: the motor runs on when the driver is gone')
+    told = catalog.Fact.NETWORK_CONTROL in profile.status_word.valid
+    if not (told or profile.holders):
+        found.append(
+            'nothing tells who has control: a motor that runs is stopped when the driver connects'
+        )
+    return found
+
+
+def put_families() -> None:
+    """Print all families that are found, and where."""
+    rows = [(one.name, one.title, one.of, one.place) for one in sorted(every(), key=_order)]
+    for line in columns([('family', 'title', 'found in', 'place'), *rows]):
+        put(line)
+
+
+def _order(one: Found) -> str:
+    return one.name
+
+
+def main() -> int:
+    """Run the command ``families``."""
+    if sys.argv[1:2] and sys.argv[1] not in ('--ros-args',):
+        put('usage: families lists the families of drives that are found, and where')
+        return 0 if sys.argv[1] in ('-h', '--help') else 2
+    put_families()
+    return 0
