@@ -336,6 +336,7 @@ class DriveSettings:
                 'nominal_speed first, in rpm, such as 1500 of a four-pole motor; the telegram '
                 'does not tell it'
             )
+
     def _model_of_family(self) -> str:
         """Return the model that :attr:`family` means; it is loaded, so that it is right."""
         found = find(self.family)
