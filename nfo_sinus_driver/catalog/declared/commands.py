@@ -176,6 +176,7 @@ class Commands:
         for name in ('stop', 'coast', 'quick_stop'):
             if name in control:
                 self._check_stop(name)
+        self._check_direction()
 
     def lists(self) -> dict[str, Any]:
         """Return them by name."""
@@ -191,6 +192,18 @@ class Commands:
         if name in _AT_ONCE and self._lists[name] and isinstance(self._lists[name][0], Pause):
             self._problems.add(
                 self._control[name].line, f'{name} begins with a pause: a stop is never delayed'
+            )
+
+    def _check_direction(self) -> None:
+        """See to it that run leaves the direction that it is said to: forward."""
+        if self._direction is None:
+            return
+        value, _ = left_by(self._lists['run']).get(self._direction.key, (None, 0))
+        if value not in (None, self._direction.forward):
+            self._problems.add(
+                self._control['run'].line,
+                f'run leaves {value:X}h where the direction has forward: '
+                f'{self._direction.forward:X}h; it has to run forward',
             )
 
     def _check_stop(self, name: str) -> None:

@@ -87,6 +87,7 @@ class _Reader:
         commands = Commands(control, steps, setpoint.direction, self._problems)
         measured, roles = self._measured(facts)
         self._require_control_told(control, settings)
+        after_write = tuple(self._after_write(steps))
         parameters = {**settings.parameters, **measured, **self._places.made}
         return Description(
             name=self._path.name.removesuffix(SUFFIX),
@@ -101,7 +102,7 @@ class _Reader:
             facts=facts,
             setpoint=setpoint,
             **commands.lists(),
-            after_write=tuple(self._after_write(steps)),
+            after_write=after_write,
             requires=tuple(self._requires(control, settings)),
             holder=settings.holder(control.get('holder')),
             stop_mode=self._stop_mode(control.get('stop_mode'), settings),

@@ -122,9 +122,7 @@ def _target(place: SetpointPlace) -> Target:
     nominal = math.inf if place.nominal is None else place.nominal
     kind = Target if place.direction is None else SizeAndDirection
     forward_only = not place.signed and place.direction is None
-    return kind(
-        place.key, place.most, forward_only=forward_only, nominal=nominal, place=place
-    )
+    return kind(place.key, place.most, forward_only=forward_only, nominal=nominal, place=place)
 
 
 # --- control --------------------------------------------------------------------------------------
@@ -176,7 +174,15 @@ class Declared(ControlMethod):
         yield from self._setpoint.set_to_zero()
 
     def run(self) -> Steps[None]:
-        """Give the run command; its last step once."""
+        """
+        Give the run command, forward, each step once.
+
+        A direction of its own may be left from before: it is written first, at set-point 0.
+        """
+        direction = self._drive.setpoint.direction
+        written = {step.key for step in self._drive.run if isinstance(step, Put)}
+        if direction is not None and direction.key not in written:
+            yield Write(direction.key, direction.forward, retry=False)
         yield from _carry_out(self._drive.run, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:

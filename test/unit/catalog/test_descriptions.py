@@ -121,6 +121,9 @@ BAD = {
     'a direction that is none': (
         'signed: true}', 'direction: {register: 10, forward: 1, reverse: 1}}', 'have to differ',
     ),
+    'a run that is not forward': (
+        'signed: true}', 'direction: {register: 10, forward: 3, reverse: 2}}', 'has to run forward',
+    ),
     'a set-point too great': ('most: 60', 'most: 6000', 'carries 32767 at most'),
     'a unit of another kind': ('unit: Hz, most', 'unit: km/h, most', 'choose one of Hz, rpm'),
     'a parameter that is none': ('timeout: {parameter: serial.timeout}',

@@ -1,0 +1,359 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What drives of other makers do otherwise, each said in a file, and driven."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.described import DescribedRig
+import yaml
+
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.simulator.memory import Refused
+
+#: A drive without peculiarities; of each odd one, what is otherwise.
+PLAIN: dict[str, Any] = yaml.safe_load("""
+vfd: 1
+title: Odd
+source: made up
+control:
+  run: [{register: 10, value: 1}]
+  stop: [{register: 10, value: 0}]
+  reset: [{register: 10, value: 8}, {register: 10, value: 0}]
+setpoint: {register: 11, type: int16, factor: 0.1, unit: Hz, most: 60, signed: true}
+status:
+  register: 20
+  running: {bit: 0}
+  fault: {bit: 3}
+measured:
+  actual_frequency: {register: 22, type: int16, factor: 0.1}
+faults:
+  register: 21
+  codes: {1: {text: hot, remedy: Let it cool}, 195: {text: odd}}
+parameters:
+  ramp.accel: {register: 30, factor: 0.1, unit: s, minimum: 0.1, maximum: 60, default: 5}
+  ramp.decel: {register: 31, factor: 0.1, unit: s, minimum: 0.1, maximum: 60, default: 5}
+simulated: {accel: ramp.accel, decel: ramp.decel}
+""")
+
+ODD: dict[str, dict[str, Any]] = {
+    'plain': {},
+    'coils': {
+        'control': {
+            'run': [{'coil': 2, 'on': True}],
+            'stop': [{'coil': 2, 'on': False}],
+            'reset': [{'coil': 3, 'on': True}, {'coil': 3, 'on': False}],
+        },
+        'setpoint': {
+            'register': 11, 'factor': 0.1, 'unit': 'Hz', 'most': 60,
+            'direction': {'coil': 4, 'forward': 0, 'reverse': 1},
+        },
+        'status': {'running': {'coil': 16}, 'fault': {'coil': 19}, 'reverse': {'coil': 20}},
+        'faults': {},
+        'measured': {'actual_frequency': {'register': 22, 'factor': 0.1}},
+    },
+    'edges': {
+        'control': {
+            'run': [{'coil': 2, 'on': True}, {'coil': 2, 'on': False}],
+            'stop': [{'coil': 3, 'on': True}, {'coil': 3, 'on': False}],
+            'reset': [{'coil': 4, 'on': True}, {'coil': 4, 'on': False}],
+        },
+    },
+    'bits of a kept word': {
+        'control': {
+            'run': [{'register': 10, 'set': 1}],
+            'stop': [{'register': 10, 'clear': 1}],
+            'reset': [{'register': 10, 'set': 8}, {'register': 10, 'clear': 8}],
+        },
+    },
+    'several in one message': {
+        'control': {
+            'run': [{'register': 9, 'values': [7, 1]}],
+            'stop': [{'register': 9, 'values': [7, 0]}],
+            'coast': [{'register': 9, 'values': [0, 2]}],
+            'reset': [{'register': 10, 'value': 8}, {'register': 10, 'value': 0}],
+        },
+    },
+    'steps that wait': {
+        'control': {
+            'prepare': [{'register': 10, 'value': 6}],
+            'run': [
+                {'register': 10, 'value': 6}, {'until': {'bits': [4, 6], 'value': 1}},
+                {'register': 10, 'value': 7}, {'until': {'bits': [4, 6], 'value': 3}},
+                {'wait': 0.2}, {'register': 10, 'value': 15},
+            ],
+            'stop': [{'register': 10, 'value': 6}],
+            'reset': [
+                {'register': 10, 'value': 128}, {'until': {'bit': 3, 'is': 0}, 'within': 0.5},
+                {'register': 10, 'value': 0},
+            ],
+        },
+    },
+    'function 16 alone': {'line': {'write': 16}},
+    'function 06 alone': {'line': {'write': 6, 'most_registers': 2}},
+    'input registers': {
+        'measured': {
+            'actual_frequency': {'register': 22, 'type': 'int16', 'factor': 0.1, 'table': 'input'},
+        },
+    },
+    'two registers, the low one first': {
+        'measured': {
+            'actual_frequency': {
+                'register': 22, 'type': 'int32', 'order': 'low_first', 'factor': 0.001,
+            },
+        },
+        'setpoint': {
+            'register': 11, 'type': 'int32', 'order': 'low_first', 'factor': 0.001, 'unit': 'Hz',
+            'most': 60, 'signed': True,
+        },
+    },
+    'a fault far away': {'faults': {'register': 900, 'codes': {1: {'text': 'hot'}}}},
+    'faults as bits': {
+        'faults': {
+            'flags': [
+                {'register': 21, 'bit': 0, 'text': 'hot'}, {'register': 21, 'bit': 1, 'text': 'ov'},
+            ],
+        },
+    },
+    'a block with more': {
+        'status': {
+            'register': 20, 'running': {'bit': 0}, 'fault': {'register': 24, 'bit': 3},
+            'block': {'register': 20, 'count': 5},
+        },
+        'faults': {},
+        'measured': {},
+    },
+    'rpm': {
+        'setpoint': {
+            'register': 11, 'type': 'int16', 'factor': 1, 'unit': 'rpm', 'most': 1800,
+            'signed': True,
+        },
+        'measured': {
+            'actual_speed': {'register': 23, 'type': 'int16'},
+            'actual_frequency': {'register': 22, 'type': 'int16', 'factor': 0.1},
+        },
+    },
+    'a set-point that is not read': {
+        'setpoint': {
+            'register': 11, 'type': 'int16', 'factor': 0.1, 'unit': 'Hz', 'most': 60,
+            'signed': True, 'access': 'w',
+        },
+    },
+    'a set-point that is read elsewhere': {
+        'setpoint': {
+            'register': 11, 'type': 'int16', 'factor': 0.1, 'unit': 'Hz', 'most': 60,
+            'signed': True, 'read_register': 12,
+        },
+    },
+    'in parts of a parameter': {
+        'setpoint': {
+            'register': 11, 'type': 'int16', 'factor': '1/10000', 'scaled_by': 'limit.maximum',
+            'limit': 'limit.maximum', 'unit': 'Hz', 'most': 60, 'signed': True,
+        },
+        'parameters': {
+            **PLAIN['parameters'],
+            'limit.maximum': {'register': 40, 'factor': 0.1, 'unit': 'Hz', 'default': 55},
+        },
+    },
+    'a parameter tells who has control': {
+        'control': {
+            **PLAIN['control'],
+            'holder': {'parameter': 'source.command', 'bus': ['Bus', 'Both']},
+            'requires': [{'parameter': 'source.command', 'value': 'Bus', 'write': True}],
+        },
+        'parameters': {
+            **PLAIN['parameters'],
+            'source.command': {
+                'register': 41, 'choices': {0: 'Keypad', 1: 'Bus', 2: 'Both'}, 'default': 'Keypad',
+            },
+        },
+    },
+    'the status tells who has control': {
+        'status': {
+            'register': 20, 'running': {'bit': 0}, 'fault': {'bit': 3}, 'local': {'bit': 9},
+            'alarm': {'bit': 7}, 'stopping': {'bit': 4},
+        },
+    },
+    'printed from 40001': {
+        'line': {'numbering': 40001},
+        'control': {
+            'run': [{'register': 40011, 'value': 1}],
+            'stop': [{'register': 40011, 'value': 0}],
+            'reset': [{'register': 40011, 'value': 8}, {'register': 40011, 'value': 0}],
+        },
+        'setpoint': {
+            'register': 40012, 'type': 'int16', 'factor': 0.1, 'unit': 'Hz', 'most': 60,
+            'signed': True,
+        },
+        'status': {'register': 40021, 'running': {'bit': 0}, 'fault': {'bit': 3}},
+        'measured': {'actual_frequency': {'register': 40023, 'type': 'int16', 'factor': 0.1}},
+        'faults': {}, 'simulated': {},
+        'parameters': {'motor.speed': {'register': 40031}},
+    },
+}
+
+
+def described(tmp_path: Path, **otherwise: Any) -> Path:
+    """Return the file of a drive."""
+    path = tmp_path / 'odd.vfd.yaml'
+    path.write_text(yaml.safe_dump({**PLAIN, **otherwise}), encoding='utf-8')
+    return path
+
+
+@pytest.mark.parametrize('protocol', ['modbus_rtu', 'modbus_tcp'])
+@pytest.mark.parametrize('name', ODD)
+def test_it_is_driven(tmp_path: Path, name: str, protocol: str) -> None:
+    with DescribedRig(described(tmp_path, **ODD[name]), protocol) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        assert not rig.turns
+        rig.follow(20.0)
+        rig.follow(-15.0)
+        if rig.file.coast:
+            rig.answer(rig.drive.quick_stop())
+            assert not rig.far.motor.driven
+            rig.enable()
+            rig.follow(20.0)
+        assert 'stop' in rig.answer(rig.drive.stop())
+        rig.wait_until(lambda: not rig.far.motor.driven, 10.0)
+        rig.enable()
+        rig.follow(20.0)
+        rig.far.trip(next(iter(rig.file.faults), 100 if rig.file.flags else 198))
+        rig.pass_time(1.0)
+        assert not rig.drive.following
+        assert 'acknowledged' in rig.answer(rig.drive.acknowledge())
+        rig.pass_time(2.0)
+        assert not rig.turns and not rig.far.faults
+        assert not rig.notes.said(Cause.DRIVER_ERROR), rig.notes.events
+
+
+def test_a_fault_with_a_number_that_the_driver_needs_is_told_behind(tmp_path: Path) -> None:
+    with DescribedRig(described(tmp_path)) as rig:
+        rig.connect()
+        rig.far.trip(1195)
+        rig.pass_time(0.5)
+        assert rig.drive.snapshot.text == 'odd' and rig.drive.snapshot.status.code == 1195
+
+
+def test_a_fault_that_the_file_does_not_list_is_shown_by_its_number(tmp_path: Path) -> None:
+    file = described(tmp_path, faults={'register': 21, 'codes': {1: {'text': 'hot'}}})
+    with DescribedRig(file) as rig:
+        rig.connect()
+        rig.far.control_unit._number = lambda code: 77  # type: ignore[attr-defined]
+        rig.far.trip(1)
+        rig.pass_time(0.5)
+        assert rig.drive.snapshot.text == 'Code 77'
+        assert rig.drive.snapshot.status.faulted
+
+
+def test_a_number_that_means_none_is_no_value(tmp_path: Path) -> None:
+    measured = {
+        **PLAIN['measured'],
+        'motor_temperature': {'register': 25, 'none': 0},
+        'output_current': {'register': 26, 'factor': 0.1, 'none': 0x7FFF},
+    }
+    with DescribedRig(described(tmp_path, measured=measured), telemetry_rate=5.0) as rig:
+        rig.connect()
+        rig.pass_time(1.0)
+        values = rig.notes.telemetry[-1].values
+        assert math.isnan(values[Role.MOTOR_TEMPERATURE]) and values[Role.OUTPUT_CURRENT] == 0
+        assert not rig.notes.said(Cause.IMPOSSIBLE_VALUE)
+
+
+def test_exceptions_have_the_texts_of_the_file_and_what_is_busy_is_asked_again(
+    tmp_path: Path,
+) -> None:
+    line = {'exceptions': {0x22: 'parameters are locked', 0x30: 'later'}, 'busy': [0x30]}
+    with DescribedRig(described(tmp_path, line=line)) as rig:
+        rig.connect(parameters=True)
+        left = [0x22, 0x22, 0x30]
+
+        def refuse(key: str) -> None:
+            if key == 'ramp.accel' and left:
+                raise Refused(left.pop(), 'as the test says')  # type: ignore[arg-type]
+
+        rig.far.control_unit.admit = refuse  # type: ignore[method-assign]
+        answer = rig.answer(rig.drive.parameters.change({'ramp.accel': 7.0}))
+        assert 'parameters are locked (exception 34)' in answer
+        left.clear()
+        left.append(0x30)
+        rig.result(rig.drive.parameters.change({'ramp.accel': 7.0}))
+        assert rig.far.peek('ramp.accel') == 7.0 and not left
+
+
+def test_what_makes_a_setting_take_effect_is_written_after_it(tmp_path: Path) -> None:
+    after = [{'register': 50, 'value': 1}]
+    with DescribedRig(described(tmp_path, after_write=after)) as rig:
+        rig.connect(parameters=True)
+        rig.result(rig.drive.parameters.change({'ramp.accel': 7.0}))
+        written = [key for _, key, data in rig.asked if data is not None]
+        assert written[-2:] == ['ramp.accel', 'line.r0032']
+
+
+def test_the_stop_mode_says_whether_a_stop_coasts(tmp_path: Path) -> None:
+    parameters = {
+        **PLAIN['parameters'],
+        'stop.mode': {'register': 51, 'choices': {0: 'Ramp', 1: 'Coast'}, 'default': 'Coast'},
+    }
+    control = {**PLAIN['control'], 'stop_mode': {'parameter': 'stop.mode', 'coasts': 'Coast'}}
+    file = described(tmp_path, parameters=parameters, control=control)
+    with DescribedRig(file, parameters={'ramp.decel': 5.0}) as rig:
+        rig.connect()
+        rig.enable()
+        rig.follow(20.0)
+        rig.answer(rig.drive.stop())
+        assert not rig.far.motor.driven and rig.far.motor.turning
+        rig.pass_time(30.0)
+        rig.far.set_from_keypad('stop.mode', 'Ramp')
+        rig.enable()
+        rig.follow(20.0)
+        assert 'ramp' in rig.answer(rig.drive.stop())
+
+
+def test_its_own_time_out_is_set_and_stops_it_when_the_driver_is_gone(tmp_path: Path) -> None:
+    parameters = {
+        **PLAIN['parameters'],
+        'serial.timeout': {'register': 52, 'factor': 0.1, 'unit': 's'},
+        'serial.action': {'register': 53, 'choices': {0: 'Nothing', 1: 'Warn', 2: 'Stop'}},
+    }
+    timeout = {
+        'parameter': 'serial.timeout', 'action': {'parameter': 'serial.action', 'stops': 'Stop'},
+    }
+    file = described(tmp_path, parameters=parameters, timeout=timeout)
+    with DescribedRig(file, drive_timeout=2.0) as rig:
+        rig.connect()
+        assert (rig.far.peek('serial.timeout'), rig.far.peek('serial.action')) == (2.0, 'Stop')
+        rig.enable()
+        rig.follow(20.0)
+        rig.kill()
+        rig.line.go_to(rig.clock.now + 10.0)
+        assert not rig.far.motor.turning
+        rig.begin()
+        rig.connect()
+
+
+def test_a_drive_that_ignores_commands_in_local_is_not_taken_for_enabled(tmp_path: Path) -> None:
+    for what in ('ignores', 'refuses'):
+        status = ODD['the status tells who has control']['status']
+        with DescribedRig(
+            described(tmp_path, status=status), options={'in_local': what}
+        ) as rig:
+            rig.connect()
+            unit = rig.far.control_unit
+            unit.local = True  # type: ignore[attr-defined]
+            answer = rig.answer(rig.drive.enable())
+            assert not rig.drive.following and not rig.turns, answer
+            unit.local = False  # type: ignore[attr-defined]
+            rig.pass_time(0.5)
+            rig.enable()
+            rig.follow(20.0)
+            unit.local = True  # type: ignore[attr-defined]
+            rig.far.control_unit.settle()
+            rig.pass_time(1.0)
+            assert not rig.drive.following
