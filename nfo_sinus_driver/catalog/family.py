@@ -28,6 +28,23 @@ from nfo_sinus_driver.catalog.profile import Profile, SetpointTarget
 from nfo_sinus_driver.catalog.status import Kind, Meaning, Role, StatusCode
 
 _FAMILIES = 'nfo_sinus_driver.families'
+#: Roles of what is read beside the polls, and in no hurry: such parameters may take their time, as
+#: those do that a PLC asks the drive for.
+_UNHURRIED = frozenset(
+    (
+        Role.FIRMWARE,
+        Role.MOTOR_FIRMWARE,
+        Role.CONTROL_MODE,
+        Role.MOTOR_TEMPERATURE,
+        Role.PT1000_TEMPERATURE,
+        Role.OPERATING_TIME,
+        Role.RUNNING_TIME,
+        Role.BRAKE_TIME,
+        Role.ENERGY,
+        Role.TOTAL_ENERGY,
+        Role.BUS_ADDRESS,
+    )
+)
 #: The message InvSt has one byte for a status code.
 _HIGHEST_CODE = 0xFF
 #: What the name of a file ends with that describes a family.
@@ -315,13 +332,46 @@ def _read_family(name: str, method: str = '') -> Family:
 
     log = folder / 'error_log.csv'
     logs = table.read(log, area, lambda row: [row.protocol]) if log.exists() else []
-    return Family(
+    family = Family(
         name=name,
         parameters=parameters,
         roles=roles,
         status_codes={row.code: row for row in codes},
         error_logs={row.protocol: row for row in logs},
         profile=profile,
+    )
+    return _with_mailbox(family, _read_family(name), method) if profile.mailbox else family
+
+
+def _with_mailbox(own: Family, whole: Family, method: str) -> Family:
+    """
+    Return the family of a telegram with what the mailbox of the PLC reaches of the whole one.
+
+    That is settings and what is only read: no commands, whose words are those of the telegram.
+    """
+    profile = own.profile
+    protocol, addressing = profile.mailbox, profile.methods[method].addressing
+
+    def placed(parameter: Parameter) -> Parameter:
+        address = replace(parameter.at(protocol), protocol=addressing)
+        return replace(parameter, addresses={**parameter.addresses, addressing: address})
+
+    reached = {
+        key: placed(parameter)
+        for key, parameter in whole.items()
+        if protocol in parameter.addresses
+        and (parameter.is_setting or parameter.access is Access.READ)
+    }
+    roles = {role: key for role, key in whole.roles.items() if key in reached}
+    named = {Role.FAULT_CODE: roles[Role.STATUS_CODE]} if Role.STATUS_CODE in roles else {}
+    unhurried = {role: key for role, key in roles.items() if role in _UNHURRIED}
+    log = whole.error_logs.get(protocol)
+    return replace(
+        own,
+        parameters={**reached, **own},
+        roles={**unhurried, **named, **own.roles},
+        status_codes={**whole.status_codes, **own.status_codes},
+        error_logs={addressing: replace(log, protocol=addressing)} if log else {},
     )
 
 

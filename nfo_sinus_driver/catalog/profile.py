@@ -539,6 +539,8 @@ class Profile:
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
     :ivar may_lack: parameters that not every drive has, by the protocol; what lacks is found out
         whenever it is connected.
+    :ivar mailbox: behind a PLC with a mailbox for parameters, the protocol by which the tables of
+        the family say where each of them is; ``''``: they do not.
     :ivar words: behind a PLC that can map either of several sets of words, the profile of each, by
         its name; this one is the first.
     :ivar speed_mode: how it means its values in Speed mode, where it does not tell the mode and
@@ -581,6 +583,7 @@ class Profile:
     line_check: Mapping[str, str] = field(default_factory=dict)
     holds_control: Mapping[str, str] = field(default_factory=dict)
     measured: tuple[str, ...] = ()
+    mailbox: str = ''
     words: Mapping[str, Profile] = field(default_factory=dict)
     speed_mode: SpeedMode | None = None
     line: Mapping[str, int | str] = field(default_factory=dict)

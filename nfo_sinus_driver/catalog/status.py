@@ -60,6 +60,8 @@ class Meaning(_LookedUp):
     TUNING_FAILED = 'tuning_failed'
     #: The current limit holds the motor back.
     CURRENT_LIMIT = 'current_limit'
+    #: There is a fault or an alarm; another parameter names it.
+    UNNAMED = 'unnamed'
     #: The serial line was silent for too long, or damaged; the same of the fieldbus.
     SERIAL_FAILURE = 'serial_failure'
     FIELDBUS_FAILURE = 'fieldbus_failure'
@@ -227,6 +229,10 @@ class Role(_LookedUp):
     CONTROL_SOURCE = 'control_source'
     #: Whether keypad or terminals command, whatever the control source says.
     LOCAL_OPERATION = 'local_operation'
+    #: Behind a PLC: which telegram is exchanged; a drive that tells it has parameters there.
+    TELEGRAM = 'telegram'
+    #: Which fault or alarm it is, where the status word only says that there is one.
+    FAULT_CODE = 'fault_code'
     FIRMWARE = 'firmware'
     MOTOR_FIRMWARE = 'motor_firmware'
 

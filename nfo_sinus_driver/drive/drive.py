@@ -19,6 +19,7 @@ from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.error_log import ErrorLog, ErrorLogMonitor
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.drive.fault_name import FaultNamer
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters, on_bus
@@ -80,6 +81,7 @@ class Drive:
         )
         self.log = ErrorLog(self.state, procedures)
         self._error_log_monitor = ErrorLogMonitor(self.state, self.log)
+        self._fault_namer = FaultNamer(self.state)
         self._tuning = Tuning(self.state, self.parameters, procedures)
         #: It has said who it is, and is of this family.
         self._recognised = False
@@ -209,6 +211,7 @@ class Drive:
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
             self._watch.begin()
             self._error_log_monitor.begin()
+            self._fault_namer.begin()
         assert self.state.nameplate.identity is not None
         return self.state.nameplate.identity
 
@@ -243,6 +246,7 @@ class Drive:
             self._bus.cancel(self._parameters_task)
             self._set_disconnected()
             self._error_log_monitor.end()
+            self._fault_namer.end()
             self._watch.end()
 
     @on_bus

@@ -130,6 +130,8 @@ class DriveState:
         self._measured: Mapping[str, float] = {}
         #: It changes its parameters itself just now.
         self.tuning = False
+        #: The codes of a fault or an alarm that the status word does not name, and of its name.
+        self._named: tuple[int, int] | None = None
         self.control_mode = ''
         self.unit = ''
         #: What it does by itself when it hears nothing.
@@ -197,8 +199,30 @@ class DriveState:
         code_of = self.model.profile.status_word.code
         if code_of is None:
             return InverterStatus(at, word, NO_CODE, self.model)
-        status = InverterStatus(at, word, code_of(word), self.model, code_at=at)
+        code = code_of(word)
+        if self._named is not None and self._named[0] == code:
+            code = self._named[1]
+        status = InverterStatus(at, word, code, self.model, code_at=at)
         return self._with_control_as_before(status)
+
+    @property
+    def unnamed(self) -> int:
+        """The code of the fault or alarm that the status word does not name; 0: there is none."""
+        code_of, status = self.model.profile.status_word.code, self.status
+        if code_of is None or status is None or status.word is None:
+            return 0
+        code = code_of(status.word)
+        return code if Meaning.UNNAMED in self.model.status_code(code).meanings else 0
+
+    def name(self, unnamed: int, code: int) -> None:
+        """Take what a fault or an alarm is called that the status word does not name."""
+        is_one = self.model.status_code(code).kind is not Kind.STATUS
+        self._named = (unnamed, code) if is_one and code in self.model.status_codes else None
+
+    @property
+    def named(self) -> bool:
+        """What it is called is known."""
+        return self._named is not None
 
     def require_fresh(self, status: InverterStatus) -> None:
         """
@@ -302,6 +326,8 @@ class DriveState:
         before = self.status
         if before is None or status.at >= before.at:
             self.status = status
+            if not self.unnamed:
+                self._named = None
             self._intervals.append(status.at - before.at if before else 0.0)
             self._note_fault(before)
         return status
@@ -464,8 +490,13 @@ class DriveState:
         Where no register tells it ([C58]), it is what the settings expect.
         """
         key = self.model.key(Role.CONTROL_MODE)
-        if self.params.reaches(key):
+        if self.params.reaches(key) and not self.params.by_mailbox(key):
             mode = str(await self.params.read(key, priority, retry=retry))
+        elif self.params.reaches(key) and (priority is Priority.SERVICE or not self.control_mode):
+            # never by a poll: a PLC takes its time
+            mode = str(await self.params.read(key, priority, retry=False))
+        elif self.params.reaches(key):
+            return self.control_mode
         else:
             mode = self.settings.expected_control_mode or next(iter(self.model.profile.setpoints))
         unit = _UNITS.get(mode, '')

@@ -63,6 +63,11 @@ class ErrorLog:
         return self._params.protocol in self._state.model.error_logs
 
     @property
+    def reached(self) -> bool:
+        """It can be read just now."""
+        return self.documented and self._params.reaches_space(self.area.space)
+
+    @property
     def timed(self) -> bool:
         """It is documented, and tells when an error happened."""
         return self.documented and self.area.timed
@@ -258,7 +263,7 @@ class ErrorLogMonitor:
 
         Where entries have no time, nothing tells a new one from the same fault before.
         """
-        if not self._error_log.timed:
+        if not self._error_log.timed or not self._error_log.reached:
             return
         self._known = None
         self._looked_at = self._told_at = -math.inf

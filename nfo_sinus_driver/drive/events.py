@@ -64,6 +64,7 @@ class Cause(enum.Enum):
         'this drive has no {names}, which control_method {method} needs: {call.set_method} '
         '({others})'
     )
+    NO_MAILBOX = 'parameters, error log and the names of faults are not reached: {why}'
     UNEXPECTED_IDENTITY = (
         'this drive says that it is a {model}; no {title} says anything: {call.set_model}'
     )

@@ -17,7 +17,7 @@ from nfo_sinus_driver.drive.events import Cause, Report, Severity
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.scales import Scales
 from nfo_sinus_driver.drive.settings import DriveSettings
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.link import LinkError, PortError, Refused
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,8 @@ class Nameplate:
         self._report = report
         self.identity: Identity | None = None
         self.is_older = False
+        #: Why no parameters are reached behind a PLC, as reported; ``''``: they are.
+        self._mailbox_trouble = ''
         self.scales = Scales(params, self.has, settings.scales)
 
     async def identify(self, *, retry: bool = True) -> Identity:
@@ -91,6 +93,7 @@ class Nameplate:
         priority = Priority.SERVICE if retry else Priority.POLL
         await self._params.read(self._model.key_of_status, priority, retry=retry)
         await self._params.find_lacking()
+        await self._find_mailbox()
         dialect = self._dialect
         before, was_older = self.identity, self.is_older
         self._be_older(dialect is not None and self._settings.classic_dialect == dialect.name)
@@ -122,6 +125,26 @@ class Nameplate:
             self._be_older(dialect is not None and firmware < dialect.before)
             self.identity = Identity(firmware, int(motor))
         return self.identity
+
+    async def _find_mailbox(self) -> None:
+        """Find out whether parameters are reached behind a PLC; it goes on without them."""
+        key = self._model.key(Role.TELEGRAM)
+        if not key or self._settings.method == 'monitor':
+            # who only watches writes no request either
+            return
+        trouble = ''
+        try:
+            await self._params.read(key, Priority.SERVICE, retry=False)
+        except PortError:
+            raise
+        except LinkError as error:
+            trouble = str(error)
+            if trouble != self._mailbox_trouble:
+                absent = isinstance(error, Refused) and error.code == Refused.ILLEGAL_ADDRESS
+                severity = Severity.INFO if absent else Severity.WARNING
+                self._report(severity, Report(Cause.NO_MAILBOX, why=trouble))
+        self._mailbox_trouble = trouble
+        self._params.use_mailbox(not trouble)
 
     def _be_older(self, older: bool) -> None:
         """Take the firmware for one of the older dialect, or not."""

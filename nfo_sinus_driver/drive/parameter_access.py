@@ -12,6 +12,7 @@ from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Role, Value
 from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.link import (
+    MAILBOX,
     Address,
     DamagedAnswer,
     Identification,
@@ -77,6 +78,8 @@ class ParameterAccess:
         #: They stand in the registers of a PLC.
         self.in_block = self.protocol != bus.protocol.addressing
         self._block = block_address if self.in_block else None
+        #: The PLC has a mailbox by which parameters of the drive are reached.
+        self._has_mailbox = False
         reads = (model.key(role) for role in _RESYNC_READS if role in model.roles)
         bus.use_resync_reads(unit, tuple(self.address(key) for key in reads))
 
@@ -131,7 +134,21 @@ class ParameterAccess:
     def reaches(self, key: str) -> bool:
         """Tell whether the drive has a parameter and it can be reached over this line."""
         there = key in self.model and self.protocol in self.model[key].addresses
-        return there and key not in self._lacking
+        if not there or key in self._lacking:
+            return False
+        return self.reaches_space(self.model[key].at(self.protocol).space)
+
+    def reaches_space(self, space: str) -> bool:
+        """Tell whether what stands in a space of addresses can be reached over this line."""
+        return space != MAILBOX or not self.in_block or self._has_mailbox
+
+    def by_mailbox(self, key: str) -> bool:
+        """Tell whether a parameter is reached by the mailbox of a PLC, which takes its time."""
+        return self.in_block and self.model[key].at(self.protocol).space == MAILBOX
+
+    def use_mailbox(self, has_mailbox: bool) -> None:
+        """Take note of whether parameters are reached by the mailbox of the PLC."""
+        self._has_mailbox = has_mailbox
 
     async def find_lacking(self) -> None:
         """Find out which parameters this drive lacks of those that not every drive has."""
@@ -229,6 +246,7 @@ class ParameterAccess:
 
     async def read_from(self, address: Address, priority: Priority, *, retry: bool = True) -> bytes:
         """Read what stands at an address."""
+        address = address._replace(block=self._block)
         return (await self._ask(address, priority, None, retry)).data
 
     def is_odd(self, key: str) -> bool:

@@ -44,6 +44,8 @@ _log = logging.getLogger(__name__)
 #: How long one round of reading every parameter again takes at least, s: a change at the keypad
 #: is seen within 10 s, and a fast line is not kept busy for nothing.
 _ROUND = 9.8
+#: How often at most one is read by the mailbox of a PLC, s: it has other work.
+_MAILBOX_PACE = 0.5
 #: How often it is looked whether there is something to read, s.
 _WAIT = 0.5
 #: When progress is logged first while the parameters are read for the first time, s; then each time
@@ -272,6 +274,8 @@ class Parameters:
                     state.missed()
             # many drives on a line take their time, so that other things go on, too
             pace = _ROUND * sharers() / len(due)
+            if self._params.by_mailbox(key):
+                pace = max(pace, _MAILBOX_PACE)
             await self._bus.sleep(started + number * pace - self._bus.now())
             if keys is not self._keys:
                 # they are read anew

@@ -76,6 +76,8 @@ class StartSequence:
         require_no_fault(state, status)
         control_mode = await state.read_control_mode()
         expected = state.settings.expected_control_mode
+        if state.params.in_block and control_mode not in state.model.profile.setpoints:
+            expected = expected or next(iter(state.model.profile.setpoints))
         if expected and control_mode != expected:
             key = state.model.key(Role.CONTROL_MODE)
             raise DriveError(

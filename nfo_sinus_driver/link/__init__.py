@@ -4,6 +4,7 @@
 """Bytes on one line, one transaction at a time. No ROS, no knowledge of drives or parameters."""
 
 from nfo_sinus_driver.link.interface import (
+    MAILBOX,
     Address,
     Clock,
     Connecting,
@@ -37,6 +38,7 @@ from nfo_sinus_driver.link.reconnect import Reconnect
 __all__ = [
     'ADDRESSES',
     'BIT_RATES',
+    'MAILBOX',
     'PROTOCOLS',
     'Address',
     'BusSettings',

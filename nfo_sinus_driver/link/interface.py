@@ -25,6 +25,10 @@ _CHECK = (
 Clock = Callable[[], float]
 
 
+#: The space of addresses that count in PNUs: of parameters that a PLC asks a drive for.
+MAILBOX = 'pnu'
+
+
 class Address(NamedTuple):
     """
     Where a parameter stands on a line; only the link looks inside.

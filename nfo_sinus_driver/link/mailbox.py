@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import enum
 import struct
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, NoReturn, TypeVar
 
 from nfo_sinus_driver.link.interface import (
     Address,
@@ -39,14 +39,14 @@ from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write, WriteAndRead
 
 _T = TypeVar('_T')
 
-#: The space of addresses that count in PNUs.
-SPACE = 'pnu'
 #: The first register of a mailbox in its block.
 FIRST = 16
 #: How long an answer is waited for, s.
 TIME = 1.0
 #: How often the mailbox is looked at meanwhile, s.
 _PERIOD = 0.02
+#: Who waits for a turn asks again within this time, s.
+_WAITS_FOR = 0.2
 #: So long an order that was given up is not taken for another one that is the same, s.
 _REMEMBERED = 1.0
 
@@ -55,15 +55,13 @@ _REQUEST = struct.Struct('>3HL')
 _READ, _WRITE = 1, 2
 #: What +25 says.
 _DONE, _REFUSED, _NONE_SUCH, _BUSY, _NO_ACCESS = range(5)
-#: The error numbers of PROFIdrive that mean what an exception code of Modbus means.
+#: The error numbers of PROFIdrive that mean what an exception code of Modbus means: it can only be
+#: read, and this value cannot be.
 _CODES = {
-    0x01: (Refused.ILLEGAL_FUNCTION, 'the parameter can only be read'),
-    0x02: (Refused.ILLEGAL_VALUE, 'the drive does not accept this value'),
-    0x0B: (Refused.DEVICE_FAILURE, 'the drive does not let the PLC change parameters'),
-    0x11: (Refused.DEVICE_FAILURE, 'the drive cannot do this in its present state'),
-    0x14: (Refused.ILLEGAL_VALUE, 'the drive does not accept this value'),
+    0x01: Refused.ILLEGAL_FUNCTION,
+    0x02: Refused.ILLEGAL_VALUE,
+    0x14: Refused.ILLEGAL_VALUE,
 }
-_ANY = Refused.DEVICE_FAILURE, 'the drive refused'
 
 Ask = Callable[[Request[_T]], tuple[_T, float]]
 
@@ -174,12 +172,15 @@ class Mailbox:
         self._pending: _Pending | None = None
         #: A write that was given up while another request was wanted.
         self._unconfirmed: _Pending | None = None
+        #: What waits for its turn, in order, and when it was last asked for.
+        self._waiting: dict[_Wanted, float] = {}
         #: Function 23 was refused.
         self._apart = False
 
     def forget(self) -> None:
         """Take note that the connection is another one."""
         self._pending = self._unconfirmed = None
+        self._waiting.clear()
 
     def access(self, address: Address, data: bytes | None = None) -> Reply:
         """
@@ -210,15 +211,28 @@ class Mailbox:
         if pending is not None and now <= pending.until:
             if pending.wanted == wanted:
                 return pending
-            raise NotReady(min(now + _PERIOD, pending.until + _PERIOD))
+            self._wait(wanted, now)
         for late in (pending, self._unconfirmed):
             if late and late.wanted == wanted and now <= late.until + _REMEMBERED and late.number:
                 self.forget()
                 raise self._unanswered(wanted)
+        if self._first_waiting(now) not in (None, wanted):
+            self._wait(wanted, now)
+        self._waiting.pop(wanted, None)
         if pending is not None and pending.number and pending.wanted.writes:
             self._unconfirmed = pending
         self._pending = _Pending(wanted, now + TIME)
         return self._pending
+
+    def _wait(self, wanted: _Wanted, now: float) -> NoReturn:
+        self._waiting[wanted] = now
+        raise NotReady(now + _PERIOD)
+
+    def _first_waiting(self, now: float) -> _Wanted | None:
+        """Return what has waited longest, and still does."""
+        waiting = self._waiting.items()
+        self._waiting = {one: at for one, at in waiting if now - at <= _WAITS_FOR}
+        return next(iter(self._waiting), None)
 
     def _step(self, pending: _Pending) -> _Shown | None:
         """Do the next step; return what the mailbox shows then, once the number was written."""
@@ -245,7 +259,7 @@ class Mailbox:
             pending.stage = _Stage.ASK
             raise InProgress(self._now())
         if shown.answered != pending.number:
-            raise InProgress(min(self._now() + _PERIOD, pending.until + _PERIOD))
+            raise InProgress(self._now() + _PERIOD)
         self._pending = None
         if shown.result != _DONE:
             raise self._refused(wanted, shown)
@@ -279,8 +293,9 @@ class Mailbox:
         if shown.result == _NONE_SUCH:
             return Refused(Refused.ILLEGAL_ADDRESS, f'the drive has no {wanted.place}')
         if shown.result == _REFUSED:
-            code, text = _CODES.get(shown.error, _ANY)
-            return Refused(code, f'{text} ({wanted.place}, PROFIdrive error {shown.error:02X}h)')
+            code = _CODES.get(shown.error, Refused.DEVICE_FAILURE)
+            place, number = wanted.place, shown.error
+            return Refused(code, f'the drive refused {place} (PROFIdrive error {number:02X}h)')
         return NoPath(
             f'the PLC does not reach {wanted.place} of the drive (register +25 of its block is '
             f'{shown.result}): check the fieldbus, and FB_RosParameter in the program of the PLC'

@@ -27,8 +27,8 @@ from collections.abc import Callable
 import struct
 from typing import TypeVar
 
-from nfo_sinus_driver.link import mailbox
 from nfo_sinus_driver.link.interface import (
+    MAILBOX,
     Address,
     Clock,
     InProgress,
@@ -61,10 +61,8 @@ NEXT = 3
 CLEAR = 4
 #: The set-point alone; refused where no STW1 stands.
 SETPOINT = 5
-#: To be read: the layout of the block, whatever else stands in it.
-LAYOUT = 6
-#: What a longer telegram tells, three words from here on; refused where it is not shown.
-MORE = 7
+#: To be read: what a longer telegram tells, three words from here on; refused where none is shown.
+MORE = 6
 
 #: Without a new count from us for so long the PLC stops the drive, s.
 PLC_TIME = 1.0
@@ -153,26 +151,29 @@ class Block:
         The actual value is that of the status that was read just before: the two are of one
         telegram, and the PLC is not asked twice.
         """
-        if address.space == mailbox.SPACE:
+        if address.space == MAILBOX:
             return self._access(address)
-        beside, self._beside = self._beside, None
-        if address.sub_index is not None and address.sub_index >= LAYOUT:
-            beside = self._last
-        elif address.sub_index != ACTUAL:
-            beside = None
-        if beside is not None:
-            shared, at = beside
-            if self._now() - at <= _SHARED_FOR:
-                return Reply(self._part(shared[0], address), shared[1], requests=0)
+        shared = self._shared_with(address)
+        if shared is not None:
+            return Reply(self._part(shared[0], address), shared[1], requests=0)
         shown, arrived = self._exchange()
         reply = Reply(self._part(shown, address), arrived)
         if address.sub_index == STATUS:
             self._beside = (shown, arrived), self._now()
         return reply
 
+    def _shared_with(self, address: Address) -> _Shown | None:
+        """Return what was read just before, and has this part of the same telegram."""
+        beside, self._beside = self._beside, None
+        part = address.sub_index
+        shared = self._last if part is not None and part >= MORE else beside
+        if shared is None or part == STATUS or self._now() - shared[1] > _SHARED_FOR:
+            return None
+        return shared[0]
+
     def write(self, address: Address, data: bytes) -> Reply:
         """Write a part of it."""
-        if address.space == mailbox.SPACE:
+        if address.space == MAILBOX:
             return self._access(address, data)
         _, arrived = self._exchange((address, data))
         return Reply(b'', arrived)
@@ -198,10 +199,8 @@ class Block:
         return self._mailbox.access(address, data)
 
     def _part(self, shown: tuple[int, ...], address: Address) -> bytes:
-        word, actual, _, flags, layout = shown[:5]
+        word, actual, _, flags = shown[:4]
         part = address.sub_index
-        if part == LAYOUT:
-            return _word(layout)
         if not flags & _VALID:
             raise NoData(
                 f'the PLC has no valid data from the drive (bit 0 of register {self._start + 3} of '

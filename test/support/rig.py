@@ -56,6 +56,7 @@ class Way:
     :ivar parameters: of the simulated drive, other than factory.
     :ivar hertz: what a set-point is that turns the motor with 1 Hz.
     :ivar closed: the terminals that start it.
+    :ivar plc: how the PLC between is programmed.
     """
 
     protocol: str
@@ -67,6 +68,7 @@ class Way:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     hertz: float = 1.0
     closed: tuple[int, ...] = ()
+    plc: Mapping[str, Any] = field(default_factory=dict)
 
 
 _OLD = {'classic_dialect': 'v5.0'}
@@ -110,6 +112,7 @@ WAYS: Mapping[str, Way] = {
         'telegram1', method='telegram1', options=_DRIVECONTROL, driver=_DRIVECONTROL
     ),
     'telegram1 sinus_h': Way('telegram1', 'sinus_h', 'telegram1'),
+    'telegram1 g2, mailbox': Way('telegram1', method='telegram1', plc={'layout': 2}),
 }
 
 
@@ -198,6 +201,9 @@ class Rig:
         self.way = way = WAYS[way] if isinstance(way, str) else way
         self.clock = Clock()
         quick = ramps(way.model, 0.3, 0.3)
+        line = dict(line or {})
+        if way.plc:
+            line['plc'] = {**way.plc, **line.get('plc', {})}
         if way.protocol == 'canopen':
             settings = {'setpoint_timeout': 0.0, **settings}
         self.line = Line(
@@ -207,7 +213,7 @@ class Rig:
             range(1, drives + 1),
             settings={**quick, **way.parameters, **(parameters or {})},
             options={**hardest(way.model), **way.options, **(options or {})},
-            **(line or {}),
+            **line,
         )
         self.line.passed = self._passed
         self.fars = self.line.drives
@@ -448,7 +454,7 @@ class Rig:
     def _places(self, drive: Drive) -> dict[tuple[Any, ...], str]:
         params, keys = drive.params, {}
         for key in params.model:
-            if params.reaches(key):
+            if params.protocol in params.model[key].addresses:
                 for part in self.link.parts(params.address(key)):
                     keys.setdefault(part[:3], key)
         return keys

@@ -39,7 +39,7 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
         data = bytes.fromhex(frame['hex'])
         # what was lost on its way was written nowhere
         unheard = frame['direction'] == 'request' and frame.get('note') == 'lost'
-        if len(data) < 8 or data[6] != unit or unheard:
+        if len(data) < 8 or data[6] != unit or unheard or _of_mailbox(frame, data, start):
             continue
         number, function = data[:2], data[7]
         if frame['direction'] == 'request':
@@ -55,7 +55,8 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
             }.get(function, 0)
             assert at or function in (3, 43, 17), f'function {function} at a block'
             written = Exchange(*struct.unpack_from('>3H', data, at), zsw1, flags) if at else None
-            asked = {number: (function in (3, 23) and words == (start, 5), written)}
+            reads = function in (3, 23) and words in ((start, 5), (start, 8))
+            asked = {number: (reads, written)}
         elif number in asked:
             reads, written = asked.pop(number)
             if function & 0x80:
@@ -67,6 +68,50 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
                 # a PLC that has just started shows nothing yet
                 if version:
                     zsw1, flags = told, told_flags
+
+
+#: The registers of the mailbox in a block.
+_MAILBOX = range(16, 28)
+#: MODE, SCMD, DriveControl with its mask, ProfidriveControl and the set-points of a G2
+#: [M0 tables 9, 10]: commands, which are the telegram's.
+COMMANDS = frozenset((1034, 1035, 1018, 1017, 1003, 1020, 1124, 1127, 1129))
+
+
+def _of_mailbox(frame: Mapping[str, Any], data: bytes, start: int) -> bool:
+    """Tell whether a request is to the mailbox alone; its answer is asked for by nothing else."""
+    if frame['direction'] != 'request' or data[7] not in (3, 16, 23):
+        return False
+    return struct.unpack_from('>H', data, 8)[0] - start in _MAILBOX
+
+
+def mailbox_complaints(
+    frames: Iterable[Mapping[str, Any]], unit: int = 1, start: int = 0
+) -> Iterator[str]:
+    """Yield what is wrong with what was written to the mailbox of a block."""
+    asked = b''
+    given: set[int] = set()
+    for frame in frames:
+        data = bytes.fromhex(frame['hex'])
+        if len(data) < 8 or data[6] != unit or not _of_mailbox(frame, data, start):
+            continue
+        at = {16: 8, 23: 12}.get(data[7])
+        if at is None:
+            continue
+        register, count = struct.unpack_from('>HH', data, at)
+        written = data[at + 5 :]
+        place = register - start
+        if (place, count) == (17, 5):
+            asked, given = written, set()
+            command, pnu = struct.unpack_from('>HH', asked)
+            if command == 2 and pnu in COMMANDS:
+                yield f'PNU {pnu} is a command, and was written by the mailbox'
+            continue
+        if (place, count) != (16, 1):
+            yield f'{count} registers were written from +{place} on'
+            continue
+        given.add(int.from_bytes(written, 'big'))
+        if not asked or 0 in given or len(given) > 1:
+            yield f'request {asked.hex()} has the numbers {sorted(given)}'
 
 
 def words(frames: Iterable[Mapping[str, Any]], unit: int = 1) -> list[int]:
@@ -214,4 +259,6 @@ def violations(
 ) -> list[str]:
     """Return what is wrong with all that was written to the block of a unit."""
     judge = JUDGES[model]()
-    return [wrong for one in exchanges(frames, unit, start) for wrong in judge.complaints(one)]
+    frames = list(frames)
+    found = [wrong for one in exchanges(frames, unit, start) for wrong in judge.complaints(one)]
+    return [*found, *mailbox_complaints(frames, unit, start)]

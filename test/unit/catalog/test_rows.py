@@ -403,7 +403,9 @@ def test_the_same_thing_has_the_same_key_on_g2_and_optimal() -> None:
 
 def test_roles() -> None:
     # pole pairs follow from its nominal values, and no setting of it is a keypad's control
-    assert set(Role) - set(G2.roles) == {Role.POLE_PAIRS, Role.LOCAL_OPERATION}
+    own = {Role.POLE_PAIRS, Role.LOCAL_OPERATION}
+    # behind a PLC
+    assert set(Role) - set(G2.roles) == own | {Role.TELEGRAM, Role.FAULT_CODE}
     assert set(G2.roles) > set(OPTIMAL.roles)
     assert G2.key(Role.ACTUAL_SPEED) == 'status.spd_act'
     assert G2.key(Role.COMMUNICATION_TIMEOUT) == 'serial.sio_tot'

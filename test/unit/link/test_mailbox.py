@@ -171,8 +171,8 @@ def test_its_number_is_none_that_stands_there(plc: Plc, block: telegram.Block) -
 @pytest.mark.parametrize(
     ('result', 'error', 'code', 'text'),
     [
-        (1, 2, Refused.ILLEGAL_VALUE, r'does not accept this value \(PNU 1028.1, PROFIdrive err'),
-        (1, 0x11, Refused.DEVICE_FAILURE, 'in its present state'),
+        (1, 2, Refused.ILLEGAL_VALUE, r'refused PNU 1028.1 \(PROFIdrive error 02h\)'),
+        (1, 0x11, Refused.DEVICE_FAILURE, 'error 11h'),
         (1, 0x65, Refused.DEVICE_FAILURE, 'error 65h'),
         (2, 0, Refused.ILLEGAL_ADDRESS, 'the drive has no PNU 1028.1'),
         (3, 0, Refused.BUSY, 'busy'),

@@ -138,6 +138,9 @@ PROFILE = Profile(
     setpoints=method.setpoints(150.0),
     in_charge=method.in_charge,
     writes_and_reads=True,
+    mailbox='profibus',
+    # it decides what a set-point means
+    start_settings=frozenset({'control.mode'}),
     # a tenth above what a set-point may be, for a motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 165.0},
     # those of SpdSet and SpdAct, by the factory's SpdScl ([M0 §6.3 table 9, §8.3.2], [M2 table 2])

@@ -1,0 +1,63 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which fault or alarm a drive has whose status word only says that there is one."""
+
+from __future__ import annotations
+
+import math
+
+from nfo_sinus_driver.bus import Priority, Task
+from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.drive.drive_state import DriveState
+from nfo_sinus_driver.link import LinkError
+
+#: How often it is looked whether there is one to be named, s.
+_WAIT = 0.1
+#: How often it is asked for in vain, and how often again, for another one may have come, s.
+_RETRY_PERIOD = 0.5
+_PERIOD = 2.0
+
+
+class FaultNamer:
+    """
+    Reads what a fault or an alarm is called, beside the polls; used on the bus alone.
+
+    The status is judged before that: a fault without a name stops the motor, too.
+    """
+
+    def __init__(self, state: DriveState) -> None:
+        self._state = state
+        self._task: Task | None = None
+
+    def begin(self) -> None:
+        """Name what comes from now on, where the model has a parameter for that."""
+        if self._state.model.key(Role.FAULT_CODE):
+            self._task = self._state.bus.spawn(self._name_repeatedly())
+
+    def end(self) -> None:
+        """Leave the drive alone."""
+        self._state.bus.cancel(self._task)
+
+    async def _name_repeatedly(self) -> None:
+        state, read_at = self._state, -math.inf
+        while True:
+            now = state.bus.now()
+            if not state.unnamed:
+                read_at = -math.inf
+            elif now - read_at > (_PERIOD if state.named else _RETRY_PERIOD):
+                read_at = now
+                await self._name(state.unnamed)
+            await state.bus.sleep(_WAIT)
+
+    async def _name(self, unnamed: int) -> None:
+        state, key = self._state, self._state.model.key(Role.FAULT_CODE)
+        if not state.params.reaches(key):
+            return
+        try:
+            code = await state.params.read_number(key, Priority.POLL, retry=False)
+        except LinkError:
+            # the poll reports it if the drive is lost
+            return
+        if state.unnamed == unnamed:
+            state.name(unnamed, int(code))

@@ -1,0 +1,239 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A drive behind a PLC whose blocks have a mailbox: settings, faults, error log, losses."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import pytest
+from support.rig import Rig
+from support.said import raises
+from support.telegram_laws import COMMANDS, words
+
+from nfo_sinus_driver.catalog import Access, load_family
+from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.simulator.memory import Reason, Refused
+
+G2 = 'telegram1 g2, mailbox'
+ACCEL = 'control.accel'
+
+
+def plc(way: str = G2, **setting: Any) -> Rig:
+    """Return a drive behind a PLC that is programmed so."""
+    return Rig(way, line={'plc': setting, 'response_timeout': 0.2})
+
+
+# --- settings -------------------------------------------------------------------------------------
+
+
+def test_settings_of_a_g2_are_those_that_it_has_over_modbus() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        values = rig.drive.parameters.values
+        over_modbus = load_family('sinus_g2')
+        reached = {one.key for one in over_modbus.settings if 'profibus' in one.addresses}
+        assert set(values) == reached
+        for key, value in values.items():
+            assert value == rig.far.peek(key), key
+            assert type(value) is over_modbus[key].kind or over_modbus[key].kind is float, key
+        assert str(rig.drive.identity).startswith('firmware 4.38')
+
+
+def test_a_setting_is_written_and_read_back() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        rig.answer(rig.drive.parameters.change({ACCEL: 7.5, 'pi_reg.t_min': -12}))
+        assert rig.far.peek(ACCEL) == 7.5 and rig.far.peek('pi_reg.t_min') == -12
+        assert rig.far.writes[ACCEL] == rig.far.writes['pi_reg.t_min'] == 1
+        assert rig.drive.parameters.values[ACCEL] == 7.5
+
+
+def test_a_refusal_has_the_reason_of_the_drive() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        channel = rig.line.plc.channels[1].server.parameters
+
+        def refuse(raw: int) -> None:
+            raise Refused(Reason.STATE, 'not now')
+
+        channel.entries[1028, 1] = dataclasses.replace(channel.entries[1028, 1], write=refuse)
+        with raises(Cause.NOT_CHANGED):
+            rig.result(rig.drive.parameters.change({ACCEL: 9.0}))
+        said = rig.answer(rig.drive.parameters.change({ACCEL: 9.0}))
+        assert 'refused PNU 1028.1 (PROFIdrive error 11h)' in said
+
+
+def test_what_only_a_standing_motor_allows_is_refused_while_it_turns() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        rig.send(20.0)
+        rig.pass_time(1.5)
+        with raises(Cause.NOT_CHANGED):
+            rig.result(rig.drive.parameters.change({'motor.f_nom': 60}))
+        # it decides what a set-point means
+        with raises(Cause.NOT_CHANGED):
+            rig.result(rig.drive.parameters.change({'control.mode': 'Speed'}))
+        assert rig.turns
+
+
+def test_a_drive_in_a_mode_without_set_points_of_the_telegram_is_not_enabled() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        rig.answer(rig.drive.parameters.change({'control.mode': 'Torque'}))
+        with raises(Cause.WRONG_CONTROL_MODE):
+            rig.result(rig.drive.enable())
+        rig.answer(rig.drive.parameters.change({'control.mode': 'Freque'}))
+        rig.enable()
+
+
+def test_no_command_can_be_reached_by_the_mailbox() -> None:
+    model = load_family('sinus_g2', 'telegram1')
+    written = {
+        one.at('telegram1').index
+        for one in model.values()
+        if one.at('telegram1').space == 'pnu' and one.access is not Access.READ
+    }
+    assert len(written) > 100 and not COMMANDS & written
+
+
+# --- faults and the error log ---------------------------------------------------------------------
+
+
+def test_a_fault_stops_the_motor_at_once_and_is_named_with_its_remedy() -> None:
+    with Rig(G2) as rig:
+        rig.turn()
+        rig.far.trip(3)
+        rig.wait_until(lambda: rig.notes.said('191 Fault'), 0.3)
+        assert not rig.drive.following
+        rig.wait_until(lambda: rig.drive.snapshot.text == 'Temp Hi', 1.5)
+        shown = rig.drive.snapshot
+        assert 'check fan' in shown.remedy and shown.requires_ack
+        assert rig.far.faults, 'it is not acknowledged by that'
+        assert rig.notes.said('fault 3 Temp Hi', Severity.ERROR)
+        assert 'acknowledged 3 Temp Hi' in rig.answer(rig.drive.acknowledge())
+        rig.pass_time(0.5)
+        assert rig.drive.snapshot.text != 'Temp Hi'
+        # the next one is another
+        rig.far.trip(5)
+        rig.wait_until(lambda: rig.notes.said('fault 5 '), 2.0)
+
+
+def test_the_error_log_is_read_and_watched() -> None:
+    with Rig(G2) as rig:
+        rig.connect()
+        for code in (3, 5):
+            rig.far.trip(code)
+            rig.pass_time(2.0)
+            rig.acknowledged += 1
+            rig.answer(rig.drive.acknowledge())
+        entries = rig.result(rig.drive.error_log())
+        assert [entry.code for entry in entries[:2]] == [5, 3]
+        assert rig.notes.said('error log: 5 ')
+
+
+# --- what it does not have ------------------------------------------------------------------------
+
+
+def test_layout_1_goes_on_and_says_what_it_lacks() -> None:
+    with Rig('telegram1 g2') as rig:
+        rig.connect(parameters=True)
+        assert rig.notes.said(Cause.NO_MAILBOX, Severity.INFO)
+        assert rig.notes.said('layout 1, which has no mailbox')
+        assert not rig.drive.parameters.values
+        rig.enable()
+        rig.far.trip(3)
+        rig.pass_time(3.0)
+        assert rig.drive.snapshot.status.code == 191
+
+
+def test_a_plc_without_access_to_parameters_is_no_reason_not_to_connect() -> None:
+    rig = Rig(G2)
+    rig.line.plc.channels[1].server.parameters = None
+    with rig:
+        rig.connect(parameters=True)
+        assert rig.notes.said(Cause.NO_MAILBOX, Severity.WARNING)
+        assert rig.notes.said('FB_RosParameter')
+        rig.enable()
+        rig.send(20.0)
+        rig.pass_time(1.5)
+        assert rig.turns
+
+
+# --- nothing waits for it -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('apart', [False, True])
+def test_stop_and_polls_wait_for_no_answer_of_the_mailbox(apart: bool) -> None:
+    with plc(access_time=0.02, write_and_read=not apart) as rig:
+        rig.turn()
+        rig.line.plc.channels[1].records._seconds = 30.0
+        pending = rig.drive.parameters.change({ACCEL: 9.0})
+        rig.pass_time(0.3)
+        polls = len(rig.notes.snapshots)
+        rig.pass_time(0.5)
+        assert len(rig.notes.snapshots) - polls >= 8
+        began = rig.clock.now
+        answer = rig.answer(rig.drive.stop())
+        assert 'stop' in answer and rig.clock.now - began < 0.5
+        assert not rig.turns
+        with raises(Cause.NOT_CHANGED):
+            rig.result(pending)
+
+
+def test_life_counter_goes_on_while_settings_are_read() -> None:
+    with Rig(G2) as rig:
+        rig.turn()
+        reading = rig.drive.parameters.read()
+        rig.wait_until(reading.done)
+        assert rig.turns and rig.drive.following
+
+
+@pytest.mark.parametrize('outage', [0.1, 0.6, 3.0])
+@pytest.mark.parametrize('at', range(6))
+def test_a_line_cut_in_the_middle_of_a_request_loses_nothing_and_blocks_no_stop(
+    at: int, outage: float
+) -> None:
+    with Rig(G2, line={'response_timeout': 0.2}) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        rig.send(20.0)
+        rig.pass_time(1.5)
+        asked = rig.drive.parameters.change({ACCEL: 9.0})
+        before = len(rig.line.frames)
+
+        def cut() -> bool:
+            return requests_to_mailbox(rig, before) > at or asked.done()
+
+        rig.wait_until(cut)
+        rig.line.state = 'silent'
+        rig.pass_time(outage)
+        stopped = rig.drive.stop()
+        rig.pass_time(0.1)
+        rig.line.mend()
+        rig.answer(stopped)
+        rig.wait_until(lambda: not rig.far.motor.driven, 3.0)
+        rig.wait_until(asked.done)
+        # the drive has one of the two, and the driver knows which
+        rig.wait_until(lambda: rig.drive.state.connected)
+        assert rig.far.writes[ACCEL] <= 2
+        rig.wait_until(lambda: rig.drive.parameters.values[ACCEL] == rig.far.peek(ACCEL), 90.0)
+        rig.answer(rig.drive.parameters.change({ACCEL: 11.0}))
+        assert rig.far.peek(ACCEL) == 11.0
+
+
+def requests_to_mailbox(rig: Rig, since: int) -> int:
+    """Return how many requests were sent to the mailbox."""
+    sent = [one for one in list(rig.line.frames)[since:] if one['direction'] == 'request']
+    data = [bytes.fromhex(one['hex']) for one in sent]
+    return sum(int.from_bytes(one[8:10], 'big') >= 16 for one in data)
+
+
+def test_what_the_mailbox_asks_writes_no_word_to_the_drive() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        rig.pass_time(2.0)
+        assert not words(rig.line.frames)
