@@ -23,7 +23,7 @@ _N = TypeVar('_N', int, float)
 SETTINGS = {**settings_of(BusSettings), **settings_of(DriveSettings)}
 LINE_AND_DRIVE = (
     'port', 'protocol', 'address', 'model', 'family', 'baud_rate', 'char_format',
-    'response_timeout', 'retries',
+    'response_timeout', 'retries', 'control_method', 'block_address', 'telegram_words',
 )
 DEFAULTS = {name: SETTINGS[name].default for name in LINE_AND_DRIVE}
 #: What is as short as it can be for each of 247 addresses.

@@ -96,7 +96,7 @@ class _Run:
         self._control = control
         self._options = options
         self._drive = control.command(
-            control_method=options.method,
+            control_method=options.method or options.control_method,
             reference=options.reference,
             expected_control_mode=options.control_mode,
             drive_timeout=options.drive_timeout,

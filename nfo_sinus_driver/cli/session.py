@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Collection, Coroutine, Mapping
+from dataclasses import replace
 import math
 import time
 from typing import Any, TypeVar
@@ -113,7 +114,7 @@ class OfflineDrive(EventListener):
 
     def on_event(self, event: Event) -> None:
         """Report what an operator has to know."""
-        if event.severity is not Severity.INFO:
+        if event.severity is not Severity.INFO or event.report.cause is Cause.NO_MAILBOX:
             remark(say(event.report))
 
     def on_parameters(self, keys: Collection[str]) -> None:
@@ -184,8 +185,14 @@ class Session:
             'address': address,
             'model': options.model,
             'family': options.family,
-            'control_method': '' if self._writes else MONITOR,
+            'control_method': options.control_method,
+            'block_address': options.block_address,
+            'telegram_words': options.telegram_words,
             'retries': options.retries,
             'allow_communication_changes': getattr(options, 'allow_communication_changes', False),
         }
-        return DriveSettings(**{**usual, **others})
+        settings = DriveSettings(**{**usual, **others})
+        # a PLC is sent a request for each parameter that is read
+        if self._writes or settings.method_class.addressing:
+            return settings
+        return replace(settings, control_method=MONITOR)

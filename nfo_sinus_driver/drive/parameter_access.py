@@ -131,10 +131,13 @@ class ParameterAccess:
         """Return what the drive means by bytes."""
         return self._parameter(key).decode(data, self.protocol)
 
+    def is_addressable(self, key: str) -> bool:
+        """Tell whether the tables say where a parameter stands on this line."""
+        return key in self.model and self.protocol in self.model[key].addresses
+
     def reaches(self, key: str) -> bool:
         """Tell whether the drive has a parameter and it can be reached over this line."""
-        there = key in self.model and self.protocol in self.model[key].addresses
-        if not there or key in self._lacking:
+        if not self.is_addressable(key) or key in self._lacking:
             return False
         return self.reaches_space(self.model[key].at(self.protocol).space)
 

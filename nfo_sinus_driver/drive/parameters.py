@@ -166,7 +166,7 @@ class Parameters:
 
     def reaches(self, key: str) -> bool:
         """Tell whether a parameter can be reached over this line."""
-        return self._params.reaches(key)
+        return self._params.is_addressable(key)
 
     def available(self, only: Collection[str] | None = None) -> list[str]:
         """Return what the drive should keep, all settings or some of it, in its order."""

@@ -1,0 +1,82 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The command with drives behind a PLC: settings and the error log by its mailbox."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import json
+from pathlib import Path
+
+from cli_bench import Bench, Done, MakeBench
+import pytest
+
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.cli import session
+from nfo_sinus_driver.simulator.plc import PlcSetting
+
+Nfo = Callable[..., Done]
+QUICK = PlcSetting(layout=2, cycle=0.002, exchange=0.004, access_time=0.002)
+OVER_MODBUS = {
+    one.key for one in load_family('sinus_g2').settings if 'profibus' in one.addresses
+}
+
+
+def behind_plc(make_bench: MakeBench, plc: PlcSetting) -> Bench:
+    bench = make_bench(protocol='telegram1', plc=plc)
+    options = [one.replace('telegram1', 'modbus_tcp') for one in bench.options]
+    bench.options = (*options, '--control-method', 'telegram1')
+    return bench
+
+
+@pytest.fixture
+def bench(make_bench: MakeBench, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    # this PLC has no other work
+    monkeypatch.setattr(session, 'Bus', lambda link, most_requests: Bus(link))
+    return behind_plc(make_bench, QUICK)
+
+
+def test_settings_are_listed_read_set_dumped_and_loaded(
+    nfo: Nfo, bench: Bench, tmp_path: Path
+) -> None:
+    done = nfo('list', '--json')
+    assert done.status == 0, done.err
+    listed = json.loads(done.out)
+    assert listed.keys() == OVER_MODBUS
+    assert listed['control.accel']['value'] == bench.value('control.accel')
+    assert 'kW' in nfo('get', 'motor.p_nom').out
+    done = nfo('set', 'control.accel=7.5', 'control.st_mode=Release')
+    assert done.status == 0, done.err
+    assert (bench.value('control.accel'), bench.value('control.st_mode')) == (7.5, 'Release')
+    path = tmp_path / 'dump.yaml'
+    done = nfo('dump', path)
+    assert done.status == 0, done.err
+    bench.set('control.accel', 1.0)
+    done = nfo('load', path)
+    assert done.status == 0 and 'one parameter' not in done.out, done.err
+    assert bench.value('control.accel') == 7.5
+    assert nfo('diff', path).status == 0
+
+
+def test_a_fault_is_named_and_the_error_log_is_shown(nfo: Nfo, bench: Bench) -> None:
+    with bench.simulator.lock:
+        bench.drive().trip(3)
+    done = nfo('errors')
+    assert done.status == 0 and 'Temp Hi' in done.out, done.err
+    assert nfo('get', 'profidrive.fault_number').out.split()[-1] == '3'
+
+
+def test_layout_1_says_what_it_lacks(make_bench: MakeBench, nfo: Nfo, bench: Bench) -> None:
+    other = behind_plc(make_bench, PlcSetting())
+    done = nfo(*other.options, 'get', 'control.accel')
+    assert done.status == 1 and 'layout 1, which has no mailbox' in done.err
+    assert nfo(*other.options, 'list').out == ''
+
+
+def test_no_word_is_written_to_the_drive(nfo: Nfo, bench: Bench) -> None:
+    nfo('set', 'control.accel=7.5')
+    with bench.simulator.lock:
+        assert bench.simulator.plc is not None
+        assert bench.simulator.plc.channels[1].block.ros_life == 0
