@@ -54,7 +54,7 @@ How to read the tables:
 - **Option**: the option cards of which the drive needs one for it.
 - **Stopped**: it can only be written while the motor stands.
 - **Modbus** is the first holding register, counted from 0, **Classic** the parameter's id (two: the
-  low word first), **PROFIBUS** its parameter number, **CANopen** its index.
+  low word first), **PROFIBUS** its parameter number (PNU), on PROFINET, too, **CANopen** its index.
 - A **type** with bits behind it, such as `[0:23]`: only these bits count, on one of the buses.
 - **From** is the first firmware that has it; empty: all have it.
 
@@ -78,7 +78,7 @@ inverter status above it. Code 0 ends the log.
 """
 _UNTIMED = """\
 The codes of the last faults, the newest first, without a time; what the drive measured at that
-moment is shown with them. Code 0 ends the log.
+moment, where it keeps that, is shown with them. Code 0 ends the log.
 """
 _LOG_HEAD = """
 | bus | first entry | next entry | entries |
@@ -147,6 +147,8 @@ def _family(family: Family, taken: list[str]) -> Iterator[str]:
 def _log_row(area: ErrorLogArea) -> str:
     bus, first, following = _printed(area.space)
     entries = f'{area.entries}' + (f' to {area.limit}' if area.limit > area.entries else '')
+    if area.sub_stride is not None:
+        following = f'{area.sub_stride} sub-indices on'
     return f'| {bus} | {first.format(area.first)} | {following.format(area.stride)} | {entries} |\n'
 
 

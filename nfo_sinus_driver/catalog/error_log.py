@@ -35,6 +35,9 @@ class ErrorLogArea:
     :ivar stride: from an entry to the next older one.
     :ivar entries: how many every drive has.
     :ivar limit: how many some drives have; beyond ``entries`` stop at code 0 or a refusal [C4].
+    :ivar sub_stride: from the sub-index of an entry to that of the next older one, which all stand
+        at :attr:`first`; the newest is the fault that is active, and empty while none is. ``None``:
+        entries have no sub-index.
     :ivar elsewhere: where the newest entry stands if there is none at ``first``; ``None``: nowhere.
     :ivar codec: how the bytes of an entry are read.
     :ivar factor: of entries that are a code alone: the code of one raw count.
@@ -54,6 +57,7 @@ class ErrorLogArea:
     above: int | None = None
     readings: tuple[tuple[str, str], ...] = ()
     elsewhere: int | None = None
+    sub_stride: int | None = None
 
     @property
     def timed(self) -> bool:
@@ -93,4 +97,6 @@ class ErrorLogArea:
         index = self.address(entry)
         # on Classic the high word has the next id
         sub_index = index + 1 if self.space == 'id' else None
+        if self.sub_stride is not None:
+            sub_index = self.sub_stride * entry
         return self.space, index, sub_index, self.codec.size

@@ -542,4 +542,5 @@ def _area(row: table.Row) -> ErrorLogArea:
         above=table.number(row.get('above', '')),
         readings=tuple(_readings(row.get('readings', ''))),
         elsewhere=table.number(row.get('elsewhere', '')),
+        sub_stride=table.number(row.get('sub_stride', '')),
     )

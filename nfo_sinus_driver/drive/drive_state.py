@@ -31,7 +31,7 @@ from nfo_sinus_driver.drive.identity import Nameplate
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED, Listener, Measured
-from nfo_sinus_driver.link import Refused, Reply
+from nfo_sinus_driver.link import LinkError, PortError, Refused, Reply
 
 _log = logging.getLogger(__name__)
 
@@ -490,22 +490,31 @@ class DriveState:
         Where no register tells it ([C58]), it is what the settings expect.
         """
         key = self.model.key(Role.CONTROL_MODE)
-        if self.params.reaches(key) and not self.params.by_mailbox(key):
-            mode = str(await self.params.read(key, priority, retry=retry))
-        elif self.params.reaches(key) and (priority is Priority.SERVICE or not self.control_mode):
-            # never by a poll: a PLC takes its time
-            mode = str(await self.params.read(key, priority, retry=False))
-        elif self.params.reaches(key):
-            return self.control_mode
+        expected = self.settings.expected_control_mode or next(iter(self.model.profile.setpoints))
+        if not self.params.reaches(key):
+            mode = expected
+        elif self.params.by_mailbox(key):
+            mode = await self._read_mode_by_mailbox(key, priority, self.control_mode or expected)
         else:
-            mode = self.settings.expected_control_mode or next(iter(self.model.profile.setpoints))
+            mode = str(await self.params.read(key, priority, retry=retry))
         unit = _UNITS.get(mode, '')
-        if mode == 'PI-Reg':
+        if mode == 'PI-Reg' and not self.params.in_block:
             key = self.model.key(Role.PROCESS_UNIT)
             unit = str(await self.params.read(key, priority, retry=retry))
         # both at once: neither is published without the other
         self.control_mode, self.unit = mode, unit
         return mode
+
+    async def _read_mode_by_mailbox(self, key: str, priority: Priority, known: str) -> str:
+        """Read it where a PLC takes its time: by no poll, and it is not insisted on."""
+        if priority is not Priority.SERVICE:
+            return known
+        try:
+            return str(await self.params.read(key, priority, retry=False))
+        except PortError:
+            raise
+        except LinkError:
+            return known
 
     async def coasts_to_stop(self) -> bool:
         """Tell whether an ordinary stop releases the motor [C97], as far as the drive tells."""

@@ -178,7 +178,7 @@ class ErrorLog:
         for _ in range(_READINGS):
             entries = await self._read_down(area, limit, known, priority)
             # an entry that came in meanwhile has moved the others
-            if not entries or await self._entry(0, priority) == entries[0]:
+            if not entries or await self._read_down(area, 1, 0, priority) == entries[:1]:
                 return entries
         raise DriveError(Cause.LOG_CHANGES)
 
@@ -187,16 +187,21 @@ class ErrorLog:
     ) -> list[int]:
         """Read entries until one is empty or known, or until there are no more."""
         found: list[int] = []
-        while len(found) < limit:
+        for number in range(area.limit):
             try:
-                entry = await self._entry(len(found), priority)
+                entry = await self._entry(number, priority)
             except Refused:
-                if len(found) < area.entries:
+                if number < area.entries:
                     raise
                 break
+            if area.sub_stride and not number and not area.code(entry):
+                # no fault is active
+                continue
             if not area.code(entry) or entry == known:
                 break
             found.append(entry)
+            if len(found) == limit:
+                break
         return found
 
     async def _entry(self, number: int, priority: Priority) -> int:

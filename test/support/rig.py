@@ -113,6 +113,13 @@ WAYS: Mapping[str, Way] = {
     ),
     'telegram1 sinus_h': Way('telegram1', 'sinus_h', 'telegram1'),
     'telegram1 g2, mailbox': Way('telegram1', method='telegram1', plc={'layout': 2}),
+    'telegram1 sinus_h, mailbox': Way(
+        'telegram1',
+        'sinus_h',
+        'telegram1',
+        parameters={'com.opt_para_13': 'Vendor Specific Telegram'},
+        plc={'layout': 2, 'longer_telegram': True},
+    ),
 }
 
 

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The settings and trips of a Sinus H at its keypad, by the groups and numbers of [M3 §4, §9].
+The settings of a Sinus H at its keypad, by the groups and numbers of [M3 §4].
 
-No telegram reaches them, and none tells which trip it is. What [M3] does not print is marked; the
-maker's manual of the drive has it, but its defaults are not known here.
+No telegram reaches them. What [M3] does not print is marked; the maker's manual of the drive has
+it, but its defaults are not known here.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from nfo_sinus_driver.catalog import Access, Family, Kind, Parameter, StatusCode, Value
+from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
 from nfo_sinus_driver.catalog.codec import codec_of
 from nfo_sinus_driver.catalog.parameter import Address
 
@@ -84,45 +84,8 @@ FACTORY: Mapping[str, Value] = {
     LOST_CMD_TIME: 1.0,
 }
 
-#: By their fault messages. The bit positions behind them are not printed [C69].
+#: The fault message of a trip that the drive makes itself [M3 §9].
 LOST_COMMAND = 35
-_TRIPS: Mapping[int, str] = {
-    1: 'Overload Trip',
-    2: 'Underload Trip',
-    3: 'Inverter Overload Trip',
-    4: 'E-Thermal Trip',
-    5: 'Ground Fault Trip',
-    6: 'Missing Output Phase Trip',
-    7: 'Missing Input Phase Trip',
-    10: 'NTC Trip',
-    11: 'Overcurrent Trip',
-    12: 'Overvoltage Trip',
-    13: 'External Trip',
-    14: 'Arm Short',
-    15: 'Overheat Trip',
-    16: 'Fuse Open Trip',
-    17: 'MC Fail Trip',
-    19: 'PTC (Thermal sensor) Trip',
-    20: 'FAN Trip',
-    22: 'Parameter Write Error',
-    23: 'Pre PID Fail',
-    24: 'IO Board Connection Fault',
-    25: 'External Brake Trip',
-    26: 'No Motor Trip',
-    27: 'Option Card Connection Fault',
-    29: 'Safety A Trip',
-    30: 'Safety B Trip',
-    33: 'BX',
-    34: 'LV',
-    LOST_COMMAND: 'Lost Command',
-    36: 'Keypad Lost Command',
-    49: 'ADC Error',
-    50: 'EEPROM Error',
-    51: 'Watchdog-1 Error',
-    52: 'Watchdog-2 Error',
-    54: 'QueueFull',
-    64: 'Internal Communication Error between the Inverter and the Option Card',
-}
 
 
 def _setting(
@@ -189,13 +152,5 @@ _SETTINGS = (
 
 
 def with_keypad(model: Family) -> Family:
-    """Return the tables of the family with the settings and the trips that its keypad shows."""
-    trips = {
-        number: StatusCode(number, name, kind=Kind.FAULT, requires_ack=True, description=name)
-        for number, name in _TRIPS.items()
-    }
-    return replace(
-        model,
-        parameters={**model, **{setting.key: setting for setting in _SETTINGS}},
-        status_codes={**model.status_codes, **trips},
-    )
+    """Return the tables of the family with the settings that its keypad shows."""
+    return replace(model, parameters={**model, **{one.key: one for one in _SETTINGS}})

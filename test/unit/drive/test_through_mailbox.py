@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import pytest
@@ -13,11 +14,11 @@ from support.rig import Rig
 from support.said import raises
 from support.telegram_laws import COMMANDS, words
 
-from nfo_sinus_driver.catalog import Access, load_family
+from nfo_sinus_driver.catalog import Access, Role, load_family
 from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 
-G2 = 'telegram1 g2, mailbox'
+G2, SINUS_H = 'telegram1 g2, mailbox', 'telegram1 sinus_h, mailbox'
 ACCEL = 'control.accel'
 
 
@@ -133,6 +134,41 @@ def test_the_error_log_is_read_and_watched() -> None:
         entries = rig.result(rig.drive.error_log())
         assert [entry.code for entry in entries[:2]] == [5, 3]
         assert rig.notes.said('error log: 5 ')
+
+
+@pytest.mark.parametrize(('code', 'text', 'remedy'), [
+    (11, 'Overcurrent Trip', 'Lengthen the acceleration time'),
+    (35, 'Lost Command', 'Check the PLC'),
+    (64, 'Internal Comm Error', 'seat of the module'),
+])
+def test_a_trip_of_a_sinus_h_is_named_with_its_remedy(code: int, text: str, remedy: str) -> None:
+    with Rig(SINUS_H) as rig:
+        rig.turn()
+        rig.far.trip(code)
+        rig.wait_until(lambda: rig.drive.snapshot.text == text, 1.5)
+        assert remedy in rig.drive.snapshot.remedy
+        assert [one.code for one in rig.result(rig.drive.error_log())] == [code]
+        assert f'acknowledged {code} {text}' in rig.answer(rig.drive.acknowledge())
+        # the present situation is empty now, and the one before it is the newest entry
+        rig.pass_time(0.5)
+        assert [one.code for one in rig.result(rig.drive.error_log())] == [code]
+        assert rig.result(rig.drive.error_log(1))[0].code == code
+
+
+def test_torque_and_current_of_a_sinus_h_come_with_its_longer_telegram() -> None:
+    with Rig(SINUS_H) as rig:
+        rig.turn()
+        rig.far.motor.load = 0.5
+        rig.pass_time(2.0)
+        measured = rig.notes.telemetry[-1].values
+        motor = rig.far.motor
+        assert measured[Role.ACTUAL_TORQUE] == pytest.approx(100 * motor.torque, abs=1.0)
+        assert measured[Role.OUTPUT_CURRENT] == pytest.approx(motor.current, abs=0.2)
+        assert rig.result(rig.drive.measure('profidrive.telegram')) == 'Vendor specific telegram'
+    with Rig('telegram1 sinus_h') as rig:
+        rig.turn()
+        rig.pass_time(2.0)
+        assert math.isnan(rig.notes.telemetry[-1].values[Role.ACTUAL_TORQUE])
 
 
 # --- what it does not have ------------------------------------------------------------------------
