@@ -112,6 +112,18 @@ def test_a_ride_and_what_ends_it(bench: Bench) -> None:
         turns(client, 20.0)
 
 
+@pytest.mark.parametrize('behind', ['sinus_g2'], indirect=True)
+def test_by_the_mailbox_settings_are_parameters_and_a_fault_has_its_name(bench: Bench) -> None:
+    unlimited = (*PATIENT, '-p', 'max_requests:=0.0')
+    drive, client = start(bench, '--layout', '2', settings=unlimited)
+    assert len([name for name in client.parameter_names() if name.startswith('motor.')]) > 5
+    assert client.set_parameters(**{'control.accel': 1.5}).successful
+    assert drive.wait_for(lambda state: state['parameters']['control.accel'] == 1.5)
+    drive.inject('fault', 3)
+    client.wait_for('inv_st', lambda shown: shown.code == 3 and 'fan' in shown.remedy, 'its name')
+    assert 'Temp Hi' in client.call('fault_ack').message
+
+
 @pytest.mark.parametrize('behind', ['sinus_optimal', 'sinus_g2'], indirect=True)
 def test_in_speed_mode_the_speed_is_published(bench: Bench) -> None:
     in_speed = ('-p', 'expected_control_mode:=Speed', '-p', 'nominal_speed:=1500')
