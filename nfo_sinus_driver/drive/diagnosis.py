@@ -17,16 +17,19 @@ from nfo_sinus_driver.link import (
     GatewaySilent,
     Interrupted,
     LinkError,
+    MailboxSilent,
     NoAnswer,
     NoData,
     NoPath,
     PortError,
     Refused,
+    Unconfirmed,
 )
 
 #: What is wrong is not the drive, nor the settings of its line.
 _SAYS_WHAT_TO_DO = (
-    PortError, Refused, GatewaySilent, GatewayLate, GatewayFault, NoPath, NoData, Interrupted
+    PortError, Refused, GatewaySilent, GatewayLate, GatewayFault, NoPath, NoData, Interrupted,
+    MailboxSilent, Unconfirmed,
 )
 
 

@@ -380,8 +380,12 @@ class Interrupted(LinkError):
     """What is between has stopped the drive, for it was not reached for longer than its time."""
 
 
+class MailboxSilent(NoAnswer):
+    """A PLC did not answer what was asked by its mailbox; the message says what to do."""
+
+
 class Unconfirmed(LinkError):
-    """Whether the drive has taken a write is not known, and it may not be repeated."""
+    """The same of a write: whether the drive has taken it is not known, nor is it repeated."""
 
     maybe_done = True
 

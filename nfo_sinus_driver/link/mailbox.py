@@ -27,7 +27,7 @@ from nfo_sinus_driver.link.interface import (
     Clock,
     InProgress,
     LinkError,
-    NoAnswer,
+    MailboxSilent,
     NoPath,
     NotReady,
     PortError,
@@ -188,7 +188,7 @@ class Mailbox:
 
         :raises InProgress: there are more.
         :raises NotReady: another request is under way.
-        :raises NoAnswer: a read was given up.
+        :raises MailboxSilent: a read was given up.
         :raises Unconfirmed: a write was given up.
         :raises Refused: the drive refused, or has no such parameter; BUSY: nothing was done.
         :raises NoPath: the PLC does not reach the parameters of the drive.
@@ -198,7 +198,7 @@ class Mailbox:
             shown = self._step(pending)
         except LinkError as error:
             error.maybe_done = pending.wanted.writes and pending.stage is not _Stage.PREPARE
-            if isinstance(error, PortError):
+            if isinstance(error, (PortError, Refused, NoPath)):
                 self._pending = None
             raise
         if shown is None:
@@ -317,7 +317,7 @@ class Mailbox:
 
     @staticmethod
     def _lost(wanted: _Wanted, text: str) -> LinkError:
-        return Unconfirmed(text) if wanted.writes else NoAnswer(text)
+        return Unconfirmed(text) if wanted.writes else MailboxSilent(text)
 
     def _of_registers(self, refusal: Refused) -> LinkError:
         if refusal.code != Refused.ILLEGAL_ADDRESS:
