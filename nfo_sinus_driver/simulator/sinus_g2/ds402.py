@@ -11,6 +11,7 @@ controls the generic state machine [M0 §7], whose bits 0 to 7 are the same.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+import math
 
 from nfo_sinus_driver.families.sinus_g2.words import Control, Status
 from nfo_sinus_driver.simulator.faults import Faults
@@ -118,6 +119,9 @@ class DriveProfile:
         if self._mode == _TORQUE:
             return self._memory.number('fieldbus.target_torque') / 100
         target = self._memory.number('fieldbus.vl_target_velocity')
+        least = self._memory.number('fieldbus.vl_velocity_min_amount')
+        most = self._memory.number('fieldbus.vl_velocity_max_amount')
+        target = math.copysign(min(max(abs(target), least), most), target)
         return target * self._factor * self._motor.plate.pole_pairs / 60
 
     def _counts(self, frequency: float) -> float:

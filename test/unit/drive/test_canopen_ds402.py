@@ -160,14 +160,34 @@ def test_torque_is_a_mode_of_operation_and_the_process_is_none(way: str) -> None
         assert not rig.turns and not rig.drive.following
 
 
-def test_a_set_point_that_is_not_in_rpm_is_refused() -> None:
-    factor = {'fieldbus.vl_dimension_factor_numerator': 2}
-    with Rig('canopen, ds402', parameters=factor) as rig:
+@pytest.mark.parametrize(
+    ('key', 'value', 'why'),
+    [
+        ('dimension_factor_numerator', 2, 'vl dimension factor (object 604Ch) is 2/1'),
+        ('velocity_min_amount', 300, 'vl velocity min amount (object 6046h) is 300 rpm'),
+    ],
+)
+def test_what_makes_a_set_point_mean_something_else_is_refused(
+    key: str, value: int, why: str
+) -> None:
+    with Rig('canopen, ds402', parameters={f'fieldbus.vl_{key}': value}) as rig:
         rig.connect()
         begun = len(rig.line.frames)
-        answer = rig.answer(rig.drive.enable())
-        assert 'vl dimension factor (object 604Ch) is 2/1' in answer
+        assert why in rig.answer(rig.drive.enable())
         assert written(rig, begun) == [] and not rig.drive.following
+
+
+def test_a_module_without_mode_is_commanded_all_the_same() -> None:
+    with Rig('canopen, ds402') as rig:
+        del rig.far.servers['canopen']._entries[0x2022, 0]
+        rig.turn()
+        assert 'stop' in rig.answer(rig.drive.stop())
+        rig.far.trip(OVERVOLTAGE)
+        rig.pass_time(1.0)
+        assert 'acknowledged' in rig.answer(rig.drive.acknowledge())
+        rig.assert_only_enable_helps()
+        assert 'the bus keeps control' in rig.answer(rig.drive.disconnect(4.0))
+        assert not rig.turns
 
 
 @every_shape

@@ -86,6 +86,11 @@ def test_control_is_taken_without_a_run_command_and_not_while_it_tunes() -> None
         play(METHOD.take_control(), (Read(MODE), INHIBIT))
     holders = (Holder.INHIBITED, Holder.NOBODY, Holder.LOCAL, Holder.BUS)
     assert [play(METHOD.holder(), (Read(MODE), mode)) for mode in range(4)] == list(holders)
+    # a module that has no MODE
+    absent = (Read(MODE), REFUSED)
+    assert play(METHOD.holder(), absent, FROM_BUS) is Holder.BUS
+    assert play(METHOD.holder(), absent, LOCAL) is Holder.UNKNOWN
+    play(METHOD.release(), FROM_BUS, (TO_NOBODY, REFUSED))
 
 
 def test_each_step_of_a_run_waits_for_the_one_before() -> None:
@@ -143,8 +148,13 @@ def test_a_fault_is_acknowledged_by_the_edge_or_by_reading() -> None:
 
 def test_the_set_point_is_refused_where_it_does_not_mean_rpm() -> None:
     above, below = (f'fieldbus.vl_dimension_factor_{one}' for one in ('numerator', 'denominator'))
-    play(METHOD.require_startable(), (Read(above), 1), (Read(below), 1))
-    play(METHOD.require_startable(), (Read(above), REFUSED))
+    least = Read('fieldbus.vl_velocity_min_amount')
+    play(METHOD.require_startable(), (Read(above), 1), (Read(below), 1), (least, 0))
+    # without the objects there is neither a factor nor a limit
+    absent = ((Read(above), REFUSED), (Read(below), REFUSED), (least, REFUSED))
+    play(METHOD.require_startable(), *absent)
+    with pytest.raises(NotPossible, match=r'6046h\) is 30 rpm'):
+        play(METHOD.require_startable(), *absent[:2], (least, 30))
     with pytest.raises(NotPossible, match=r'604Ch\) is 1/10'):
         play(METHOD.require_startable(), (Read(above), 1), (Read(below), 10))
     with pytest.raises(NotPossible, match='6061h'):

@@ -141,6 +141,15 @@ def test_the_scale_of_the_target_is_the_dimension_factor() -> None:
     assert bus.drive.motor.frequency == pytest.approx(10.0, abs=0.1)
 
 
+def test_the_least_and_the_greatest_speed_hold_for_every_target() -> None:
+    bus = running()
+    for target, sub_index, limit, frequency in ((0, 1, 300, 10.0), (-600, 2, 450, -15.0)):
+        bus.write(TARGET, 0, word(target))
+        assert bus.write(0x6046, sub_index, limit.to_bytes(4, 'little')) == ''
+        bus.wait(2.0)
+        assert bus.drive.motor.frequency == pytest.approx(frequency, abs=0.1)
+
+
 def test_what_is_not_implemented_is_absent_and_the_words_of_the_state_machine_may_be() -> None:
     for index in ('766000', '876000'):
         assert Bus().sdo(f'40{index}00000000') == f'80{index}00000206'

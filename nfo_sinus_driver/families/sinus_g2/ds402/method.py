@@ -34,6 +34,7 @@ CONTROL_WORD = 'fieldbus.control_word'
 STATUS_WORD = 'fieldbus.status_word'
 _ERROR_CODE = 'fieldbus.error_code'
 _DIMENSION = 'fieldbus.vl_dimension_factor_'
+_LEAST = 'fieldbus.vl_velocity_min_amount'
 _MODE = 'fieldbus.mode'
 _INV_ST_WITH_ACK = 'fieldbus.inv_st_with_ack'
 
@@ -65,25 +66,30 @@ class Ds402(ControlMethod):
         return bool(int((yield Read(STATUS_WORD))) & words.Status.REMOTE)
 
     def holder(self) -> Steps[Holder]:
-        """Tell who has control of the drive."""
-        return HOLDERS.get((yield Read(_MODE)), Holder.UNKNOWN)
+        """Tell who has control of the drive; where it has no MODE, whether the bus has it."""
+        try:
+            return HOLDERS.get((yield Read(_MODE)), Holder.UNKNOWN)
+        except Refusal:
+            return Holder.BUS if (yield from self.in_control()) else Holder.UNKNOWN
 
     def require_startable(self) -> Steps[None]:
         """
-        See to it that the set-point means rpm.
+        See to it that a set-point means rpm, and that set-point 0 does not turn the motor.
 
-        :raises NotPossible: the drive multiplies it by something.
+        :raises NotPossible: the drive multiplies set-points, or has a least speed (CiA 402).
         """
-        try:
-            above = yield Read(f'{_DIMENSION}numerator')
-            below = yield Read(f'{_DIMENSION}denominator')
-        except Refusal:
-            # without the object there is no factor
-            return
+        above = yield from _read(f'{_DIMENSION}numerator', 1)
+        below = yield from _read(f'{_DIMENSION}denominator', 1)
         if above != below:
             raise NotPossible(
                 f'vl dimension factor (object 604Ch) is {above}/{below}, so that set-points do '
                 'not mean rpm: set it to 1/1'
+            )
+        least = yield from _read(_LEAST, 0)
+        if least:
+            raise NotPossible(
+                f'vl velocity min amount (object 6046h) is {least} rpm, so that the motor would '
+                'turn at set-point 0: set it to 0'
             )
 
     def take_control(self) -> Steps[None]:
@@ -94,7 +100,7 @@ class Ds402(ControlMethod):
 
         :raises NotPossible: it is tuning.
         """
-        if (yield Read(_MODE)) == Mode.INHIBIT:
+        if (yield from self.holder()) is Holder.INHIBITED:
             raise NotPossible('the drive lets no one take control now (MODE is Inhibit: tuning?)')
         if not (yield from self.in_control()):
             yield Write(_MODE, Mode.BUS)
@@ -144,9 +150,9 @@ class Ds402(ControlMethod):
         return (yield from taken(one(Write(_MODE, Mode.STOP)))) or obeyed
 
     def release(self) -> Steps[None]:
-        """Give control back by MODE = Stop, once the motor stands."""
+        """Give control back by MODE = Stop, if the drive takes it, once the motor stands."""
         if (yield from self.in_control()):
-            yield Write(_MODE, Mode.STOP)
+            yield from taken(one(Write(_MODE, Mode.STOP)))
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Switch off; where that is refused, MODE = Stop, and set-point 0."""
@@ -165,10 +171,10 @@ class Ds402(ControlMethod):
         A serial fault by MODE = Stop first [C99]. Where the control word is refused, or is not
         processed because the bus has no control, by reading the status that acknowledges.
         """
-        error = yield from self._error()
-        if Meaning.SERIAL_FAILURE in shown.meanings and (yield Read(_MODE)) != Mode.EXT:
-            with contextlib.suppress(Refusal):
-                yield Write(_MODE, Mode.STOP)
+        error = words.error_text((yield from _read(_ERROR_CODE, 0)))
+        serial = Meaning.SERIAL_FAILURE in shown.meanings
+        if serial and (yield from self.holder()) is not Holder.LOCAL:
+            yield from taken(one(Write(_MODE, Mode.STOP)))
         reset = yield from taken(self._reset_fault())
         if not (reset and (yield from self.perhaps_in_control())):
             yield from self._acknowledge_by_reading(control_mode)
@@ -198,9 +204,10 @@ class Ds402(ControlMethod):
         else:
             yield Acknowledge(_INV_ST_WITH_ACK)
 
-    @staticmethod
-    def _error() -> Steps[str]:
-        try:
-            return words.error_text(int((yield Read(_ERROR_CODE))))
-        except Refusal:
-            return ''
+
+def _read(key: str, otherwise: int) -> Steps[int]:
+    """Return the number of an object; another where the drive does not have it."""
+    try:
+        return int((yield Read(key)))
+    except Refusal:
+        return otherwise
