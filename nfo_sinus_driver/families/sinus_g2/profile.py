@@ -490,7 +490,7 @@ PROFILE = Profile(
     ),
     most=MOST,
     # a module with a drive profile need not have them [M0 §7]
-    may_lack={'canopen': (CONTROL_WORD, STATUS_WORD)},
+    may_lack={'canopen': DriveControl.needs},
     # before it code 1 is another format ([C3], [C5])
     uncertain={'serial.si_prot': 4.28},
     # [C93]

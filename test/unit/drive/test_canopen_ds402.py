@@ -213,12 +213,16 @@ def test_a_stop_that_is_refused_ends_in_mode_stop() -> None:
         assert not rig.turns and rig.written(MODE)[-1] == 1
 
 
-def test_without_status_word_it_is_refused_and_names_the_others() -> None:
+@pytest.mark.parametrize(
+    ('index', 'name'), [(0x6041, 'StatusWord'), (0x6061, 'Modes of operation display')]
+)
+def test_without_an_object_that_it_needs_it_is_refused_and_names_the_others(
+    index: int, name: str
+) -> None:
     rig = Rig('canopen, ds402')
-    server = rig.far.servers['canopen']
-    del server._entries[0x6041, 0]
+    del rig.far.servers['canopen']._entries[index, 0]
     answer = rig.answer(rig.drive.connect(retry=False))
-    assert 'this drive has no StatusWord, which control_method ds402 needs' in answer
+    assert f'this drive has no {name}, which control_method ds402 needs' in answer
     assert '(mode_scmd, drive_control)' in answer
     rig.close()
 

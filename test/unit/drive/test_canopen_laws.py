@@ -223,6 +223,17 @@ def test_without_drive_control_what_needs_it_is_refused_and_names_the_others(way
     rig.close()
 
 
+def test_what_is_only_watched_is_shown_by_the_inverter_status_alone() -> None:
+    alone = {'canopen_state_machine': 'absent'}
+    with Rig('canopen', options=alone, control_method='monitor') as rig:
+        rig.connect()
+        rig.far.trip(OVERLOAD)
+        rig.pass_time(0.5)
+        shown = rig.notes.snapshot
+        assert shown.status.word is None and shown.status.faulted
+        assert all(data is None for _, _, data in rig.asked)
+
+
 def test_a_drive_that_is_exchanged_has_what_it_has() -> None:
     with Rig('canopen') as rig:
         rig.connect()

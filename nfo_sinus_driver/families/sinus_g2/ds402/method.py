@@ -32,6 +32,7 @@ from nfo_sinus_driver.families.sinus_g2.words import HOLDERS, Mode
 
 CONTROL_WORD = 'fieldbus.control_word'
 STATUS_WORD = 'fieldbus.status_word'
+MODE_OF_OPERATION = 'fieldbus.modes_of_operation_display'
 _ERROR_CODE = 'fieldbus.error_code'
 _DIMENSION = 'fieldbus.vl_dimension_factor_'
 _LEAST = 'fieldbus.vl_velocity_min_amount'
@@ -59,7 +60,7 @@ class Ds402(ControlMethod):
     coasts = True
     older = False
     addressing: ClassVar[str] = 'canopen'
-    needs = (CONTROL_WORD, STATUS_WORD)
+    needs = (CONTROL_WORD, STATUS_WORD, MODE_OF_OPERATION)
 
     def in_control(self) -> Steps[bool]:
         """Tell whether the bus has control of the drive, from us or from whom was here before."""

@@ -9,21 +9,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nfo_sinus_driver.families.sinus_g2 import profile
-from nfo_sinus_driver.families.sinus_g2.ds402.method import (
-    CONTROL_WORD,
-    SETPOINTS,
-    STATUS_WORD,
-)
-from nfo_sinus_driver.families.sinus_g2.ds402.words import STATUS_WORD as WORD
+from nfo_sinus_driver.families.sinus_g2.ds402.method import SETPOINTS, Ds402
+from nfo_sinus_driver.families.sinus_g2.ds402.words import STATUS_WORD
 
 PROFILE = replace(
     profile.PROFILE,
-    status_word=WORD,
+    status_word=STATUS_WORD,
     setpoints=SETPOINTS,
     measured=(
         *(target.key for target in SETPOINTS.values()),
         'fieldbus.vl_velocity_demand',
         'status.reg_act',
     ),
-    may_lack={'canopen': (CONTROL_WORD, STATUS_WORD)},
+    may_lack={'canopen': Ds402.needs},
 )
