@@ -319,8 +319,7 @@ class ControlMethod(abc.ABC):
     :cvar means: what takes its commands.
     :cvar references: those that there are.
     :cvar coasts: it can release the motor at once.
-    :cvar quick_stop_by: the setting of the drive that a quick stop goes by, where it may be a ramp;
-        ``''``: it releases the motor.
+    :cvar quick_stop_by: the setting by which a quick stop may be a ramp; ``''``: the motor coasts.
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
     :cvar needs: parameters without which a drive cannot be commanded by it.
     :cvar procedures: what begins each procedure that it has.
@@ -328,12 +327,10 @@ class ControlMethod(abc.ABC):
     :cvar setpoints: where its set-points go, likewise.
     :cvar addressing: how it reaches the parameters of its tables, where that is another way than
         that of the line; ``''``: that of the line.
-    :cvar plc_time: who is between stops the drive after so long without a word of ours, s; 0:
-        there is no PLC between.
+    :cvar plc_time: after so long without a word of ours a PLC stops the drive, s; 0: there is none.
     :cvar caution: what of the drive itself decides whether it stops when the line is gone, and
         cannot be read; ``''``: nothing.
-    :cvar control_retained: why :meth:`release` leaves control to the bus, and how a person gets it
-        back; ``''`` where it does not.
+    :cvar control_retained: why :meth:`release` leaves control to the bus; ``''``: it does not.
     """
 
     means: ClassVar[str]
@@ -537,29 +534,23 @@ class Profile:
     :ivar older: its firmware that lacks parameters.
     :ivar most: beyond which size a measured value is none of this drive, by its role.
     :ivar uncertain: what codes mean differs in firmware before this, by parameter.
-    :ivar may_lack: parameters that not every drive has, by the protocol; what lacks is found out
-        whenever it is connected.
+    :ivar may_lack: parameters that not every drive has, by the protocol; looked for at connect.
     :ivar mailbox: behind a PLC with a mailbox for parameters, the protocol by which the tables of
         the family say where each of them is; ``''``: they do not.
-    :ivar words: behind a PLC that can map either of several sets of words, the profile of each, by
-        its name; this one is the first.
+    :ivar words: the profile of each set of words that a PLC can map, by name; this is the first.
     :ivar speed_mode: how it means its values in Speed mode, where it does not tell the mode and
         has no parameters of their own for it; ``None``: it is otherwise, or has none.
     :ivar start_settings: what :meth:`ControlMethod.require_startable` depends on: none of these
         settings changes while the motor is enabled.
     :ivar line_check: what to look at, in this order, while a drive of it has never answered, by the
         protocol; where one is not there, what the protocol says itself.
-    :ivar measured: the measured values that matter beside the telemetry: the usual ones of
-        ``~/measured``.
-    :ivar line: how its line leaves the factory, where its manual says it: ``baud_rate``,
-        ``char_format`` and ``address``.
+    :ivar measured: the usual ones of ``~/measured``: what matters beside the telemetry.
+    :ivar line: of the factory, by its manual: ``baud_rate``, ``char_format``, ``address``.
     :ivar refusals: what exception codes mean that say something of their own; by the code.
     :ivar busy: exception codes by which it says that it may take the request the next moment.
-    :ivar stops_at_timeout: the value of the parameter that has the role ``stop_at_timeout`` by
-        which the motor stops.
+    :ivar stops_at_timeout: by this value of the role ``stop_at_timeout`` the motor stops.
     :ivar after_write: what makes settings take effect that were written, or keeps them.
-    :ivar holds_control: why the bus gets control as soon as anybody asks anything, and keeps it, by
-        the protocol over which that is so.
+    :ivar holds_control: why the first request gives the bus control for good, by the protocol.
     """
 
     title: str
