@@ -33,7 +33,7 @@ class ModbusLink(ABC):
 
     def parts(self, address: Address) -> tuple[Address, ...]:
         """Return the whole; where the first register stands apart, it and then the others."""
-        if address.sub_index is None:
+        if address.sub_index is None or address.block is not None:
             return (address,)
         first = address._replace(sub_index=None, size=2)
         return first, first._replace(index=address.sub_index, size=address.size - 2)
