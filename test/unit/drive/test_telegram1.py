@@ -81,7 +81,7 @@ def test_status_and_direction_are_those_of_the_motor(way: str) -> None:
                 assert (Fact.REVERSE in status.facts) == (turns < 0)
         assert rig.notes.said('set-point -15 is limited to 0') == (way == SINUS_H)
         assert math.isnan(rig.drive.snapshot.speed)
-        lacks = 'layout 1, which has no mailbox' if way == G2 else 'not documented'
+        lacks = 'not documented' if way == OPTIMAL else 'layout 1, which has no mailbox'
         assert lacks in rig.answer(rig.drive.error_log())
 
 

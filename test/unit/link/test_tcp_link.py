@@ -385,7 +385,7 @@ def test_words_that_let_a_motor_run_are_forgotten_with_a_mute_connection(
     )
     hasty._response_timeout = PATIENCE
     for part in (telegram.BEGIN, telegram.NEXT):
-        place = Address(telegram.ADDRESSING, 100, part, 4)
+        place = Address(telegram.ADDRESSING, 0, part, 4, block=100)
         hasty.write(1, place, packed(0x47F, 0))
     assert gateway.requests[-1][1][1] == 23
     # beside the mute one
