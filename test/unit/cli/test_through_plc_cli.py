@@ -24,8 +24,8 @@ OVER_MODBUS = {
 }
 
 
-def behind_plc(make_bench: MakeBench, plc: PlcSetting) -> Bench:
-    bench = make_bench(protocol='telegram1', plc=plc)
+def behind_plc(make_bench: MakeBench, plc: PlcSetting, **options: str) -> Bench:
+    bench = make_bench(protocol='telegram1', plc=plc, **options)
     options = [one.replace('telegram1', 'modbus_tcp') for one in bench.options]
     bench.options = (*options, '--control-method', 'telegram1')
     return bench
@@ -66,6 +66,21 @@ def test_a_fault_is_named_and_the_error_log_is_shown(nfo: Nfo, bench: Bench) -> 
     done = nfo('errors')
     assert done.status == 0 and 'Temp Hi' in done.out, done.err
     assert nfo('get', 'profidrive.fault_number').out.split()[-1] == '3'
+
+
+def test_trips_of_a_sinus_h_are_shown_by_name(
+    make_bench: MakeBench, nfo: Nfo, bench: Bench
+) -> None:
+    other = behind_plc(make_bench, QUICK, model='sinus_h')
+    with other.simulator.lock:
+        for code in (11, 12):
+            other.drive().trip(code)
+            other.drive().faults.acknowledge()
+    done = nfo(*other.options, 'errors')
+    assert [line.split()[2] for line in done.out.splitlines()] == ['Overvoltage', 'Overcurrent']
+    done = nfo(*other.options, 'get', 'profidrive.telegram', 'profidrive.manufacturer')
+    assert 'Standard telegram' in done.out and '849' in done.out
+    assert 'no settings are known' in nfo(*other.options, 'list').err
 
 
 def test_layout_1_says_what_it_lacks(make_bench: MakeBench, nfo: Nfo, bench: Bench) -> None:
