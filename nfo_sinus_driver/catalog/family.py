@@ -23,6 +23,7 @@ from pathlib import Path
 from nfo_sinus_driver.catalog import table
 from nfo_sinus_driver.catalog.codec import Number, codec_of
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
+from nfo_sinus_driver.catalog.own_parameters import own_parameter
 from nfo_sinus_driver.catalog.parameter import Access, Address, Parameter, Value
 from nfo_sinus_driver.catalog.profile import Profile, SetpointTarget
 from nfo_sinus_driver.catalog.status import Kind, Meaning, Role, StatusCode
@@ -229,7 +230,11 @@ def load_profile(name: str, method: str = '') -> Profile:
 
 
 def load_family(
-    name: str, method: str = '', words: str = '', nominal_speed: float = 0.0
+    name: str,
+    method: str = '',
+    words: str = '',
+    nominal_speed: float = 0.0,
+    own: tuple[str, ...] = (),
 ) -> Family:
     """
     Read and check the tables of one drive family.
@@ -238,13 +243,32 @@ def load_family(
     :param words: which of the ``words`` of its profile a PLC maps; ``''``: the first.
     :param nominal_speed: of a motor in Speed mode, rpm, where the profile has a ``speed_mode``; 0:
         it is in another one.
-    :raises ValueError: there is no such family; the message lists those there are.
+    :param own: parameters that a user names, where the profile has ``own_addresses``.
+    :raises ValueError: there is no such family; the message lists those there are. Or one of the
+        user's parameters cannot be.
     :raises CatalogError: a table contradicts itself, or another one.
     """
     # the same tables for all the methods that share them
     family = _read_family(name, method if _has_profile(name, method) else '')
     family = _speaking(family, words, method)
+    family = _with_own(family, own) if own else family
     return _in_speed_mode(family, nominal_speed) if nominal_speed else family
+
+
+@functools.cache
+def _with_own(family: Family, texts: tuple[str, ...]) -> Family:
+    """Return a family with the parameters that a user names, too."""
+    places = family.profile.own_addresses
+    if places is None:
+        raise ValueError(f'no manual says how a {family.name} is reached by addresses')
+    addressing = next(iter(family.profile.methods.values())).addressing
+    parameters = dict(family.parameters)
+    for text in texts:
+        own = own_parameter(text, addressing, places)
+        if own.key in parameters:
+            raise ValueError(f'{text!r}: there is a {own.key} already')
+        parameters[own.key] = own
+    return replace(family, parameters=parameters)
 
 
 @functools.cache

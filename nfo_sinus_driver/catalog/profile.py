@@ -21,6 +21,7 @@ from fractions import Fraction
 import math
 from typing import Any, ClassVar, Protocol, TypeVar
 
+from nfo_sinus_driver.catalog.own_parameters import OwnAddresses
 from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.status import Role, State, StatusCode, StatusWord
 
@@ -537,6 +538,7 @@ class Profile:
     :ivar may_lack: parameters that not every drive has, by the protocol; looked for at connect.
     :ivar mailbox: behind a PLC with a mailbox for parameters, the protocol by which the tables of
         the family say where each of them is; ``''``: they do not.
+    :ivar own_addresses: the parameters that a user may name; ``None``: there are none such.
     :ivar words: the profile of each set of words that a PLC can map, by name; this is the first.
     :ivar speed_mode: how it means its values in Speed mode, where it does not tell the mode and
         has no parameters of their own for it; ``None``: it is otherwise, or has none.
@@ -575,6 +577,7 @@ class Profile:
     holds_control: Mapping[str, str] = field(default_factory=dict)
     measured: tuple[str, ...] = ()
     mailbox: str = ''
+    own_addresses: OwnAddresses | None = None
     words: Mapping[str, Profile] = field(default_factory=dict)
     speed_mode: SpeedMode | None = None
     line: Mapping[str, int | str] = field(default_factory=dict)

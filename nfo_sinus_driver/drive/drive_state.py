@@ -50,6 +50,7 @@ _FIXED = (
     'address',
     'block_address',
     'telegram_words',
+    'drive_addresses',
     'model',
     'control_method',
     'reference',
@@ -87,7 +88,11 @@ class DriveState:
         self.settings = settings
         #: What the catalog knows of its family.
         self.model = load_family(
-            settings.model, settings.method, settings.telegram_words, settings.telegram_speed
+            settings.model,
+            settings.method,
+            settings.telegram_words,
+            settings.telegram_speed,
+            settings.own_parameters,
         )
         self.turning = _turning(self.model)
         method = settings.method_class

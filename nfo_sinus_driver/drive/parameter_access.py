@@ -12,7 +12,7 @@ from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Role, Value
 from nfo_sinus_driver.catalog.profile import Write
 from nfo_sinus_driver.link import (
-    MAILBOX,
+    BY_MAILBOX,
     Address,
     DamagedAnswer,
     Identification,
@@ -143,11 +143,11 @@ class ParameterAccess:
 
     def reaches_space(self, space: str) -> bool:
         """Tell whether what stands in a space of addresses can be reached over this line."""
-        return space != MAILBOX or not self.in_block or self._has_mailbox
+        return space not in BY_MAILBOX or not self.in_block or self._has_mailbox
 
     def by_mailbox(self, key: str) -> bool:
         """Tell whether a parameter is reached by the mailbox of a PLC, which takes its time."""
-        return self.in_block and self.model[key].at(self.protocol).space == MAILBOX
+        return self.in_block and self.model[key].at(self.protocol).space in BY_MAILBOX
 
     def use_mailbox(self, has_mailbox: bool) -> None:
         """Take note of whether parameters are reached by the mailbox of the PLC."""

@@ -123,6 +123,13 @@ class DriveSettings:
         'drive; the blocks of two drives do not overlap',
         0, LAST_BLOCK, change=UNCONFIGURED,
     )
+    drive_addresses: Sequence[str] = setting(
+        ('',),
+        'behind a PLC with a mailbox, where a model has such: its parameters by their '
+        'communication addresses, each group.name=ADDRESS:FACTOR:UNIT:rw, such as '
+        'drv.acc_time=1103h:0.1:s:rw',
+        zero='none', change=UNCONFIGURED,
+    )
     telegram_words: str = setting(
         '',
         'with control_method telegram1: the words that the PLC maps, where the model has several',
@@ -321,6 +328,7 @@ class DriveSettings:
         modes = _control_modes(self.model, self.method)
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
         self._require_measured()
+        self._require_own_addresses()
         if self.expected_control_mode == 'Speed' and not self.nominal_speed:
             self._require_no_speed_mode()
         self._check_drive_timeout()
@@ -384,6 +392,18 @@ class DriveSettings:
                 raise ValueError(
                     f'measured: {self.model} measures no {name!r}: choose of {", ".join(known)}'
                 )
+
+    @property
+    def own_parameters(self) -> tuple[str, ...]:
+        """The parameters that the user names."""
+        return tuple(filter(None, self.drive_addresses))
+
+    def _require_own_addresses(self) -> None:
+        if self.own_parameters and self.model != AUTO:
+            try:
+                load_family(self.model, self.method, self.telegram_words, own=self.own_parameters)
+            except ValueError as error:
+                raise ValueError(f'drive_addresses: {error}') from None
 
     def _require_known_method(self) -> None:
         for profile in _profiles(self.model):

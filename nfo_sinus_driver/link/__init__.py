@@ -4,7 +4,7 @@
 """Bytes on one line, one transaction at a time. No ROS, no knowledge of drives or parameters."""
 
 from nfo_sinus_driver.link.interface import (
-    MAILBOX,
+    BY_MAILBOX,
     Address,
     Clock,
     Connecting,
@@ -39,7 +39,7 @@ from nfo_sinus_driver.link.reconnect import Reconnect
 __all__ = [
     'ADDRESSES',
     'BIT_RATES',
-    'MAILBOX',
+    'BY_MAILBOX',
     'PROTOCOLS',
     'Address',
     'BusSettings',

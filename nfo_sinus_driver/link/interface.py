@@ -27,6 +27,10 @@ Clock = Callable[[], float]
 
 #: The space of addresses that count in PNUs: of parameters that a PLC asks a drive for.
 MAILBOX = 'pnu'
+#: That of addresses of the drive itself, which go by such parameters.
+DRIVE_ADDRESS = 'drive_address'
+#: Both: what is reached by the mailbox of a PLC.
+BY_MAILBOX = frozenset((MAILBOX, DRIVE_ADDRESS))
 
 
 class Address(NamedTuple):

@@ -27,7 +27,9 @@ from collections.abc import Callable
 import struct
 from typing import TypeVar
 
+from nfo_sinus_driver.link.by_address import ByAddress
 from nfo_sinus_driver.link.interface import (
+    BY_MAILBOX,
     MAILBOX,
     Address,
     Clock,
@@ -136,11 +138,13 @@ class Block:
         #: What was read last, and when.
         self._last: tuple[_Shown, float] | None = None
         self._mailbox = Mailbox(ask, now, unit, start)
+        self._by_address = ByAddress(self._mailbox, now)
 
     def forget(self) -> None:
         """Write nothing any more, only read: the connection is another one."""
         self._layout = 0
         self._mailbox.forget()
+        self._by_address.forget()
         self._command, self._live = None, False
         self._acknowledged = None
 
@@ -151,7 +155,7 @@ class Block:
         The actual value is that of the status that was read just before: the two are of one
         telegram, and the PLC is not asked twice.
         """
-        if address.space == MAILBOX:
+        if address.space in BY_MAILBOX:
             return self._access(address)
         shared = self._shared_with(address)
         if shared is not None:
@@ -173,7 +177,7 @@ class Block:
 
     def write(self, address: Address, data: bytes) -> Reply:
         """Write a part of it."""
-        if address.space == MAILBOX:
+        if address.space in BY_MAILBOX:
             return self._access(address, data)
         _, arrived = self._exchange((address, data))
         return Reply(b'', arrived)
@@ -196,7 +200,8 @@ class Block:
             raise InProgress(self._now())
         if self._layout == 1:
             raise Refused(Refused.ILLEGAL_ADDRESS, _NO_MAILBOX)
-        return self._mailbox.access(address, data)
+        by = self._mailbox if address.space == MAILBOX else self._by_address
+        return by.access(address, data)
 
     def _part(self, shown: tuple[int, ...], address: Address) -> bytes:
         word, actual, _, flags = shown[:4]

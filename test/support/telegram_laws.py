@@ -72,6 +72,8 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
 
 #: The registers of the mailbox in a block.
 _MAILBOX = range(16, 28)
+#: The operation command of a Sinus H, by its address [M3 §7.2.1].
+_OPERATION_COMMAND = 0x0382
 #: MODE, SCMD, DriveControl with its mask, ProfidriveControl and the set-points of a G2
 #: [M0 tables 9, 10]: commands, which are the telegram's.
 COMMANDS = frozenset((1034, 1035, 1018, 1017, 1003, 1020, 1124, 1127, 1129))
@@ -85,7 +87,7 @@ def _of_mailbox(frame: Mapping[str, Any], data: bytes, start: int) -> bool:
 
 
 def mailbox_complaints(
-    frames: Iterable[Mapping[str, Any]], unit: int = 1, start: int = 0
+    frames: Iterable[Mapping[str, Any]], model: str, unit: int = 1, start: int = 0
 ) -> Iterator[str]:
     """Yield what is wrong with what was written to the mailbox of a block."""
     asked = b''
@@ -102,8 +104,9 @@ def mailbox_complaints(
         place = register - start
         if (place, count) == (17, 5):
             asked, given = written, set()
-            command, pnu = struct.unpack_from('>HH', asked)
-            if command == 2 and pnu in COMMANDS:
+            command, pnu, _, _, value = struct.unpack('>5H', asked)
+            by_address = model == 'sinus_h' and pnu == 1000 and value == _OPERATION_COMMAND
+            if command == 2 and (pnu in COMMANDS if model != 'sinus_h' else by_address):
                 yield f'PNU {pnu} is a command, and was written by the mailbox'
             continue
         if (place, count) != (16, 1):
@@ -261,4 +264,4 @@ def violations(
     judge = JUDGES[model]()
     frames = list(frames)
     found = [wrong for one in exchanges(frames, unit, start) for wrong in judge.complaints(one)]
-    return [*found, *mailbox_complaints(frames, unit, start)]
+    return [*found, *mailbox_complaints(frames, model, unit, start)]

@@ -11,7 +11,16 @@ ADV-8 says; out of S4 there is no other way than that, QuickStop and CoastStop [
 
 from __future__ import annotations
 
-from nfo_sinus_driver.catalog.profile import Profile, Read, Removal, Steps, Until, one, taken
+from nfo_sinus_driver.catalog.own_parameters import OwnAddresses
+from nfo_sinus_driver.catalog.profile import (
+    Profile,
+    Read,
+    Removal,
+    Steps,
+    Until,
+    one,
+    taken,
+)
 from nfo_sinus_driver.catalog.status import Role, State
 from nfo_sinus_driver.families._telegram1 import method
 from nfo_sinus_driver.families._telegram1.method import Telegram1
@@ -73,5 +82,7 @@ PROFILE = Profile(
     setpoints=method.setpoints(327.67, forward_only=True),
     in_charge=method.in_charge,
     writes_and_reads=True,
+    # 0382h is the operation command [M3 §7.2.1]
+    own_addresses=OwnAddresses('drive_address', frozenset((0x0382,)), 'M3 §10; C124'),
     most={Role.ACTUAL_FREQUENCY: 327.67},
 )

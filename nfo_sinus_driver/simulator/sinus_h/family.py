@@ -12,6 +12,7 @@ from nfo_sinus_driver.simulator import telegram1
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
 from nfo_sinus_driver.simulator.injections import Injections
+from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.parameter_channel import ParameterChannel, ParameterEntry
 from nfo_sinus_driver.simulator.sinus_h import keypad
 from nfo_sinus_driver.simulator.sinus_h.control_unit import (
@@ -36,6 +37,9 @@ class Server(telegram1.Server):
     def __init__(self, drive: SimulatedDrive) -> None:
         assert isinstance(drive.control_unit, SinusHControlUnit)
         self._unit = drive.control_unit
+        self._drive = drive
+        #: PNU 1000 to 1003: address, data, command, acknowledge.
+        self._by_address = [0, 0, 0, 0]
         self.parameters = ParameterChannel(self._profile())
 
     @property
@@ -80,7 +84,35 @@ class Server(telegram1.Server):
             for pnu, reads in told.items()
             for sub, read in enumerate(reads)
         }
+        for number in range(4):
+            read, write = self._register(number)
+            found[1000 + number, 0] = ParameterEntry(read, write)
         return {**found, (972, 0): ParameterEntry(lambda: 0, self._reset)}
+
+    def _register(self, number: int) -> tuple[Callable[[], int], Callable[[int], None]]:
+        """Return what reads and writes one of PNU 1000 to 1003 [M3 §10]."""
+
+        def write(word: int) -> None:
+            self._by_address[number] = word
+            if number == _COMMAND and word:
+                self._by_address[_ACKNOWLEDGE] = _DONE if self._carry_out(word) else _FAILED
+
+        return lambda: self._by_address[number], write
+
+    def _carry_out(self, command: int) -> bool:
+        """Write or read by address; false if the drive has none such, or does not take it."""
+        address, data = self._by_address[:2]
+        key = keypad.KEYS.get(address)
+        if key is None:
+            return False
+        try:
+            if command == _WRITE:
+                self._drive.write_raw(key, data)
+            else:
+                self._by_address[1] = self._drive.read_raw(key)
+        except Refused:
+            return False
+        return True
 
     def _message(self, index: int) -> Callable[[], int]:
         """Return what reads a fault message of PNU 947 [M3 §9, C68]."""
@@ -106,6 +138,9 @@ def _constant(word: int) -> Callable[[], int]:
     return lambda: word
 
 
+#: PNU 1002 and 1003 among the four; what writes, and what 1003 says.
+_COMMAND, _ACKNOWLEDGE = 2, 3
+_WRITE, _DONE, _FAILED = 1, 1, 2
 #: What PNU 922 says of the longer telegram, and the bit of the alarm information for warnings.
 _VENDOR_TELEGRAM = 100
 _WARNING = 1 << 4

@@ -15,7 +15,7 @@ from support.said import raises
 from support.telegram_laws import COMMANDS, words
 
 from nfo_sinus_driver.catalog import Access, Role, load_family
-from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.drive import Cause, DriveSettings, Severity
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 
 G2, SINUS_H = 'telegram1 g2, mailbox', 'telegram1 sinus_h, mailbox'
@@ -169,6 +169,50 @@ def test_torque_and_current_of_a_sinus_h_come_with_its_longer_telegram() -> None
         rig.turn()
         rig.pass_time(2.0)
         assert math.isnan(rig.notes.telemetry[-1].values[Role.ACTUAL_TORQUE])
+
+
+# --- parameters by a user's own addresses ---------------------------------------------------------
+
+
+OWN = ('drv.acc_time=1105h:0.1:s:rw', 'drv.max_freq=4356:0.01:Hz')
+
+
+def test_parameters_of_a_sinus_h_are_those_that_the_user_names_by_address() -> None:
+    with Rig(SINUS_H, drive_addresses=OWN) as rig:
+        rig.connect(parameters=True)
+        assert rig.drive.parameters.values == {
+            'drv.acc_time': rig.far.peek('drv.acc_time'), 'drv.max_freq': 60.0
+        }
+        rig.answer(rig.drive.parameters.change({'drv.acc_time': 7.5}))
+        assert rig.far.peek('drv.acc_time') == 7.5 and rig.far.writes['drv.acc_time'] == 1
+        with raises(Cause.NO_SETTING):
+            rig.result(rig.drive.parameters.change({'drv.max_freq': 50.0}))
+
+
+def test_an_address_that_the_drive_lacks_is_reported() -> None:
+    with Rig(SINUS_H, drive_addresses=(*OWN, 'drv.none=1')) as rig:
+        rig.connect(parameters=True)
+        assert rig.notes.said('drv.none cannot be read: the drive refused the access to its addr')
+        assert len(rig.drive.parameters.values) == 2
+
+
+@pytest.mark.parametrize(
+    ('text', 'why'),
+    [
+        ('drv.acc_time', 'write group.name=ADDRESS'),
+        ('acc_time=1105h', 'write group.name=ADDRESS'),
+        ('drv.acc_time=1105h:0', 'the factor is not 0'),
+        ('drv.acc_time=10000h', 'not this address'),
+        ('drv.command=0382h:1::rw', 'not this address'),
+        ('fieldbus.x=1', 'or not this group'),
+        ('telegram.torque=1', 'already'),
+    ],
+)
+def test_what_cannot_be_an_address_is_refused(text: str, why: str) -> None:
+    with pytest.raises(ValueError, match=f'drive_addresses: .*{why}'):
+        DriveSettings(model='sinus_h', drive_addresses=(text,))
+    with pytest.raises(ValueError, match='no manual says'):
+        DriveSettings(model='sinus_optimal', drive_addresses=('drv.acc_time=1105h',))
 
 
 # --- what it does not have ------------------------------------------------------------------------
