@@ -23,6 +23,7 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 from nfo_sinus_driver.catalog.own_parameters import OwnAddresses
 from nfo_sinus_driver.catalog.parameter import Value
+from nfo_sinus_driver.catalog.speed_mode import SpeedMode
 from nfo_sinus_driver.catalog.status import Role, State, StatusCode, StatusWord
 
 _T = TypeVar('_T')
@@ -495,21 +496,6 @@ class OlderDialect:
     before: float
     harmless: frozenset[Holder]
     factors: Mapping[str, Fraction] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class SpeedMode:
-    """
-    What the parameters that are frequencies are in Speed mode, where the same have both.
-
-    :ivar keys: those parameters; the last one takes the set-point.
-    :ivar count: gives what one count of them is, rpm, for a nominal speed of the motor, rpm.
-    :ivar most: gives the greatest set-point, rpm, likewise.
-    """
-
-    keys: tuple[str, ...]
-    count: Callable[[Fraction], Fraction]
-    most: Callable[[float], float]
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 
-from nfo_sinus_driver.catalog.profile import Profile, SpeedMode, Steps, Until
+from nfo_sinus_driver.catalog.profile import Profile, Steps, Until
+from nfo_sinus_driver.catalog.speed_mode import SpeedMode
 from nfo_sinus_driver.catalog.status import Fact, Role, State
 from nfo_sinus_driver.families._telegram1 import method, profidrive
 from nfo_sinus_driver.families._telegram1.method import Telegram1, Words

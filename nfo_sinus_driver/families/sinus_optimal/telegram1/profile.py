@@ -14,13 +14,13 @@ from __future__ import annotations
 from nfo_sinus_driver.catalog.profile import (
     Profile,
     Read,
-    SpeedMode,
     Status as InverterStatus,
     Steps,
     Until,
     one,
     taken,
 )
+from nfo_sinus_driver.catalog.speed_mode import SpeedMode
 from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.families._telegram1 import method
 from nfo_sinus_driver.families._telegram1.method import Telegram1, Words
