@@ -322,6 +322,7 @@ class ControlMethod(abc.ABC):
     :cvar references: those that there are.
     :cvar coasts: it can release the motor at once.
     :cvar quick_stop_by: the setting by which a quick stop may be a ramp; ``''``: the motor coasts.
+    :cvar stop_ramp: it can have the drive take a stop ramp of its own.
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
     :cvar needs: parameters without which a drive cannot be commanded by it.
     :cvar procedures: what begins each procedure that it has.
@@ -339,6 +340,7 @@ class ControlMethod(abc.ABC):
     references: ClassVar[Sequence[str]]
     coasts: ClassVar[bool] = False
     quick_stop_by: ClassVar[str] = ''
+    stop_ramp: ClassVar[bool] = False
     older: ClassVar[bool] = True
     needs: ClassVar[Sequence[str]] = ()
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
@@ -396,6 +398,10 @@ class ControlMethod(abc.ABC):
 
         Control may be given back by it.
         """
+        return self.stop(control_mode)
+
+    def rapid_stop(self, control_mode: str) -> Steps[None]:
+        """Stop along the stop ramp of the drive, if it has one; control is kept."""
         return self.stop(control_mode)
 
     def force_stop(self, control_mode: str) -> Steps[bool]:

@@ -206,6 +206,11 @@ class Commands:
         return self._method.coasts
 
     @property
+    def stop_ramp(self) -> bool:
+        """It can have the drive take a stop ramp of its own."""
+        return self._method.stop_ramp
+
+    @property
     def quick_stop_by(self) -> str:
         """The setting of the drive that a quick stop goes by; ``''``: it releases the motor."""
         return self._method.quick_stop_by
@@ -274,6 +279,10 @@ class Commands:
     async def quick_stop(self, control_mode: str) -> None:
         """Do the quick stop of the drive, if it has one; control may be given back by it."""
         await carry_out(self._method.quick_stop(control_mode), self._params, Priority.STOP)
+
+    async def rapid_stop(self, control_mode: str) -> None:
+        """Have the drive take its stop ramp, if it has one, at the head of the bus."""
+        await carry_out(self._method.rapid_stop(control_mode), self._params, Priority.STOP)
 
     async def force_stop(self, control_mode: str) -> bool:
         """Stop by all that is left, at the head of the bus; tell whether the drive took it."""

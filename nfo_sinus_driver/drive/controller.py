@@ -333,6 +333,25 @@ class Controller:
             await self._settle()
             return self._quick_stopped()
 
+    async def rapid_stop(self) -> Report:
+        """
+        Stop along the stop ramp of the drive, if it has one, else as usual; control is kept.
+
+        The stop goes on as any other, whatever becomes of the request for that ramp.
+        """
+        if not self.method.stop_ramp:
+            return Report(Cause.NO_RAPID_STOP, stop=await self.stop())
+        with self._sequence.external_stop():
+            with contextlib.suppress(LinkError, DriveError):
+                await self.method.rapid_stop(self._state.control_mode)
+            stopped = await self.stop()
+        status = self._state.status
+        if status is None or not status.driven or status.faulted:
+            return stopped
+        if status.state is State.QUICK_STOP:
+            return self._state.report(Cause.RAPID_STOPPING)
+        return self._state.report(Cause.NOT_RAPID, stop=stopped)
+
     async def _await_quick_stop(self, told_at: float) -> None:
         """Wait until the motor is released, or on its way to a stop where a setting decides."""
         by = self.method.quick_stop_by

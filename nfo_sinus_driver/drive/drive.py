@@ -289,6 +289,11 @@ class Drive:
         return await self._procedures.controller.stop()
 
     @on_bus
+    async def rapid_stop(self) -> Report:
+        """Stop along the stop ramp of the drive, where it has one; control is kept."""
+        return await self._procedures.controller.rapid_stop()
+
+    @on_bus
     async def quick_stop(self) -> Report:
         """Release the motor at once: it coasts."""
         return await self._procedures.controller.quick_stop()

@@ -125,6 +125,12 @@ class Cause(enum.Enum):
     QUICK_STOP_RAMPS = 'stopping: it ramps down (quick stop by {by})'
     QUICK_STOP_OFF = 'stopped: the output is at 0 Hz (quick stop by {by})'
     NO_QUICK_STOP = '{stop} (this drive has no quick stop)'
+    RAPID_STOPPING = 'stopping: by its stop ramp ({status})'
+    NOT_RAPID = (
+        '{stop} (the drive takes its ordinary ramp, {status}: for the stop ramp open its '
+        '{enable_input})'
+    )
+    NO_RAPID_STOP = '{stop} (this drive has no stop ramp of its own)'
     QUICK_STOP_UNCONFIRMED = 'the quick stop is NOT confirmed: {why} ({status}); trying a stop'
     NO_CONTROL = 'the bus has no control of this drive ({status}), and it does not run'
     RUN_BY_OTHERS = (

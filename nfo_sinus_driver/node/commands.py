@@ -72,6 +72,7 @@ class Commands:
         )
         self.offer('~/stop', Drive.stop, _LONGEST_STOP)
         self.offer('~/quick_stop', Drive.quick_stop, _LONGEST_STOP)
+        self.offer('~/rapid_stop', Drive.rapid_stop, _LONGEST_STOP)
         self.offer('~/fault_ack', Drive.acknowledge, _LONGEST_STOP)
         self.offer(
             '~/refresh_parameters', lambda drive: drive.parameters.refresh(), _LONGEST_REFRESH

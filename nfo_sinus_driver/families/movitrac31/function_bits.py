@@ -102,6 +102,7 @@ class FunctionBits(ByLine):
 
     means = 'function bits'
     coasts = True
+    stop_ramp = True
     holders: ClassVar[Mapping[Value, Holder]] = {
         words.STANDARD: Holder.LOCAL,
         # terminals start the motor there
@@ -178,6 +179,11 @@ class FunctionBits(ByLine):
         """Release the motor at once, by controller inhibit; control is kept."""
         inhibit = Write(BITS, int(Bits.CONTROLLER_INHIBIT))
         yield from self._stop_by(one(inhibit), self.target.zero(retry=True))
+
+    def rapid_stop(self, control_mode: str) -> Steps[None]:
+        """Take the enable with the direction, so that the motor takes ramp t13 or t23 [C105]."""
+        cleared = Write(BITS, 0, retry=False)
+        yield from self._stop_by(one(cleared), self.target.zero(retry=False))
 
     def release(self) -> Steps[None]:
         """Remove function bits and set-point; P841 stays, for another one can start the motor."""

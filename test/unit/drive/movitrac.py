@@ -33,6 +33,7 @@ SWITCHES: Mapping[str, Mapping[str, str]] = {
 STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
     'stop': lambda drive: drive.stop(),
     'quick stop': lambda drive: drive.quick_stop(),
+    'rapid stop': lambda drive: drive.rapid_stop(),
     'deactivate': lambda drive: drive.deactivate(),
     'disconnect': lambda drive: drive.disconnect(1.0),
     'exit': lambda drive: drive.stop_for_good(1.0),

@@ -32,6 +32,7 @@ _SPEED = 20.0
 STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
     'stop': lambda drive: drive.stop(),
     'quick stop': lambda drive: drive.quick_stop(),
+    'rapid stop': lambda drive: drive.rapid_stop(),
     'deactivate': lambda drive: drive.deactivate(),
     'disconnect': lambda drive: drive.disconnect(4.0),
     'exit': lambda drive: drive.stop_for_good(4.0),

@@ -162,6 +162,26 @@ def test_an_enable_is_refused_in_another_operating_mode(
         assert not rig.drive.following
 
 
+@pytest.mark.parametrize(('enable_bit', 'at_once'), [
+    ('anded', True), ('ored', False), ('either', False),
+])
+def test_a_rapid_stop_takes_the_enable_and_tells_whether_the_drive_takes_its_stop_ramp(
+    enable_bit: str, at_once: bool
+) -> None:
+    ramps = {'ramp.t11_down': 4.0, 'ramp.t13_stop': 0.5}
+    with make(parameters=ramps, options={'enable_bit': enable_bit}) as rig:
+        rig.turn(40.0)
+        answer = rig.answer(rig.drive.rapid_stop())
+        assert ('by its stop ramp' in answer, 'its ordinary ramp' in answer) == (
+            at_once, not at_once
+        )
+        rig.pass_time(1.0)
+        assert (rig.far.motor.frequency == 0) is at_once
+        assert not rig.drive.following and not bits(rig) & (DIRECTIONS | Bit.ENABLE)
+        rig.pass_time(4.0)
+        rig.assert_only_enable_helps()
+
+
 def test_the_last_five_faults_are_shown_newest_first() -> None:
     with make() as rig:
         rig.connect()

@@ -284,6 +284,13 @@ def test_a_quick_stop_inhibits_the_controller() -> None:
         play(method.quick_stop('Freque'), (Write(BITS, INHIBIT), None), (Write(SIZE, 0.0), late))
 
 
+def test_a_rapid_stop_takes_the_enable_with_the_direction() -> None:
+    assert method.stop_ramp
+    cleared = Write(BITS, 0, retry=False), Write(SIZE, 0.0, retry=False)
+    play(method.rapid_stop('Freque'), (cleared[0], None), (cleared[1], None))
+    play(method.rapid_stop('Freque'), (cleared[0], REFUSED), (Read(MODE), STANDARD))
+
+
 def test_release_removes_the_bits_and_never_writes_p841() -> None:
     cleared = (Write(BITS, 0), None), (Write(SIZE, 0.0), None)
     play(method.release(), (Read(MODE), REMOTE), *cleared)
