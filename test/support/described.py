@@ -54,7 +54,3 @@ class DescribedRig(Rig):
         self.wait_until(lambda: self.drive.state.connected, 20.0)
         self.pass_time(2.0)
         assert not self.turns
-
-    def violations(self) -> list[str]:
-        """Return nothing: the laws of the shipped families name their parameters."""
-        return []

@@ -20,6 +20,7 @@ import math
 from typing import Any, NamedTuple
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.catalog import is_described
 from nfo_sinus_driver.drive import (
     Cause,
     Drive,
@@ -36,7 +37,7 @@ from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from support import telegram_laws, trace_laws
 from support.rig_line import Clock, Line
 from support.said import Said, said, says
-from support.variants import hardest, ramps
+from support.variants import hardest, ramps, shipped
 
 #: How far the clock goes at a time while nothing is due, s.
 SLICE = 0.02
@@ -104,6 +105,10 @@ WAYS: Mapping[str, Way] = {
         parameters={'serial.control_mode': 'Remote setpoint'},
     ),
     'made up': Way('modbus_rtu', 'acme', 'drive_control'),
+    # drives that files describe: a direction word; a state machine; nothing tells who has control
+    'described': Way('modbus_rtu', shipped('delta_vfd_el'), 'custom'),
+    'described, by states': Way('modbus_rtu', shipped('abb_acs355'), 'custom'),
+    'described, untold': Way('modbus_rtu', shipped('toshiba_vf_s11'), 'custom'),
     'telegram1 g2': Way('telegram1', method='telegram1'),
     'telegram1 optimal': Way('telegram1', 'sinus_optimal', 'telegram1'),
     'telegram1 g2, speed': Way('telegram1', method='telegram1', **_SPEED),
@@ -293,6 +298,9 @@ class Rig:
         if self.way.protocol == 'telegram1':
             words = self.way.options.get('telegram_words', self.way.model)
             return telegram_laws.violations(self.line.frames, words)
+        if is_described(self.way.model):
+            # those laws are about registers of one family
+            return []
         return trace_laws.violations(
             self.line.frames, -math.inf, self.way.model, self.way.protocol, self.way.method
         )

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from nfo_sinus_driver.catalog.declared import read
+from nfo_sinus_driver import families
+from nfo_sinus_driver.catalog.declared import SUFFIX, read
 
 _HARDEST = {
     'sinus_g2': {'run_command_in_fault': 'keeps', 'refuses_in_fault': 'all'},
@@ -29,6 +30,12 @@ _RAMPS = {
     'acme': ('ramp.up', 'ramp.up'),
     'sinus_h': ('drv.acc_time', 'drv.dec_time'),
 }
+
+
+def shipped(name: str) -> str:
+    """Return the path of a shipped file that describes a drive."""
+    (path,) = Path(families.__path__[0]).rglob(f'{name}{SUFFIX}')
+    return str(path)
 
 
 def hardest(model: str = 'sinus_g2') -> Mapping[str, str]:

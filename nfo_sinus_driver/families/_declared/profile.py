@@ -53,7 +53,7 @@ from nfo_sinus_driver.families._declared.words import is_remote, words_of
 #: The control method of every such drive.
 METHOD = 'custom'
 #: A measured value beyond so many times the greatest set-point is none of this drive.
-_BEYOND = 4
+_BEYOND = 1.5
 
 
 # --- set-points -----------------------------------------------------------------------------------

@@ -36,6 +36,9 @@ _NO_OTHER_WAY = {
     'optimal, control word': 'fieldbus.drive_control',
     'movitrac': 'fieldbus.function_bits',
     'made up': 'bus.word',
+    'described': 'line.r2000',
+    'described, by states': 'line.r0000',
+    'described, untold': 'line.rfa00',
 }
 
 
