@@ -136,7 +136,7 @@ class Hold:
 
 @dataclass(frozen=True)
 class Wait:
-    """Let time pass, s; a stop that waits has written its first step."""
+    """Let time pass, s."""
 
     seconds: float
 
