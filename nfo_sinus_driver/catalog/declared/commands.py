@@ -176,11 +176,19 @@ class Commands:
         for name in ('stop', 'coast', 'quick_stop'):
             if name in control:
                 self._check_stop(name)
+        for name in ('prepare', 'reset', 'release'):
+            self._check_runs_nothing(name)
         self._check_direction()
 
     def lists(self) -> dict[str, Any]:
-        """Return them by name."""
-        return dict(self._lists)
+        """Return them by name, and whether no run command stands behind prepare."""
+        return {**self._lists, 'prepare_stops': self._prepare_stops}
+
+    @property
+    def _prepare_stops(self) -> bool:
+        """Whether prepare takes back all that run leaves."""
+        run, left = left_by(self._lists['run']), left_by(self._lists['prepare'])
+        return bool(run) and all(key in left and takes_back(run[key], left[key]) for key in run)
 
     def _check_pauses(self, name: str) -> None:
         pauses = [step.seconds for step in self._lists[name] if isinstance(step, Pause)]
@@ -193,6 +201,17 @@ class Commands:
             self._problems.add(
                 self._control[name].line, f'{name} begins with a pause: a stop is never delayed'
             )
+
+    def _check_runs_nothing(self, name: str) -> None:
+        """See to it that what is no run command leaves none."""
+        run, left = left_by(self._lists['run']), left_by(self._lists[name])
+        for key, (value, known) in run.items():
+            if value and key in left and not known & ~left[key][1] and not takes_back(
+                run[key], left[key]
+            ):
+                self._problems.add(
+                    self._control[name].line, f'{name} leaves the run command: the motor would turn'
+                )
 
     def _check_direction(self) -> None:
         """See to it that run leaves the direction that it is said to: forward."""

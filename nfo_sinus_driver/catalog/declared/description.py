@@ -247,6 +247,7 @@ class Description:
     :ivar facts: the conditions of the status, by the names of the file.
     :ivar flags: faults that are bits, the gravest first.
     :ivar holder: the parameter that tells who has control, and its values for the line.
+    :ivar prepare_stops: no run command stands behind ``prepare``.
     :ivar stop_mode: the parameter that says how it stops, and its value for coasting.
     :ivar defaults: with what value a parameter leaves the factory, by key.
     """
@@ -265,6 +266,7 @@ class Description:
     run: Steps
     stop: Steps
     prepare: Steps = ()
+    prepare_stops: bool = False
     coast: Steps = ()
     quick_stop: Steps = ()
     reset: Steps = ()

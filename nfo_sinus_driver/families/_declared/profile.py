@@ -11,9 +11,7 @@ driver connects.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-import math
+from collections.abc import Callable
 from typing import ClassVar
 
 from nfo_sinus_driver.catalog.declared import (
@@ -22,10 +20,8 @@ from nfo_sinus_driver.catalog.declared import (
     Await,
     Change,
     Description,
-    Direction,
     Pause,
     Put,
-    SetpointPlace,
     Steps as Listed,
 )
 from nfo_sinus_driver.catalog.parameter import Value
@@ -33,13 +29,11 @@ from nfo_sinus_driver.catalog.profile import (
     ControlMethod,
     Hold,
     Holder,
-    Limits,
     NotPossible,
     Profile,
     Read,
     Refusal,
     Removal,
-    SetpointTarget,
     Status,
     Steps,
     Until,
@@ -48,81 +42,13 @@ from nfo_sinus_driver.catalog.profile import (
     taken,
 )
 from nfo_sinus_driver.catalog.status import Role, StatusCode
+from nfo_sinus_driver.families._declared.setpoints import Target, target_of
 from nfo_sinus_driver.families._declared.words import is_remote, words_of
 
 #: The control method of every such drive.
 METHOD = 'custom'
 #: A measured value beyond so many times the greatest set-point is none of this drive.
 _BEYOND = 1.5
-
-
-# --- set-points -----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Target(SetpointTarget):
-    """Where the set-points of one drive go; with a direction word their size stands alone."""
-
-    place: SetpointPlace | None = None
-
-    def read_limits(self, has: Callable[[str], bool], *, older: bool = False) -> Steps[Limits]:
-        """Find out what a set-point may be: the file and a parameter of the drive limit it."""
-        found = yield from super().read_limits(has, older=older)
-        assert self.place is not None
-        if not self.place.limit:
-            return found
-        most = min(found.most, float((yield Read(self.place.limit))))
-        return Limits(max(found.least, -most), most, found.nominal)
-
-    def set_to_zero(self) -> Steps[None]:
-        """Write set-point 0, and read it back where the drive tells it."""
-        assert self.place is not None
-        yield from self.zero(retry=True)
-        if not self.place.read_key:
-            return
-        kept = float((yield Read(self.place.read_key)))
-        if kept != 0:
-            raise NotPossible(f'the drive keeps a set-point of {kept:g} where 0 was written')
-
-
-@dataclass(frozen=True)
-class SizeAndDirection(Target):
-    """A set-point whose size stands beside a direction; at 0 the direction stays as it was."""
-
-    def writes(self, value: float, before: float = math.nan) -> Sequence[Write]:
-        """Return what is to be written: no size of the one direction is followed in the other."""
-        direction = self._direction
-        unknown = math.isnan(before)
-        reverse = _reverse(before if value == 0 and not unknown else value)
-        turn = Write(direction.key, direction.reverse if reverse else direction.forward)
-        written = turn, Write(self.key, abs(value))
-        turns = before != 0 and reverse is not _reverse(before)
-        return (Write(self.key, 0.0), *written) if unknown or turns else written
-
-    def value(self, values: Mapping[str, Value]) -> float:
-        """Return the set-point that size and direction mean; -0.0 is 0 in reverse."""
-        reverse = values[self._direction.key] == self._direction.reverse
-        return math.copysign(float(values[self.key]), -1 if reverse else 1)
-
-    def zero(self, *, retry: bool) -> Steps[None]:
-        """Write size 0 and leave the direction alone, for with it goes a run command."""
-        yield Write(self.key, 0.0, retry=retry)
-
-    @property
-    def _direction(self) -> Direction:
-        assert self.place is not None and self.place.direction is not None
-        return self.place.direction
-
-
-def _reverse(value: float) -> bool:
-    return math.copysign(1, value) < 0
-
-
-def _target(place: SetpointPlace) -> Target:
-    nominal = math.inf if place.nominal is None else place.nominal
-    kind = Target if place.direction is None else SizeAndDirection
-    forward_only = not place.signed and place.direction is None
-    return kind(place.key, place.most, forward_only=forward_only, nominal=nominal, place=place)
 
 
 # --- control --------------------------------------------------------------------------------------
@@ -153,21 +79,36 @@ class Declared(ControlMethod):
 
     def require_startable(self) -> Steps[None]:
         """
-        See to it that the parameters are so that the drive obeys the line; it only reads.
+        See to it that the drive obeys the line, and does nothing yet; it only reads.
 
-        :raises NotPossible: one is not, and the file does not have it written.
+        :raises NotPossible: keypad or terminals run the motor; or a parameter is not as it has to
+            be, and the file does not have it written.
         """
-        for one in self._drive.requires:
+        drive = self._drive
+        if drive.tells_control:
+            word = int((yield Read(STATUS_KEY)))
+            if not is_remote(drive, word) and drive.facts['running'].holds(word):
+                raise NotPossible('keypad or terminals run the motor: stop it there')
+        for one in drive.requires:
             if not one.write and (found := (yield Read(one.key))) != one.value:
                 todo = one.text or f'set {one.key} to {one.value}'
                 raise NotPossible(f'{one.key} is {found}, so the line has no control: {todo}')
 
     def take_control(self) -> Steps[None]:
-        """Put the drive under control of the line, with no run command."""
-        for one in self._drive.requires:
+        """
+        Put the drive under control of the line, with no run command.
+
+        One that an earlier session has left would turn the motor as soon as the line has control;
+        a drive may refuse or ignore the stop before that, so it comes again right behind.
+        """
+        drive = self._drive
+        yield from taken(_carry_out(drive.stop))
+        for one in drive.requires:
             if one.write:
                 yield Write(one.key, one.value, stored=True)
-        yield from _carry_out(self._drive.prepare or self._drive.stop)
+        yield from _carry_out(drive.prepare)
+        if not drive.prepare_stops:
+            yield from _carry_out(drive.stop, head=True)
 
     def zero_setpoint(self, control_mode: str) -> Steps[None]:
         """Write set-point 0, and read it back where the drive tells it."""
@@ -187,16 +128,14 @@ class Declared(ControlMethod):
 
     def stop(self, control_mode: str) -> Steps[None]:
         """Take the run command back and write set-point 0, each step by itself [C126]."""
-        yield from self._stop_by(
-            _carry_out(self._drive.stop, retry=False), self._setpoint.zero(retry=False)
-        )
+        yield from self._stop_by(_each(self._drive.stop), self._setpoint.zero(retry=False))
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once, or stop as quickly as the file has it."""
         steps = self._drive.coast or self._drive.quick_stop
         if not steps:
             return self.stop(control_mode)
-        return self._stop_by(_carry_out(steps), self._setpoint.zero(retry=True))
+        return self._stop_by(_each(steps, retry=True), self._setpoint.zero(retry=True))
 
     def release(self) -> Steps[None]:
         """Give control back, if the file says how; the run command is taken back in any case."""
@@ -206,7 +145,7 @@ class Declared(ControlMethod):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove run command and set-point while a fault is active, each by itself."""
-        command = yield from taken(_carry_out(self._drive.stop))
+        command = yield from taken(_each(self._drive.stop, retry=True))
         setpoint = yield from taken(self.zero_setpoint(control_mode))
         if command:
             return Removal.COMMAND
@@ -226,28 +165,46 @@ class Declared(ControlMethod):
         return ''
 
 
-def _carry_out(steps: Listed, *, retry: bool = True, holds: bool = False) -> Steps[None]:
+def _carry_out(
+    steps: Listed, *, retry: bool = True, head: bool = False, holds: bool = False
+) -> Steps[None]:
     """Carry out the steps of a list; ``holds``: go on where a condition is never met."""
     for step in steps:
-        if isinstance(step, Put):
-            yield Write(step.key, step.raw, retry=retry)
-        elif isinstance(step, Change):
-            yield Write(step.key, (yield from _changed(step, retry=retry)), retry=retry)
-        elif isinstance(step, Assign):
-            yield Write(step.key, step.value, retry=retry)
-        elif isinstance(step, Pause):
+        if isinstance(step, Pause):
             yield Wait(step.seconds)
-        elif holds:
-            yield Hold(_fulfils(step), step.seconds)
+        elif isinstance(step, Await):
+            condition = _fulfils(step)
+            yield Hold(condition, step.seconds) if holds else Until(condition)
+        elif isinstance(step, Assign):
+            yield Write(step.key, step.value, retry=retry, head=head)
         else:
-            yield Until(_fulfils(step))
+            raw = step.raw if isinstance(step, Put) else (yield from _changed(step, retry))
+            yield Write(step.key, raw, retry=retry, head=head)
 
 
-def _changed(step: Change, *, retry: bool) -> Steps[int]:
-    """Return a register with some bits changed; where it cannot be read, none are kept."""
+def _each(steps: Listed, *, retry: bool = False) -> Steps[None]:
+    """
+    Carry out the steps of a stop, each by itself.
+
+    :raises Refusal: the drive has refused one; the others were tried.
+    """
+    refusal: Refusal | None = None
+    for step in steps:
+        try:
+            yield from _carry_out((step,), retry=retry)
+        except Refusal as error:
+            refusal = refusal or error
+    if refusal is not None:
+        raise refusal
+
+
+def _changed(step: Change, retry: bool) -> Steps[int]:
+    """Return a register with bits changed; what is only cleared is 0 where it cannot be read."""
     try:
         before = int((yield Read(step.key, retry=retry)))
     except Refusal:
+        if step.set:
+            raise
         before = 0
     return (before | step.set) & ~step.clear
 
@@ -263,7 +220,7 @@ def _in_charge(status: Status | None) -> Steps[str]:
 
 def profile_of(drive: Description) -> Profile:
     """Return the profile of a drive that a file describes."""
-    target = _target(drive.setpoint)
+    target = target_of(drive.setpoint)
     members = {
         '__doc__': f'Control of {drive.title}.',
         '_drive': drive,
@@ -288,6 +245,7 @@ def profile_of(drive: Description) -> Profile:
         releases='' if drive.stop_mode is None else drive.stop_mode[1],
         in_charge=_in_charge,
         most={of_speed: most},
+        start_settings=frozenset(one.key for one in drive.requires),
         line=drive.line.factory,
         refusals=drive.line.exceptions,
         busy=drive.line.busy,

@@ -121,6 +121,10 @@ BAD = {
     'a direction that is none': (
         'signed: true}', 'direction: {register: 10, forward: 1, reverse: 1}}', 'have to differ',
     ),
+    'a prepare that runs': (
+        '  run:', '  prepare: [{register: 10, value: 1}]\n  run:', 'prepare leaves the run command',
+    ),
+    'a reset that runs': ('{register: 10, clear: 8}]', '{register: 10, value: 1}]', 'would turn'),
     'a run that is not forward': (
         'signed: true}', 'direction: {register: 10, forward: 3, reverse: 2}}', 'has to run forward',
     ),

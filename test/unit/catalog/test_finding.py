@@ -1,0 +1,109 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Where families are found: by name, by path, in ROS packages, as entry points."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+from pathlib import Path
+import shutil
+
+import pytest
+from support.described import SHIPPED
+
+from nfo_sinus_driver import families
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog.finding import GROUP, every, find
+from nfo_sinus_driver.drive import DriveSettings
+
+DELTA = SHIPPED['delta_vfd_el']
+
+
+@pytest.fixture
+def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A prefix in which the package `robot` offers a file."""
+    prefix = tmp_path / 'install'
+    index = prefix / 'share' / 'ament_index' / 'resource_index'
+    for kind, text in (('packages', ''), (GROUP, 'config/theirs.vfd.yaml\n\n')):
+        (index / kind).mkdir(parents=True)
+        (index / kind / 'robot').write_text(text)
+    (prefix / 'share' / 'robot' / 'config').mkdir(parents=True)
+    shutil.copy(DELTA, prefix / 'share' / 'robot' / 'config' / 'theirs.vfd.yaml')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere{os.pathsep}{prefix}')
+    return prefix
+
+
+def test_by_name(prefix: Path) -> None:
+    assert find('sinus_g2') == 'sinus_g2'
+    assert find('delta_vfd_el') == str(DELTA)
+    theirs = prefix / 'share' / 'robot' / 'config' / 'theirs.vfd.yaml'
+    assert find('theirs') == find('package://robot/config/theirs.vfd.yaml') == str(theirs)
+    found = {one.name: one for one in every()}
+    assert found['theirs'].of == 'package robot' and found['theirs'].title == 'Delta VFD-EL'
+    assert {one.of for one in found.values()} == {'shipped', 'package robot'}
+    # of two with one name that counts which is shipped
+    shutil.copy(theirs, theirs.with_name('delta_vfd_el.vfd.yaml'))
+    (prefix / 'share' / 'ament_index' / 'resource_index' / GROUP / 'robot').write_text(
+        'config/delta_vfd_el.vfd.yaml'
+    )
+    assert find('delta_vfd_el') == str(DELTA)
+
+
+def test_by_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copy(DELTA, tmp_path / 'mine.vfd.yaml')
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('HOME', str(tmp_path))
+    mine = str(tmp_path / 'mine.vfd.yaml')
+    for text in ('mine.vfd.yaml', './mine.vfd.yaml', '~/mine.vfd.yaml', mine):
+        assert find(text) == mine
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        ('theirs', "no family 'theirs': choose one of abb_acs355"),
+        ('./mine.vfd.yaml', 'no such file'),
+        ('./mine.yaml', r'ends with \.vfd\.yaml'),
+        ('package://robot/a.vfd.yaml', 'no package robot: build it'),
+        ('', 'no family'),
+    ],
+)
+def test_what_is_not_found_is_refused_with_what_to_do(
+    text: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
+    with pytest.raises(ValueError, match=said):
+        find(text)
+
+
+def test_a_family_with_code_is_an_entry_point(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made_up = Path(__file__).parents[1] / 'drive' / 'made_up' / 'acme'
+    shutil.copytree(made_up, tmp_path / 'their_robot' / 'acme')
+    (tmp_path / 'their_robot' / '__init__.py').write_text('')
+    point = importlib.metadata.EntryPoint('acme', 'their_robot.acme', GROUP)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(families, '__path__', [*families.__path__])
+    monkeypatch.setattr(
+        importlib.metadata, 'entry_points', lambda group: [point] if group == GROUP else []
+    )
+    assert find('acme') == 'acme'
+    found = {one.name: one for one in every()}
+    assert found['acme'].of == 'entry point' and found['acme'].title == 'Acme'
+    assert load_family('acme').profile.title == 'Acme'
+
+
+def test_a_drive_has_the_family_that_is_given(tmp_path: Path) -> None:
+    settings = DriveSettings(family='siemens_v20')
+    assert settings.model == str(SHIPPED['siemens_v20']) and settings.method == 'custom'
+    with pytest.raises(ValueError, match='leave one of both away'):
+        DriveSettings(family='siemens_v20', model='sinus_optimal')
+    bad = tmp_path / 'bad.vfd.yaml'
+    bad.write_text('vfd: 1\n')
+    with pytest.raises(ValueError, match=r'cannot be used: .*bad.vfd.yaml, line 1: .*needs'):
+        DriveSettings(family=str(bad))
+    with pytest.raises(ValueError, match='choose one of'):
+        DriveSettings(family='siemens_v20', control_method='mode_scmd')
