@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
+import textwrap
 
 import pytest
 from support.described import SHIPPED, DescribedRig
@@ -66,6 +68,21 @@ def test_a_ride(name: str, protocol: str) -> None:
             rig.connect()
             rig.pass_time(1.0)
             assert not rig.turns
+
+
+def test_the_template_of_the_page_is_right_and_is_driven(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[3] / 'docs' / 'your_own_drive.md').read_text(encoding='utf-8')
+    template = page.partition('## Template\n')[2].partition('\nComplete examples')[0]
+    path = tmp_path / 'my_drive.vfd.yaml'
+    path.write_text(textwrap.dedent(template), encoding='utf-8')
+    with DescribedRig(path) as rig:
+        assert rig.file.title == 'Example 100'
+        rig.connect(parameters=True)
+        rig.enable()
+        rig.follow(20.0)
+        rig.follow(-20.0)
+        rig.answer(rig.drive.quick_stop())
+        assert not rig.far.motor.driven
 
 
 @pytest.mark.parametrize('name', SHIPPED)

@@ -1,0 +1,70 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""``nfo-sinus family``, ``families``, and ``--family`` of the tool and the simulator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import shutil
+
+import pytest
+from support.described import SHIPPED
+
+from nfo_sinus_driver.cli import families
+from nfo_sinus_driver.cli.main import main, parse
+from nfo_sinus_driver.simulator import main as simulator
+
+V20 = str(SHIPPED['siemens_v20'])
+
+
+def test_a_file_is_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bad = tmp_path / 'bad.vfd.yaml'
+    bad.write_text(Path(V20).read_text().replace('bit: 2', 'bit: 3'))
+    assert main(['family', 'check', V20]) == 0
+    assert 'Siemens SINAMICS V20, 4 settings' in (said := capsys.readouterr().out)
+    assert 'no time-out of its own' in said
+    assert main(['family', 'check', V20, str(bad)]) == 1
+    assert f'{bad}, line 41: fault and running mean the same bits' in capsys.readouterr().out
+    assert main(['family', 'check', str(tmp_path / 'none.vfd.yaml')]) == 1
+    assert 'No such file' in capsys.readouterr().out
+
+
+def test_families_are_listed(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
+    assert main(['family', 'list']) == 0
+    listed = capsys.readouterr().out
+    assert {'sinus_g2', *SHIPPED} <= {line.split()[0] for line in listed.splitlines()}
+    assert V20 in listed
+    monkeypatch.setattr('sys.argv', ['families', '--ros-args', '-r', '__node:=x'])
+    assert families.main() == 0
+    assert capsys.readouterr().out == listed
+
+
+def test_the_line_is_that_of_the_file_where_nothing_else_is_given() -> None:
+    options = parse(['--family', 'yaskawa_v1000', 'info'])
+    assert (options.address, options.baud_rate, options.char_format) == (31, 9600, '8N1')
+    options = parse(['info', '--family', 'yaskawa_v1000', '--address', '2', '--baud-rate', '1200'])
+    assert (options.address, options.baud_rate, options.char_format) == (2, 1200, '8N1')
+    assert options.model == str(SHIPPED['yaskawa_v1000'])
+
+
+def test_a_family_that_is_none_leaves_with_what_to_do(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for command in (['--family', 'none', 'info'], ['--family', './none.vfd.yaml', 'info']):
+        with pytest.raises(SystemExit) as left:
+            parse(command)
+        assert left.value.code == 2
+    assert 'choose one of' in (said := capsys.readouterr().err) and 'no such file' in said
+    with pytest.raises(SystemExit):
+        simulator.main(['--family', 'none'])
+    assert "no family 'none'" in capsys.readouterr().err
+
+
+def test_a_parameter_file_is_of_the_family(tmp_path: Path) -> None:
+    path = tmp_path / 'mine.vfd.yaml'
+    shutil.copy(V20, path)
+    assert parse(['--family', str(path), 'info']).model == str(path)
