@@ -34,7 +34,7 @@ from nfo_sinus_driver.link.interface import NeverSilent
 
 #: Parity and stop bits that are tried [M0 §6.2.2].
 _PARITIES = ('E1', 'O1', 'N2')
-_LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200)
+_LIKELIEST = (19200, 9600, 57600, 38400, 4800, 2400, 1200, 115_200)
 #: How often an address that gave a damaged answer is asked again.
 _DAMAGE_RETRIES = 2
 #: The columns and their widths.

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import importlib
 from typing import Protocol, cast
 
-from nfo_sinus_driver.link.interface import LineProtocol, LineSettings, Link
+from nfo_sinus_driver.link.interface import BAUD_RATES, LineProtocol, LineSettings, Link
 from nfo_sinus_driver.setting import FIXED, setting
 
 #: The addresses of drives on Modbus [M0 §6.2.2].
@@ -31,6 +31,8 @@ MODBUS_RTU = LineProtocol(
     units=_MODBUS_UNITS,
     baud_rate=19200,
     char_format='8E1',
+    # beyond what the manuals of the shipped drives have, for those that files describe
+    baud_rates=(*BAUD_RATES, 115_200),
     char_formats=('8E1', '8O1', '8N2', '8N1', '8E2', '8O2'),
     identifies=True,
     writes_and_reads=True,

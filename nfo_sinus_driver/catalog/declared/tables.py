@@ -28,15 +28,19 @@ class Code(enum.IntEnum):
 
 
 _STANDS, _RUNS = frozenset({Meaning.BUS_STANDBY}), frozenset({Meaning.BUS_RUNNING})
-_TEXTS: Mapping[Code, tuple[str, frozenset[Meaning]]] = {
-    Code.READY: ('Ready', _STANDS),
-    Code.RUNNING: ('Running', _RUNS),
-    Code.STOPPING: ('Stopping', _RUNS | {Meaning.SLOWING}),
-    Code.INHIBITED: ('Not ready', _STANDS),
-    Code.LOCAL: ('Local', frozenset({Meaning.KEYPAD})),
-    Code.LOCAL_RUNNING: ('Local, running', frozenset({Meaning.KEYPAD, Meaning.LOCAL_RUNNING})),
-    Code.ALARM: ('', _STANDS),
-    Code.ALARM_RUNNING: ('', _RUNS),
+#: The text of each, what it means, and what that is to the driver; an alarm has those of the file.
+_TEXTS: Mapping[Code, tuple[str, str, frozenset[Meaning]]] = {
+    Code.READY: ('Ready', 'The motor stands and can be started', _STANDS),
+    Code.RUNNING: ('Running', 'The motor is driven', _RUNS),
+    Code.STOPPING: ('Stopping', 'The motor is on its way to a stop', _RUNS | {Meaning.SLOWING}),
+    Code.INHIBITED: ('Not ready', 'The motor stands and cannot be started', _STANDS),
+    Code.LOCAL: ('Local', 'Keypad or terminals have control', frozenset({Meaning.KEYPAD})),
+    Code.LOCAL_RUNNING: (
+        'Local, running', 'Keypad or terminals run the motor',
+        frozenset({Meaning.KEYPAD, Meaning.LOCAL_RUNNING}),
+    ),
+    Code.ALARM: ('', '', _STANDS),
+    Code.ALARM_RUNNING: ('', '', _RUNS),
 }
 _DRIVEN = (Code.RUNNING, Code.STOPPING, Code.LOCAL_RUNNING, Code.ALARM_RUNNING)
 
@@ -53,11 +57,11 @@ def status_codes(drive: Description) -> Mapping[int, StatusCode]:
 
 
 def _of_state(drive: Description, code: Code) -> StatusCode:
-    text, meanings = _TEXTS[code]
+    text, description, meanings = _TEXTS[code]
     if drive.holder is not None:
         meanings = frozenset({Meaning.ANONYMOUS, *({Meaning.RUNNING} if code in _DRIVEN else ())})
     if text:
-        return StatusCode(int(code), text, meanings=meanings)
+        return StatusCode(int(code), text, meanings=meanings, description=description)
     alarm = drive.alarm
     return StatusCode(
         int(code), alarm.text, kind=Kind.ALARM, meanings=meanings,
