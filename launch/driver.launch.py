@@ -40,6 +40,7 @@ OVERRIDES = {
     'char_format': ('/**/nfo_sinus_bus', str, 'character format, such as 8E1'),
     'address': ('/**', int, 'address of the drive, where there is one'),
     'model': ('/**', str, 'family of the drives, such as movitrac31'),
+    'family': ('/**', str, 'in place of model: a name, the path of a NAME.vfd.yaml, or package://'),
 }
 
 
