@@ -54,5 +54,8 @@ setup(
             f'record = {NAME}.demo.record:main',
             f'simulator = {NAME}.simulator.main:main',
         ],
+        # loaded by `ros2 doctor` alone
+        'ros2doctor.checks': [f'DriveCheck = {NAME}.node.doctor:DriveCheck'],
+        'ros2doctor.report': [f'DriveReport = {NAME}.node.doctor:DriveReport'],
     },
 )

@@ -188,7 +188,7 @@ def test_what_is_public_is_documented() -> None:
     topics = {
         name for path in (PACKAGE / 'node').glob('*.py') for name in topics_and_services(read(path))
     }
-    executables = set(re.findall(r"f'([\w-]+) = \{NAME\}", read(ROOT / 'setup.py')))
+    executables = set(re.findall(r"f'([a-z-]+) = \{NAME\}", read(ROOT / 'setup.py')))
     names = topics | executables | SETTINGS
     assert names >= {
         *('~/status', '~/setpoint', '~/enable', '/diagnostics', 'driver', 'simulator'),

@@ -39,6 +39,7 @@ ON_NOBLE = {
 #: The driver says so, a test is skipped.
 OPTIONAL = {
     'nfo_sinus_driver/demo/bags_rosbags.py': {'rosbags'},
+    'nfo_sinus_driver/node/doctor.py': {'ros2doctor'},
     'nfo_sinus_driver/view/app.py': {'rich', 'textual'},
     'test/ros/stand_ins/rosbag2_py.py': {'rosbags'},
     'test/unit/view/test_app.py': {'textual'},
