@@ -10,6 +10,7 @@ from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.settings import CONTROL_METHODS, DriveSettings
 from nfo_sinus_driver.drive.snapshot import Listener, LogEntry, Snapshot, Telemetry
+from nfo_sinus_driver.drive.stop_reason import StopReason
 from nfo_sinus_driver.drive.tuning import Tuned
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     'Report',
     'Severity',
     'Snapshot',
+    'StopReason',
     'Telemetry',
     'Tuned',
 ]

@@ -15,6 +15,9 @@ from collections.abc import Callable, Mapping
 import enum
 import math
 
+from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.stop_reason import StopReason, reason_of
+
 
 class ControlState(enum.Enum):
     """What the driver is doing with the drive; the values describe it to users."""
@@ -88,24 +91,37 @@ class Control:
     :ivar state: what the driver is doing with the drive.
     :ivar since: when the last event was, s: a status from before says nothing of it.
     :ivar stopped_at: when a stop was confirmed last, s.
+    :ivar stopped_for: why the motor was stopped last; ``None`` before the first time.
     """
 
     def __init__(self, now: Callable[[], float], on_change: Callable[[ControlState], None]) -> None:
         self.state = ControlState.OFFLINE
         self.since = 0.0
         self.stopped_at = -math.inf
+        self.stopped_for: Report | None = None
         self._now = now
         self._on_change = on_change
 
-    def dispatch(self, event: ControlEvent) -> None:
-        """Go where an event leads."""
+    def dispatch(self, event: ControlEvent, why: Report | None = None) -> None:
+        """Go where an event leads; where that ends what may drive the motor, note why."""
         before = self.state
         self.state = TRANSITIONS.get((before, event), before)
         self.since = self._now()
         if event is ControlEvent.STOPPED:
             self.stopped_at = self.since
         if self.state is not before:
+            self._note(before, why)
             self._on_change(before)
+
+    def explain(self, why: Report) -> None:
+        """Note a better reason for the stop that is on its way."""
+        self.stopped_for = why
+
+    def _note(self, before: ControlState, why: Report | None) -> None:
+        """Note why the motor is stopped; a stop of one that was not commanded explains nothing."""
+        commanded = before in COMMANDED or reason_of(why) is StopReason.NOT_ENABLED
+        if why is not None and commanded and self.state is ControlState.STOPPING:
+            self.stopped_for = why
 
     def accepts(self, event: ControlEvent) -> bool:
         """Whether an event leads to another state."""

@@ -31,6 +31,7 @@ from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.following import Following
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.starting import StartSequence
+from nfo_sinus_driver.drive.stop_reason import StopReason, reason_of
 from nfo_sinus_driver.drive.stopping import StopSequence
 from nfo_sinus_driver.link import LinkError, Refused
 
@@ -116,9 +117,14 @@ class Controller:
         return self._control.commanded
 
     @property
-    def procedure_runs(self) -> bool:
-        """A procedure has the drive; it may have been stopped, and not have ended yet."""
-        return self._access is not None
+    def procedure(self) -> str:
+        """What has exclusive access, perhaps stopped and not ended yet; ``''`` if nothing has."""
+        return '' if self._access is None else self._access.what
+
+    @property
+    def stopped_for(self) -> Report | None:
+        """Why the motor was stopped last; ``None`` while it follows set-points that arrive."""
+        return self._setpoint.timed_out if self.enabled else self._control.stopped_for
 
     @property
     def changing(self) -> bool:
@@ -258,17 +264,18 @@ class Controller:
             self._following.begin()
         except Exception as error:
             # whatever went wrong, a run command may stand by now
-            self._sequence.start()
+            self._sequence.start(Report(Cause.ENABLE_FAILED, why=report_of(error)))
             await self._settle()
             raise DriveError(report_of(error)) from error
 
-    async def stop(self, patience: float | None = None) -> Report:
+    async def stop(self, why: Report | None = None, patience: float | None = None) -> Report:
         """
         Stop as the drive's StMode says; control is kept. Tells whether it ramps or coasts [C97].
 
+        :param why: needed where something may drive the motor.
         :param patience: how long the drive may take to confirm it, s.
         """
-        self._sequence.start()
+        self._sequence.start(why)
         await self._sequence.wait_confirmed(patience or None)
         status = self._state.status
         if self.blocked_by_fault:
@@ -293,12 +300,12 @@ class Controller:
         """Put the drive under bus control for a procedure, with no run command standing."""
         await self._starting.take_control(control_mode)
 
-    async def withdraw_run_command(self) -> None:
-        """Remove what a procedure has commanded; control is kept."""
-        self._sequence.start()
+    async def withdraw_run_command(self, ended: Report | None) -> None:
+        """Remove what a procedure has commanded, and note that it has ended; control is kept."""
+        self._sequence.start(ended)
         await self._sequence.wait_confirmed()
 
-    async def quick_stop(self) -> Report:
+    async def quick_stop(self, why: Report) -> Report:
         """
         Release the motor at once: it coasts; by MODE and SCMD control is given back, too.
 
@@ -306,9 +313,9 @@ class Controller:
         none, stop as usual [C96].
         """
         if not self.method.coasts:
-            return Report(Cause.NO_QUICK_STOP, stop=await self.stop())
+            return Report(Cause.NO_QUICK_STOP, stop=await self.stop(why))
         may_run = self.may_run
-        with self._sequence.external_stop():
+        with self._sequence.external_stop(why):
             try:
                 may_run = may_run or await self.method.in_control(Priority.STOP)
                 may_run = may_run or (await self._state.read_status(Priority.LOOK)).tuning
@@ -333,18 +340,18 @@ class Controller:
             await self._settle()
             return self._quick_stopped()
 
-    async def rapid_stop(self) -> Report:
+    async def rapid_stop(self, why: Report) -> Report:
         """
         Stop along the stop ramp of the drive, if it has one, else as usual; control is kept.
 
         The stop goes on as any other, whatever becomes of the request for that ramp.
         """
         if not self.method.stop_ramp:
-            return Report(Cause.NO_RAPID_STOP, stop=await self.stop())
-        with self._sequence.external_stop():
+            return Report(Cause.NO_RAPID_STOP, stop=await self.stop(why))
+        with self._sequence.external_stop(why):
             with contextlib.suppress(LinkError, DriveError):
                 await self.method.rapid_stop(self._state.control_mode)
-            stopped = await self.stop()
+            stopped = await self.stop(why)
         status = self._state.status
         if status is None or not status.driven or status.faulted:
             return stopped
@@ -372,7 +379,7 @@ class Controller:
         ramps = status is not None and status.driven
         return Report(Cause.QUICK_STOP_RAMPS if ramps else Cause.QUICK_STOP_OFF, by=by)
 
-    async def acknowledge(self) -> Report:
+    async def acknowledge(self, why: Report) -> Report:
         """Acknowledge a fault, run command and set-point first, where the drive lets us."""
         state = self._state
         status = await state.read_status(Priority.SERVICE)
@@ -380,7 +387,7 @@ class Controller:
         if not status.faulted and fault.kind is Kind.STATUS:
             return state.report(Cause.NOTHING_TO_ACKNOWLEDGE)
         may_run = self.may_run or await self.method.in_control(Priority.SERVICE)
-        with self._sequence.external_stop():
+        with self._sequence.external_stop(why):
             return await self._acknowledge(status, may_run=may_run)
 
     async def _acknowledge(self, status: InverterStatus, *, may_run: bool) -> Report:
@@ -413,7 +420,7 @@ class Controller:
             return Report(Cause.ACKNOWLEDGED_DETAILED, status=acknowledged, details=details)
         return Report(Cause.ACKNOWLEDGED, status=acknowledged)
 
-    async def release(self, timeout: float) -> Report:
+    async def release(self, timeout: float, why: Report) -> Report:
         """
         Give control back once the motor stands.
 
@@ -428,7 +435,7 @@ class Controller:
         status = self._state.status
         may_run = self.commanded or self.stopping or (status is not None and status.from_bus)
         # no client can enable it until the motor stands
-        with self._sequence.external_stop():
+        with self._sequence.external_stop(why):
             return await self._release(timeout, may_run=may_run)
 
     async def _release(self, timeout: float, *, may_run: bool) -> Report:
@@ -464,11 +471,11 @@ class Controller:
             await self._state.wait_until(lambda status: not status.driven, Priority.LOOK, timeout)
             await self.method.release()
 
-    def close(self) -> None:
+    def close(self, why: Report) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
         self.closed = True
         if self.may_run:
-            self._sequence.start()
+            self._sequence.start(why)
 
     # --- what happens by itself ---------------------------------------------------------------
 
@@ -477,31 +484,36 @@ class Controller:
         state, status = self._state, self._state.status
         if await self.method.in_control(Priority.SERVICE):
             turns = status is not None and (status.runs_by_bus or abs(status.frequency) > 0)
+            found = None
             if turns and not self.stopping:
-                state.tell(Severity.WARNING, state.report(Cause.FOUND_RUNNING))
-            self._sequence.restart()
+                found = state.report(Cause.FOUND_RUNNING)
+                state.tell(Severity.WARNING, found)
+            self._sequence.restart(found)
         elif self._lost_in_use and status is not None and not status.faulted:
-            state.tell(Severity.WARNING, state.report(Cause.CONTROL_LOST_WHILE_AWAY))
+            why = state.report(Cause.CONTROL_LOST_WHILE_AWAY)
+            state.tell(Severity.WARNING, why)
+            self._control.explain(why)
         self._lost_in_use = False
 
     def connected(self) -> None:
         """Take note that the drive is connected."""
         self._control.dispatch(ControlEvent.CONNECTED)
 
-    def disconnected(self) -> None:
+    def disconnected(self, why: Report) -> None:
         """Take note that the drive is left alone; what still drives the motor is stopped."""
-        self._control.dispatch(ControlEvent.LOST)
+        self._control.dispatch(ControlEvent.LOST, why)
         if self.stopping:
             self._sequence.start()
 
-    def lost(self) -> bool:
+    def lost(self, why: Report) -> bool:
         """Take note that the drive does not answer any more; true if it may have followed us."""
         self._lost_in_use = self.commanded or self._refusal is not None
         if self._refusal is not None:
             # no status will come that could tell a better reason
             (_, reason), self._refusal = self._refusal, None
             self._state.tell(Severity.WARNING, Cause.STOPPING_BECAUSE, why=reason)
-        self._control.dispatch(ControlEvent.LOST)
+        known = reason_of(why) is not StopReason.OTHER
+        self._control.dispatch(ControlEvent.LOST, why if known else Report(Cause.LOST, why=why))
         if self._lost_in_use:
             self._sequence.start()
         return self._lost_in_use
@@ -529,13 +541,13 @@ class Controller:
         elif not (self.commanded or self.stopping) and status.keeps_running:
             reason = Report(Cause.RUNS_UNASKED)
         if reason is not None:
-            self._sequence.start()
+            self._sequence.start(reason)
             self._tell_stopped(reason)
         return reason is not None
 
     def refused(self, reason: Report) -> None:
         """Stop because of a set-point; the next status may tell a better reason."""
-        self._sequence.start()
+        self._sequence.start(reason)
         self._refusal = (self._bus.now(), reason)
 
     def _explain_refusal(self, status: InverterStatus) -> bool:
@@ -543,7 +555,10 @@ class Controller:
             return False
         # it was told to stop when it refused; a drive with a fault refuses everything
         (_, reason), self._refusal = self._refusal, None
-        self._tell_stopped(explain_fault(self._state, status) if status.faulted else reason)
+        if status.faulted:
+            reason = explain_fault(self._state, status)
+            self._control.explain(reason)
+        self._tell_stopped(reason)
         return True
 
     def _tell_stopped(self, reason: Report) -> None:

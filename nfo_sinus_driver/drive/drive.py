@@ -38,6 +38,13 @@ _T = TypeVar('_T')
 _FIRST_ANSWER = 1.0
 #: What the unit of set-points follows from.
 _MODE_ROLES = (Role.CONTROL_MODE, Role.PROCESS_UNIT)
+#: Why a motor is stopped by a command of which no more is said.
+_BY = 'the program'
+_STOP = Report(Cause.STOP_REQUESTED, by=_BY)
+_QUICK_STOP = Report(Cause.QUICK_STOP_REQUESTED, by=_BY)
+_ACKNOWLEDGE = Report(Cause.ACKNOWLEDGE_REQUESTED, by=_BY)
+_LEFT = Report(Cause.TRANSITION_REQUESTED, by=_BY)
+_ENDS = Report(Cause.DRIVER_ENDS, by=_BY)
 
 
 class Drive:
@@ -45,7 +52,8 @@ class Drive:
     One drive on a bus.
 
     All public methods may be called from any thread. Those that take time return a future; its
-    exception is a :class:`DriveError`, which says what is wrong.
+    exception is a :class:`DriveError`, which says what is wrong. Those that stop the motor take
+    why: who requested it is a value of that report.
 
     :param listener: told about every poll and event, on the worker of the bus.
     :ivar model: what the catalog knows of its family.
@@ -206,7 +214,7 @@ class Drive:
                     await self.parameters.read_now([one.key for one in self.model.kept])
                 except BaseException:
                     # no poller watches it yet
-                    self._set_disconnected()
+                    self._set_disconnected(_LEFT)
                     raise
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
             self._watch.begin()
@@ -230,40 +238,40 @@ class Drive:
             raise DriveError(self.state.report(Cause.OTHER_METHOD_RUNS, method=method))
 
     @on_bus
-    async def disconnect(self, timeout: float) -> Report:
+    async def disconnect(self, timeout: float, why: Report = _LEFT) -> Report:
         """Stop the motor, wait so long, s, until it stands, and give control back."""
         # no client may enable it until the motor stands
         self._set_active(False)
         try:
             if self._controller is None:
                 return Report(Cause.ONLY_WATCHED)
-            answer = await self._controller.release(timeout)
+            answer = await self._controller.release(timeout, why)
             # whoever has control at this moment: it may come back to the bus by itself
             if self._controller.method.control_retained:
                 await self._watchdog.put_back()
             return answer
         finally:
             self._bus.cancel(self._parameters_task)
-            self._set_disconnected()
+            self._set_disconnected(why)
             self._error_log_monitor.end()
             self._fault_namer.end()
             self._watch.end()
 
     @on_bus
-    async def deactivate(self) -> Report | None:
+    async def deactivate(self, why: Report = _LEFT) -> Report | None:
         """Stop the motor, if it may run, and only keep watch until it is active again."""
-        return await self._deactivate()
+        return await self._deactivate(why)
 
     @on_bus
-    async def stop_for_good(self, patience: float) -> Report | None:
+    async def stop_for_good(self, patience: float, why: Report = _ENDS) -> Report | None:
         """Stop the motor within so many s; it can never be enabled again."""
         if self._controller is not None:
-            self._controller.close()
+            self._controller.close(why)
         if not self.ever_responded:
             # it may not be there at all, or be just about to answer for the first time
             patience = min(patience, _FIRST_ANSWER)
         until = self._bus.now() + patience
-        answer = await self._deactivate(patience)
+        answer = await self._deactivate(why, patience)
         if self._controller is not None and answer is not None:
             await self._controller.leave(until - self._bus.now())
         return answer
@@ -284,26 +292,26 @@ class Drive:
         return answer
 
     @on_bus
-    async def stop(self) -> Report:
+    async def stop(self, why: Report = _STOP) -> Report:
         """Stop as the drive's StMode says; control is kept."""
-        return await self._procedures.controller.stop()
+        return await self._procedures.controller.stop(why)
 
     @on_bus
-    async def rapid_stop(self) -> Report:
+    async def rapid_stop(self, why: Report = _STOP) -> Report:
         """Stop along the stop ramp of the drive, where it has one; control is kept."""
-        return await self._procedures.controller.rapid_stop()
+        return await self._procedures.controller.rapid_stop(why)
 
     @on_bus
-    async def quick_stop(self) -> Report:
+    async def quick_stop(self, why: Report = _QUICK_STOP) -> Report:
         """Release the motor at once: it coasts."""
-        return await self._procedures.controller.quick_stop()
+        return await self._procedures.controller.quick_stop(why)
 
     @on_bus
-    async def acknowledge(self) -> Report:
+    async def acknowledge(self, why: Report = _ACKNOWLEDGE) -> Report:
         """Acknowledge a fault."""
         controller = self._procedures.controller
         self._require_connected()
-        return await controller.acknowledge()
+        return await controller.acknowledge(why)
 
     @on_bus
     async def identify(self, *, thoroughly: bool = True) -> Identity:
@@ -457,16 +465,16 @@ class Drive:
         told = ', '.join(part for part in (name, str(identity)) if part)
         state.tell(Severity.INFO, Cause.CONNECTED, drive=told)
 
-    def _set_disconnected(self) -> None:
+    def _set_disconnected(self, why: Report) -> None:
         self.state.lost()
         if self._controller is not None:
-            self._controller.disconnected()
+            self._controller.disconnected(why)
 
-    async def _deactivate(self, patience: float | None = None) -> Report | None:
+    async def _deactivate(self, why: Report, patience: float | None = None) -> Report | None:
         self._set_active(False)
         if self._controller is None or not self._controller.may_run:
             return None
-        return await self._controller.stop(patience)
+        return await self._controller.stop(why, patience)
 
     def _take_parameters(self, keys: Collection[str]) -> None:
         """Take note of parameters that have new values, whoever changed them."""

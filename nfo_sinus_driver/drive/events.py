@@ -170,6 +170,17 @@ class Cause(enum.Enum):
     TUNING_ENERGISES = 'the motor is energised by a tuning ({status})'
     TUNING_REFUSES = 'the motor is energised by a tuning ({status}): {error}'
     DRIVE_SAYS = 'the drive says {status}'
+    # --- the motor is stopped by a command, and whose
+    STOP_REQUESTED = 'a stop was requested: {by}'
+    DISABLE_REQUESTED = 'a disable was requested: {by}'
+    QUICK_STOP_REQUESTED = 'a quick stop was requested: {by}'
+    STOP_ALL_REQUESTED = 'a stop of all drives was requested: {by}'
+    ACKNOWLEDGE_REQUESTED = 'an acknowledgement stops the motor first: {by}'
+    TRANSITION_REQUESTED = 'a transition was requested: {by}'
+    DRIVER_ENDS = 'this {call.program} ends: {by}'
+    ENABLE_FAILED = 'the enable failed: {why}'
+    PROCEDURE_ENDED = '{what} has ended'
+    PROCEDURE_CANCELLED = '{what} was cancelled'
     # --- the motor is stopped without a command, and why
     STOPPED_BECAUSE = f'stopped: {{why}}; {_GO_ON}'
     STOPPED_BECAUSE_OF_FAULT = f'stopped: {{why}}; then {{call.acknowledge}}, {_GO_ON}'

@@ -89,7 +89,7 @@ class Poller:
         #: Poll at full rate.
         self.active = False
         #: The newest poll.
-        self.snapshot = take_snapshot(state, setpoint, None)
+        self.snapshot = take_snapshot(state, setpoint)
         #: Since when every poll failed, although the drive may have answered.
         self._failing_since = math.inf
         #: How often in a row it could not be connected to.
@@ -441,7 +441,7 @@ class Poller:
         state.lost()
         why = explain_failure(error, state)
         self._bus.recorder.cycle(self._unit, math.nan)
-        in_use = self._controller is not None and self._controller.lost()
+        in_use = self._controller is not None and self._controller.lost(why)
         cause = Cause.LOST_IN_USE if in_use else Cause.LOST
         state.tell(Severity.ERROR, cause, why=why)
         try:
@@ -457,7 +457,10 @@ class Poller:
             status = state.status
         frequency, speed = (state.last_polled(role) for role in _BASIC)
         actual = state.last_polled(_ACTUAL.get(state.control_mode)).value
-        self.snapshot = take_snapshot(state, self._setpoint, status, frequency, speed, actual)
+        stop = None if self._controller is None else self._controller.stopped_for
+        self.snapshot = take_snapshot(
+            state, self._setpoint, status, frequency, speed, actual, stop
+        )
         state.listener.on_snapshot(self.snapshot)
 
 
@@ -468,15 +471,16 @@ def _is(error: Exception, cause: Cause) -> bool:
 def take_snapshot(
     state: DriveState,
     setpoint: Setpoint,
-    status: InverterStatus | None,
+    status: InverterStatus | None = None,
     frequency: Measured = NOT_MEASURED,
     speed: Measured = NOT_MEASURED,
     actual: float = NAN,
+    stop: Report | None = None,
 ) -> Snapshot:
     """Return the snapshot of a poll; without a status while the drive is not connected."""
     standing = (state.connected, setpoint.following, state.settings.method)
     if status is None:
-        return Snapshot(state.bus.now(), *standing)
+        return Snapshot(state.bus.now(), *standing, stop=stop)
     code = status.listed
     watched = state.settings.method == MONITOR
     return Snapshot(
@@ -498,4 +502,5 @@ def take_snapshot(
         speed=speed.value,
         speed_at=speed.at,
         actual=actual,
+        stop=stop,
     )

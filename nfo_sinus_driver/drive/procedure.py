@@ -80,11 +80,15 @@ class Procedures:
             yield access
 
     @contextlib.asynccontextmanager
-    async def in_standby(self, access: ExclusiveAccess) -> AsyncIterator[None]:
+    async def in_standby(
+        self, access: ExclusiveAccess, ended: Report | None = None
+    ) -> AsyncIterator[None]:
         """
         Take control of a drive whose motor stands, and give it back as it was found.
 
         Not from keypad or terminals: giving it back to them could start the motor [C43].
+
+        :param ended: why the motor stops then, if it is energised meanwhile.
         """
         found = await self._take(access)
         try:
@@ -92,16 +96,17 @@ class Procedures:
         except Exception:
             # who asked is told what went wrong first; what comes of it is logged
             with contextlib.suppress(DriveError, LinkError):
-                await self._give_back(found)
+                await self._give_back(found, ended)
             raise
-        await self._give_back(found)
+        await self._give_back(found, ended)
 
     async def abort(self) -> Report | None:
         """End the procedure that has the drive; anything else goes on."""
         controller = self._controller
-        if controller is None or not controller.procedure_runs:
+        if controller is None or not controller.procedure:
             return None
-        return await controller.stop()
+        what = controller.procedure
+        return await controller.stop(Report(Cause.PROCEDURE_CANCELLED, what=what))
 
     async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
         """
@@ -146,9 +151,9 @@ class Procedures:
             await self._bus.sleep(drive_state.LOOK_PERIOD)
         return found
 
-    async def _give_back(self, found: Holder) -> None:
+    async def _give_back(self, found: Holder, ended: Report | None = None) -> None:
         """Remove the command, and give control back where it was free; not while faulted."""
         controller = self.controller
-        await controller.withdraw_run_command()
+        await controller.withdraw_run_command(ended)
         if found is Holder.NOBODY and not controller.blocked_by_fault:
             await controller.method.release()

@@ -93,7 +93,8 @@ class Setpoint:
         self._written: dict[Address, tuple[bytes, float]] = {}
         self._watch: Task | None = None
         self._expired = False
-        self._warned = False
+        #: What was reported when none came for so long that the motor had to be stopped.
+        self._timed_out: Report | None = None
         self._waits_for_answer = False
         self._busy_since = math.inf
         self._clamp_told = False
@@ -132,6 +133,11 @@ class Setpoint:
         return self._expired
 
     @property
+    def timed_out(self) -> Report | None:
+        """What was reported when the motor was stopped for want of set-points, while it is."""
+        return self._timed_out
+
+    @property
     def age(self) -> float:
         """How long ago the newest valid set-point came in, s; NaN if none did since arming."""
         at = self._request.at
@@ -166,7 +172,7 @@ class Setpoint:
         self._had = [(0.0, math.inf)]
         self.clamped = self._clamp_told = False
         self._expired = False
-        self._warned = False
+        self._timed_out = None
         self._waits_for_answer = False
         self._busy_since = math.inf
         if follows:
@@ -280,8 +286,8 @@ class Setpoint:
         limited = self._limited(request)
         self.clamped = limited != request.value
         self._expired = False
-        if self._warned:
-            self._warned = False
+        if self._timed_out is not None:
+            self._timed_out = None
             self._state.tell(Severity.INFO, Cause.SETPOINTS_AGAIN)
         return limited
 
@@ -422,9 +428,9 @@ class Setpoint:
         assert self._target is not None
         zero = self._target.writes(0.0, self._meant(self._standing))
         if self._standing != dict(map(self._params.target, zero)):
-            if not self._warned:
-                self._warned = True
-                self._state.tell(Severity.WARNING, Cause.SETPOINT_TIMED_OUT, timeout=timeout)
+            if self._timed_out is None:
+                self._timed_out = Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
+                self._state.tell(Severity.WARNING, self._timed_out)
             before = self._request
             for step in zero:
                 if self._request is not before:

@@ -12,7 +12,8 @@ import math
 from typing import NamedTuple, Protocol
 
 from nfo_sinus_driver.catalog import InverterStatus, Kind, Role
-from nfo_sinus_driver.drive.events import Event
+from nfo_sinus_driver.drive.events import Event, Report
+from nfo_sinus_driver.drive.stop_reason import StopReason, reason_of
 from nfo_sinus_driver.link import Clock
 
 NAN = math.nan
@@ -47,6 +48,8 @@ class Snapshot:
     :ivar speed: rpm, likewise.
     :ivar text: the inverter status as on the display.
     :ivar kind: its kind; the fault bit has the last word [C95].
+    :ivar stop: why the motor was stopped last; ``None`` before the first time, and while it is
+        enabled and set-points arrive.
     """
 
     at: float
@@ -69,6 +72,12 @@ class Snapshot:
     remedy: str = ''
     kind: Kind = Kind.STATUS
     requires_ack: bool = False
+    stop: Report | None = None
+
+    @property
+    def stop_reason(self) -> StopReason:
+        """Which kind of reason that is."""
+        return reason_of(self.stop)
 
 
 @dataclass(frozen=True)

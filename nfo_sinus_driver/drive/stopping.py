@@ -88,24 +88,26 @@ class StopSequence:
         return waiting and self._bus.now() >= self._due
 
     @contextlib.contextmanager
-    def external_stop(self) -> Iterator[None]:
+    def external_stop(self, why: Report) -> Iterator[None]:
         """Be stopping while an operation stops the motor by other means."""
         self._external += 1
-        self._control.dispatch(ControlEvent.STOP)
+        self._control.dispatch(ControlEvent.STOP, why)
         try:
             yield
         finally:
             self._external -= 1
             self._report_end()
 
-    def start(self) -> None:
+    def start(self, why: Report | None = None) -> None:
         """
         Remove the run command, again and again until the drive says that it stops.
 
         Where that is going on already nothing has to be added: no client can start the motor
         meanwhile. Only what a fault has blocked is tried once more, for it may be over by now.
+
+        :param why: needed where something may drive the motor.
         """
-        self._control.dispatch(ControlEvent.STOP)
+        self._control.dispatch(ControlEvent.STOP, why)
         if self._control.blocked and self._bus.now() > self._tried_at + _RETRY_PERIOD:
             self.restart()
         if self._task is None:
@@ -118,10 +120,10 @@ class StopSequence:
             task = self._bus.spawn(self._keep_trying())
             self._task = None if task.future.done() else task
 
-    def restart(self) -> None:
+    def restart(self, why: Report | None = None) -> None:
         """Start, or try again at once: what attempts show that have begun counts no more."""
         if self._task is None:
-            self.start()
+            self.start(why)
         else:
             self._tried_at = -math.inf
             self._told_at = math.inf

@@ -91,7 +91,8 @@ class Tuning:
             motor = self._state.model.group_of(Role.NOMINAL_POWER)
             keys = [key for key in self._parameters.available() if key in motor]
             async with self._parameters.left_to_the_drive(keys) as changes:
-                async with self._procedures.in_standby(access):
+                ended = Report(Cause.PROCEDURE_ENDED, what=what)
+                async with self._procedures.in_standby(access, ended):
                     self._state.tell(Severity.INFO, Cause.TUNING_BEGINS, what=what)
                     await self._procedures.command(access, procedure)
                     how = await self._outcome(procedure, access, progress)

@@ -13,10 +13,10 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.drive import DriveError, Report
+from nfo_sinus_driver.drive import Cause, DriveError, Report
 from nfo_sinus_driver.drive.broadcast import broadcast_stop
 from nfo_sinus_driver.node.bus_context import BusContext
-from nfo_sinus_driver.node.callers import log_call
+from nfo_sinus_driver.node.callers import Call
 from nfo_sinus_driver.node.executor import received_at
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
@@ -27,8 +27,8 @@ _LONGEST_ENABLE = 3700.0
 _LONGEST_STOP = 15.0
 
 _Command = Callable[[ManagedDrive], Future[Report]]
-#: Is given what to call when all drives have their command; returns what failed, and what was done.
-_Callback = Callable[[Callable[[], None]], tuple[list[str], list[str]]]
+#: Returns what failed, and what was done.
+_Callback = Callable[[Call], tuple[list[str], list[str]]]
 
 
 class AllDrives:
@@ -52,21 +52,24 @@ class AllDrives:
         self, name: str, callback: _Callback
     ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            call = Call(self._node, name)
             try:
-                failed, done = callback(lambda: log_call(self._node, name))
+                failed, done = callback(call)
             except Exception as error:
                 # an exception that leaves a service callback would end the executor
                 self._node.get_logger().error(f'error in a service: {error!r}')
                 failed, done = [f'error in the driver: {error}'], []
             response.success = not failed
             response.message = '; '.join((*failed, *done)) or 'no drive is controlled here'
+            call.log(response.message)
             return response
 
         return answer
 
-    def _stop(self, given: Callable[[], None]) -> tuple[list[str], list[str]]:
+    def _stop(self, call: Call) -> tuple[list[str], list[str]]:
         """Stop each drive by its address; call to those that cannot be reached, where allowed."""
-        failed, done = self._command(_stop_one, _LONGEST_STOP, given)
+        why = Report(Cause.STOP_ALL_REQUESTED, by=call)
+        failed, done = self._command(lambda one: _stop_one(one, why), _LONGEST_STOP, call)
         if failed and self._context.bus.protocol.broadcast is not None:
             if any(one.settings.method == 'monitor' for one in self._context.drives):
                 failed.append('no stop was broadcast, for a drive here is only monitored')
@@ -83,14 +86,14 @@ class AllDrives:
             return f'a stop for all could not be broadcast: {error}'
         return 'a stop for all was broadcast, which releases every motor; no drive confirms it'
 
-    def _enable(self, given: Callable[[], None]) -> tuple[list[str], list[str]]:
+    def _enable(self, call: Call) -> tuple[list[str], list[str]]:
         requested_at = received_at()
         return self._command(
-            lambda managed: managed.require_active().enable(requested_at), _LONGEST_ENABLE, given
+            lambda managed: managed.require_active().enable(requested_at), _LONGEST_ENABLE, call
         )
 
     def _command(
-        self, command: _Command, timeout: float, given: Callable[[], None]
+        self, command: _Command, timeout: float, call: Call
     ) -> tuple[list[str], list[str]]:
         """Give a command to every controlled drive; return what failed, and what was done."""
         failed: list[str] = []
@@ -105,7 +108,7 @@ class AllDrives:
                 except NodeError as error:
                     failed.append(f'{managed.name}: {error}')
         deadline = time.monotonic() + timeout
-        given()
+        call.find()
         for managed, future in futures:
             name, say = managed.name, managed.wording.say
             try:
@@ -119,7 +122,7 @@ class AllDrives:
         return failed, done
 
 
-def _stop_one(managed: ManagedDrive) -> Future[Report]:
+def _stop_one(managed: ManagedDrive, why: Report) -> Future[Report]:
     if managed.drive.identity is None:
         raise NodeError('it has never answered')
-    return managed.drive.stop()
+    return managed.drive.stop(why)

@@ -1,10 +1,11 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which client has called a service: one line in the log for each command."""
+"""Which client has called a service, and what came of it: one line in the log for each command."""
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 import contextlib
 import threading
 import time
@@ -18,36 +19,55 @@ _KNOWN_WITHIN = 0.5
 _LOOK_PERIOD = 0.02
 
 
-def log_call(node: Node, service: str, detail: str = '') -> None:
+class Call:
     """
-    Log that a command was called, and by whom.
+    A command that was called; as text, by whom, as far as that is known by now.
 
     rclpy does not give a request the name of its client. So these are the nodes that have a client
-    of the service: more than one if several have.
+    of the service: more than one if several have. Nothing is looked for before :meth:`find`: a stop
+    never waits for it.
 
     :param service: its name as it was created, such as ``~/stop``; an action is named with the
         service of it that was called.
     :param detail: what was called for, where the name does not say it.
     """
-    name = node.resolve_service_name(service)
-    if clients := _clients(node, name):
-        _log(node, name, detail, clients)
-        return
-    # who has just come may be known a moment later; its answer must not wait for that
-    threading.Thread(target=_log_later, args=(node, name, detail), daemon=True).start()
 
+    def __init__(self, node: Node, service: str, detail: str = '') -> None:
+        self._node = node
+        self._service = node.resolve_service_name(service)
+        self._detail = detail
+        self._by: Future[str] = Future()
 
-def _log_later(node: Node, name: str, detail: str) -> None:
-    deadline = time.monotonic() + _KNOWN_WITHIN
-    while not (clients := _clients(node, name)) and time.monotonic() < deadline:
-        time.sleep(_LOOK_PERIOD)
-    _log(node, name, detail, clients)
+    def __str__(self) -> str:
+        called = self._service.partition('/_action/')[0]
+        detail = self._detail and f' ({self._detail})'
+        by = self._by.result() if self._by.done() else 'a client'
+        return f'{called}{detail} called by {by}'
 
+    def find(self) -> None:
+        """Find who called, once the command is given; one who has just come may take a moment."""
+        if not self._look():
+            threading.Thread(target=self._keep_looking, daemon=True).start()
 
-def _log(node: Node, name: str, detail: str, clients: list[str]) -> None:
-    called = name.partition('/_action/')[0]
-    by = ' or '.join(clients) or 'a client that the middleware does not name'
-    node.get_logger().info(f'{called}{detail and f" ({detail})"} called by {by}')
+    def log(self, outcome: str = '') -> None:
+        """Log the call and what came of it, as soon as it is known who called."""
+        answered = outcome and f': {outcome}'
+        log = self._node.get_logger()
+        self._by.add_done_callback(lambda _: log.info(f'{self}{answered}'))
+
+    def _keep_looking(self) -> None:
+        deadline = time.monotonic() + _KNOWN_WITHIN
+        while not self._look():
+            if time.monotonic() > deadline:
+                self._by.set_result('a client that the middleware does not name')
+                return
+            time.sleep(_LOOK_PERIOD)
+
+    def _look(self) -> bool:
+        clients = _clients(self._node, self._service)
+        if clients:
+            self._by.set_result(' or '.join(clients))
+        return bool(clients)
 
 
 def _clients(node: Node, service: str) -> list[str]:

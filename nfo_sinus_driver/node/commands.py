@@ -39,7 +39,7 @@ from nfo_sinus_driver.drive import (
     Tuned,
 )
 from nfo_sinus_driver.node import messages
-from nfo_sinus_driver.node.callers import log_call
+from nfo_sinus_driver.node.callers import Call
 from nfo_sinus_driver.node.executor import received_at
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import inv_st
@@ -56,6 +56,7 @@ _LONGEST_REFRESH = 300.0
 CALLS_OF_ENABLE = 4
 
 _T = TypeVar('_T')
+_Command = Callable[[Drive, Call], Future[Report]]
 
 
 class Commands:
@@ -70,27 +71,33 @@ class Commands:
         node.create_service(
             SetBool, '~/enable', self._on_enable, qos_profile=COMMANDS, callback_group=group
         )
-        self.offer('~/stop', Drive.stop, _LONGEST_STOP)
-        self.offer('~/quick_stop', Drive.quick_stop, _LONGEST_STOP)
-        self.offer('~/rapid_stop', Drive.rapid_stop, _LONGEST_STOP)
-        self.offer('~/fault_ack', Drive.acknowledge, _LONGEST_STOP)
+        self.offer('~/stop', _stop, _LONGEST_STOP)
+        self.offer('~/quick_stop', _quick_stop, _LONGEST_STOP)
+        self.offer('~/rapid_stop', _rapid_stop, _LONGEST_STOP)
+        self.offer('~/fault_ack', _acknowledge, _LONGEST_STOP)
         self.offer(
-            '~/refresh_parameters', lambda drive: drive.parameters.refresh(), _LONGEST_REFRESH
+            '~/refresh_parameters', lambda drive, _: drive.parameters.refresh(), _LONGEST_REFRESH
         )
 
-    def offer(self, name: str, command: Callable[[Drive], Future[Report]], timeout: float) -> None:
+    def offer(self, name: str, command: _Command, timeout: float) -> None:
         """Offer a service that answers when a command is done, or after a time-out, s."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            call = Call(self._node, name)
             return self._answer(
-                response, _and_log(self._node, name, lambda: command(self._managed.drive)), timeout
+                response, call, lambda: command(self._managed.drive, call), timeout
             )
 
         group = MutuallyExclusiveCallbackGroup()
         self._node.create_service(Trigger, name, answer, qos_profile=COMMANDS, callback_group=group)
 
-    def _answer(self, response: Any, command: Callable[[], Future[Report]], timeout: float) -> Any:
-        return self.answer(response, command, timeout, self._managed.wording.say)
+    def _answer(
+        self, response: Any, call: Call, command: Callable[[], Future[Report]], timeout: float
+    ) -> Any:
+        """Give a command, and log who called it and what came of it."""
+        self.answer(response, _and_find(call, command), timeout, self._managed.wording.say)
+        call.log(response.message)
+        return response
 
     def answer(
         self,
@@ -114,26 +121,43 @@ class Commands:
         return response
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        call = Call(self._node, '~/enable', str(request.data).lower())
+
         def enable() -> Future[Report]:
             return self._managed.require_active().enable(received_at())
 
-        command, timeout = self._managed.drive.stop, _LONGEST_STOP
+        def disable() -> Future[Report]:
+            return self._managed.drive.stop(Report(Cause.DISABLE_REQUESTED, by=call))
+
         if request.data:
-            command, timeout = enable, _LONGEST_COMMAND
-        detail = str(request.data).lower()
-        return self._answer(response, _and_log(self._node, '~/enable', command, detail), timeout)
+            return self._answer(response, call, enable, _LONGEST_COMMAND)
+        return self._answer(response, call, disable, _LONGEST_STOP)
 
 
-def _and_log(
-    node: Node, service: str, command: Callable[[], _T], detail: str = ''
-) -> Callable[[], _T]:
-    """Return a command that is logged as well, right after it was given: a stop never waits."""
+def _stop(drive: Drive, call: Call) -> Future[Report]:
+    return drive.stop(Report(Cause.STOP_REQUESTED, by=call))
+
+
+def _quick_stop(drive: Drive, call: Call) -> Future[Report]:
+    return drive.quick_stop(Report(Cause.QUICK_STOP_REQUESTED, by=call))
+
+
+def _rapid_stop(drive: Drive, call: Call) -> Future[Report]:
+    return drive.rapid_stop(Report(Cause.STOP_REQUESTED, by=call))
+
+
+def _acknowledge(drive: Drive, call: Call) -> Future[Report]:
+    return drive.acknowledge(Report(Cause.ACKNOWLEDGE_REQUESTED, by=call))
+
+
+def _and_find(call: Call, command: Callable[[], _T]) -> Callable[[], _T]:
+    """Return a command after which is found who called it: a stop never waits."""
 
     def given() -> _T:
         try:
             return command()
         finally:
-            log_call(node, service, detail)
+            call.find()
 
     return given
 
@@ -183,8 +207,8 @@ class ErrorLogServices:
             self._on_get,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
-        commands.offer('~/erase_error_log', Drive.erase_error_log, _LONGEST)
-        commands.offer('~/reset_energy', Drive.reset_energy, _LONGEST)
+        commands.offer('~/erase_error_log', lambda drive, _: drive.erase_error_log(), _LONGEST)
+        commands.offer('~/reset_energy', lambda drive, _: drive.reset_energy(), _LONGEST)
 
     def _on_get(
         self, request: GetErrorLog.Request, response: GetErrorLog.Response
@@ -259,9 +283,11 @@ class TuningServices:
     ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             requested_at = received_at()
-            tune = _and_log(
-                self._node,
-                name,
+            call = Call(self._node, name)
+            # it may take minutes, and how it ends is reported anyway
+            call.log()
+            tune = _and_find(
+                call,
                 lambda: self._managed.require_active().tune(procedure, requested_at=requested_at),
             )
             tuned = self._result(lambda: tune().result())
@@ -312,7 +338,9 @@ class TuningServices:
 
     def _followed(self, goal: ServerGoalHandle, requested_at: float) -> Tuned:
         procedure = _PROCEDURES[goal.request.procedure]
-        log_call(self._node, '~/tune/_action/send_goal', procedure.name.lower())
+        call = Call(self._node, '~/tune/_action/send_goal', procedure.name.lower())
+        call.log()
+        call.find()
         drive = self._managed.require_active()
         # the bus reports how far it is, and nothing may keep it waiting
         reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()

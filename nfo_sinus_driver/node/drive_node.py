@@ -17,8 +17,9 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from nfo_sinus_driver.drive import Change, DriveError, DriveSettings, Report
+from nfo_sinus_driver.drive import Cause, Change, DriveError, DriveSettings, Report
 from nfo_sinus_driver.node.bus_context import BusContext
+from nfo_sinus_driver.node.callers import Call
 from nfo_sinus_driver.node.commands import Commands, ErrorLogServices, TuningServices
 from nfo_sinus_driver.node.declaring import coerce, declare
 from nfo_sinus_driver.node.drive_parameters import DriveParameters, wanted_state
@@ -103,12 +104,12 @@ class DriveNode(LifecycleNodeMixin, Node):
         TuningServices(self, self.managed, reporter.stamp)
         context.add(self.managed)
 
-    def stop_for_good(self, patience: float) -> Future[Report | None]:
+    def stop_for_good(self, patience: float, why: str) -> Future[Report | None]:
         """Stop the motor within so many s, and see to it that no client can start it again."""
         self._ending = True
         self.lifecycle.end()
         self._setpoints.be_quiet(True)
-        return self.managed.drive.stop_for_good(patience)
+        return self.managed.drive.stop_for_good(patience, Report(Cause.DRIVER_ENDS, by=why))
 
     @property
     def later_parameters(self) -> list[str]:
@@ -201,11 +202,13 @@ class DriveNode(LifecycleNodeMixin, Node):
         confirmed = self._stop_for(what, drive.deactivate)
         return confirmed or not (drive.stop_unconfirmed and drive.snapshot.connected)
 
-    def _stop_for(self, what: str, command: Callable[[], Future[Any]]) -> bool:
+    def _stop_for(self, what: str, command: Callable[[Report], Future[Any]]) -> bool:
         """Give a command that stops the motor; return whether the drive has confirmed it."""
-        say = self.managed.wording.say
+        say, call = self.managed.wording.say, Call(self, '~/change_state', what)
         try:
-            answer = command().result(_LONGEST_STOP + self.managed.settings.shutdown_timeout)
+            stopping = command(Report(Cause.TRANSITION_REQUESTED, by=call))
+            call.find()
+            answer = stopping.result(_LONGEST_STOP + self.managed.settings.shutdown_timeout)
         except (DriveError, FutureTimeoutError) as error:
             self.get_logger().error(f'{what}, but: {say(error)}')
             return False

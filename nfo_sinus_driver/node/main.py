@@ -138,7 +138,7 @@ class DriverProcess:
         # all are requested before the first is awaited, and none can be enabled again
         with self._context.at_once():
             stops = {
-                node.stop_for_good(node.managed.settings.shutdown_timeout): node
+                node.stop_for_good(node.managed.settings.shutdown_timeout, why): node
                 for node in self._drives
             }
         self._bus_node.get_logger().info(f'{why}: stopping the motors')

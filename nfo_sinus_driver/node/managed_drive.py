@@ -138,9 +138,9 @@ class ManagedDrive:
             self._drive.settings = self._concrete
         return asked_for
 
-    def disconnect(self) -> Future[Report]:
+    def disconnect(self, why: Report) -> Future[Report]:
         """Stop the motor, give control back and leave the drive alone."""
-        return self._drive.disconnect(self._settings.shutdown_timeout)
+        return self._drive.disconnect(self._settings.shutdown_timeout, why)
 
     @property
     def _concrete(self) -> DriveSettings:

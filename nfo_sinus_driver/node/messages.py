@@ -67,8 +67,10 @@ _TELEMETRY = {
 }
 
 
-def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str, scale: Scale) -> DriveStatus:
-    """Return the DriveStatus of a poll, in the unit of a scale."""
+def drive_status(
+    snapshot: Snapshot, stamp: Time, frame_id: str, scale: Scale, stop_text: str
+) -> DriveStatus:
+    """Return the DriveStatus of a poll, in the unit of a scale; with why it stopped last."""
     return DriveStatus(
         header=Header(stamp=stamp, frame_id=frame_id),
         connected=snapshot.connected,
@@ -80,6 +82,8 @@ def drive_status(snapshot: Snapshot, stamp: Time, frame_id: str, scale: Scale) -
         setpoint_age=snapshot.setpoint_age,
         setpoint_clamped=snapshot.setpoint_clamped,
         actual=scale.shown(snapshot.actual),
+        stop_reason=snapshot.stop_reason,
+        stop_text=stop_text,
         **_told_by(snapshot.status),
     )
 

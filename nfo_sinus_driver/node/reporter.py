@@ -24,7 +24,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.drive import Event, LogEntry, Severity, Snapshot, Telemetry
+from nfo_sinus_driver.drive import Event, LogEntry, Report, Severity, Snapshot, Telemetry
 from nfo_sinus_driver.node import diagnostics, messages
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import Joint
@@ -68,6 +68,9 @@ class Reporter:
         # a drive that is not connected tells by the clock, a poll when it was answered
         self._status_stamps = Sequence(self._stamps)
         self._telemetry_stamps = Sequence(self._stamps)
+        #: Why it stopped last, and what is said of it; by whom may be known a moment later.
+        self._stop: Report | None = None
+        self._stop_text = ''
         self._last_inv_st: tuple[int, Kind] | None = None
         self._last_diagnosis: tuple[bytes, str] | None = None
         create = node.create_lifecycle_publisher
@@ -144,8 +147,16 @@ class Reporter:
             self._inv_st.publish(messages.inv_st(snapshot, stamp, frame_id))
 
     def _publish_status(self, snapshot: Snapshot, stamp: Time, frame_id: str) -> None:
+        if snapshot.stop is not self._stop:
+            self._say_stop(snapshot)
         scale = self._managed().scale
-        self._status.publish(messages.drive_status(snapshot, stamp, frame_id, scale))
+        self._status.publish(
+            messages.drive_status(snapshot, stamp, frame_id, scale, self._stop_text)
+        )
+
+    def _say_stop(self, snapshot: Snapshot) -> None:
+        self._stop = snapshot.stop
+        self._stop_text = self._wording.say(self._stop)
 
     def _publish_telemetry(self, telemetry: Telemetry) -> None:
         stamp = _message(self._telemetry_stamps.next(telemetry.at))
@@ -159,6 +170,7 @@ class Reporter:
 
     def _report_regularly(self) -> None:
         snapshot = self._managed().drive.snapshot
+        self._say_stop(snapshot)
         if not snapshot.connected:
             stamp = _message(self._status_stamps.next(time.monotonic()))
             self._publish_status(snapshot, stamp, self._frame_id())

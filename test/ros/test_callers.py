@@ -9,11 +9,12 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+from bench import wait_until
 import pytest
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-from nfo_sinus_driver.node.callers import log_call
+from nfo_sinus_driver.node.callers import Call
 
 
 @pytest.mark.parametrize('error', [rclpy_implementation.RCLError('x'), InvalidHandle('x')])
@@ -21,10 +22,16 @@ def test_what_the_middleware_cannot_tell_spoils_no_answer(error: Exception) -> N
     def fail(*_: Any) -> None:
         raise error
 
-    logger = SimpleNamespace(info=lambda text: None)
+    lines: list[str] = []
+    logger = SimpleNamespace(info=lines.append)
     node: Any = SimpleNamespace(
         resolve_service_name=lambda name: name,
         get_node_names_and_namespaces=fail,
         get_logger=lambda: logger,
     )
-    log_call(node, '~/stop')
+    call = Call(node, '~/stop')
+    call.find()
+    call.log('stopped')
+    # looked for no longer than a moment
+    wait_until(lambda: lines, 'the line')
+    assert lines == ['~/stop called by a client that the middleware does not name: stopped']

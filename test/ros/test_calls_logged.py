@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Each command leaves one line in the log: what was called, and which node has called it."""
+"""Each command leaves one line in the log: what was called, which node called, what came of it."""
 
 from __future__ import annotations
 
@@ -35,5 +35,8 @@ def test_each_command_is_logged_once_with_the_name_of_its_client(bench: Bench) -
     ]
     wait_until(lambda: all(line in driver.text for line in expected), f'{expected}')
     assert driver.text.count(' called by ') == len(expected), driver.text
+    # and with what came of it
+    assert f'/nfo_sinus/enable (true) called by {name}: enabled; it follows' in driver.text
+    assert f'/nfo_sinus/enable (false) called by {name}: stopp' in driver.text
     # even one that is refused is to be found in the log
     assert '[INFO]' in next(line for line in driver.text.splitlines() if expected[2] in line)

@@ -37,6 +37,10 @@ SUCCESSES = {
     *(Cause.CONTROL_RELEASED, Cause.ONLY_WATCHED, Cause.TUNED, Cause.LOG_ERASED),
     *(Cause.ENERGY_RESET, Cause.SETTINGS_REFRESHED, Cause.CHANGED, Cause.CHANGED_AS_WANTED),
     Cause.CHANGED_FOR_TIMEOUT,
+    # who stopped the motor, as ~/status has it
+    *(Cause.STOP_REQUESTED, Cause.DISABLE_REQUESTED, Cause.QUICK_STOP_REQUESTED),
+    *(Cause.STOP_ALL_REQUESTED, Cause.ACKNOWLEDGE_REQUESTED, Cause.TRANSITION_REQUESTED),
+    *(Cause.DRIVER_ENDS, Cause.ENABLE_FAILED, Cause.PROCEDURE_ENDED, Cause.PROCEDURE_CANCELLED),
 }
 SENTENCES = {cause: cause.value for cause in Cause}
 #: The simulator and the command line have pages of their own, and no log.
