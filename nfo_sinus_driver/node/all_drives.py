@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 from nfo_sinus_driver.drive import Cause, DriveError, Report
 from nfo_sinus_driver.drive.broadcast import broadcast_stop
 from nfo_sinus_driver.node.bus_context import BusContext
-from nfo_sinus_driver.node.callers import Call
+from nfo_sinus_driver.node.callers import Call, publish_calls
 from nfo_sinus_driver.node.executor import received_at
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
@@ -44,9 +44,10 @@ class AllDrives:
         ):
             group = MutuallyExclusiveCallbackGroup()
             answer = self._safe(name, callback)
-            node.create_service(
+            service = node.create_service(
                 Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
             )
+            publish_calls(node, service)
 
     def _safe(
         self, name: str, callback: _Callback

@@ -13,6 +13,10 @@ import time
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.service import Service
+from rclpy.service_introspection import ServiceIntrospectionState
+
+from nfo_sinus_driver.node.qos import RELIABLE
 
 #: Within what time the middleware knows of a new client, s, and how often it is looked for.
 _KNOWN_WITHIN = 0.5
@@ -68,6 +72,13 @@ class Call:
         if clients:
             self._by.set_result(' or '.join(clients))
         return bool(clients)
+
+
+def publish_calls(node: Node, service: Service) -> None:
+    """Publish each call of a service and its answer, so that a bag has them."""
+    service.configure_introspection(
+        node.get_clock(), RELIABLE, ServiceIntrospectionState.CONTENTS
+    )
 
 
 def _clients(node: Node, service: str) -> list[str]:

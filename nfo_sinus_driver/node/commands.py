@@ -26,6 +26,7 @@ from rclpy.callback_groups import (
     ReentrantCallbackGroup,
 )
 from rclpy.node import Node
+from rclpy.service import Service
 from std_srvs.srv import SetBool, Trigger
 
 from nfo_sinus_driver.drive import (
@@ -39,7 +40,7 @@ from nfo_sinus_driver.drive import (
     Tuned,
 )
 from nfo_sinus_driver.node import messages
-from nfo_sinus_driver.node.callers import Call
+from nfo_sinus_driver.node.callers import Call, publish_calls
 from nfo_sinus_driver.node.executor import received_at
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import inv_st
@@ -68,18 +69,20 @@ class Commands:
         # several, for to disable must not wait for an enable that waits for a start delay; but not
         # any number, for each keeps a thread that other drives may need
         group = BoundedCallbackGroup(CALLS_OF_ENABLE)
-        node.create_service(
+        enable = node.create_service(
             SetBool, '~/enable', self._on_enable, qos_profile=COMMANDS, callback_group=group
         )
-        self.offer('~/stop', _stop, _LONGEST_STOP)
-        self.offer('~/quick_stop', _quick_stop, _LONGEST_STOP)
-        self.offer('~/rapid_stop', _rapid_stop, _LONGEST_STOP)
-        self.offer('~/fault_ack', _acknowledge, _LONGEST_STOP)
+        stop = self.offer('~/stop', _stop, _LONGEST_STOP)
+        quick_stop = self.offer('~/quick_stop', _quick_stop, _LONGEST_STOP)
+        rapid_stop = self.offer('~/rapid_stop', _rapid_stop, _LONGEST_STOP)
+        acknowledge = self.offer('~/fault_ack', _acknowledge, _LONGEST_STOP)
+        for service in (enable, stop, quick_stop, rapid_stop, acknowledge):
+            publish_calls(node, service)
         self.offer(
             '~/refresh_parameters', lambda drive, _: drive.parameters.refresh(), _LONGEST_REFRESH
         )
 
-    def offer(self, name: str, command: _Command, timeout: float) -> None:
+    def offer(self, name: str, command: _Command, timeout: float) -> Service:
         """Offer a service that answers when a command is done, or after a time-out, s."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -89,7 +92,9 @@ class Commands:
             )
 
         group = MutuallyExclusiveCallbackGroup()
-        self._node.create_service(Trigger, name, answer, qos_profile=COMMANDS, callback_group=group)
+        return self._node.create_service(
+            Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
+        )
 
     def _answer(
         self, response: Any, call: Call, command: Callable[[], Future[Report]], timeout: float
