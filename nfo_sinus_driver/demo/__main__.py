@@ -75,7 +75,7 @@ def main() -> int:
         from nfo_sinus_driver.demo.picture import draw
 
         picture = folder / 'ride.png'
-        draw(bag, picture)
+        draw(bag, picture, '/nfo_sinus')
         print(f'Its picture: {picture}')
     return 0
 
@@ -89,7 +89,7 @@ def _sequence(bag: Path | None) -> Iterator[DemoSequence]:
         executor = SingleThreadedExecutor()
         # before anything is there to be heard
         if bag is not None:
-            recorder = stack.enter_context(Recorder(bag, '/nfo_sinus', _REMARKS))
+            recorder = stack.enter_context(Recorder(bag, ['/nfo_sinus'], _REMARKS))
             executor.add_node(recorder)
         sequence = DemoSequence()
         stack.callback(sequence.destroy_node)

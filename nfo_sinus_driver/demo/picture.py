@@ -1,17 +1,13 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Draws a recorded run: reads it back from its bag as curves and spans."""
+"""Draws recorded runs: one of a drive, or those of all drives of a line."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-import dataclasses
-from dataclasses import dataclass, field
-from datetime import datetime
+from collections.abc import Sequence
 import math
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 from matplotlib.artist import Artist
@@ -23,23 +19,14 @@ from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Transform, blended_transform_factory
 
-from nfo_sinus_driver.demo import bags
+from nfo_sinus_driver.demo.recorded import Curve, Recording, Span, read
 
-_EVENT = '/_service_event'
-_STATUS = 'nfo_sinus_msgs/msg/DriveStatus'
-#: The topics of a drive that are drawn, besides its service events.
-_DRAWN = ('status', 'setpoint', 'actual_speed', 'telemetry', 'inv_st')
-#: What the states of DriveStatus mean for the motor.
-_PHASE_OF_STATE = {
-    'OPERATION_ENABLED': 'running',
-    'STOPPING': 'stopping',
-    'QUICK_STOP': 'stopping',
-    'FAULT_REACTION_ACTIVE': 'fault',
-    'FAULTED': 'fault',
-}
-#: The picture, inches and dots per inch: 1600 x 1000.
-_SIZE = (16.0, 10.0)
+#: The picture of a drive, inches and dots per inch: 1600 x 1000; that of a line is higher with each
+#: drive. What is above and below the panels, and what one drive of several has.
+_WIDTH, _HEIGHT = 16.0, 10.0
 _DPI = 100
+_HEAD, _FOOT = 1.58, 0.85
+_OF_DRIVE = 2.6
 _LEFT, _RIGHT = 0.075, 0.98
 #: A text is made smaller rather than left out.
 _SPAN_SIZES = (13, 12, 11, 10)
@@ -52,6 +39,7 @@ _GREEN = '#009E73'
 _BLUE = '#0072B2'
 _VERMILION = '#D55E00'
 _PURPLE = '#AA4499'
+_DARK_RED = '#8C1C13'
 _INK = '#222222'
 _SOFT = '#555555'
 _GREY = '#8A8A8A'
@@ -62,6 +50,7 @@ _PHASES = {
     'running': (_GREEN, 'white'),
     'stopping': (_SKY_BLUE, _INK),
     'fault': (_VERMILION, 'white'),
+    'lost': (_SOFT, 'white'),
 }
 _STYLE = {
     'font.family': 'DejaVu Sans',
@@ -82,249 +71,108 @@ _QUANTITIES = {'Hz': 'frequency', 'rpm': 'speed', '%': 'torque', 'm/s': 'speed'}
 _SILENCE = 0.5
 
 
-# --- what the bag says ------------------------------------------------------------------------
-
-
-@dataclass
-class Curve:
-    """Values over time, s since the run began."""
-
-    times: list[float] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-
-    def add(self, time: float, value: float) -> None:
-        """Append a point."""
-        self.times.append(time)
-        self.values.append(value)
-
-
-@dataclass(frozen=True)
-class Span:
-    """Something that held for a while, s since the run began; a fault has a code."""
-
-    begin: float
-    end: float
-    what: str
-    code: int = 0
-
-
-@dataclass(frozen=True)
-class Recording:
-    """
-    What a bag says of a run.
-
-    :ivar began: when the drive was connected; times are counted from there, s.
-    :ivar source: the bag, its messages and its topics.
-    :ivar unit: of the set-point and of what follows it.
-    :ivar identity: model, serial number and firmware, as far as the drive reports them.
-    :ivar phases: what the motor did: standby, running, stopping or fault.
-    :ivar texts: what the drive's display said.
-    :ivar faults: of the texts, those that name a fault.
-    :ivar enabled: when the driver followed set-points.
-    :ivar calls: which services were called, and when.
-    """
-
-    began: datetime
-    length: float
-    remarks: dict[str, str]
-    source: str
-    unit: str
-    identity: list[str]
-    setpoint: Curve
-    actual: Curve
-    speed: Curve
-    current: Curve
-    phases: list[Span]
-    texts: list[Span]
-    faults: list[Span]
-    enabled: list[Span]
-    calls: list[tuple[float, str]]
-
-
-def read(folder: Path, drive: str = '/nfo_sinus') -> Recording:
-    """Read the run of a drive from a bag; a ValueError if it was never connected."""
-    messages: dict[str, list[tuple[int, Any]]] = {}
-    for topic, stamp, message in bags.read(folder, lambda topic: _is_of(drive, topic)):
-        messages.setdefault(topic, []).append((stamp, message))
-    connected = [m for _, m in messages.get(f'{drive}/status', ()) if m.connected]
-    if not connected:
-        raise ValueError(f'{drive} was never connected')
-    start = _nanoseconds(connected[0].header.stamp)
-
-    def since(nanoseconds: int) -> float:
-        return (nanoseconds - start) / 1e9
-
-    def measured(topic: str) -> list[tuple[float, Any]]:
-        """Messages by the time that they carry themselves."""
-        found = messages.get(f'{drive}/{topic}', ())
-        return [(since(_nanoseconds(m.header.stamp)), m) for _, m in found]
-
-    def received(topic: str) -> Curve:
-        found = messages.get(f'{drive}/{topic}', ())
-        return Curve([since(stamp) for stamp, _ in found], [m.data for _, m in found])
-
-    length = since(_nanoseconds(connected[-1].header.stamp))
-    statuses = [(time, status) for time, status in measured('status') if status.connected]
-    currents = measured('telemetry')
-    texts = measured('inv_st')
-    shown = _spans([(time, m.text) for time, m in texts], length)
-    # a fault is named a moment before the drive's state is one
-    faults = {m.text: m.code for _, m in texts if m.kind == m.FAULT}
-    described = bags.metadata(folder)
-    return Recording(
-        began=datetime.fromtimestamp(start / 1e9),
-        length=length,
-        remarks=dict(described.get('custom_data') or {}),
-        source=f'{folder.name}: {described["message_count"]} messages on '
-        f'{len(bags.topics(folder))} topics',
-        unit=next((m.unit for m in reversed(connected) if m.unit), 'Hz'),
-        identity=_identity((m for _, m in messages.get('/diagnostics', ())), drive),
-        setpoint=received('setpoint'),
-        actual=Curve([time for time, _ in statuses], [m.actual for _, m in statuses]),
-        speed=received('actual_speed'),
-        current=Curve([time for time, _ in currents], [m.output_current for _, m in currents]),
-        phases=_spans([(time, _phase(m)) for time, m in statuses], length),
-        texts=shown,
-        faults=[
-            dataclasses.replace(span, code=faults[span.what])
-            for span in shown
-            if span.what in faults
-        ],
-        enabled=[
-            span
-            for span in _spans([(time, 'enabled' * m.enabled) for time, m in statuses], length)
-            if span.what
-        ],
-        calls=sorted(_calls(messages, drive, since)),
-    )
-
-
-def only_drive(folder: Path) -> str:
-    """Return the name of the drive that is in a bag; a ValueError if there is none, or several."""
-    drives = sorted(
-        topic.removesuffix('/status')
-        for topic, type_ in bags.topics(folder)
-        if type_ == _STATUS and topic.endswith('/status')
-    )
-    if len(drives) == 1:
-        return drives[0]
-    if drives:
-        raise ValueError(f'it has several drives: choose one by --drive: {", ".join(drives)}')
-    raise ValueError('it has no drive: no topic ~/status was recorded')
-
-
-def _is_of(drive: str, topic: str) -> bool:
-    """Tell whether a topic is one of those that are drawn."""
-    if topic == '/diagnostics':
-        return True
-    name = topic.removeprefix(f'{drive}/')
-    return name != topic and (topic.endswith(_EVENT) or name in _DRAWN)
-
-
-def _calls(
-    messages: dict[str, list[tuple[int, Any]]], drive: str, since: Callable[[int], float]
-) -> Iterable[tuple[float, str]]:
-    for topic, events in messages.items():
-        if topic.startswith(drive) and topic.endswith(_EVENT):
-            name = topic.removesuffix(_EVENT).rpartition('/')[2]
-            for _, event in events:
-                if event.info.event_type == event.info.REQUEST_SENT:
-                    off = not getattr(event.request[0], 'data', True)
-                    yield since(_nanoseconds(event.info.stamp)), f'{name} off' if off else name
-
-
-def _identity(arrays: Iterable[Any], drive: str) -> list[str]:
-    """Return what diagnostics report of the identity of the drive."""
-    mine = f'{drive.lstrip("/")}: drive'
-    for array in arrays:
-        for status in array.status:
-            values = {pair.key: pair.value for pair in status.values}
-            if status.name == mine and values.get('firmware'):
-                named = {
-                    '': values.get('model', ''),
-                    'serial ': values.get('serial number', ''),
-                    'firmware ': values['firmware'],
-                }
-                return [name + value for name, value in named.items() if value]
-    return []
-
-
-def _phase(status: Any) -> str:
-    for name, phase in _PHASE_OF_STATE.items():
-        if status.state == getattr(status, name):
-            return phase
-    return 'standby'
-
-
-def _spans(points: list[tuple[float, str]], end: float) -> list[Span]:
-    """Join equal neighbours to spans that follow each other up to the end."""
-    changes: list[tuple[float, str]] = []
-    for time, what in points:
-        if not changes or what != changes[-1][1]:
-            changes.append((time, what))
-    ends = [*(time for time, _ in changes[1:]), end]
-    # what is latched may have been published before the first status that was received
-    return [
-        Span(max(begin, 0.0), until, what)
-        for (begin, what), until in zip(changes, ends, strict=False)
-        if until > 0
-    ]
-
-
-def _nanoseconds(stamp: Any) -> int:
-    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
-
-
 # --- the picture ------------------------------------------------------------------------------
 
 
-def draw(bag: Path, picture: Path, drive: str = '/nfo_sinus') -> None:
+def draw(bag: Path, picture: Path, *drives: str) -> None:
     """
-    Draw what a bag says of a run into a PNG file.
+    Draw what a bag says of a drive into a PNG file; of several, what they did beside each other.
 
-    :raises ValueError: there is nothing of the drive in it.
+    :raises ValueError: there is nothing of one of them in it.
     """
-    run = read(bag, drive)
+    runs = read(bag, drives)
     with matplotlib.rc_context(_STYLE):
-        # no window, and no state that is shared: the figure is drawn for the file alone
-        figure = Figure(figsize=_SIZE, dpi=_DPI, facecolor='white')
-        FigureCanvasAgg(figure)
-        grid = figure.add_gridspec(
-            4, 1, height_ratios=(1.0, 4.2, 2.3, 2.3), hspace=0.16,
-            left=_LEFT, right=_RIGHT, top=0.842, bottom=0.085,
-        )
-        states, frequency, speed, current = (figure.add_subplot(cell) for cell in grid)
-        for axes in (states, frequency, speed, current):
-            axes.set_xlim(-0.2, run.length + 0.2)
-            axes.xaxis.set_major_locator(MultipleLocator(_step(max(run.length, 1.0))))
-            axes.tick_params(axis='x', labelbottom=axes is current, length=0)
-            _mark(axes, run)
-        _draw_states(states, run)
-        _name_calls(states, run)
-        _draw_frequency(frequency, run)
-        _draw_quantity(speed, run.speed, 'motor speed (rpm)', _GREEN)
-        _draw_quantity(current, run.current, 'output current (A)', _PURPLE, marker='o')
-        current.set_ylim(bottom=0.0)
-        current.set_xlabel('time (s)', labelpad=8)
-        _name_faults(frequency, run)
-        figure.align_ylabels([frequency, speed, current])
-        _draw_title(figure, run, frequency.get_legend_handles_labels()[0])
+        figure = _picture_of(runs[0]) if len(runs) == 1 else _picture_of_line(runs)
         picture.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(picture, dpi=_DPI)
 
 
-def _draw_title(figure: Figure, run: Recording, lines: list[Artist]) -> None:
-    facts = [run.remarks.get('drive', ''), *run.identity, f'{run.began:%d %B %Y, %H:%M}']
-    figure.text(_LEFT, 0.944, run.remarks.get('title', 'A test run'), size=25, weight='bold')
-    figure.text(_LEFT, 0.904, '   ·   '.join(filter(None, facts)), size=14, color=_SOFT)
+def _figure(height: float) -> Figure:
+    # no window, and no state that is shared: the figure is drawn for the file alone
+    figure = Figure(figsize=(_WIDTH, height), dpi=_DPI, facecolor='white')
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _picture_of(run: Recording) -> Figure:
+    figure = _figure(_HEIGHT)
+    grid = figure.add_gridspec(
+        4, 1, height_ratios=(1.0, 4.2, 2.3, 2.3), hspace=0.16,
+        left=_LEFT, right=_RIGHT, top=1 - _HEAD / _HEIGHT, bottom=_FOOT / _HEIGHT,
+    )
+    states, frequency, speed, current = (figure.add_subplot(cell) for cell in grid)
+    for axes in (states, frequency, speed, current):
+        _set_time(axes, run.length, shown=axes is current)
+        _mark(axes, run)
+    _draw_states(states, run)
+    _name_calls(states, run)
+    _draw_frequency(frequency, run)
+    _draw_quantity(speed, run.speed, 'motor speed (rpm)', _GREEN)
+    _draw_quantity(current, run.current, 'output current (A)', _PURPLE, marker='o')
+    current.set_ylim(bottom=0.0)
+    _name_faults(frequency, run)
+    _name_stops(speed, run)
+    figure.align_ylabels([frequency, speed, current])
+    title, name = run.remarks.get('title', 'A test run'), run.remarks.get('drive', run.drive)
+    _draw_title(figure, run, title, [name, *run.identity], _lines_of(frequency))
+    return figure
+
+
+def _picture_of_line(runs: Sequence[Recording]) -> Figure:
+    height = _HEAD + _FOOT + _OF_DRIVE * len(runs)
+    figure = _figure(height)
+    grid = figure.add_gridspec(
+        2 * len(runs), 1, height_ratios=(1.0, 4.2) * len(runs), hspace=0.3,
+        left=_LEFT, right=_RIGHT, top=1 - _HEAD / height, bottom=_FOOT / height,
+    )
+    length = max(run.length for run in runs)
+    panels = [figure.add_subplot(cell) for cell in grid]
+    for run, states, frequency in zip(runs, panels[::2], panels[1::2], strict=True):
+        for axes in (states, frequency):
+            _set_time(axes, length, shown=axes is panels[-1])
+            _mark(axes, run)
+        _draw_motor(states, run)
+        _draw_frequency(frequency, run)
+        frequency.set_ylabel(f'{run.drive.rpartition("/")[2]}\n({run.unit})')
+        _name_stops(frequency, run)
+    figure.align_ylabels(panels[1::2])
+    line = runs[0].drive.rpartition('/')[0] or '/'
+    _draw_title(figure, runs[0], f'The line {line}', [f'{len(runs)} drives'], _lines_of(panels[1]))
+    return figure
+
+
+def _set_time(axes: Axes, length: float, *, shown: bool) -> None:
+    axes.set_xlim(-0.2, length + 0.2)
+    axes.xaxis.set_major_locator(MultipleLocator(_step(max(length, 1.0))))
+    axes.tick_params(axis='x', labelbottom=shown, length=0)
+    if shown:
+        axes.set_xlabel('time (s)', labelpad=8)
+
+
+def _lines_of(axes: Axes) -> list[Artist]:
+    lines: list[Artist] = axes.get_legend_handles_labels()[0]
+    return lines
+
+
+def _draw_title(
+    figure: Figure, run: Recording, title: str, facts: Sequence[str], lines: list[Artist]
+) -> None:
+    def at(inches: float) -> float:
+        """Return how high that is, so far below the top."""
+        return 1 - inches / float(figure.get_figheight())
+
+    told = '   ·   '.join(filter(None, (*facts, f'{run.began:%d %B %Y, %H:%M}')))
+    figure.text(_LEFT, at(0.56), title, size=25, weight='bold')
+    figure.text(_LEFT, at(0.96), told, size=14, color=_SOFT)
     figure.text(
-        _RIGHT, 0.018, f'drawn from the bag {run.source}', size=11, color=_SOFT, ha='right'
+        _RIGHT, 1 - at(0.18), f'drawn from the bag {run.source}', size=11, color=_SOFT, ha='right'
     )
     phases = [Patch(color=colour, label=phase) for phase, (colour, _) in _PHASES.items()]
-    for y, handles in ((0.976, phases), (0.948, lines)):
+    for inches, handles in ((0.24, phases), (0.52, lines)):
         figure.legend(
-            handles=handles, loc='upper right', bbox_to_anchor=(_RIGHT, y), ncols=len(handles),
-            fontsize=12, borderaxespad=0.0, borderpad=0.0, handlelength=1.8, columnspacing=1.4,
+            handles=handles, loc='upper right', bbox_to_anchor=(_RIGHT, at(inches)),
+            ncols=len(handles), fontsize=12, borderaxespad=0.0, borderpad=0.0, handlelength=1.8,
+            columnspacing=1.4,
         )
 
 
@@ -332,17 +180,30 @@ def _draw_title(figure: Figure, run: Recording, lines: list[Artist]) -> None:
 
 
 def _draw_states(axes: Axes, run: Recording) -> None:
-    axes.set_ylim(0.0, 2.0)
-    axes.set_yticks([0.48, 1.52], ['display', 'motor'])
-    axes.tick_params(axis='y', length=0)
-    axes.spines[:].set_visible(False)
-    for span in run.phases:
-        colour, ink = _PHASES[span.what]
-        _draw_span(axes, span, 1.04, colour, ink, bold=True)
+    _set_bars(axes, {0.48: 'display', 1.52: 'motor'})
+    _draw_phases(axes, run, 1.04)
     faulty = {span.what for span in run.faults}
     for span in run.texts:
         fault = span.what in faulty
         _draw_span(axes, span, 0.0, '#F9DCCB' if fault else '#F0F0F0', _INK, bold=fault)
+
+
+def _draw_motor(axes: Axes, run: Recording) -> None:
+    _set_bars(axes, {0.48: 'motor'})
+    _draw_phases(axes, run, 0.0)
+
+
+def _set_bars(axes: Axes, names: dict[float, str]) -> None:
+    axes.set_ylim(0.0, float(len(names)))
+    axes.set_yticks(list(names), list(names.values()))
+    axes.tick_params(axis='y', length=0)
+    axes.spines[:].set_visible(False)
+
+
+def _draw_phases(axes: Axes, run: Recording, bottom: float) -> None:
+    for span in run.phases:
+        colour, ink = _PHASES[span.what]
+        _draw_span(axes, span, bottom, colour, ink, bold=True)
 
 
 def _draw_span(
@@ -421,24 +282,42 @@ def _finish(axes: Axes) -> None:
 
 
 def _mark(axes: Axes, run: Recording) -> None:
-    """Draw calls and faults through a panel."""
-    for time, _ in run.calls:
-        axes.axvline(time, color=_INK, linewidth=1.0, linestyle=(0, (4, 4)), zorder=2)
+    """Draw calls, stops and faults through a panel."""
+    for call in run.calls:
+        axes.axvline(call.time, color=_INK, linewidth=1.0, linestyle=(0, (4, 4)), zorder=2)
+    for stop in run.stops:
+        axes.axvline(stop.time, color=_DARK_RED, linewidth=1.4, linestyle=(0, (1, 1)), zorder=5)
     for span in run.faults:
         axes.axvspan(span.begin, span.end, color=_VERMILION, alpha=0.10, linewidth=0, zorder=0)
         axes.axvline(span.begin, color=_VERMILION, linewidth=2.2, zorder=5)
 
 
 def _name_calls(axes: Axes, run: Recording) -> None:
-    """Name the calls above the panel, one above the other where they would overlap."""
+    _name_moments(axes, [(call.time, f'▼ {call.name}') for call in run.calls], 1.06, 0.3)
+
+
+def _name_stops(axes: Axes, run: Recording) -> None:
+    named = [(stop.time, f'■ {stop.reason}') for stop in run.stops]
+    for text in _name_moments(axes, named, 0.04, 0.13):
+        text.set(color=_DARK_RED, weight='bold', zorder=8)
+        text.set_bbox({'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0, 'pad': 1.0})
+
+
+def _name_moments(
+    axes: Axes, named: Sequence[tuple[float, str]], lowest: float, above: float
+) -> list[Text]:
+    """Name moments at a part of a panel's height, one above the other where they would overlap."""
     ends: list[float] = []
-    for time, name in run.calls:
+    texts: list[Text] = []
+    for time, name in named:
         text = axes.text(
-            time, 0.0, f'▼ {name}', transform=_at_height(axes), ha='left', va='bottom', size=13
+            time, 0.0, name, transform=_at_height(axes), ha='left', va='bottom', size=13
         )
         row = next((row for row, end in enumerate(ends) if end < time), len(ends))
         ends[row : row + 1] = [time + _width(text)]
-        text.set_y(1.06 + 0.3 * row)
+        text.set_y(lowest + above * row)
+        texts.append(text)
+    return texts
 
 
 def _name_setpoints(axes: Axes, followed: Curve, unit: str) -> None:

@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-``record``: what a drive does goes to a bag until Ctrl-C, and then to a picture.
+``record``: what drives do goes to a bag until Ctrl-C, and then to a picture.
 
-``plot`` draws what is in a bag already, recorded by this or by ``ros2 bag record``.
+``plot`` draws what is in a bag already, recorded by this or by ``ros2 bag record``, or explains it.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 import contextlib
 import importlib
 import math
@@ -21,9 +21,11 @@ import sys
 import threading
 import time
 
+from nfo_sinus_msgs.msg import DriveStatus
 import rclpy
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 import rclpy.utilities
 from rclpy.validate_full_topic_name import validate_full_topic_name
@@ -31,11 +33,14 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.bench import handle_signals
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
+from nfo_sinus_driver.demo.type_definitions import name_of
 from nfo_sinus_driver.node.executor import spinning
 from nfo_sinus_driver.version import VERSION
 
 #: When it is time to say that there is no driver, s.
 _PATIENCE = 5.0
+#: No other drive comes when none has for so long, s.
+_QUIET = 2.0
 #: How long what was sent before the end may be on its way, s.
 _ON_ITS_WAY = 0.5
 #: How long a signal may wait that came to another thread: Python handles it in the main one, but
@@ -44,7 +49,7 @@ _POLL_SIGNALS = 0.2
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Record a drive until Ctrl-C or a signal, then draw it; return the exit status."""
+    """Record drives until Ctrl-C or a signal, then draw them; return the exit status."""
     given = list(sys.argv[1:] if args is None else args)
     parser = _record_parser()
     options = parser.parse_args(rclpy.utilities.remove_ros_args(['', *given])[1:])
@@ -57,30 +62,32 @@ def main(args: Sequence[str] | None = None) -> int:
         return 1
     handle_signals(signal.default_int_handler)
     try:
-        with _recorder(bag, options.drive, given) as recorder:
-            print(f'record: {options.drive} goes to {bag}; Ctrl-C ends it', flush=True)
-            _wait(recorder, options.drive, options.seconds)
+        drives = _record(bag, options, given)
     except RecordingError as error:
         print(f'record: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         # before there was anything to be kept
         return 130
-    print(f'record: the bag is {bag}; {replay_warning(options.drive)}')
+    print(f'record: the bag is {bag}; {replay_warning(*drives)}')
     if no_picture := why_no_picture():
         print(f'record: no picture: {no_picture}', file=sys.stderr)
         return 0
-    return _draw('record', bag, options.drive, folder / 'ride.png')
+    return _draw('record', bag, drives, folder / 'ride.png')
 
 
 def plot(args: Sequence[str] | None = None) -> int:
-    """Draw the run of a drive that is in a bag; return the exit status."""
+    """Draw the runs of drives that are in a bag, or say what happened; return the exit status."""
     options = _plot_parser().parse_args(args)
-    if missing := [why for why in (bags.why_none(), why_no_picture()) if why]:
+    no_picture = '' if options.explain else why_no_picture()
+    if missing := [why for why in (bags.why_none(), no_picture) if why]:
         print(f'plot: {"; ".join(missing)}', file=sys.stderr)
         return 1
     bag: Path = options.bag.resolve()
-    return _draw('plot', bag, options.drive, options.output or bag.with_name(f'{bag.name}.png'))
+    drives = [options.drive] if options.drive else []
+    if options.explain:
+        return _explain(bag, drives)
+    return _draw('plot', bag, drives, options.output or bag.with_name(f'{bag.name}.png'))
 
 
 def why_no_picture() -> str:
@@ -92,48 +99,102 @@ def why_no_picture() -> str:
     return ''
 
 
-def _draw(command: str, bag: Path, drive: str | None, picture: Path) -> int:
+def _draw(command: str, bag: Path, drives: Sequence[str], picture: Path) -> int:
+    """Draw some drives, or all: one picture for each line."""
     # here and not above: a recorder has no use for it before
-    from nfo_sinus_driver.demo.picture import draw, only_drive
+    from nfo_sinus_driver.demo.picture import draw
+    from nfo_sinus_driver.demo.recorded import drives_in
 
     try:
-        draw(bag, picture, drive or only_drive(bag))
+        lines = _by_line(drives or drives_in(bag))
+        for line, chosen in lines.items():
+            path = picture if len(lines) == 1 else picture.with_stem(f'{picture.stem}_{line}')
+            draw(bag, path, *chosen)
+            print(f'{command}: the picture is {path}')
     except (OSError, ValueError) as error:
         print(f'{command}: cannot draw {bag}: {error}', file=sys.stderr)
         return 1
-    print(f'{command}: the picture is {picture}')
     return 0
 
 
-@contextlib.contextmanager
-def _recorder(bag: Path, drive: str, arguments: Sequence[str]) -> Iterator[Recorder]:
-    """Record on a thread of its own; nothing is received any more when the bag is closed."""
+def _by_line(drives: Sequence[str]) -> dict[str, list[str]]:
+    """Return the drives of each line, by its namespace as a part of a file name."""
+    lines: dict[str, list[str]] = {}
+    for drive in drives:
+        namespace = drive.rpartition('/')[0].strip('/')
+        lines.setdefault(namespace.replace('/', '_') or 'root', []).append(drive)
+    return lines
+
+
+def _explain(bag: Path, drives: Sequence[str]) -> int:
+    """Say what happened to some drives, or all."""
+    from nfo_sinus_driver.demo.recorded import drives_in, read
+    from nfo_sinus_driver.demo.story import story
+
+    try:
+        for run in read(bag, drives or drives_in(bag)):
+            print('\n'.join(story(run)), end='\n\n')
+    except (OSError, ValueError) as error:
+        print(f'plot: cannot read {bag}: {error}', file=sys.stderr)
+        return 1
+    return 0
+
+
+def _record(bag: Path, options: argparse.Namespace, arguments: Sequence[str]) -> list[str]:
+    """Record on a thread of its own until the end; return the drives."""
     with contextlib.ExitStack() as stack:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
-        recorder = stack.enter_context(
-            Recorder(bag, drive, {'drive': drive}, lambda: _report_heard(drive))
-        )
+        drives = _drives_of_graph() if options.all else [options.drive or '/nfo_sinus']
+        # nothing is received any more when the bag is closed
+        recorder = stack.enter_context(Recorder(bag, drives, {}, _report_heard))
         executor = SingleThreadedExecutor()
         executor.add_node(recorder)
         stack.enter_context(spinning(executor))
-        yield recorder
+        print(f'record: {", ".join(drives)} goes to {bag}; Ctrl-C ends it', flush=True)
+        _wait(recorder, options.seconds)
+    return drives
+
+
+def _drives_of_graph() -> list[str]:
+    """Return all drives, once no other one has come for a while; a RecordingError if none does."""
+    node = Node('record_all', enable_rosout=False)
+    try:
+        drives: list[str] = []
+        end = time.monotonic() + _PATIENCE
+        while time.monotonic() < end:
+            found = sorted(
+                topic.removesuffix('/status')
+                for topic, types in node.get_topic_names_and_types()
+                if name_of(DriveStatus) in types and topic.endswith('/status')
+            )
+            if found != drives:
+                drives, end = found, time.monotonic() + _QUIET
+            time.sleep(_POLL_SIGNALS)
+    finally:
+        node.destroy_node()
+    if not drives:
+        raise RecordingError(f'there is no drive {_where()}: does a driver run?')
+    return drives
+
+
+def _where() -> str:
+    return f'in this ROS_DOMAIN_ID ({os.environ.get("ROS_DOMAIN_ID", "0")})'
 
 
 def _report_heard(drive: str) -> None:
     print(f'record: {drive} is heard', flush=True)
 
 
-def _wait(recorder: Recorder, drive: str, seconds: float) -> None:
+def _wait(recorder: Recorder, seconds: float) -> None:
     """Wait until the time is over, or a signal ends it."""
     end = time.monotonic() + seconds
     with contextlib.suppress(KeyboardInterrupt):
         _sleep_until(min(end, time.monotonic() + _PATIENCE))
-        if not recorder.hears_drive:
-            domain = os.environ.get('ROS_DOMAIN_ID', '0')
+        if silent := ', '.join(recorder.silent):
             print(
-                f'record: nothing is heard of {drive} yet: does the driver run, with this name '
-                f'and in this ROS_DOMAIN_ID ({domain})?',
+                f'record: nothing is heard of {silent} yet: does the driver run, with this name '
+                f'and {_where()}?',
                 file=sys.stderr, flush=True,
             )
         _sleep_until(end)
@@ -151,11 +212,16 @@ def _sleep_until(end: float) -> None:
 
 def _record_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='record', description='Records what a drive does until Ctrl-C, and draws it.',
+        prog='record', description='Records what drives do until Ctrl-C, and draws it.',
     )
-    parser.add_argument(
-        'drive', nargs='?', type=_node, default='/nfo_sinus', metavar='DRIVE',
+    chosen = parser.add_mutually_exclusive_group()
+    chosen.add_argument(
+        'drive', nargs='?', type=_node, metavar='DRIVE',
         help='the full name of the drive node (default: /nfo_sinus)',
+    )
+    chosen.add_argument(
+        '--all', action='store_true',
+        help='every drive that is in the graph at the start; one picture for each line',
     )
     parser.add_argument(
         '--output', type=Path, metavar='DIR',
@@ -172,12 +238,16 @@ def _record_parser() -> argparse.ArgumentParser:
 
 def _plot_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='plot', description='Draws what a bag tells of the ride of a drive.',
+        prog='plot', description='Draws what a bag tells of drives, and why they stopped.',
     )
     parser.add_argument('bag', type=Path, metavar='BAG', help='the folder of the bag')
     parser.add_argument(
         '--drive', type=_node, metavar='DRIVE',
-        help='the full name of the drive node; needed if the bag has several',
+        help='the full name of the drive node (default: all, one picture for each line)',
+    )
+    parser.add_argument(
+        '--explain', action='store_true',
+        help='say what happened, when, by whom and why, in place of a picture',
     )
     parser.add_argument('--output', type=Path, metavar='PNG', help='the picture (default: BAG.png)')
     parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')

@@ -1,11 +1,11 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Records a run: what its topics say goes to a rosbag2 bag (MCAP), byte for byte as it comes."""
+"""Records runs: what topics say goes to a rosbag2 bag (MCAP), byte for byte as it comes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from pathlib import Path
 import time
 from typing import Any
@@ -31,28 +31,36 @@ _ROSOUT = QoSProfile(
 _DEPTH = 1000
 
 
-def topics_of(drive: str) -> Iterator[tuple[str, type, QoSProfile]]:
-    """Yield what is recorded of a drive: topic, type, and the quality that publishers offer."""
-    line = drive.rpartition('/')[0]
-    yield f'{drive}/setpoint', Float32, NEWEST
-    yield f'{drive}/status', DriveStatus, RELIABLE
-    yield f'{drive}/inv_st', InvSt, LATCHED
-    yield f'{drive}/actual_speed', Float32, RELIABLE
-    yield f'{drive}/actual_frequency', Float32, RELIABLE
-    yield f'{drive}/telemetry', Telemetry, RELIABLE
-    yield f'{drive}/enable/{_EVENT}', SetBool.Event, RELIABLE
-    yield f'{drive}/stop/{_EVENT}', Trigger.Event, RELIABLE
-    yield f'{drive}/fault_ack/{_EVENT}', Trigger.Event, RELIABLE
-    yield f'{line}/nfo_sinus_bus/statistics', BusStatistics, RELIABLE
-    yield '/diagnostics', DiagnosticArray, RELIABLE
-    yield '/rosout', Log, _ROSOUT
+def topics_of(*drives: str) -> dict[str, tuple[type, QoSProfile]]:
+    """Return what is recorded of drives: topics, types, and the quality that publishers offer."""
+    found: dict[str, tuple[type, QoSProfile]] = {}
+    for drive in drives:
+        line = f'{drive.rpartition("/")[0]}/nfo_sinus_bus'
+        found |= {
+            f'{drive}/setpoint': (Float32, NEWEST),
+            f'{drive}/status': (DriveStatus, RELIABLE),
+            f'{drive}/inv_st': (InvSt, LATCHED),
+            f'{drive}/actual_speed': (Float32, RELIABLE),
+            f'{drive}/actual_frequency': (Float32, RELIABLE),
+            f'{drive}/telemetry': (Telemetry, RELIABLE),
+            f'{drive}/enable/{_EVENT}': (SetBool.Event, RELIABLE),
+            f'{drive}/stop/{_EVENT}': (Trigger.Event, RELIABLE),
+            f'{drive}/quick_stop/{_EVENT}': (Trigger.Event, RELIABLE),
+            f'{drive}/fault_ack/{_EVENT}': (Trigger.Event, RELIABLE),
+            f'{line}/stop_all/{_EVENT}': (Trigger.Event, RELIABLE),
+            f'{line}/disable_all/{_EVENT}': (Trigger.Event, RELIABLE),
+            f'{line}/enable_all/{_EVENT}': (Trigger.Event, RELIABLE),
+            f'{line}/statistics': (BusStatistics, RELIABLE),
+        }
+    return {**found, '/diagnostics': (DiagnosticArray, RELIABLE), '/rosout': (Log, _ROSOUT)}
 
 
-def replay_warning(drive: str) -> str:
-    """Return what an operator must know before a bag of this drive is played."""
+def replay_warning(*drives: str) -> str:
+    """Return what an operator must know before a bag of these drives is played."""
+    obeyed = ' '.join(topic for topic, (_, qos) in topics_of(*drives).items() if qos is NEWEST)
     return (
-        f'`ros2 bag play` publishes {drive}/setpoint, and an enabled drive follows it: play the '
-        f'bag in another ROS_DOMAIN_ID, or with `--exclude-topics {drive}/setpoint`'
+        '`ros2 bag play` publishes set-points, and an enabled drive follows them: play the '
+        f'bag in another ROS_DOMAIN_ID, or with `--exclude-topics {obeyed}`'
     )
 
 
@@ -67,21 +75,23 @@ class Recorder(Node):
     By then nothing may be received any more.
 
     :param folder: the bag, a folder that does not exist.
-    :param drive: the full name of the drive node.
+    :param drives: the full names of the drive nodes.
     :param remarks: what the bag is to say of itself.
-    :param heard: called once, when the first status of the drive is in the bag.
+    :param heard: called with the name of each drive, when its first status is in the bag.
     :raises RecordingError: the bag cannot be made or, at the end, is not whole.
     """
 
     def __init__(
         self,
         folder: Path,
-        drive: str,
+        drives: Sequence[str],
         remarks: dict[str, str],
-        heard: Callable[[], None] = lambda: None,
+        heard: Callable[[str], None] = lambda _: None,
     ) -> None:
         super().__init__('recorder', enable_rosout=False)
-        self._heard: Callable[[], None] | None = heard
+        self._heard = heard
+        #: The drives of which no status has come yet.
+        self._silent = dict.fromkeys(drives)
         self._error: Exception | None = None
         self._count = 0
         self._began = time.monotonic()
@@ -89,13 +99,13 @@ class Recorder(Node):
             self._bag = bags.create(folder, remarks)
         except OSError as error:
             raise RecordingError(f'no bag can be written to {folder}: {error}') from error
-        for topic, type_, qos in topics_of(drive):
+        for topic, (type_, qos) in topics_of(*drives).items():
             self._record(topic, type_, qos)
 
     @property
-    def hears_drive(self) -> bool:
-        """The status of the drive has been received."""
-        return self._heard is None
+    def silent(self) -> list[str]:
+        """The drives of which no status has been received."""
+        return list(self._silent)
 
     def __enter__(self) -> Recorder:
         return self
@@ -128,15 +138,15 @@ class Recorder(Node):
             latest = max(latest, info.get('received_timestamp') or time.time_ns())
             self._write(topic, latest, data)
             if type_ is DriveStatus:
-                self._hear_drive()
+                self._hear(topic.removesuffix('/status'))
 
         deep = QoSProfile(depth=_DEPTH, reliability=qos.reliability, durability=qos.durability)
         self.create_subscription(type_, topic, write, deep, raw=True)
 
-    def _hear_drive(self) -> None:
-        heard, self._heard = self._heard, None
-        if heard is not None:
-            heard()
+    def _hear(self, drive: str) -> None:
+        if drive in self._silent:
+            del self._silent[drive]
+            self._heard(drive)
 
     def _write(self, topic: str, stamp: int, data: bytes) -> None:
         if self._error is not None:

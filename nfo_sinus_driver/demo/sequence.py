@@ -14,7 +14,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import DriveStatus, InvSt, Telemetry
 from rclpy.node import Node
-from rclpy.service_introspection import ServiceIntrospectionState
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool, Trigger
 
@@ -70,11 +69,6 @@ class DemoSequence(Node):
         self._triggers = {
             name: self.create_client(Trigger, f'{drive}/{name}') for name in ('stop', 'fault_ack')
         }
-        # requests and responses are published, so that they can be recorded
-        for client in (self._enable_client, *self._triggers.values()):
-            client.configure_introspection(
-                self.get_clock(), RELIABLE, ServiceIntrospectionState.CONTENTS
-            )
 
     def run(self, bench: Bench) -> None:
         """Go through it, or a StepError."""

@@ -50,6 +50,10 @@ _TYPES = {
     '/nfo_sinus/enable/_service_event': _EVENT.format('SetBool'),
     '/nfo_sinus/stop/_service_event': _EVENT.format('Trigger'),
     '/nfo_sinus/fault_ack/_service_event': _EVENT.format('Trigger'),
+    '/nfo_sinus/quick_stop/_service_event': _EVENT.format('Trigger'),
+    '/nfo_sinus_bus/stop_all/_service_event': _EVENT.format('Trigger'),
+    '/nfo_sinus_bus/disable_all/_service_event': _EVENT.format('Trigger'),
+    '/nfo_sinus_bus/enable_all/_service_event': _EVENT.format('Trigger'),
     '/nfo_sinus_bus/statistics': 'nfo_sinus_msgs/msg/BusStatistics',
     '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
     '/rosout': 'rcl_interfaces/msg/Log',
@@ -245,7 +249,7 @@ def _check_metadata(folder: Path, bag: Bag) -> None:
     for topic in information['topics_with_message_count']:
         told = topic['topic_metadata']
         assert told['type_description_hash'].startswith('RIHS01_')
-        assert topic['message_count'] == len(bag.messages[told['name']])
+        assert topic['message_count'] == len(bag.messages.get(told['name'], ()))
         offered[told['name']] = [
             (qos['reliability'], qos['durability']) for qos in told['offered_qos_profiles']
         ]

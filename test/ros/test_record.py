@@ -17,7 +17,7 @@ from types import SimpleNamespace
 from bench import Bench, Process, wait_until
 from ways import needs
 
-from nfo_sinus_driver.demo import picture
+from nfo_sinus_driver.demo.recorded import drives_in, identity, read
 from nfo_sinus_driver.demo.recording import topics_of
 
 _RECORD = (sys.executable, '-m', 'nfo_sinus_driver.demo.record')
@@ -27,6 +27,11 @@ _PLOT = (
 )
 _DRIVE = '/line1/infeed'
 _TIME = 120.0
+_TWO = """
+/**/nfo_sinus_bus: {ros__parameters: {drives: [infeed, outfeed]}}
+/**/outfeed: {ros__parameters: {address: 2, setpoint_timeout: 0.0}}
+/**/infeed: {ros__parameters: {setpoint_timeout: 0.0}}
+"""
 
 
 def _recorder(bench: Bench, *arguments: str) -> Process:
@@ -42,6 +47,10 @@ def _run(*command: str) -> subprocess.CompletedProcess[str]:
 
 def _is_picture(path: Path) -> bool:
     return struct.unpack('>II', path.read_bytes()[16:24]) == (1600, 1000)
+
+
+def _is_png(path: Path) -> bool:
+    return path.read_bytes().startswith(b'\x89PNG')
 
 
 @needs('own')
@@ -81,11 +90,11 @@ def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     obeyed = client.node.get_subscriber_names_and_types_by_node('infeed', '/line1')
     excluded = re.search(r'--exclude-topics (\S+)`', recorder.text)
     assert excluded is not None, recorder.text
-    recorded = {topic for topic, _, _ in topics_of(_DRIVE)}
+    recorded = set(topics_of(_DRIVE))
     assert {excluded.group(1)} == recorded & {name for name, _ in obeyed}
     assert 'another ROS_DOMAIN_ID' in recorder.text
 
-    ride = picture.read(bag, picture.only_drive(bag))
+    [ride] = read(bag, drives_in(bag))
     assert max(ride.actual.values) > 19 and abs(ride.actual.values[-1]) < 0.1
     assert set(ride.setpoint.values) == {20.0, 7.0} and ride.unit == 'Hz'
     assert len(ride.enabled) == 1 and 'running' in {span.what for span in ride.phases}
@@ -99,6 +108,41 @@ def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     assert done.returncode == 1 and 'it is no bag' in done.stderr
     again = _run(*_RECORD, '--output', str(folder))
     assert again.returncode == 2 and 'is there already' in again.stderr
+
+
+@needs('own')
+def test_all_drives_are_recorded_and_it_is_explained_why_they_stopped(bench: Bench) -> None:
+    simulator = bench.simulator('--address', '1', '--address', '2')
+    parameters = bench.folder / 'two.yaml'
+    parameters.write_text(_TWO)
+    bench.driver('-r', '__ns:=/line1', '--params-file', str(parameters))
+    infeed = bench.client('/line1/infeed').connected()
+    outfeed = bench.client('/line1/outfeed').connected()
+    bus = bench.client('/line1/nfo_sinus_bus')
+    folder = bench.folder / 'all'
+    recorder = _recorder(bench, '--all', '--output', str(folder))
+    wait_until(lambda: recorder.text.count('is heard') == 2, 'the recorder hears both')
+    infeed.enable()
+    outfeed.enable()
+    simulator.inject('fault', 5, address=1)
+    infeed.wait_for('status', lambda one: one.stop_reason == one.REASON_FAULT, 'the fault')
+    bus.call('stop_all')
+    outfeed.wait_for('status', lambda one: one.stop_reason == one.REASON_STOP_ALL, 'the stop')
+    known = len(outfeed.messages['status'])
+    # the name of who called is there within a second
+    wait_until(lambda: len(outfeed.messages['status']) > known + 80, 'it is told who stopped it')
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 0, recorder.text
+    assert _is_png(folder / 'ride.png') and 'infeed/setpoint /line1/outfeed/' in recorder.text
+
+    done = _run(*_PLOT, str(folder / 'ride'), '--explain')
+    assert done.returncode == 0, done.stderr
+    first, second = done.stdout.split('/line1/outfeed, times in s')
+    assert 'STOPPED, fault: fault 5 Overload' in first and 'shows fault 5 Overload' in first
+    name = bus.node.get_fully_qualified_name()
+    assert 'STOPPED, stop all: a stop of all drives was requested: ' in second
+    assert f'/line1/nfo_sinus_bus/stop_all called by {name}' in second
+    assert 'enable (true) called by' in second and 'Overload' not in second.split('STOPPED')[0]
 
 
 @needs('own')
@@ -141,5 +185,5 @@ def test_who_a_drive_is_is_told_by_its_own_diagnostics() -> None:
         return SimpleNamespace(status=[SimpleNamespace(name=name, values=pairs)])
 
     arrays = [told('line1/outfeed: drive', 'A1'), told('line1/infeed: drive', 'B2')]
-    assert picture._identity(arrays, _DRIVE) == ['serial B2', 'firmware 4.38']
-    assert picture._identity(arrays, '/infeed') == []
+    assert identity(arrays, _DRIVE) == ['serial B2', 'firmware 4.38']
+    assert identity(arrays, '/infeed') == []

@@ -59,7 +59,6 @@ NEVER_SHOWN = {
     'link/sdo.py': 'no parameter of a table has such a size',
     'drive/drive_state.py': 'the node makes another session, and asks before',
     'drive/setpoint.py': 'the node takes finite numbers only, and says so itself',
-    'demo/picture.py': 'the demo has waited for the connection before',
     'node/messages.py:inv_st': 'made only of a status that came',
 }
 LEVELS = {'error', 'warning', 'warn', 'fatal', 'critical', 'exception'}

@@ -1,0 +1,54 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Says in text what a bag says of a drive: when, who, and why it stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from nfo_sinus_driver.demo.recorded import Recording
+
+#: A drive that is no longer enabled was stopped by what is noted within this, s.
+_SAME = 1.5
+
+
+def story(run: Recording) -> Iterator[str]:
+    """Yield the lines of the story of a drive, with times in s."""
+    yield f'{run.drive}, times in s from {run.began:%d %B %Y, %H:%M:%S} on:'
+    moments = [*_answers(run), *_calls(run), *_enabled(run), *_faults(run), *_stops(run)]
+    # what was done comes before what came of it in the same moment
+    for time, text in sorted(moments, key=lambda moment: moment[0]):
+        yield f'{time:9.2f}  {text}'
+    yield f'{run.length:9.2f}  the end: {run.phases[-1].what if run.phases else "not known"}'
+
+
+def _answers(run: Recording) -> Iterator[tuple[float, str]]:
+    for span in run.connected:
+        yield span.begin, ', '.join(('connected', *run.identity))
+        if span.end < run.length:
+            yield span.end, 'the drive is lost'
+
+
+def _calls(run: Recording) -> Iterator[tuple[float, str]]:
+    """Yield calls: as the log has them, with who called; else as the services have."""
+    for call in run.logged or run.calls:
+        yield call.time, f'{call.name}: {call.answer}' if call.answer else call.name
+
+
+def _enabled(run: Recording) -> Iterator[tuple[float, str]]:
+    for span in run.enabled:
+        yield span.begin, 'enabled'
+        explained = any(abs(stop.time - span.end) < _SAME for stop in run.stops)
+        if span.end < run.length and not explained:
+            yield span.end, 'no longer enabled; this bag does not say why'
+
+
+def _faults(run: Recording) -> Iterator[tuple[float, str]]:
+    for span in run.faults:
+        yield span.begin, f'the drive shows fault {span.code} {span.what}'
+
+
+def _stops(run: Recording) -> Iterator[tuple[float, str]]:
+    for stop in run.stops:
+        yield stop.time, f'STOPPED, {stop.reason}: {stop.text}'

@@ -1,0 +1,150 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""``plot --explain``: a bag alone says when a motor stopped, why, and who wanted that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import re
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from nfo_sinus_msgs.msg import DriveStatus
+import pytest
+from rclpy.serialization import serialize_message
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool
+
+from nfo_sinus_driver.demo import bags
+from nfo_sinus_driver.demo.record import plot
+from nfo_sinus_driver.demo.recorded import read
+from nfo_sinus_driver.node.qos import RELIABLE
+
+_DRIVE = '/line1/infeed'
+_BEGAN = 1_700_000_000
+#: Why it stopped, one reason after the other, and in words.
+_STOPS = {
+    'STOP': 'a stop was requested: /line1/infeed/stop called by /panel',
+    'DISABLE': 'a disable was requested: /line1/infeed/enable (false) called by /panel',
+    'QUICK_STOP': 'a quick stop was requested: /line1/infeed/quick_stop called by /panel',
+    'STOP_ALL': 'a stop of all drives was requested: /line1/nfo_sinus_bus/stop_all called by /plc',
+    'LIFECYCLE': 'a transition was requested: /infeed/change_state (deactivated) called by /x',
+    'DRIVER_ENDS': 'this driver ends: SIGTERM',
+    'SETPOINT_TIMEOUT': 'no set-point for 2.5 s',
+    'FAULT': 'fault 5 Overload',
+    'RUN_INPUT': 'the RUN input of the drive was lost',
+    'CONTROL_TAKEN': 'the keypad has control now',
+    'DRIVE_LOST': 'lost: no answer',
+}
+
+
+def stamp(seconds: float) -> Time:
+    return Time(sec=_BEGAN + int(seconds), nanosec=int(seconds % 1 * 1e9))
+
+
+def status(at: float, reason: int = 0, text: str = '', *, enabled: bool = False) -> DriveStatus:
+    state = DriveStatus.OPERATION_ENABLED if enabled else DriveStatus.SWITCHED_ON
+    return DriveStatus(
+        header=Header(stamp=stamp(at)), connected=True, enabled=enabled, state=state, unit='Hz',
+        stop_reason=reason, stop_text=text,
+    )
+
+
+def statuses() -> Iterator[tuple[float, DriveStatus]]:
+    """Yield what the drive says: it is enabled every ten seconds, and stopped four later."""
+    yield 0.0, status(0.0)
+    for number, (name, text) in enumerate(_STOPS.items()):
+        enabled_at = 10.0 * number + 1.0
+        yield enabled_at, status(enabled_at, enabled=True)
+        reason = getattr(DriveStatus, f'REASON_{name}')
+        # who requested it may be told a moment later
+        yield enabled_at + 4.0, status(enabled_at + 4.0, reason, 'a client')
+        yield enabled_at + 5.0, status(enabled_at + 5.0, reason, text)
+
+
+def write(bag: Path, told: list[tuple[str, float, Any]]) -> None:
+    """Write messages: topic, when (s) and what."""
+    writer = bags.create(bag, {})
+    told.sort(key=lambda one: one[1])
+    for topic, type_ in {topic: type(message) for topic, _, message in told}.items():
+        writer.add_topic(topic, type_, RELIABLE)
+    for topic, at, message in told:
+        writer.write(topic, int((_BEGAN + at) * 1e9), serialize_message(message))
+    writer.close()
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    """A bag of two drives on two lines; one was enabled by a call."""
+    folder = tmp_path / 'ride'
+    event = SetBool.Event(request=[SetBool.Request(data=True)])
+    event.info.stamp, event.info.event_type = stamp(0.9), event.info.REQUEST_RECEIVED
+    answer = SetBool.Event(response=[SetBool.Response(success=True, message='enabled')])
+    answer.info.stamp, answer.info.event_type = stamp(1.0), answer.info.RESPONSE_SENT
+    call = f'{_DRIVE}/enable/_service_event'
+    write(folder, [
+        *((f'{_DRIVE}/status', at, one) for at, one in statuses()),
+        (call, 0.9, event), (call, 1.0, answer), ('/line2/outfeed/status', 0.5, status(0.5)),
+    ])
+    return folder
+
+
+def test_it_is_told_from_the_bag_alone_why_it_stopped_each_time(
+    bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert plot([str(bag), '--drive', _DRIVE, '--explain']) == 0
+    told = capsys.readouterr().out
+    assert re.search(r'^ +0\.90  enable: enabled$', told, re.MULTILINE), told
+    stops = re.findall(r'^ +([\d.]+)  STOPPED, ([\w ]+): (.*)$', told, re.MULTILINE)
+    assert stops == [
+        (f'{10 * number + 5}.00', name.lower().replace('_', ' '), text)
+        for number, (name, text) in enumerate(_STOPS.items())
+    ]
+
+
+def test_each_line_has_a_picture_with_its_stops(bag: Path) -> None:
+    assert plot([str(bag)]) == 0
+    assert {path.name for path in bag.parent.glob('*.png')} == {
+        'ride_line1.png', 'ride_line2.png'
+    }
+    first, second = read(bag, [_DRIVE, '/line2/outfeed'])
+    assert len(first.stops) == len(_STOPS) and not second.stops
+    # beside each other they count from the same moment
+    assert first.began == second.began
+
+
+def test_a_bag_that_begins_after_a_stop_tells_of_none(tmp_path: Path) -> None:
+    told = [
+        (f'{_DRIVE}/status', at, status(at, DriveStatus.REASON_FAULT, 'fault 5'))
+        for at in (0.0, 1.0)
+    ]
+    write(tmp_path / 'ride', told)
+    [run] = read(tmp_path / 'ride', [_DRIVE])
+    assert run.stops == []
+
+
+def test_a_better_reason_for_the_same_stop_is_no_other_stop(tmp_path: Path) -> None:
+    reasons = (
+        DriveStatus.REASON_NONE, DriveStatus.REASON_DRIVE_LOST, DriveStatus.REASON_POWER_CYCLE
+    )
+    told = [
+        (f'{_DRIVE}/status', at, status(at, reason, 'why'))
+        for at, reason in enumerate(reasons)
+    ]
+    write(tmp_path / 'ride', told)
+    [run] = read(tmp_path / 'ride', [_DRIVE])
+    assert [(stop.time, stop.reason) for stop in run.stops] == [(1.0, 'power cycle')]
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'why'),
+    [(['--explain'], 'it is no bag'), (['--explain', '--drive', 'other'], 'never connected')],
+)
+def test_what_cannot_be_explained_is_refused(
+    bag: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], why: str
+) -> None:
+    where = bag.parent if 'no bag' in why else bag
+    assert plot([str(where), *arguments]) == 1
+    assert why in capsys.readouterr().err
