@@ -9,7 +9,9 @@ from bench import Bench, wait_until
 from std_srvs.srv import SetBool, Trigger
 from ways import needs
 
-_TRIGGERS = ('stop', 'quick_stop', 'rapid_stop', 'fault_ack', 'refresh_parameters', 'erase_error_log')
+_TRIGGERS = (
+    'stop', 'quick_stop', 'rapid_stop', 'fault_ack', 'refresh_parameters', 'erase_error_log',
+)
 
 
 @needs('own')

@@ -33,7 +33,8 @@ PAGE = ROOT / 'docs' / 'troubleshooting.md'
 #: Answers of commands that succeed, and changes that somebody asked for: nothing is wrong.
 SUCCESSES = {
     *(Cause.ENABLED, Cause.ENABLED_ALREADY, Cause.STOPPED, Cause.STOPPING, Cause.COASTING),
-    *(Cause.RAMPING, Cause.QUICK_STOPPED, Cause.RAPID_STOPPING, Cause.ACKNOWLEDGED, Cause.ACKNOWLEDGED_DETAILED),
+    *(Cause.RAMPING, Cause.QUICK_STOPPED, Cause.RAPID_STOPPING),
+    *(Cause.ACKNOWLEDGED, Cause.ACKNOWLEDGED_DETAILED),
     *(Cause.CONTROL_RELEASED, Cause.ONLY_WATCHED, Cause.TUNED, Cause.LOG_ERASED),
     *(Cause.ENERGY_RESET, Cause.SETTINGS_REFRESHED, Cause.CHANGED, Cause.CHANGED_AS_WANTED),
     Cause.CHANGED_FOR_TIMEOUT,
