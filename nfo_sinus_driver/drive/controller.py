@@ -16,7 +16,7 @@ import contextlib
 import math
 
 from nfo_sinus_driver.bus import Cancelled, Priority, Task
-from nfo_sinus_driver.catalog import InverterStatus, Kind, Limits, State
+from nfo_sinus_driver.catalog import InverterStatus, Kind, Limits, Meaning, State
 from nfo_sinus_driver.drive.commands import Commands
 from nfo_sinus_driver.drive.control_state import Control, ControlEvent, ControlState
 from nfo_sinus_driver.drive.diagnosis import (
@@ -26,7 +26,7 @@ from nfo_sinus_driver.drive.diagnosis import (
     report_of,
     require_no_fault,
 )
-from nfo_sinus_driver.drive.drive_state import DriveState
+from nfo_sinus_driver.drive.drive_state import TIMEOUT, DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.following import Following
 from nfo_sinus_driver.drive.setpoint import Setpoint
@@ -81,6 +81,7 @@ class Controller:
         self._refusal: tuple[float, Report] | None = None
         #: The status that was judged last.
         self._judged: InverterStatus | None = None
+        self._stood_at = -math.inf
         #: It was lost while it may have followed us.
         self._lost_in_use = False
 
@@ -538,12 +539,19 @@ class Controller:
             reason = self._why_stopped(status) or self._why_slower(status, before)
             if reason is None and self._state.settings.follows_setpoints:
                 reason = self._following.judge()
-        elif not (self.commanded or self.stopping) and status.keeps_running:
+        elif not (self.commanded or self.stopping) and self._runs_unasked(status):
             reason = Report(Cause.RUNS_UNASKED)
         if reason is not None:
             self._sequence.start(reason)
             self._tell_stopped(reason)
         return reason is not None
+
+    def _runs_unasked(self, status: InverterStatus) -> bool:
+        self._stood_at = self._stood_at if status.keeps_running else status.at
+        since = max(self._stood_at, self._control.since)
+        # a current limit without a status word may be that of a ramp
+        ramps = status.word is None and status.means(Meaning.CURRENT_LIMIT)
+        return status.keeps_running and not (ramps and status.at - since < TIMEOUT)
 
     def refused(self, reason: Report) -> None:
         """Stop because of a set-point; the next status may tell a better reason."""
@@ -568,8 +576,6 @@ class Controller:
         else:
             self._state.tell(Severity.WARNING, Cause.STOPPED_BECAUSE, why=reason)
 
-    # --- how --------------------------------------------------------------------------------
-
     async def _settle(self) -> None:
         """Let a stop that comes with something else be confirmed, so that enable can follow."""
         with contextlib.suppress(DriveError):
@@ -579,10 +585,9 @@ class Controller:
         return explain_stop(self._state, status, self._setpoint.control_mode)
 
     def _why_slower(self, status: InverterStatus, before: InverterStatus | None) -> Report | None:
-        if before is None or before.at < self._control.since:
-            return None
         turning = self._state.turning
-        if self._setpoint.control_mode != turning.control_mode:
+        by_it = self._setpoint.control_mode == turning.control_mode
+        if before is None or before.at < self._control.since or not by_it:
             return None
         reverse = self._setpoint.directed and before.frequency < 0
         least = self._setpoint.least_since(before.at, reverse=reverse)

@@ -14,6 +14,7 @@ from support.drives import DRIVES
 from support.rig import WAYS, Rig
 from support.said import said
 
+from nfo_sinus_driver.catalog import Kind, is_described
 from nfo_sinus_driver.drive import Cause, Drive, Procedure, Report, StopReason
 from nfo_sinus_driver.drive.stop_reason import reason_of
 
@@ -40,8 +41,11 @@ def command(cause: Cause, give: Callable[[Drive, Report], Future[Any]]) -> Calla
 
 
 def overload(rig: Rig) -> None:
-    way = rig.way
-    drives = DRIVES.get(f'{way.model} {way.method}') or DRIVES[way.model]
+    if is_described(rig.way.model):
+        codes = rig.drive.model.status_codes.values()
+        rig.far.trip(next(one.code for one in codes if one.kind is Kind.FAULT))
+        return
+    drives = DRIVES.get(f'{rig.way.model} {rig.way.method}') or DRIVES[rig.way.model]
     rig.far.trip(drives.overload.code)
 
 
