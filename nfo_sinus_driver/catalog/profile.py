@@ -207,6 +207,11 @@ class SetpointTarget:
         """The least set-point: the greatest one in reverse, or 0."""
         return 0.0 if self.forward_only else -self.most
 
+    @property
+    def written_once(self) -> frozenset[str]:
+        """The parameters that are not written again as long as the same stands in the drive."""
+        return frozenset()
+
     def read_nominal(self, has: Callable[[str], bool]) -> Steps[float]:
         """
         Find out what the motor is made for, in the unit of the control mode; it only reads.
@@ -363,6 +368,10 @@ class ControlMethod(abc.ABC):
     def holder(self) -> Steps[Holder]:
         """Tell who has control of the drive."""
 
+    def setpoint_target(self, target: SetpointTarget) -> SetpointTarget:
+        """Return where set-points of a control mode go by this method: here where others do."""
+        return target
+
     def require_startable(self) -> Steps[None]:
         """Raise :class:`NotPossible` if more than a fault keeps the motor from being started."""
         yield from ()
@@ -393,11 +402,7 @@ class ControlMethod(abc.ABC):
         """
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
-        """
-        Release the motor at once, or stop it by :attr:`quick_stop_by`. Else stop as usual.
-
-        Control may be given back by it.
-        """
+        """Release the motor, or stop it by :attr:`quick_stop_by`; control may be given back."""
         return self.stop(control_mode)
 
     def rapid_stop(self, control_mode: str) -> Steps[None]:

@@ -25,6 +25,7 @@ from nfo_sinus_driver.catalog import (
     Refusal,
     Removal,
     Reset,
+    SetpointTarget,
     profile,
 )
 from nfo_sinus_driver.drive.drive_state import DriveState
@@ -194,6 +195,7 @@ class Commands:
         self._others = state.settings.other_methods(state.bus.protocol)
         method = state.model.profile.methods[state.settings.method]
         self._method = method(state.settings.reference, state.params.reaches)
+        self._state = state
         self._params = state.params
         #: Why the line has the bus keep control.
         self._held = state.model.profile.holds_control.get(state.params.protocol, '')
@@ -237,6 +239,12 @@ class Commands:
             raise DriveError(
                 Cause.METHOD_NEEDS, names=names, method=self._name, others=self._others
             )
+
+    def setpoint_target(self, control_mode: str) -> SetpointTarget | None:
+        """Return where set-points of a control mode go; ``None``: the motor follows none."""
+        if not self._state.settings.follows_setpoints:
+            return None
+        return self._method.setpoint_target(self._params.model.profile.setpoints[control_mode])
 
     async def kept(self) -> bool:
         """Tell whether control has stayed with the bus; so it is where the drive does not tell."""

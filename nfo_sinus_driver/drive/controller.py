@@ -261,7 +261,8 @@ class Controller:
             self._control.dispatch(ControlEvent.RUNNING)
             if not self.enabled:
                 raise Cancelled
-            self._setpoint.follow(control_mode, limits)
+            target = self.method.setpoint_target(control_mode)
+            self._setpoint.follow(control_mode, limits, target)
             self._following.begin()
         except Exception as error:
             # whatever went wrong, a run command may stand by now

@@ -148,23 +148,23 @@ class Setpoint:
         able = self._params.writes_and_reads
         self._combining = _Combining.UNTRIED if able else _Combining.GIVEN_UP
 
-    def follow(self, control_mode: str, limits: Limits) -> None:
+    def follow(self, control_mode: str, limits: Limits, target: SetpointTarget | None) -> None:
         """
         Follow set-points that come in from now on; 0 stands in the drive.
 
         With a reference of the drive's own, none is followed and none is missed.
 
         :param limits: what a set-point may be, in the unit of the control mode.
+        :param target: where set-points go; ``None``: none is followed.
         """
         self.control_mode = control_mode
         self._limits = limits
-        follows = self._state.settings.follows_setpoints
-        self._target = self._params.model.profile.setpoints[control_mode] if follows else None
+        self._target, follows = target, target is not None
         self._following_since = self._bus.now()
         self._keys, self._written = {}, {}
         self._encode.cache_clear()
-        if self._target is not None:
-            for step in self._target.writes(0.0):
+        if target is not None:
+            for step in target.writes(0.0):
                 address, data = self._params.target(step)
                 self._keys[address] = step.key
                 self._written[address] = data, self._following_since
@@ -211,7 +211,10 @@ class Setpoint:
 
     def write_again(self) -> None:
         """Write the set-point again that stands in the drive, for another may stand there."""
-        self._written = {where: (data, -math.inf) for where, (data, _) in self._written.items()}
+        self._written = {
+            where: (data, since if self._is_once(where) else -math.inf)
+            for where, (data, since) in self._written.items()
+        }
         self._bus.request(self._slot)
 
     def _may_have(self, value: float) -> None:
@@ -266,14 +269,23 @@ class Setpoint:
     def _due(self, request: Request) -> list[tuple[Address, bytes]]:
         """Return what has to be written for a request: else other stands in the drive, or long."""
         assert self._target is not None
-        now, period = self._bus.now(), self._rewrite_period
         found: list[tuple[Address, bytes]] = []
         before_all = self._meant(self._standing)
         for address, data in self._encode(self._limited(request), before_all):
-            before, since = self._written.get(address, (b'', -math.inf))
-            if data != before or now - since >= period:
+            if not self._stands(address, data):
                 found.append((address, data))
         return found
+
+    def _stands(self, address: Address, data: bytes) -> bool:
+        """Tell whether the same stands there, and need not be written again."""
+        before, since = self._written.get(address, (b'', -math.inf))
+        if data != before or since == -math.inf:
+            return False
+        return self._is_once(address) or self._bus.now() - since < self._rewrite_period
+
+    def _is_once(self, address: Address) -> bool:
+        """Tell whether what stands there is never written again."""
+        return self._target is not None and self._keys[address] in self._target.written_once
 
     def _limited(self, request: Request) -> float:
         limits, most = self._limits, self._most
@@ -437,6 +449,9 @@ class Setpoint:
                     # that one is written instead
                     return
                 self._may_have(0.0)
+                address, data = self._params.target(step)
+                if self._is_once(address) and self._stands(address, data):
+                    continue
                 try:
                     await self._params.write(replace(step, retry=False), Priority.STOP)
                 except LinkError as error:
@@ -447,7 +462,6 @@ class Setpoint:
                     # the poll finds out whether the drive is lost; until then this is tried again
                     await self._bus.sleep(_WATCH_PERIOD)
                     return
-                address, data = self._params.target(step)
                 self._written[address] = data, self._bus.now()
                 self._busy_since = math.inf
             if self._request is before:

@@ -236,14 +236,17 @@ class DriveControlJudge(Judge):
     def order(self, word: int, stood: int, zsw1: int) -> Iterator[str]:
         """Yield what is wrong with the order of the bits."""
         rises = word & ~stood
+        directions = 1 << 3 | 1 << 13
+        # one direction for the other, in operation
+        turns = rises & directions and stood & directions and not rises & ~directions
         stopping = zsw1 & 1 << 15
         if word & 1 << 3 and word & 1 << 13:
             yield 'both directions mean no change [C36]'
         if rises & 1 << 0 and not (zsw1 & 0x4F == 0x01 or stopping):
             yield 'bit 0 before READY_TO_SWITCH_ON was shown'
-        if rises & (1 << 3 | 1 << 13) and not (zsw1 & 0x4F == 0x03 or stopping):
+        if rises & directions and not (turns or zsw1 & 0x4F == 0x03 or stopping):
             yield 'a direction before SWITCHED_ON was shown'
-        if rises & 1 << 0 and rises & (1 << 3 | 1 << 13):
+        if rises & 1 << 0 and rises & directions:
             yield 'bit 0 and a direction at once'
         if not word & 1 << 14:
             yield 'control is asked for no more'

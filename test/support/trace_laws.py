@@ -27,6 +27,8 @@ _SETPOINTS = {
 _CONTROL_WORD, _ENABLED = 0x6040, 0x0F
 _TARGETS = frozenset((0x6042, 0x6071))
 
+_DIRECTIONS = Control.ENABLE_OP | Control.ENABLE_REV_OP
+
 #: A master waits at least so long for an answer, s; a later one may meet the next request, and
 #: so many frames behind it are looked at.
 _GIVEN_UP = 0.19
@@ -107,6 +109,8 @@ class _Judge:
         self._places = _places(model, protocol)
         #: The set-point of each unit is 0 and was written since its last run command.
         self._zero: dict[int, bool] = {}
+        #: The set-point of each unit that was written last is 0.
+        self._stands: dict[int, bool] = {}
         #: How each unit was commanded at first.
         self._methods: dict[int, str] = {}
         #: Who was spoken to, and who of them was given a run command that nobody has removed.
@@ -142,15 +146,20 @@ class _Judge:
             return
         if place == places.mask:
             yield from _wrong_control_word(words[1])
+            if words[1] & _DIRECTIONS and not self._stands.get(unit):
+                yield 'another direction beside a set-point'
+            if words[1] & Control.SWITCH_ON:
+                yield 'a mask switches on'
         if place == places.control:
             yield from _wrong_control_word(words[0])
         method = places.methods.get(place, '')
         if method and self._methods.setdefault(unit, method) != method:
             yield f'is commanded by {method}, and was by {self._methods[unit]}'
         if place in places.setpoints:
-            self._zero[unit] = words == (0,)
+            self._zero[unit] = self._stands[unit] = words == (0,)
         if _runs(request, places):
-            if not self._zero.get(unit):
+            turns = place == places.control and unit in self._running
+            if not (self._stands if turns else self._zero).get(unit):
                 yield 'a run command without set-point 0 before it'
             self._zero[unit] = False
             self._running.add(unit)
@@ -168,6 +177,7 @@ class _Judge:
             yield f'a set-point for all, but {sorted(self._known - self._running)} are not enabled'
         else:
             self._zero.update(dict.fromkeys(self._known, words == (0,)))
+            self._stands.update(self._zero)
 
 
 def _stops(request: Request, places: _Places) -> bool:
@@ -183,8 +193,8 @@ def _runs(request: Request, places: _Places) -> bool:
     """Tell whether a write makes the motor follow the set-point of the bus."""
     assert request.words is not None
     if request.place == places.control:
-        wanted = Control.SWITCH_ON | Control.ENABLE_OP | Control.NET_REF
-        return request.words[0] & wanted == wanted
+        wanted = Control.SWITCH_ON | Control.NET_REF
+        return request.words[0] & wanted == wanted and bool(request.words[0] & _DIRECTIONS)
     if request.place == _CONTROL_WORD:
         return request.words[0] & _ENABLED == _ENABLED
     return request.place == places.command and request.words[0] == Scmd.FIELDBUS

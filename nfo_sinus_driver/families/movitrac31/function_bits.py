@@ -10,11 +10,11 @@ with the terminals, and an enable has to stand at those, too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 import contextlib
-import math
 from typing import ClassVar
 
+from nfo_sinus_driver.catalog.directed import DirectedTarget
 from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import (
     Holder,
@@ -49,47 +49,8 @@ from nfo_sinus_driver.families.movitrac31.product import read_if_there
 from nfo_sinus_driver.families.movitrac31.words import Bits
 
 
-class DirectionAndSize(Size):
-    """
-    A set-point whose size stands in index 223, and whose sign is one of two direction bits.
-
-    The size is 0 before the direction changes, and the motor ramps through zero. At set-point 0 the
-    direction stays as it was.
-    """
-
-    def writes(self, value: float, before: float = math.nan) -> Sequence[Write]:
-        """
-        Return what is to be written for a set-point: where the direction changes, size 0 first.
-
-        :param before: the set-point that the drive has, -0.0 being one in reverse; NaN if
-            unknown.
-        """
-        unknown = math.isnan(before)
-        reverse = _reverse(before if value == 0 and not unknown else value)
-        run = Bits.ENABLE | (Bits.COUNTER_CLOCKWISE if reverse else Bits.CLOCKWISE)
-        written = Write(BITS, int(run)), Write(self.key, abs(value))
-        turns = before != 0 and reverse is not _reverse(before)
-        return (Write(self.key, 0.0), *written) if unknown or turns else written
-
-    def value(self, values: Mapping[str, Value]) -> float:
-        """Return the set-point that size and bits mean; -0.0 is 0 in reverse."""
-        reverse = int(values[BITS]) & Bits.COUNTER_CLOCKWISE
-        return math.copysign(float(values[self.key]), -1 if reverse else 1)
-
-    def zero(self, *, retry: bool) -> Steps[None]:
-        """Write size 0 and leave the bits alone, for a direction among them would be a command."""
-        yield Write(self.key, 0.0, retry=retry)
-
-    def set_to_zero(self) -> Steps[None]:
-        """Write size 0, and read it back alone."""
-        yield from self.zero(retry=True)
-        kept = float((yield Read(self.key)))
-        if kept:
-            raise NotPossible(f'the drive keeps a set-point of {kept:g} where 0 was written')
-
-
-def _reverse(value: float) -> bool:
-    return math.copysign(1, value) < 0
+class DirectionAndSize(Size, DirectedTarget):
+    """A set-point whose size stands in index 223, and whose sign is one of two direction bits."""
 
 
 class FunctionBits(ByLine):
@@ -111,7 +72,13 @@ class FunctionBits(ByLine):
         # a PLC, which is as little us as a terminal is
         words.FIELDBUS: Holder.LOCAL,
     }
-    target = DirectionAndSize(SIZE, MOST)
+    target = DirectionAndSize(
+        SIZE,
+        MOST,
+        direction=BITS,
+        forward=int(Bits.ENABLE | Bits.CLOCKWISE),
+        reverse=int(Bits.ENABLE | Bits.COUNTER_CLOCKWISE),
+    )
     setpoints: ClassVar[Mapping[str, SetpointTarget]] = {'Freque': target}
     control_retained = (
         'P841 stays Remote control, for another value can start the motor; change '

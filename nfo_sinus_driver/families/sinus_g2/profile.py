@@ -14,6 +14,7 @@ import contextlib
 from fractions import Fraction
 from typing import ClassVar
 
+from nfo_sinus_driver.catalog.directed import with_direction
 from nfo_sinus_driver.catalog.profile import (
     Acknowledge,
     AcknowledgeThenWrite,
@@ -94,7 +95,8 @@ _READY = (
     | Control.UNLOCK_RFG
     | Control.USE_REF_FOR_RFG
 )
-_RUN = Control.SWITCH_ON | Control.ENABLE_OP | Control.ENABLE_REV_OP
+_DIRECTIONS = Control.ENABLE_OP | Control.ENABLE_REV_OP
+_RUN = Control.SWITCH_ON | _DIRECTIONS
 
 #: SioErr, bit by bit [M2 table 4], but for the first, that a fault kept a message from being
 #: carried out: that a stop was refused since then is no reason of the fault.
@@ -117,6 +119,11 @@ _CONTROLLED_ELSEWHERE = (
     'the serial fault is still active: keypad or terminals have control, which MODE = Stop, the '
     'command that ends it, would take from them; press STOP at the drive, then acknowledge again'
 )
+
+
+def _masked(keep: Control, add: Control) -> int:
+    """Return what changes bits of DriveControl at once: AND mask, then OR mask [M0 §7.1]."""
+    return int(keep) & 0xFFFF | int(add) << 16
 
 
 class _G2(ControlMethod):
@@ -340,8 +347,24 @@ class DriveControl(_G2):
         switched_on = self._ready | Control.SWITCH_ON
         yield Write(CONTROL_WORD, switched_on, retry=False)
         yield Until(lambda status: status.state in (State.SWITCHED_ON, State.STOPPING))
-        # reverse is the sign of the set-point; both direction bits at once mean no change [C36]
+        # both direction bits at once mean no change [C36]
         yield Write(CONTROL_WORD, switched_on | Control.ENABLE_OP, retry=False)
+
+    def setpoint_target(self, target: SetpointTarget) -> SetpointTarget:
+        """
+        Return where sizes go, with the direction by bits 3 and 13, in one write [M0 table 14].
+
+        That a sign reverses is printed for MODE and SCMD alone [C120]. A process value has one.
+        """
+        if target is _SETPOINTS['PI-Reg']:
+            return target
+        if self._reaches(_MASK):
+            forward = _masked(~_DIRECTIONS, Control.ENABLE_OP)
+            reverse = _masked(~_DIRECTIONS, Control.ENABLE_REV_OP)
+            return with_direction(target, _MASK, forward, reverse)
+        on = self._ready | Control.SWITCH_ON
+        forward, reverse = int(on | Control.ENABLE_OP), int(on | Control.ENABLE_REV_OP)
+        return with_direction(target, CONTROL_WORD, forward, reverse)
 
     def stop(self, control_mode: str) -> Steps[None]:
         """
@@ -422,8 +445,7 @@ class DriveControl(_G2):
     def _change(self, keep: Control, add: Control, *, retry: bool = False) -> Steps[None]:
         """Change some bits of the control word and leave the others to who has control."""
         if self._reaches(_MASK):
-            # in one transaction: the AND mask first, then the OR mask [M0 §7.1]
-            yield Write(_MASK, int(keep) & 0xFFFF | int(add) << 16, retry=retry)
+            yield Write(_MASK, _masked(keep, add), retry=retry)
             return
         word = Control(int((yield Read(CONTROL_WORD))))
         yield Write(CONTROL_WORD, word & keep | add, retry=retry)

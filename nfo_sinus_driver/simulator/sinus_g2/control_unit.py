@@ -27,7 +27,13 @@ from nfo_sinus_driver.simulator.sinus.control_unit import (
 )
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules, SinusFaults
 from nfo_sinus_driver.simulator.sinus_g2 import ds402
-from nfo_sinus_driver.simulator.sinus_g2.firmware import AS_STANDBY, G2Variant, firmware_of
+from nfo_sinus_driver.simulator.sinus_g2.firmware import (
+    AS_STANDBY,
+    FOLLOWED,
+    PROFIDRIVE,
+    G2Variant,
+    firmware_of,
+)
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import (
     FAILURES,
     PROCEDURES,
@@ -532,9 +538,20 @@ class G2ControlUnit(SinusControlUnit):
         motor.regulation = regulation
         reference = self.reference()
         if self.source is Source.CONTROL_WORD:
-            reference *= self.machine.direction
-            reference = self._through_rfg(reference)
+            reference = self._through_rfg(self._directed(reference))
         motor.demand = reference
+
+    def _directed(self, reference: float) -> float:
+        """What bits 3 and 13 of DriveControl make of a reference [M0 table 14]."""
+        signed = self.setpoint_key == 'status.reg_set' or self._sign_counts
+        return self.machine.direction * (reference if signed else abs(reference))
+
+    @property
+    def _sign_counts(self) -> bool:
+        """Whether the sign of a set-point reverses: that of a drive profile does [C111]."""
+        by_telegram = self.fieldbus.active and self.variant.telegram_words == PROFIDRIVE
+        by_profile = by_telegram or self._by_profile
+        return by_profile or self.variant.sign_in_drive_control == FOLLOWED
 
     def _through_rfg(self, reference: float) -> float:
         """What the ramp generator's bits of DriveControl make of the reference [M0 table 14]."""

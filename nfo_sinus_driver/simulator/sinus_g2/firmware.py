@@ -32,6 +32,8 @@ SW_VER = 'fieldbus.sw_ver'
 _OLD_FORMAT_CODES = {'7E1': 0, '8N1': 1}
 #: The words of telegram 1.
 PROFIDRIVE, DRIVECONTROL = 'profidrive', 'drivecontrol'
+#: Whether the sign of a set-point reverses under DriveControl.
+IGNORED, FOLLOWED = 'ignored', 'followed'
 #: What it shows while it brakes a motor before the start.
 AS_RUNNING, AS_STANDBY = 'running', 'standby'
 
@@ -43,6 +45,8 @@ class G2Variant(SinusVariant):
 
     :ivar dialect: the manual that describes its firmware; ``''``: as SWVer says.
     :ivar shown_in_dc_brk: what status word and inverter status show while DC-Brk goes on [C122].
+    :ivar sign_in_drive_control: whether under DriveControl the sign of a set-point counts beside
+        bits 3 and 13 [C120]; that of a process value always does.
     :ivar telegram_words: which words telegram 1 has.
     :ivar canopen_profile: what there is of the communication profile, which the manual leaves
         "TBD". ``full``: identity, texts, heartbeats, guarding; ``minimal``: device type, error
@@ -70,6 +74,11 @@ class G2Variant(SinusVariant):
         '5.0',
         text='the manual that describes the Classic protocol of the drives (default: as their '
         'firmware, fieldbus.sw_ver, says)',
+    )
+    sign_in_drive_control: str = choice(
+        IGNORED,
+        FOLLOWED,
+        text='under DriveControl: whether the sign of a set-point reverses beside its bit 13',
     )
     shown_in_dc_brk: str = choice(
         AS_RUNNING,

@@ -21,7 +21,7 @@ import pytest
 from support.rig import WAYS, Rig
 from support.variants import ramps
 
-from nfo_sinus_driver.catalog import Kind, is_described
+from nfo_sinus_driver.catalog import Fact, Kind, is_described
 from nfo_sinus_driver.drive import Cause, Drive, Severity
 
 #: How soon a loss has to be noticed and the motor has to be stopped, beyond lost_after, s.
@@ -122,6 +122,28 @@ def test_2_without_enable_set_points_turn_nothing(way: str) -> None:
         rig.send(_SPEED)
         rig.pass_time(2.0)
         assert not rig.turns and not rig.drive.following
+
+
+@following
+def test_2_the_motor_turns_as_its_set_points_say(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect()
+        rig.enable()
+        for wanted in (_SPEED, -_SPEED, 0.0, -10.0, 10.0, 0.0, 10.0):
+            rig.send(wanted)
+            rig.pass_time(2.0)
+            # a Sinus H takes no reverse by its telegram [C60]
+            turns = 0.0 if wanted < 0 and rig.way.model == 'sinus_h' else wanted
+            # in Speed mode the slip is made up for
+            assert rig.far.motor.frequency == pytest.approx(turns, abs=0.5)
+            told = rig.drive.snapshot
+            assert told.setpoint == pytest.approx(turns * rig.way.hertz, rel=1e-3)
+            assert told.actual == pytest.approx(turns * rig.way.hertz, rel=0.02, abs=0.5)
+            status = told.status
+            assert status is not None and status.runs
+            if Fact.REVERSE in status.valid and turns:
+                assert (Fact.REVERSE in status.facts) == (turns < 0)
+        assert rig.drive.following
 
 
 def lose_line(rig: Rig) -> None:

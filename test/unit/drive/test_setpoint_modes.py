@@ -58,8 +58,11 @@ def enabled(way: str, mode: str, **settings: float) -> Rig:
 
 
 def in_drive(rig: Rig, mode: str) -> float:
-    """What stands in the drive, in the unit of the mode."""
-    return rig.far.memory.raw(rig.far.control_unit.setpoint_key) / MODES[mode].steps
+    """What stands in the drive, in the unit of the mode; its sign may be a direction."""
+    control = rig.far.control_unit
+    directed = rig.way.method == 'drive_control' and mode != 'PI-Reg'
+    sign = control.machine.direction if directed else 1
+    return sign * rig.far.memory.raw(control.setpoint_key) / MODES[mode].steps
 
 
 def facts(rig: Rig) -> Fact:

@@ -11,12 +11,13 @@ driver makes of what the drive does, whoever brought it there.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from typing import Any, cast
 
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.catalog import State
+from nfo_sinus_driver.catalog import Fact, State
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
@@ -218,6 +219,55 @@ def test_words_of_table_14(reference: str, net_ref: int) -> None:
         assert 0x0800DFF2 in rig.written(MASK)
         # the mask saves reading the word
         assert (1, CONTROL, None) not in rig.asked
+
+
+@pytest.mark.parametrize('sign', ['ignored', 'followed'])
+@pytest.mark.parametrize('mode', ['Freque', 'Speed', 'Torque'])
+def test_reverse_is_bit_13_beside_a_size(mode: str, sign: str) -> None:
+    options, parameters = {'sign_in_drive_control': sign}, {'control.mode': mode}
+    with Rig(WAY, options=options, parameters=parameters).connect() as rig:
+        rig.enable()
+        key = unit(rig).setpoint_key
+        for value in (20.0, -20.0, 0.0, -10.0, 10.0):
+            rig.send(value)
+            rig.pass_time(0.5)
+        # SwitchOn is left as it is; no size stands when the direction changes
+        assert rig.written(MASK) == [0x2000DFF7, 0x0008DFF7]
+        count = 10 if mode == 'Freque' else 1
+        sizes = [20 * count, 0, 20 * count, 0, 10 * count, 0, 10 * count]
+        assert [size for size, _ in groupby(rig.written(key)) if size is not None][1:] == sizes
+        rig.send(-20.0)
+        rig.pass_time(1.5)
+        assert (rig.far.motor.torque if mode == 'Torque' else rig.far.motor.frequency) < 0
+        status = rig.drive.snapshot.status
+        assert status is not None and Fact.REVERSE in status.facts and status.runs
+        assert rig.drive.snapshot.setpoint == -20 and rig.drive.snapshot.actual < 0
+        # a program that goes on gives no direction anew
+        before = len(rig.written(MASK))
+        rig.pass_time(12.0)
+        assert len(rig.written(MASK)) == before and rig.drive.following
+
+
+def test_the_sign_of_a_process_value_is_no_direction() -> None:
+    process = {'control.mode': 'PI-Reg', 'pi_reg.setmin': -50.0, 'pi_reg.setmax': 50.0}
+    with Rig(WAY, parameters=process).connect() as rig:
+        rig.enable()
+        rig.send(-20.0)
+        rig.pass_time(1.0)
+        assert rig.written(MASK) == [] and unit(rig).word & Control.ENABLE_OP
+        assert rig.far.memory.number('status.reg_set') == -20
+
+
+def test_a_reverse_gives_no_run_command_that_another_master_has_taken_back() -> None:
+    with Rig(WAY).connect() as rig:
+        turn(rig, 20.0)
+        rig.spoil('drop', MASK)
+        command(rig, POWER | RAMP)
+        rig.drive.set_setpoint(-20.0)
+        rig.send(None)
+        rig.pass_time(0.1)
+        assert not unit(rig).word & Control.SWITCH_ON
+        require_stopped(rig)
 
 
 # --- what another master leads it through, under the driver's eyes --------------------------------

@@ -329,6 +329,30 @@ def test_set_point_0_is_read_back() -> None:
             play(method.zero_setpoint(''))
 
 
+@pytest.mark.parametrize('classic', [False, True])
+def test_under_the_control_word_a_sign_is_a_direction(classic: bool) -> None:
+    method = control(classic=classic)
+    # the mask leaves SwitchOn as it is; without it, over Classic, the whole word is written [C27]
+    forward, reverse = (
+        (Write(WORD, READY | NET_REF | 0x0009), Write(WORD, READY | NET_REF | 0x2001))
+        if classic else (change(0x2008, 0x0008, retry=True), change(0x2008, 0x2000, retry=True))
+    )
+    for mode, target in G2.profile.setpoints.items():
+        directed = method.setpoint_target(target)
+        size, nothing = Write(target.key, 20.0, at=target.at), zero(key=target.key)
+        if mode == 'PI-Reg':
+            assert directed is target
+            continue
+        assert directed.writes(-20.0, 0.0) == (reverse, size)
+        assert directed.writes(-20.0, 5.0) == (nothing, reverse, size)
+        assert directed.writes(20.0, -0.0) == (forward, size)
+        assert directed.writes(20.0) == (nothing, forward, size)
+        assert directed.value({reverse.key: reverse.value, target.key: 20.0}) == -20.0
+        assert directed.written_once == {reverse.key}
+        # by MODE and SCMD it is the sign [M2 table 2]
+        assert scmd(classic=classic).setpoint_target(target) is target
+
+
 def test_in_charge() -> None:
     in_charge = G2.profile.in_charge
     # what has no control is asked for nothing: older firmware may not know it

@@ -14,7 +14,8 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 
-from nfo_sinus_driver.catalog.profile import Profile, Steps, Until
+from nfo_sinus_driver.catalog.directed import with_direction
+from nfo_sinus_driver.catalog.profile import Profile, SetpointTarget, Steps, Until
 from nfo_sinus_driver.catalog.speed_mode import SpeedMode
 from nfo_sinus_driver.catalog.status import Fact, Role, State
 from nfo_sinus_driver.families._telegram1 import method, profidrive
@@ -71,6 +72,9 @@ _READY = (
 )
 
 
+_ON = int(_READY | drivecontrol.Control.SWITCH_ON)
+
+
 class G2DriveControl(Telegram1):
     """Control by DriveControl: switched on, then enabled [C54]."""
 
@@ -88,16 +92,17 @@ class G2DriveControl(Telegram1):
         yield Until(lambda status: bool((status.word or 0) & self.control))
 
     def run(self) -> Steps[None]:
-        """
-        Switch on, then give the direction, each when the drive shows a state before it.
-
-        The sign of the set-point reverses; both direction bits at once mean no change [C36].
-        """
+        """Switch on, then give the direction, each when the drive shows a state before it."""
         yield Until(lambda status: status.state in _STARTABLE)
-        on = self.ready | drivecontrol.Control.SWITCH_ON
-        yield method.following(on, retry=False)
+        yield method.following(_ON, retry=False)
         yield Until(lambda status: status.state in (State.SWITCHED_ON, State.STOPPING))
-        yield method.following(on | drivecontrol.Control.ENABLE_OP, retry=False)
+        yield method.following(_ON | drivecontrol.Control.ENABLE_OP, retry=False)
+
+    def setpoint_target(self, target: SetpointTarget) -> SetpointTarget:
+        """Return where sizes go, with the direction by bits 3 and 13 ([M0 table 14], [C120])."""
+        forward = method.following(_ON | drivecontrol.Control.ENABLE_OP)
+        reverse = method.following(_ON | drivecontrol.Control.ENABLE_REV_OP)
+        return with_direction(target, method.NEXT, int(forward.value), int(reverse.value))
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Go to QUICK_STOP, which coasts [C96]; control is kept."""
@@ -160,12 +165,7 @@ PROFILE = replace(
             methods={'telegram1': G2DriveControl},
             status_word=Words(
                 state=lambda word: drivecontrol.state_of(word & 0xFFFF),
-                # by the sign of the set-point it reverses under the forward run command, so that
-                # the bit of the reverse one tells no direction
-                by_bit={
-                    bit: fact & ~Fact.REVERSE
-                    for bit, fact in drivecontrol.STATUS_WORD.by_bit.items()
-                },
+                by_bit=drivecontrol.STATUS_WORD.by_bit,
                 by_state=drivecontrol.STATUS_WORD.by_state,
                 frequency_beside=True,
                 code=lambda word: method.code_of(
