@@ -413,7 +413,10 @@ def _condition(teller: _Teller, now: float) -> Condition:
     if status.alarm or inv_st.kind == InvSt.ALARM:
         return Condition.ALARM
     # without a status word there is no state, but what it comes to
-    turns = teller.telemetry is not None and abs(teller.telemetry.frequency) > 0
+    measured = teller.telemetry
+    turns = measured is not None and any(
+        abs(value) > 0 for value in (measured.frequency, measured.speed)
+    )
     runs = status.operation_enabled or status.stopping or status.state in _RUNS or turns
     return Condition.RUNS if runs else Condition.STANDS
 
