@@ -31,6 +31,8 @@ from mutant import (
     Mutant,
 )
 
+#: What reverses under DriveControl.
+REVERSES = ('test/unit/drive/test_table_16.py', '-k', 'reverse_is_bit_13')
 #: What the laws ask of a MOVITRAC alone.
 MOVITRAC_LAWS = 'test/unit/drive/test_movitrac_laws.py'
 
@@ -148,6 +150,30 @@ LAWS = (
         '        self._following_since = self._bus.now()\n',
         '        self._following_since = 0.0\n        self._bus.request(self._slot)\n',
         (NO_RESTART, '-k', 'from_before_enable'),
+    ),
+    Mutant(
+        2,
+        'a direction is given again with every set-point',
+        SETPOINT,
+        'self._target is not None and self._keys[address] in self._target.written_once',
+        'False',
+        REVERSES,
+    ),
+    Mutant(
+        2,
+        'the direction changes beside a size that is not 0',
+        'nfo_sinus_driver/catalog/directed.py',
+        ' if unknown or turns else written',
+        ' if unknown else written',
+        REVERSES,
+    ),
+    Mutant(
+        3,
+        'a Sinus H that ignores its stops is not released',
+        'nfo_sinus_driver/families/sinus_h/profile.py',
+        'taken(one(method.begin(int(OFF & ~Control.NO_COAST_STOP))))',
+        'taken(one(method.begin(int(OFF))))',
+        ('test/unit/drive/test_telegram1.py', '-k', 'ignores_its_stops'),
     ),
     Mutant(
         2,
