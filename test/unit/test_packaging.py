@@ -98,3 +98,15 @@ def test_the_judge_sees_what_is_missing(tmp_path: Path) -> None:
     path = tmp_path / 'file.py'
     path.write_text('import os, scipy.signal\nfrom numpy import array\nfrom . import x\n')
     assert imported(path) == {'scipy', 'numpy'}
+
+
+@pytest.mark.parametrize('distribution', ['jazzy', 'kilted'])
+def test_the_wheels_of_each_distribution_are_pinned_apart(distribution: str) -> None:
+    folder = ROOT / 'requirements'
+    named = (folder / f'ros-{distribution}.txt').read_text(encoding='utf-8')
+    pins = (folder / f'constraints-{distribution}.txt').read_text(encoding='utf-8')
+    assert f'-c constraints-{distribution}.txt\n' in named and f'ros-{distribution}-rclpy' in named
+    wheels = [line for line in f'{named}\n{pins}'.splitlines() if line.startswith('ros-')]
+    assert len(wheels) > 80 and [line for line in wheels if '==' not in line] == []
+    # what holds for both has none of either
+    assert '\nros-' not in (folder / 'constraints.txt').read_text(encoding='utf-8')
