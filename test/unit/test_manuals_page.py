@@ -95,6 +95,11 @@ def test_a_row_says_what_serves_it_or_why_it_is_not_served() -> None:
     assert [one for one in whole if whole.count(one) > 1] == []
 
 
+def test_what_is_not_served_has_one_of_ten_reasons() -> None:
+    reasons = {row['why'] for row in ROWS if row['status'] == 'not'}
+    assert len(reasons) <= 10, sorted(reasons)
+
+
 def test_the_page_is_current_and_every_manual_has_rows_and_a_page_of_its_drive() -> None:
     assert read(DOCS / 'manuals.md') == _TOOL['page'](), 'make parameters'
     assert {row['manual'] for row in ROWS} == _TOOL['MANUALS'].keys() == FAMILIES.keys()
