@@ -179,7 +179,7 @@ class DriveState:
         if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
             status = replace(held, at=at)
             if not alarming(status):
-                return self._note_status(status)
+                return await self._with_frequency(status, priority, retry)
         code, code_at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, retry)
         status = replace(half, code=code, code_at=code_at)
         is_new = before is not None and code != before.code

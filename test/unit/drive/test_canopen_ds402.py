@@ -238,3 +238,13 @@ def test_tuning_is_by_scmd_alone() -> None:
         answer = rig.answer(rig.drive.erase_error_log())
         assert 'mode_scmd' in answer
         assert not rig.notes.said(Cause.DRIVER_ERROR)
+
+
+def test_a_status_has_a_frequency_that_is_as_new_as_its_word() -> None:
+    # the word alone tells no stop
+    with Rig('canopen, ds402', poll_rate=50.0) as rig:
+        rig.turn()
+        rig.asked.clear()
+        rig.pass_time(1.0)
+        asked = [key for _, key, _ in rig.asked]
+        assert asked.count('status.frq_act') >= asked.count('fieldbus.status_word') - 1 > 10
