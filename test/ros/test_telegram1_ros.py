@@ -124,6 +124,16 @@ def test_by_the_mailbox_settings_are_parameters_and_a_fault_has_its_name(bench: 
     assert 'Temp Hi' in client.call('fault_ack').message
 
 
+@pytest.mark.parametrize('behind', ['sinus_h'], indirect=True)
+def test_parameters_by_address_are_those_that_the_user_names(bench: Bench) -> None:
+    own = ('-p', 'drive_addresses:=["drv.acc_time=1105h:0.1:s:rw", "drv.max_freq=1104h:0.01:Hz"]')
+    drive, client = start(bench, '--layout', '2', settings=(*PATIENT, *own))
+    assert client.parameter('drv.max_freq') == 60.0
+    assert client.set_parameters(**{'drv.acc_time': 1.5}).successful
+    assert drive.wait_for(lambda state: state['parameters']['drv.acc_time'] == 1.5)
+    assert 'only read' in client.set_parameters(**{'drv.max_freq': 50.0}).reason
+
+
 @pytest.mark.parametrize('behind', ['sinus_optimal', 'sinus_g2'], indirect=True)
 def test_in_speed_mode_the_speed_is_published(bench: Bench) -> None:
     in_speed = ('-p', 'expected_control_mode:=Speed', '-p', 'nominal_speed:=1500')
