@@ -88,19 +88,26 @@ class Control:
 
     :param now: the clock of the bus.
     :param on_change: called with the state before, after each transition to another one.
+    :param on_stop: called with the reason when what may drive the motor is stopped.
     :ivar state: what the driver is doing with the drive.
     :ivar since: when the last event was, s: a status from before says nothing of it.
     :ivar stopped_at: when a stop was confirmed last, s.
     :ivar stopped_for: why the motor was stopped last; ``None`` before the first time.
     """
 
-    def __init__(self, now: Callable[[], float], on_change: Callable[[ControlState], None]) -> None:
+    def __init__(
+        self,
+        now: Callable[[], float],
+        on_change: Callable[[ControlState], None],
+        on_stop: Callable[[Report], None],
+    ) -> None:
         self.state = ControlState.OFFLINE
         self.since = 0.0
         self.stopped_at = -math.inf
         self.stopped_for: Report | None = None
         self._now = now
         self._on_change = on_change
+        self._on_stop = on_stop
 
     def dispatch(self, event: ControlEvent, why: Report | None = None) -> None:
         """Go where an event leads; where that ends what may drive the motor, note why."""
@@ -122,6 +129,7 @@ class Control:
         commanded = before in COMMANDED or reason_of(why) is StopReason.NOT_ENABLED
         if why is not None and commanded and self.state is ControlState.STOPPING:
             self.stopped_for = why
+            self._on_stop(why)
 
     def accepts(self, event: ControlEvent) -> bool:
         """Whether an event leads to another state."""

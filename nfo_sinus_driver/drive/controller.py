@@ -28,30 +28,13 @@ from nfo_sinus_driver.drive.diagnosis import (
 )
 from nfo_sinus_driver.drive.drive_state import TIMEOUT, DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.drive.following import Following
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.starting import StartSequence
 from nfo_sinus_driver.drive.stop_reason import StopReason, reason_of
 from nfo_sinus_driver.drive.stopping import StopSequence
 from nfo_sinus_driver.link import LinkError, Refused
-
-
-class ExclusiveAccess:
-    """Exclusive access for one procedure, such as a tuning, whose name is ``what``."""
-
-    def __init__(self, what: str) -> None:
-        self.what = what
-        #: The procedure shall stop what it does, or not begin it.
-        self.aborted = False
-
-    def abort(self) -> None:
-        """Have the procedure stop."""
-        self.aborted = True
-
-    def require_wanted(self) -> None:
-        """Raise a :class:`DriveError` if the procedure was stopped meanwhile."""
-        if self.aborted:
-            raise DriveError(Cause.PROCEDURE_NOT_BEGUN, what=self.what)
 
 
 class Controller:
@@ -68,7 +51,9 @@ class Controller:
         #: How the drive is commanded, for a procedure too.
         self.method = method
         self._setpoint = setpoint
-        self._control = Control(self._bus.now, self._changed)
+        #: Called on the bus after a stop was begun, with the reason.
+        self._on_stop: Callable[[Report], None] = lambda _: None
+        self._control = Control(self._bus.now, self._changed, self._tell_others)
         #: The driver ends: the motor is stopped, and nothing can start it any more.
         self.closed = False
         #: What enables, to be cancelled; and what no other procedure and no enable may run beside.
@@ -152,6 +137,20 @@ class Controller:
             self._access.abort()
         if self.state is ControlState.IDLE and not self._state.connected:
             self._control.dispatch(ControlEvent.LOST)
+
+    def on_stop(self, call: Callable[[Report], None]) -> None:
+        """Have something called on the bus whenever the motor is stopped, with the reason."""
+        self._on_stop = call
+
+    def _tell_others(self, why: Report) -> None:
+        # once what stops this motor is on its way
+        self._bus.call(lambda: self._on_stop(why))
+
+    def stop_beside(self, why: Report) -> None:
+        """Stop the motor, if something may drive it, because another drive stops."""
+        if self.commanded:
+            self._sequence.start(why)
+            self._tell_stopped(why)
 
     @contextlib.contextmanager
     def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:

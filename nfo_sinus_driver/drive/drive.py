@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Coroutine, Sequence
 from concurrent.futures import Future
+import logging
 import math
 from typing import Any, TypeVar
 
@@ -32,6 +33,7 @@ from nfo_sinus_driver.drive.telemetry import watch_telemetry
 from nfo_sinus_driver.drive.tuning import Tuned, Tuning
 from nfo_sinus_driver.link import LinkError, Refused
 
+_log = logging.getLogger(__name__)
 _T = TypeVar('_T')
 
 #: How long an exit waits for the first answer of a drive that has never answered yet, s.
@@ -180,6 +182,23 @@ class Drive:
                 raise DriveError(Cause.ENDING) from None
 
         return self._bus.run(explained())
+
+    def on_stop(self, call: Callable[[Report], None]) -> None:
+        """Have something called on the bus whenever the motor is stopped, with the reason."""
+
+        def safely(why: Report) -> None:
+            try:
+                call(why)
+            except Exception:
+                _log.exception('other drives were not stopped: %s', why)
+
+        if self._controller is not None:
+            self._controller.on_stop(safely)
+
+    def stop_beside(self, why: Report) -> None:
+        """Stop the motor, if this driver may run it, because another one stops; on the bus."""
+        if self._controller is not None:
+            self._controller.stop_beside(why)
 
     def activate(self) -> None:
         """Poll at full rate and measure."""

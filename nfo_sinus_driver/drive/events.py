@@ -178,6 +178,7 @@ class Cause(enum.Enum):
     ACKNOWLEDGE_REQUESTED = 'an acknowledgement stops the motor first: {by}'
     TRANSITION_REQUESTED = 'a transition was requested: {by}'
     DRIVER_ENDS = 'this {call.program} ends: {by}'
+    STOPPED_WITH = 'it stops with {drive}: {why}'
     ENABLE_FAILED = 'the enable failed: {why}'
     PROCEDURE_ENDED = '{what} has ended'
     PROCEDURE_CANCELLED = '{what} was cancelled'

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 from nfo_sinus_driver.bus import Cancelled, Priority
 from nfo_sinus_driver.catalog import Family, Role, Value
-from nfo_sinus_driver.drive.controller import ExclusiveAccess
 from nfo_sinus_driver.drive.diagnosis import explain_failure, report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.link import LinkError, Refused
 

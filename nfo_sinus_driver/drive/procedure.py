@@ -12,10 +12,11 @@ import contextlib
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family, Holder, Procedure, Reset, Role
 from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.drive.controller import Controller, ExclusiveAccess
+from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report
+from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.link import LinkError, Refused
 
 #: How often a busy drive is told again, and for how long, s.

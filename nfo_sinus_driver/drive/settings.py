@@ -210,6 +210,12 @@ class DriveSettings:
         LONGEST_DRIVE_TIMEOUT, unit='s', zero='leave it as it is',
         also='0 or at least lost_after + 0.5; the most and the step are those of the drive',
     )
+    stop_with: Sequence[str] = setting(
+        ('',),
+        'names of drives of this line that stop when this one is stopped, whatever the reason; a '
+        'set-point time-out is no stop: it stays enabled',
+        zero='none',
+    )
     shutdown_timeout: float = setting(
         4.0,
         'how long an exit or a cleanup waits for the drive to confirm that it stops',

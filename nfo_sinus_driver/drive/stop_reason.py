@@ -37,6 +37,7 @@ class StopReason(enum.IntEnum):
     ENABLE_FAILED = 19
     ACKNOWLEDGE = 20
     NOT_ENABLED = 21
+    STOP_WITH = 22
     OTHER = 255
 
 
@@ -73,6 +74,7 @@ _CAUSES: Mapping[StopReason, tuple[Cause, ...]] = {
     StopReason.CONTROL_MODE: (Cause.CONTROL_MODE_CHANGED,),
     StopReason.ENABLE_FAILED: (Cause.ENABLE_FAILED,),
     StopReason.ACKNOWLEDGE: (Cause.ACKNOWLEDGE_REQUESTED,),
+    StopReason.STOP_WITH: (Cause.STOPPED_WITH,),
     StopReason.NOT_ENABLED: (Cause.RUNS_UNASKED, Cause.FOUND_RUNNING),
 }
 _REASON_OF = {cause: reason for reason, causes in _CAUSES.items() for cause in causes}

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 import contextlib
 from dataclasses import dataclass, field
 import threading
@@ -13,6 +13,7 @@ import threading
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.settings import BLOCK_SIZE
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.publish_queue import PublishQueue
@@ -30,9 +31,21 @@ class BusContext:
     retries: int
     publish_queue: PublishQueue = field(default_factory=PublishQueue)
     setpoint_subscriber: SetpointSubscriber = field(default_factory=SetpointSubscriber)
+    #: The names of all drives of the line, those to come too.
+    names: list[str] = field(default_factory=list)
     drives: list[ManagedDrive] = field(default_factory=list)
     #: What takes a set-point for all drives of the line, one for each drive.
     on_setpoint_all: list[Callable[[Float32], None]] = field(default_factory=list)
+
+    def expect(self, names: Sequence[str]) -> None:
+        """Take note of the names of the drives that will be taken in."""
+        self.names += names
+
+    def stop_beside(self, names: Collection[str], why: Report) -> None:
+        """Stop the motors of drives because another one stops; called on the bus."""
+        for one in self.drives:
+            if one.name in names:
+                one.drive.stop_beside(why)
 
     def add(self, drive: ManagedDrive) -> None:
         """Take in another drive."""

@@ -91,6 +91,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             self._drive_settings(values),
             reporter,
             self.lifecycle,
+            self._stop_others,
         )
         try:
             self._wanted = wanted_state(self, self.managed.drive)
@@ -110,6 +111,11 @@ class DriveNode(LifecycleNodeMixin, Node):
         self.lifecycle.end()
         self._setpoints.be_quiet(True)
         return self.managed.drive.stop_for_good(patience, Report(Cause.DRIVER_ENDS, by=why))
+
+    def _stop_others(self, why: Report) -> None:
+        """Stop the drives that stop with this one; called on the bus."""
+        reason = Report(Cause.STOPPED_WITH, drive=self.get_fully_qualified_name(), why=why)
+        self._bus_context.stop_beside(self.managed.settings.stop_with, reason)
 
     @property
     def later_parameters(self) -> list[str]:
@@ -230,7 +236,17 @@ class DriveNode(LifecycleNodeMixin, Node):
                 f'address {settings.address} belongs to {other} already: '
                 'every drive on a bus needs an address of its own'
             )
+        self._require_known(settings.stop_with)
         return settings
+
+    def _require_known(self, names: Sequence[str]) -> None:
+        known = self._bus_context.names
+        for name in filter(None, names):
+            if name not in known:
+                raise ValueError(
+                    f'stop_with: there is no drive {name!r} on this line: '
+                    f'choose of {", ".join(known)}'
+                )
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters for a client, all or none: only so the drive is written to."""

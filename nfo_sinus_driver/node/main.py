@@ -79,6 +79,7 @@ class DriverProcess:
             names = _renamed(self._bus_node.drive_names, single_name)
         _check_names(names)
         self._context = self._bus_node.bus_context
+        self._context.expect(names)
         self._drives: list[DriveNode] = []
         for name in names:
             try:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future
 import dataclasses
 
@@ -32,6 +33,7 @@ class ManagedDrive:
 
     :param name: the node's.
     :param listener: told about every poll and event, on the worker of the bus.
+    :param on_stop: told on it when the motor is stopped, and why.
     :ivar wording: what it reports, as its node says it.
     :ivar scale: what set-points for it are counted in.
     """
@@ -45,6 +47,7 @@ class ManagedDrive:
         settings: DriveSettings,
         listener: Listener,
         lifecycle: Lifecycle,
+        on_stop: Callable[[Report], None],
     ) -> None:
         self.name = name
         self.wording = wording
@@ -53,9 +56,10 @@ class ManagedDrive:
         self._settings = settings
         self._listener = listener
         self._lifecycle = lifecycle
+        self._on_stop = on_stop
         #: What ``model: auto`` stands for, as far as it is known.
         self._found_model = DriveSettings().model
-        self._drive = Drive(bus, self._concrete, listener)
+        self._drive = self._make_drive()
 
     @property
     def line_check(self) -> str:
@@ -131,7 +135,7 @@ class ManagedDrive:
                 before.method != self._concrete.method
             ):
                 self._drive.require_standing().result()
-            self._drive = Drive(self._bus, self._concrete, self._listener)
+            self._drive = self._make_drive()
         self._drive.connect(retry=retry, parameters=True).result()
         asked_for = self._is_asked_for
         if asked_for:
@@ -141,6 +145,11 @@ class ManagedDrive:
     def disconnect(self, why: Report) -> Future[Report]:
         """Stop the motor, give control back and leave the drive alone."""
         return self._drive.disconnect(self._settings.shutdown_timeout, why)
+
+    def _make_drive(self) -> Drive:
+        drive = Drive(self._bus, self._concrete, self._listener)
+        drive.on_stop(self._on_stop)
+        return drive
 
     @property
     def _concrete(self) -> DriveSettings:

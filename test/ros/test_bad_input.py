@@ -330,6 +330,7 @@ def untouched(
         (['-r', '__node:=1st'], ["'1st' (in drives, or as __node)", 'begins with no digit']),
         (['-p', 'drives:=[one, two]'], ['address 1', 'belongs to one', 'address of its own']),
         (['-p', 'drives:=[one, two]', '-r', '__node:=x'], ['x', '2 drives', 'drives']),
+        (['-p', 'stop_with:=[other]'], ["no drive 'other' on this line: choose of nfo_sinus"]),
     ],
     ids=lambda value: ' '.join(value[1::2]) if value[0] in ('-p', '-r') else '',
 )

@@ -20,7 +20,7 @@ import math
 from typing import Any, NamedTuple
 
 from nfo_sinus_driver.bus import Bus
-from nfo_sinus_driver.catalog import is_described
+from nfo_sinus_driver.catalog import Kind, is_described
 from nfo_sinus_driver.drive import (
     Cause,
     Drive,
@@ -318,6 +318,12 @@ class Rig:
     @property
     def notes(self) -> Notes:
         return self.notes_of[1]
+
+    @property
+    def a_fault(self) -> int:
+        """The code of the first fault that a drive of this way can have."""
+        codes = self.far.memory.model.status_codes.values()
+        return next(code.code for code in codes if code.kind is Kind.FAULT and code.requires_ack)
 
     @property
     def turns(self) -> bool:

@@ -54,12 +54,6 @@ timed = pytest.mark.parametrize(
 )
 
 
-def a_fault(rig: Rig) -> int:
-    """Return the code of the first fault that a drive of this way can have."""
-    codes = rig.far.memory.model.status_codes.values()
-    return next(code.code for code in codes if code.kind is Kind.FAULT and code.requires_ack)
-
-
 def give_setpoints(rig: Rig) -> None:
     """Have a program give set-points, where they count."""
     rig.send(_SPEED if rig.drive.settings.follows_setpoints else None)
@@ -192,7 +186,7 @@ def open_run_input(rig: Rig) -> None:
 
 def acknowledge_beside(rig: Rig) -> None:
     """Have another master acknowledge a fault, while the run command may stand."""
-    rig.far.trip(a_fault(rig))
+    rig.far.trip(rig.a_fault)
     rig.pass_time(0.5)
     rig.far.faults.acknowledge()
     rig.far._settle()
@@ -241,7 +235,7 @@ def test_2_after_a_loss_nothing_turns_until_it_is_enabled_again(way: str, loss: 
 def test_2_after_a_fault_and_its_acknowledgement_nothing_turns(way: str) -> None:
     with Rig(way) as rig:
         rig.turn()
-        rig.far.trip(a_fault(rig))
+        rig.far.trip(rig.a_fault)
         rig.pass_time(1.0)
         assert not rig.drive.following
         assert rig.notes.snapshot.kind is Kind.FAULT

@@ -10,11 +10,9 @@ from concurrent.futures import Future
 from typing import Any, NamedTuple
 
 import pytest
-from support.drives import DRIVES
 from support.rig import WAYS, Rig
 from support.said import said
 
-from nfo_sinus_driver.catalog import Kind, is_described
 from nfo_sinus_driver.drive import Cause, Drive, Procedure, Report, StopReason
 from nfo_sinus_driver.drive.stop_reason import reason_of
 
@@ -24,7 +22,8 @@ _BY = '/teach_pendant'
 FOLLOWING = {name for name, way in WAYS.items() if way.reference == 'fieldbus'}
 TIMED = {
     name for name, way in WAYS.items()
-    if way.protocol not in ('telegram1', 'canopen') and way.model != 'sinus_optimal'
+    if way.protocol not in ('telegram1', 'canopen')
+    and way.model not in ('sinus_optimal', 'acme')
 }
 SERIAL_G2 = {
     name for name, way in WAYS.items()
@@ -38,15 +37,6 @@ WIRED = set(WAYS) - {'telegram1 sinus_h', 'movitrac'}
 def command(cause: Cause, give: Callable[[Drive, Report], Future[Any]]) -> Callable[[Rig], None]:
     """Have a client stop the motor."""
     return lambda rig: rig.answer(give(rig.drive, Report(cause, by=_BY)))
-
-
-def overload(rig: Rig) -> None:
-    if is_described(rig.way.model):
-        codes = rig.drive.model.status_codes.values()
-        rig.far.trip(next(one.code for one in codes if one.kind is Kind.FAULT))
-        return
-    drives = DRIVES.get(f'{rig.way.model} {rig.way.method}') or DRIVES[rig.way.model]
-    rig.far.trip(drives.overload.code)
 
 
 def lose_line(rig: Rig) -> None:
@@ -111,7 +101,7 @@ STOPS = {
         {_R.DRIVER_ENDS},
     ),
     'no set-points': Stop(lambda rig: rig.send(None), {_R.SETPOINT_TIMEOUT}, FOLLOWING),
-    'fault': Stop(overload, {_R.FAULT}),
+    'fault': Stop(lambda rig: rig.far.trip(rig.a_fault), {_R.FAULT}),
     'run input': Stop(
         lambda rig: rig.far.set_run_input(False), {_R.RUN_INPUT, _R.BY_ITSELF}, WIRED
     ),
@@ -151,7 +141,7 @@ def test_it_is_said_who_requested_a_stop() -> None:
 def test_a_stop_of_what_does_not_run_explains_nothing() -> None:
     with Rig() as rig:
         rig.turn()
-        overload(rig)
+        rig.far.trip(rig.a_fault)
         rig.pass_time(1.0)
         for stop in (rig.drive.stop, rig.drive.quick_stop):
             rig.answer(stop())
