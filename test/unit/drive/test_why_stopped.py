@@ -13,17 +13,19 @@ import pytest
 from support.rig import WAYS, Rig
 from support.said import said
 
+from nfo_sinus_driver.catalog import is_described
 from nfo_sinus_driver.drive import Cause, Drive, Procedure, Report, StopReason
 from nfo_sinus_driver.drive.stop_reason import reason_of
 
 _SPEED = 20.0
 _BY = '/teach_pendant'
-#: Where the motor follows set-points; where the drive counts the frames of the driver itself.
+#: Where the motor follows set-points; where the drive counts the frames of the driver itself, and
+#: has a fault when none come.
 FOLLOWING = {name for name, way in WAYS.items() if way.reference == 'fieldbus'}
 TIMED = {
     name for name, way in WAYS.items()
     if way.protocol not in ('telegram1', 'canopen')
-    and way.model not in ('sinus_optimal', 'acme')
+    and way.model not in ('sinus_optimal', 'acme') and not is_described(way.model)
 }
 SERIAL_G2 = {
     name for name, way in WAYS.items()
@@ -31,7 +33,8 @@ SERIAL_G2 = {
 }
 #: Older firmware shows running until its set-point is 0, so that more is said of it after the stop.
 DISOBEDIENT = FOLLOWING - {'classic v5.0'}
-WIRED = set(WAYS) - {'telegram1 sinus_h', 'movitrac'}
+#: Where an input enables; else the PLC does, or the bit of the bus.
+WIRED = {name for name in WAYS if not name.startswith(('telegram1 sinus_h', 'movitrac'))}
 
 
 def command(cause: Cause, give: Callable[[Drive, Report], Future[Any]]) -> Callable[[Rig], None]:
