@@ -316,7 +316,8 @@ LAWS = (
         5,
         'a request reaches over its parameter',
         'nfo_sinus_driver/drive/parameter_access.py',
-        'address._replace(block=self._block)',
+        'self._addresses[key] = address._replace(block=self._block)',
+        'self._addresses[key] = '
         "address._replace(size=4 if key == 'status.dc_link' else address.size)",
         (TRACE,),
     ),

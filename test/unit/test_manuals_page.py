@@ -50,7 +50,8 @@ def is_there(name: str, family: Family) -> bool:
     setting, _, value = name.partition(': ')
     if setting in SETTINGS:
         return not value or value in _choices(setting, family)
-    return bool(fnmatch.filter(readable(family), name))
+    ways = [load_family(family.name, method) for method in family.profile.methods]
+    return any(fnmatch.filter(readable(one), name) for one in ways)
 
 
 def _is_offered(topic: str, field: str = '') -> bool:
