@@ -146,7 +146,7 @@ def test_why_it_stops_is_said_although_the_line_is_lost_at_once() -> None:
 
         rig.meet = refuse
         rig.send(10.0)
-        rig.pass_time(2.0)
+        rig.pass_time(2.5)
         assert rig.notes.said('stopping: it refused set-point 10', Severity.WARNING)
         assert rig.notes.said('retrying, and stopped as soon as it answers', Severity.ERROR)
         rig.meet = lambda key, data: None
