@@ -202,7 +202,7 @@ def test_shipped_files_are_short_and_say_where_from() -> None:
         text = path.read_text(encoding='utf-8')
         body = text.split('\nparameters:')[0]
         assert body.count('\n') <= 60, path
-        assert text.startswith('# From the manual, not yet on a drive.'), path
+        assert 'not yet on a drive.' in text.splitlines()[0], path
         assert read(path).source
 
 
