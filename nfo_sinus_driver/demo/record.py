@@ -167,6 +167,8 @@ def _drives_of_graph() -> list[str]:
                 topic.removesuffix('/status')
                 for topic, types in node.get_topic_names_and_types()
                 if name_of(DriveStatus) in types and topic.endswith('/status')
+                # one who only listens makes a topic, too
+                and node.count_publishers(topic)
             )
             if found != drives:
                 drives, end = found, time.monotonic() + _QUIET

@@ -46,6 +46,7 @@ def topics_of(*drives: str) -> dict[str, tuple[type, QoSProfile]]:
             f'{drive}/enable/{_EVENT}': (SetBool.Event, RELIABLE),
             f'{drive}/stop/{_EVENT}': (Trigger.Event, RELIABLE),
             f'{drive}/quick_stop/{_EVENT}': (Trigger.Event, RELIABLE),
+            f'{drive}/rapid_stop/{_EVENT}': (Trigger.Event, RELIABLE),
             f'{drive}/fault_ack/{_EVENT}': (Trigger.Event, RELIABLE),
             f'{line}/stop_all/{_EVENT}': (Trigger.Event, RELIABLE),
             f'{line}/disable_all/{_EVENT}': (Trigger.Event, RELIABLE),

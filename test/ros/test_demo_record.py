@@ -51,6 +51,7 @@ _TYPES = {
     '/nfo_sinus/stop/_service_event': _EVENT.format('Trigger'),
     '/nfo_sinus/fault_ack/_service_event': _EVENT.format('Trigger'),
     '/nfo_sinus/quick_stop/_service_event': _EVENT.format('Trigger'),
+    '/nfo_sinus/rapid_stop/_service_event': _EVENT.format('Trigger'),
     '/nfo_sinus_bus/stop_all/_service_event': _EVENT.format('Trigger'),
     '/nfo_sinus_bus/disable_all/_service_event': _EVENT.format('Trigger'),
     '/nfo_sinus_bus/enable_all/_service_event': _EVENT.format('Trigger'),
