@@ -16,6 +16,7 @@ from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.interface import Link
 from nfo_sinus_driver.link.lawicel import LawicelPort
 from nfo_sinus_driver.link.modbus_tcp import TcpLink
+from nfo_sinus_driver.link.movitrac import LONGEST_RESPONSE_TIME
 from nfo_sinus_driver.link.protocols import link_class, protocol_of
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.endpoints import endpoint
@@ -259,8 +260,11 @@ class Line:
                 now = self.clock.now
                 self._trace.record('request', data, now, now, 'lost')
             return
-        if fate is not None:
-            late = _LATE * self.settings.response_timeout if fate == 'delay' else 0.0
+        # what nothing answers would spoil a later answer
+        if fate is not None and any(far.listening for far in self.drives.values()):
+            # a MOVITRAC is waited for as long as P843 may have it wait, too
+            more = LONGEST_RESPONSE_TIME if self._protocol.name == 'movitrac' else 0.0
+            late = _LATE * (self.settings.response_timeout + more) if fate == 'delay' else 0.0
             self.wire.faults.add(fate, seconds=late)
         self.wire.receive(data, self.clock.now)
 
