@@ -145,8 +145,9 @@ class _Judge:
             yield from self._call(request)
             return
         if place == places.mask:
-            yield from _wrong_control_word(words[1])
-            if words[1] & _DIRECTIONS and not self._stands.get(unit):
+            wrong = list(_wrong_control_word(words[1]))
+            yield from wrong
+            if not wrong and words[1] & _DIRECTIONS and not self._stands.get(unit):
                 yield 'another direction beside a set-point'
             if words[1] & Control.SWITCH_ON:
                 yield 'a mask switches on'

@@ -177,7 +177,7 @@ def test_exit_leaves_a_slow_motor_to_its_ramp_unless_a_fault_would_end_it(
 NO_SENSE: list[tuple[dict[str, Any], str]] = [
     ({'address': 248}, 'allowed are 0 to 247'),
     ({'model': 'sinus_x'}, "'sinus_g2', "),
-    ({'control_method': 'profidrive'}, "choose one of 'mode_scmd', 'drive_control', 'tele"),
+    ({'control_method': 'profidrive'}, "choose one of 'mode_scmd', 'drive_control', 'ds402'"),
     (
         {'reference': 'analog', 'control_method': 'drive_control'},
         'with drive_control on sinus_g2 it must be fieldbus or terminal',

@@ -169,7 +169,7 @@ def test_drives_that_stand_are_polled_seldom_while_another_is_read_for_the_first
 
 
 def test_a_drive_that_runs_is_polled_and_measured_as_always_while_another_is_read() -> None:
-    with made(3) as rig:
+    with made(3, measured=['status.frq_act']) as rig:
         start(rig, 1, 2)
         rig.enable(1)
         rig.send(20.0, 1)
