@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import json
 import os
@@ -16,6 +17,8 @@ from typing import Any
 from bench import Bench
 from support.places import ROOT
 from ways import needs
+
+from nfo_sinus_driver.demo.bench import own_domain
 
 STAND_INS = Path(__file__).with_name('stand_ins')
 #: As ros2doctor calls them.
@@ -58,8 +61,13 @@ def test_doctor_reports_drives_and_fails_for_a_fault(bench: Bench) -> None:
     assert errors == 1
 
 
-def test_without_a_driver_nothing_is_wrong(domain: int) -> None:
-    report, errors, warnings, _ = asked(domain)
+def test_without_a_driver_nothing_is_wrong() -> None:
+    with contextlib.ExitStack() as domains:
+        # what a test has left behind may still be heard where it was: then in another domain
+        for _ in range(3):
+            report, errors, warnings, _ = asked(domains.enter_context(own_domain()))
+            if 'drives' in report:
+                break
     assert report['drives'].startswith('none') and (errors, warnings) == (0, 0)
 
 

@@ -221,7 +221,7 @@ from nfo_sinus_driver.node.drive_node import DriveNode
 not_in_time = Future()
 unanswered = Report(Cause.STOP_UNCONFIRMED, why=Report(Cause.NO_ANSWER_YET))
 not_in_time.set_exception(DriveError(unanswered))
-Drive.deactivate = lambda self: not_in_time
+Drive.deactivate = lambda self, why: not_in_time
 rclpy.init()
 bus = BusNode()
 node = DriveNode('nfo_sinus', bus.bus_context)
