@@ -93,7 +93,10 @@ def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -
         cause = Cause.RUN_INPUT_LOST
     elif not status.runs:
         cause = Cause.STOPPED_BY_ITSELF
-    return cause and state.report(cause)
+    elif state.left_alone:
+        # not every drive shows by a fault that its time-out is over, and some then go on
+        cause = Cause.DRIVER_PAUSED
+    return cause and state.report(cause, seconds=state.timeout.shortest)
 
 
 def _why_control_is_lost(state: DriveState, status: InverterStatus) -> Cause:

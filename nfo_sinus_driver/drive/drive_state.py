@@ -338,6 +338,12 @@ class DriveState:
         return status
 
     @property
+    def left_alone(self) -> bool:
+        """Before the newest status the drive was not asked for longer than its own time-out."""
+        timeout = self.timeout
+        return timeout.stops_motor and 0 < timeout.shortest <= self._intervals[-1]
+
+    @property
     def usual_interval(self) -> float:
         """How far apart the statuses before the newest were, s."""
         return max(list(self._intervals)[:-1])

@@ -212,6 +212,10 @@ class Cause(enum.Enum):
         '({now:.4g} {unit}, before {before:.4g} {unit}; {status}). It may have been switched off '
         'and on: check its mains and the line'
     )
+    DRIVER_PAUSED = (
+        'this {call.program} did not run for longer than the time-out of the drive itself '
+        '({seconds:g} s), by which that stops the motor ({status}): check the load of the computer'
+    )
     TURNS_BACKWARDS = (
         'the motor turns in the other direction than its set-points say ({now:.4g} {unit}, '
         '{status}). Another master may command the drive: find out which'

@@ -68,7 +68,7 @@ _CAUSES: Mapping[StopReason, tuple[Cause, ...]] = {
     ),
     StopReason.SETPOINT_REFUSED: (Cause.SETPOINT_REFUSED,),
     StopReason.NOT_FOLLOWING: (Cause.TURNS_BACKWARDS, Cause.NOT_SLOWER_AFTER_TIME_OUT),
-    StopReason.DRIVE_TIMEOUT: (),
+    StopReason.DRIVE_TIMEOUT: (Cause.DRIVER_PAUSED,),
     StopReason.BY_ITSELF: (Cause.STOPPED_BY_ITSELF,),
     StopReason.PROCEDURE: (Cause.PROCEDURE_ENDED, Cause.PROCEDURE_CANCELLED),
     StopReason.CONTROL_MODE: (Cause.CONTROL_MODE_CHANGED,),

@@ -13,19 +13,17 @@ import pytest
 from support.rig import WAYS, Rig
 from support.said import said
 
-from nfo_sinus_driver.catalog import is_described
 from nfo_sinus_driver.drive import Cause, Drive, Procedure, Report, StopReason
 from nfo_sinus_driver.drive.stop_reason import reason_of
 
 _SPEED = 20.0
 _BY = '/teach_pendant'
-#: Where the motor follows set-points; where the drive counts the frames of the driver itself, and
-#: has a fault when none come.
+#: Where the motor follows set-points; where the drive counts the frames of the driver itself.
 FOLLOWING = {name for name, way in WAYS.items() if way.reference == 'fieldbus'}
 TIMED = {
     name for name, way in WAYS.items()
     if way.protocol not in ('telegram1', 'canopen')
-    and way.model not in ('sinus_optimal', 'acme') and not is_described(way.model)
+    and way.model not in ('sinus_optimal', 'acme')
 }
 SERIAL_G2 = {
     name for name, way in WAYS.items()
