@@ -121,6 +121,8 @@ class DriveState:
         #: How many requests had got no answer when the status was last read.
         self._unanswered = 0
         self.status: InverterStatus | None = None
+        #: Something was asked in vain since the newest status, and before it.
+        self._in_vain = self._asked_in_vain = False
         #: How far apart the last statuses were, s, the newest last.
         self._intervals: deque[float] = deque((0.0,), maxlen=4)
         #: Called when a fault comes that did not stand before.
@@ -334,6 +336,7 @@ class DriveState:
             if not self.unnamed:
                 self._named = None
             self._intervals.append(status.at - before.at if before else 0.0)
+            self._asked_in_vain, self._in_vain = self._in_vain, False
             self._note_fault(before)
         return status
 
@@ -341,7 +344,8 @@ class DriveState:
     def left_alone(self) -> bool:
         """Before the newest status the drive was not asked for longer than its own time-out."""
         timeout = self.timeout
-        return timeout.stops_motor and 0 < timeout.shortest <= self._intervals[-1]
+        alone = self._intervals[-1] if not self._asked_in_vain else 0.0
+        return timeout.stops_motor and 0 < timeout.shortest <= alone
 
     @property
     def usual_interval(self) -> float:
@@ -360,7 +364,7 @@ class DriveState:
 
     def missed(self) -> None:
         """Take note that a request failed; until it is known why, no request should wait for it."""
-        self.responsive = False
+        self.unanswered()
         self._on_missed()
 
     def answered(self) -> None:
@@ -370,6 +374,7 @@ class DriveState:
     def unanswered(self) -> None:
         """Take note that a poll was not."""
         self.responsive = False
+        self._in_vain = True
 
     def found(self) -> None:
         """Take note that it is connected."""
