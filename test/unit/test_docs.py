@@ -36,6 +36,8 @@ OF_OTHERS = {'diagnostic_aggregator.yaml'}
 CONFIGS = sorted(path for path in (ROOT / 'config').glob('*.yaml') if path.name not in OF_OTHERS)
 LAUNCH_FILES = sorted((ROOT / 'launch').glob('*.launch.py'))
 SETTINGS = {*BUS_SETTINGS, *DRIVE_SETTINGS}
+#: A citation of a manual, with the link that says what M0 is.
+CITATION = re.compile(r'\[(?P<manual>M[0-4])\b[^\]]*\](\([^)]*\))?')
 #: Arguments of remapping, and the example of a message, that look like parameters.
 NO_PARAMETERS = {'__node', '__ns', 'name'}
 
@@ -296,6 +298,16 @@ def test_parameter_files_name_parameters_that_exist() -> None:
         names = set(re.findall(r'^    (\w+):', read(path), re.MULTILINE))
         assert 'port' in names, path
         assert names - SETTINGS == set(), path
+
+
+def test_a_page_says_what_the_first_citation_of_a_manual_is() -> None:
+    pages = [*(ROOT / 'docs').glob('*.md'), *(ROOT / 'docs' / 'drives').glob('*.md')]
+    generated = ('manuals.md', 'parameters.md')
+    for page in pages:
+        if page.name not in ('readings.md', 'README.md', *generated):
+            first = {one['manual']: one[0] for one in reversed([*CITATION.finditer(read(page))])}
+            bare = [text for text in first.values() if 'readings.md)' not in text]
+            assert not bare, f'{page}: link {bare} to readings.md, which names the manuals'
 
 
 # --- the checker itself ---------------------------------------------------------------------------
