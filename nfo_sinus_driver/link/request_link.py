@@ -38,6 +38,12 @@ from nfo_sinus_driver.link.port import Port, port_of
 #: How long a write waits at least for a line that is not silent, s.
 WRITE_WAIT = 0.02
 _NEVER_SILENT = 'the line is never silent: noise, or another master on it'
+_IN_PIECES = (
+    'answers come in pieces with long pauses: the adapter, or the device server, holds bytes back; '
+    'set its latency timer or packing time to the least, or use another one'
+)
+#: A pause within an answer of which the operator hears, s: more than a good adapter makes.
+_LONG_PAUSE = 0.03
 
 _Request = TypeVar('_Request')
 _Answer = TypeVar('_Answer')
@@ -346,6 +352,12 @@ class RequestLink(ABC, Generic[_Request]):
             if now >= until:
                 return data
 
+    def _report_pause(self, longest: float) -> bool:
+        """Report the longest pause, s, within an answer if it was too long; tell whether it was."""
+        if longest > _LONG_PAUSE:
+            self.remarks.add(_IN_PIECES)
+        return longest > _LONG_PAUSE
+
 
 class _Ambiguous(DamagedAnswer):
     """An answer came that names nothing and may belong to an earlier request."""
@@ -500,10 +512,15 @@ class CodecLink(RequestLink[Any]):
         last_chance = deadline + 2 * longest
         reader = codec.reader()
         came = 0
+        last = pause = 0.0
         while data := self._read_line(deadline):
             now = self._now()
             self._another.hear(data, now)
             data = self._echo.strip(data)
+            if came:
+                # less what these bytes took themselves
+                pause = max(pause, now - last - len(data) * self._settings.char_time)
+            last = now
             came += len(data)
             messages = reader.feed(data)
             for number, message in enumerate(messages, start=1):
@@ -517,6 +534,8 @@ class CodecLink(RequestLink[Any]):
                 doubtful = self._another.doubts(message, request, now, stray)
                 if codec.kind(message) not in quarantined and not doubtful:
                     behind = b''.join(map(codec.encode, messages[number:])) + reader.rest
+                    if not stray:
+                        self._report_pause(pause)
                     return message, now, behind
                 if isinstance(request, codec.select):
                     raise _Ambiguous(f'unit {unit} answered, but perhaps to an earlier request')

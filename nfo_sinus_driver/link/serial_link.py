@@ -44,12 +44,6 @@ _FIRST_BYTE_LOST = (
     'receiving too late; use one that switches by itself, or try rs485 true where the port switches'
 )
 
-_IN_PIECES = (
-    'answers come in pieces with long pauses: the adapter, or the device server, holds bytes back; '
-    'set its latency timer or packing time to the least, or use another one'
-)
-#: A pause within an answer of which the operator hears, s: more than a good adapter makes.
-_LONG_PAUSE = 0.03
 #: No pause is waited for longer, s.
 _MOST_PAUSE = 0.2
 
@@ -383,9 +377,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
     def _learn_pause(self, longest: float) -> None:
         """Take note of the longest pause, s, within an answer that came whole, and of no other."""
-        if longest > _LONG_PAUSE:
+        if self._report_pause(longest):
             self._pause = max(self._pause, min(2 * longest, _MOST_PAUSE))
-            self.remarks.add(_IN_PIECES)
 
     def _lacks_first_byte(self, request: Request[_T], frame: bytes, came: bytes) -> bool:
         """Tell whether what came is the answer without its first byte, which is the request's."""

@@ -326,3 +326,5 @@ def test_answer_whose_pieces_an_adapter_holds_back() -> None:
 
     bench.wire.far_end = far_end
     assert bench.read(LONG).data == 2 * VALUE
+    (remark,) = bench.link.remarks.texts
+    assert 'latency timer' in remark
