@@ -70,8 +70,8 @@ class Scheduler:
     not answer is repeated at once, and after each of them another unit has a turn, too: the most
     urgent, whatever the others are owed.
 
-    Those that have been silent for long are missing. What is asked of them, and stops that they
-    were told in vain, wait until :meth:`take` may give them out, and then go ahead of other polls.
+    Those that have been silent for long are missing. What is asked of them, and stops that did
+    not reach them, wait until :meth:`take` may give them out, and then go ahead of other polls.
 
     :param is_silent: tells whether a unit has not answered the last request.
     :param is_missing: tells whether it has been silent for long.
@@ -92,10 +92,10 @@ class Scheduler:
         self._owed = dict.fromkeys(_SHARES, 0.0)
         self._given: _Rank = _SLOT
         self._slot_went = False
-        #: Who was told to stop just now, and who did not answer that.
-        self._told_to_stop: int | None = None
+        #: The unit that was given a stop just now, and the one that did not answer it.
+        self._given_stop: int | None = None
         self._unheard: int | None = None
-        #: Units that were told to stop since they were last known to answer, and said nothing.
+        #: Units that were given a stop since they were last known to answer, and said nothing.
         self._told_in_vain: set[int] = set()
 
     def add(self, entry: LatestValue | Waiting) -> None:
@@ -128,7 +128,7 @@ class Scheduler:
                 del self._queues[rank][entry]
                 self._given = rank
                 unit = None if isinstance(entry, LatestValue) else entry.transfer.unit
-                self._told_to_stop = unit if rank in _STOPS else None
+                self._given_stop = unit if rank in _STOPS else None
                 return entry
         if self._unheard is None:
             return None
@@ -160,8 +160,8 @@ class Scheduler:
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
         self._slot_went = self._given == _SLOT
-        told = self._told_to_stop
-        self._unheard = told if told is not None and self._is_silent(told) else None
+        unit = self._given_stop
+        self._unheard = unit if unit is not None and self._is_silent(unit) else None
         if self._unheard is not None:
             self._told_in_vain.add(self._unheard)
         for rank, share in _SHARES.items():

@@ -191,7 +191,7 @@ class Task:
             self.end_pause()
 
     def take_cancellation(self) -> bool:
-        """Tell whether it has still to be told that it was cancelled, which is done with it."""
+        """Tell whether its cancellation still has to reach it, which is done with it."""
         due, self.cancel_due = self.cancel_due, False
         return due
 

@@ -106,7 +106,7 @@ class Bus:
         #: Since when the gateway says nothing at all, and how long that may last by each unit, s.
         self._mute_since = math.inf
         self._lost_after: dict[int, float] = {}
-        #: Who is told that a unit has started anew.
+        #: Called when a unit has started anew.
         self._on_restart: dict[int, Callable[[], None]] = {}
         self._thread = threading.Thread(target=self._work, name='bus', daemon=True)
 
@@ -215,7 +215,7 @@ class Bus:
         return Transfer(unit, address, priority, data, source=source)
 
     def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
-        """Give a task what it waits to read, told with something else; false if it does not."""
+        """Give a task a reading that came with something else; false if it waits for none such."""
         awaited = task.awaited
         if not isinstance(awaited, Transfer) or not awaited.reads(unit, address):
             return False
@@ -378,7 +378,7 @@ class Bus:
             try:
                 self._on_restart.get(unit, lambda: None)()
             except Exception:
-                # the other drives of the line have to be told all the same
+                # the other drives of the line have to hear of it all the same
                 _log.exception('a restart could not be told; the bus worker goes on')
         return supervision.due
 
@@ -544,7 +544,7 @@ class Bus:
             if isinstance(entry, LatestValue):
                 self._fail_slot(entry, error)
             elif entry.task.awaited is entry.transfer:
-                # else who was told before has ended it
+                # else a listener before has ended it
                 self._advance(entry.task, None, error)
 
     def _fail_slot(self, slot: LatestValue, error: PortError) -> None:
@@ -553,7 +553,7 @@ class Bus:
             if transfer is not None:
                 slot.done(transfer, error)
         except BaseException:
-            # the others have to be told all the same
+            # the others have to hear of it all the same
             _log.exception('error in a slot; the bus worker goes on')
 
 

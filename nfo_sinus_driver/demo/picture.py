@@ -161,9 +161,9 @@ def _draw_title(
         """Return how high that is, so far below the top."""
         return 1 - inches / float(figure.get_figheight())
 
-    told = '   ·   '.join(filter(None, (*facts, f'{run.began:%d %B %Y, %H:%M}')))
+    headline = '   ·   '.join(filter(None, (*facts, f'{run.began:%d %B %Y, %H:%M}')))
     figure.text(_LEFT, at(0.56), title, size=25, weight='bold')
-    figure.text(_LEFT, at(0.96), told, size=14, color=_SOFT)
+    figure.text(_LEFT, at(0.96), headline, size=14, color=_SOFT)
     figure.text(
         _RIGHT, 1 - at(0.18), f'drawn from the bag {run.source}', size=11, color=_SOFT, ha='right'
     )

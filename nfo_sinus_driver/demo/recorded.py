@@ -32,7 +32,7 @@ _PHASE_OF_STATE = {
 }
 _REASON = 'REASON_'
 _CALLED_BY = ' called by '
-#: A reason that a status told later is a better one for the same stop, not that of another one.
+#: A reason that a later status gives is a better one for the same stop, not that of another one.
 _BETTER = {
     ('drive lost', 'power cycle'), ('setpoint refused', 'fault'),
     ('setpoint refused', 'drive timeout'),
@@ -238,10 +238,10 @@ class _Reader:
     def _calls_of(self, name: str, events: Sequence[Any]) -> Iterator[Call]:
         """Yield each call once; client and server may both have published it."""
         answers = {_call_id(one): one.response[0].message for one in events if len(one.response)}
-        told = set()
+        known = set()
         for one in events:
-            if len(one.request) and _call_id(one) not in told:
-                told.add(_call_id(one))
+            if len(one.request) and _call_id(one) not in known:
+                known.add(_call_id(one))
                 off = not getattr(one.request[0], 'data', True)
                 time = self._since(_nanoseconds(one.info.stamp))
                 yield Call(time, f'{name} off' if off else name, answers.get(_call_id(one), ''))

@@ -205,13 +205,13 @@ class CanopenLink:
     the answer is not believed: something is read, and :class:`DamagedAnswer` says that the outcome
     is unknown.
 
-    CAN itself sees to it that no frame is damaged, but one may be told twice, the second time right
+    CAN itself sees to it that no frame is damaged, but one may be sent twice, the second time right
     behind the first. So what is the same as the answer before, and comes before the request can
     have been answered, is believed only if no other comes for as long as the node may take.
 
     What is promised: no value of another object or node is taken, no answer up to three time-outs
-    late to a question asked before, no answer to another write. Not told apart is an answer that is
-    told twice just when the next one is lost.
+    late to a question asked before, no answer to another write. An answer that is sent twice just
+    when the next one is lost is not distinguished.
 
     Another client may ask the same nodes: an answer that may be to it is not believed, and what is
     read is read again (:class:`AnotherClient`).
@@ -488,9 +488,9 @@ class CanopenLink:
             for frame in frames:
                 if frame.identifier != sdo.ANSWERS + unit:
                     continue
-                told = sdo.kind(frame.data)
-                if told is not None and told in transfer.kinds:
-                    self._require_certain(transfer, told, now)
+                found = sdo.kind(frame.data)
+                if found is not None and found in transfer.kinds:
+                    self._require_certain(transfer, found, now)
                     self._require_one(transfer, frame, sent, now)
                     if transfer.take(frame.data):
                         return now
@@ -504,14 +504,14 @@ class CanopenLink:
         silent.hint = hint
         raise silent
 
-    def _require_certain(self, transfer: Transfer, told: Kind, now: float) -> None:
+    def _require_certain(self, transfer: Transfer, found: Kind, now: float) -> None:
         """
         Make sure that an answer is none to an earlier request, nor to another client.
 
         :raises DamagedAnswer: it may be.
         """
         unit = transfer.unit
-        if sdo.is_among(told, self._late.quarantined(unit, now)) or (
+        if sdo.is_among(found, self._late.quarantined(unit, now)) or (
             transfer.has_begun and self._another.disturbed(unit)
         ):
             raise _Ambiguous(
@@ -520,7 +520,7 @@ class CanopenLink:
 
     def _require_one(self, transfer: Transfer, answer: Frame, sent: float, now: float) -> None:
         """
-        Make sure that an answer is not the one before, told twice.
+        Make sure that an answer is not the one before, sent twice.
 
         :raises DamagedAnswer: another one came.
         """

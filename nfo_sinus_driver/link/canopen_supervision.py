@@ -256,19 +256,19 @@ class CanopenWatch:
         """
         request = self._request
         assert request is not None
-        told: bytes | None = None
+        value: bytes | None = None
         reply = Reply(b'', self._supervision.now())
         try:
             if request.data is None:
                 reply = self._read(self._unit, request.address)
             else:
                 reply = self._write(self._unit, request.address, request.data)
-            told = reply.data
+            value = reply.data
         except Refused as refusal:
             if refusal.code == Refused.BUSY:
                 raise
         try:
-            self._request = self._plan.send(told)
+            self._request = self._plan.send(value)
         except StopIteration:
             self._request = None
         return reply
@@ -285,10 +285,10 @@ class CanopenWatch:
         wanted = (client << 16 | milliseconds).to_bytes(4, 'little')
         for entry in range(1, _ENTRIES + 1):
             place = _object(0x1016, entry, 4)
-            told = yield _Request(place)
-            if told is None or len(told) != len(wanted):
+            value = yield _Request(place)
+            if value is None or len(value) != len(wanted):
                 return
-            number = int.from_bytes(told, 'little')
+            number = int.from_bytes(value, 'little')
             if number & _LONGEST and number >> 16 & 0x7F not in (0, client):
                 # it watches another node by this one
                 continue

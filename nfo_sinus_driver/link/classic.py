@@ -462,7 +462,7 @@ class ClassicLink(CodecLink):
         """
         Tell whether the last REPLY came before the request can have been answered; expect another.
 
-        It may be the one before, told twice. A line without speed, such as a pseudo-terminal, is
+        It may be the one before, sent twice. A line without speed, such as a pseudo-terminal, is
         always early.
         """
         early = self._again and self._last is not None and isinstance(self._last[1], Value)

@@ -99,7 +99,7 @@ class Inquiry(Protocol):
 
     @property
     def found(self) -> Identification:
-        """What it has told so far."""
+        """What it has said so far."""
 
     def ask(self) -> Reply:
         """
@@ -350,7 +350,7 @@ class LinkError(Exception):
     maybe_done = False
     #: The unit answered a question before, for the sake of this one: it is there.
     heard = False
-    #: What the port knows of why, as it may be told; ``''`` if nothing.
+    #: What the port knows of why, as it may be shown; ``''`` if nothing.
     hint = ''
 
 

@@ -44,7 +44,7 @@ class Doubt(enum.Enum):
     NONE = enum.auto()
     #: Nothing, for what it says is right, but it may come once more.
     ONCE_MORE = enum.auto()
-    #: Listen as long as the right reply may take: it may have been the one before, told twice.
+    #: Listen as long as the right reply may take: it may have been the one before, sent twice.
     LISTEN = enum.auto()
     #: Have the unit reply something of another kind.
     RESYNC = enum.auto()
@@ -64,7 +64,7 @@ class LateReplies(Generic[_Request, _Kind]):
     for three more, so there are never more than three such kinds: of four questions with replies
     of different kinds one is always certain, and of three after a time-out at most.
 
-    A reply with the very bytes of the one before may be the one before, told twice: see
+    A reply with the very bytes of the one before may be the one before, sent twice: see
     :meth:`doubt_about`.
 
     :param response_timeout: how long a reply is waited for, s.
@@ -114,7 +114,7 @@ class LateReplies(Generic[_Request, _Kind]):
         self._until.pop(unit, None)
 
     def clear(self) -> None:
-        """Expect nothing more from anybody, and forget what was told."""
+        """Expect nothing more from any unit, and forget what came."""
         self._until.clear()
         self._noted.clear()
         self._last = self.repeated = None
@@ -125,7 +125,7 @@ class LateReplies(Generic[_Request, _Kind]):
         """
         Return the first question whose reply cannot be confused with any that may still come.
 
-        :param questions: each with the kinds of replies to be told apart; one question at least.
+        :param questions: each with the kinds of replies to be distinguished; one question at least.
         :raises NotReady: there is none, and when there will be.
         """
         left = self._left(unit, now)
@@ -145,7 +145,7 @@ class LateReplies(Generic[_Request, _Kind]):
         self._until[unit] = left
         return left
 
-    # --- unasked, or told twice ---------------------------------------------------------------
+    # --- unasked, or sent twice ---------------------------------------------------------------
 
     def sent(self, request: _Request) -> None:
         """Take note that a request goes out."""

@@ -201,7 +201,7 @@ class ModbusInquiry:
 
     @property
     def found(self) -> Identification:
-        """What it has told so far."""
+        """What it has said so far."""
         return Identification(**self._told)
 
     def ask(self) -> Reply:

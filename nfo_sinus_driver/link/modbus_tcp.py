@@ -107,7 +107,7 @@ class TcpLink(ModbusLink):
     A Modbus master on one connection to a gateway; a unit is a drive behind it.
 
     Every request has a number of its own, which its answer repeats: a late or doubled answer is
-    told from the right one by that, so nothing is ever in quarantine. Drives that do not answer
+    distinguished by that, so nothing is ever in quarantine. Drives that do not answer
     leave the connection as it is.
 
     A connection may stay open and mute, when the gateway has lost its other side, or something

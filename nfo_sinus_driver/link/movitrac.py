@@ -9,7 +9,7 @@ pieces, among noise and the remains of others. A start delimiter says what a fra
 its last byte is the sum of all others, without carry [C85].
 
 A drive that refuses answers by NACK with one of 34 return codes [M4 §2.1.2]. Two of them inform
-only, for the drive has done what it was told [C81].
+only, for the drive has done what was requested [C81].
 """
 
 from __future__ import annotations
@@ -359,7 +359,7 @@ def refusal(code: int) -> Refused:
     return Refused(known.kind, f'{known.meaning}: {known.remedy} {hexadecimal}')
 
 
-#: How much later than at once a drive may be told to answer (P843), s.
+#: How much later than at once a drive may be set to answer (P843), s.
 LONGEST_RESPONSE_TIME = 0.2
 #: Pauses within an answer, s: 10 ms of the drive [M4 §2.4.2], and what a USB adapter holds back.
 _INTER_BYTE_TIMEOUT = 0.03
@@ -381,7 +381,7 @@ class MovitracLink(CodecLink):
     A master of the MOVITRAC's protocol on one line: no belief in a doubtful answer.
 
     A DATA names its index, ACK and NACK name nothing, and no answer names its drive. Where a late
-    answer may be *another* drive's, or be the one before told twice, the line is listened to for as
+    answer may be *another* drive's, or be the one before sent twice, the line is listened to for as
     long as the right answer may take; if anything more comes, nothing is believed. So a drive that
     is dead costs its neighbours no transaction.
 
@@ -390,8 +390,8 @@ class MovitracLink(CodecLink):
     much longer as the drive has taken of late.
 
     What is promised: no value of another index is taken, no answer of the drive up to three
-    time-outs late to a question asked before, no ACK of another write to it. Not told apart is a
-    late answer of another drive just when the right one is lost, and one that is told twice, the
+    time-outs late to a question asked before, no ACK of another write to it. Not distinguished is a
+    late answer of another drive just when the right one is lost, and one that is sent twice, the
     second time when the right one may be on its way, but does not come. There is no parity, and
     the check is a sum: choose short wires.
     """
@@ -446,7 +446,7 @@ class MovitracLink(CodecLink):
         super()._took(unit, max(_AT_ONCE, seconds))
 
     def _confirm(self, request: Any, answer: Any, arrived: float, until: float) -> None:
-        # it may be the one before, told twice, or another unit's, late
+        # it may be the one before, sent twice, or another unit's, late
         foreign = self._late.may_be_of_another(request.unit, kind(answer), arrived)
         if not (self._again or foreign) or self._now() >= until:
             return

@@ -55,5 +55,5 @@ class Reconnect:
         try:
             self._link.close()
         except BaseException:
-            # who waits for an answer must be told all the same
+            # what waits for an answer gets the error all the same
             _log.exception('error in the link')

@@ -5,7 +5,7 @@
 Requests on one serial line: ask, wait, believe.
 
 What every protocol does alike stands in :class:`RequestLink`; each adds its messages and what they
-do not say. :class:`CodecLink` serves those whose answers are told from requests by a codec.
+do not say. :class:`CodecLink` serves those whose codec distinguishes answers from requests.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ class RequestLink(ABC, Generic[_Request]):
 
     @abstractmethod
     def _telling_kinds(self, request: _Request) -> Sequence[Any]:
-        """Return the kinds of answers by which one to a read has to be told from others."""
+        """Return the kinds of answers by which one to a read is distinguished from others."""
 
     @abstractmethod
     def _transact(self, request: _Request) -> tuple[Any, float]:
@@ -219,7 +219,7 @@ class RequestLink(ABC, Generic[_Request]):
         self._late.heard_unasked(self._now())
 
     def _expect_again(self, request: _Request) -> None:
-        """Expect an answer once more where the last may have been the one before, told twice."""
+        """Expect an answer once more where the last may have been the one before, sent twice."""
 
     # --- belief -----------------------------------------------------------------------------------
 

@@ -4,7 +4,7 @@
 """
 Service data objects of CANopen, the side of the client, without I/O (CiA 301 §7.2.4).
 
-A :class:`Transfer` is asked what to send, and told what came, until it is over. Up to four bytes go
+A :class:`Transfer` says what to send, and takes what came, until it is over. Up to four bytes go
 in one exchange, *expedited*; longer values in segments of seven bytes, each confirmed, whose
 toggle bit tells each from the one before. An answer is recognised by its *kind*: what it does and
 to which object; only segments do not say to which. A server ends a transfer by an abort code.
@@ -164,9 +164,9 @@ def kinds_asked_for(request: bytes) -> frozenset[Kind]:
     return frozenset((Kind(begun, index, sub_index), Kind(_ABORT, index, sub_index)))
 
 
-def is_among(told: Kind, kinds: AbstractSet[Kind]) -> bool:
+def is_among(found: Kind, kinds: AbstractSet[Kind]) -> bool:
     """Tell whether an answer may be one of some kinds."""
-    return told in kinds or (told.command == _ABORT and _ANY_ABORT in kinds)
+    return found in kinds or (found.command == _ABORT and _ANY_ABORT in kinds)
 
 
 class Transfer(ABC):
@@ -207,10 +207,10 @@ class Transfer(ABC):
         :raises Refused: the server has ended the transfer; it is over.
         :raises DamagedAnswer: the answer makes no sense.
         """
-        told = kind(message)
-        if self.request is None or told not in self.kinds:
+        found = kind(message)
+        if self.request is None or found not in self.kinds:
             return False
-        if told is not None and told.command == _ABORT:
+        if found is not None and found.command == _ABORT:
             self.request = None
             raise refusal(_SIZE.unpack_from(message, 4)[0])
         if self._expected in SEGMENTS:
@@ -400,8 +400,8 @@ class ObjectShapes:
         """
         Write a value in as many bytes as the node has for it.
 
-        Where no reading has told, and it says that they are too many or too few, it has done
-        nothing, and others are tried.
+        Where no reading has shown how many, and the node says that they are too many or too few, it
+        has done nothing, and others are tried.
 
         :param send: writes bytes; returns when it was confirmed.
         :raises LinkError: as ``send`` does.

@@ -61,7 +61,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
     what was written.
 
     For the same reason an answer with the very bytes of the one before is not believed at once: it
-    may be the one before, told twice. The right one would come when a unit answers, so until then
+    may be the one before, sent twice. The right one would come when a unit answers, so until then
     the line is listened to. A line that has brought something unrequested is not trusted so far
     for a while: there it is believed only after a request of another shape. If it answers the same
     question too, what it says is right, but one more may come: the next request of its shape waits
@@ -158,7 +158,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         return answer
 
     def _believed(self, request: Request[_T]) -> tuple[_T, float]:
-        """Return the answer to a request; it may be to another master, but is none told twice."""
+        """Return the answer to a request; it may be to another master, but is none sent twice."""
         try:
             answer = self._transact(request)
         except Refused:
@@ -225,7 +225,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
     def _listen(self, request: Request[Any]) -> None:
-        """Wait as long as the right answer may take, if this was the one before, told twice."""
+        """Wait as long as the right answer may take, if this was the one before, sent twice."""
         length = self._frame_length(request.answer_length) * self._settings.char_time
         until = self._sent_at + self._late.longest(request.unit) + length
         while (now := self._now()) < until:

@@ -3,7 +3,7 @@
 """
 A CAN bus with nodes on it, and the adapter through which a master is there.
 
-Knows no clock of its own: it is told the time, so that tests can make it up. Of the frames that
+Knows no clock of its own: it is given the time, so that tests can make it up. Of the frames that
 wait for the bus the one with the least identifier goes first; the adapter sends its own in order. A
 frame that no node takes (no node has power, a line that carries nothing, another bit rate) is not
 sent again later.
@@ -223,7 +223,7 @@ class CanLine(Wire):
             return
         if sender is not _Else.MASTER and self._carries(end):
             noise = self.faults.noise() if 'noise' in waiting.note else b''
-            self.port.send(noise + self._adapter.told(frame, end))
+            self.port.send(noise + self._adapter.text_of(frame, end))
         for node in self._nodes():
             if node is not sender:
                 self._arrive(node, frame, end)

@@ -45,7 +45,7 @@ class State(enum.IntEnum):
 
 
 class Command(enum.IntEnum):
-    """What a node is told to do."""
+    """What a node has to do."""
 
     START = 0x01
     STOP = 0x02

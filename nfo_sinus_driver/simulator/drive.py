@@ -5,7 +5,7 @@
 A whole drive made of software: parameters, commands, motor, faults, power and time.
 
 What a family does its own way is behind :class:`ControlUnit`. It knows parameters by catalog key
-and raw numbers, and time only as it is told of it; which protocol asks is not its business.
+and raw numbers, and time only as it is given; which protocol asks is not its business.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 A CAN adapter that speaks LAWICEL's protocol on its serial port, without I/O (manual of the CANUSB).
 
 A command is a line that ends with CR. The answer is CR, or what was asked for and CR; BEL says
-*no*; an empty line is passed over. Frames are accepted and told while the channel is open only;
+*no*; an empty line is passed over. Frames are accepted and reported while the channel is open only;
 what sets up the channel is accepted while it is closed only.
 """
 
@@ -117,7 +117,7 @@ class Adapter:
         elif command == b'Z' and rest in (b'0', b'1'):
             self._stamps = rest == b'1'
         elif command == b'X' and rest in (b'0', b'1'):
-            # frames are told as they come, whatever is said
+            # frames are reported as they come, whatever is said
             return rest == b'1'
         elif _REGISTER.fullmatch(command + rest):
             register = bytes.fromhex(rest.decode())
@@ -135,8 +135,8 @@ class Adapter:
         """Tell whether it takes part in a bus with this bit rate."""
         return self.is_open and self.rate == rate
 
-    def told(self, frame: Frame, now: float) -> bytes:
-        """Return what the computer is told of a frame from the bus; nothing if it is filtered."""
+    def text_of(self, frame: Frame, now: float) -> bytes:
+        """Return what reports a frame from the bus to the computer; nothing if it is filtered."""
         if not self._passes(frame):
             return b''
         kind = ('R' if frame.remote else 'T') if frame.extended else 'r' if frame.remote else 't'

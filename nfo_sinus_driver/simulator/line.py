@@ -4,7 +4,7 @@
 """
 The far end of a line: requests come in, drives carry them out, answers go back, in their time.
 
-Knows no clock of its own: it is told the time, so that tests can make it up.
+Knows no clock of its own: it is given the time, so that tests can make it up.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Line(Wire):
     :param turnaround: time a drive takes before it answers (s).
     :param echo: whatever comes in goes out again, as from a half-duplex adapter.
     :param always_heard: the drives hear it whatever protocol, speed and format they are set to.
-    :param clock: for the stamps of bytes that go out (s); everything else is told the time.
+    :param clock: for the stamps of bytes that go out (s); everything else is given the time.
     """
 
     def __init__(

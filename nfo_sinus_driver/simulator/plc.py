@@ -6,7 +6,7 @@ A PLC between a master on Modbus TCP and drives on its fieldbus, which speak tel
 
 It runs the program of :mod:`plc_program` in cycles, and exchanges telegrams with the drives in
 another rhythm. Modbus requests come in between; the registers are there for them all the time,
-whatever became of the drives. It is told the time, as everything here.
+whatever became of the drives. It is given the time, as everything here.
 """
 
 from __future__ import annotations

@@ -143,14 +143,14 @@ class Server:
     def _download(self, request: bytes) -> bytes:
         flags = request[0]
         if flags & _IS_EXPEDITED:
-            told = _EXPEDITED - (flags >> 2 & 3) if flags & _HAS_SIZE else None
-            size = self._objects.admit(*self._place, told)
+            size_said = _EXPEDITED - (flags >> 2 & 3) if flags & _HAS_SIZE else None
+            size = self._objects.admit(*self._place, size_said)
             if size > _EXPEDITED:
                 raise Abort(AbortCode.TOO_SHORT)
             self._objects.write(*self._place, request[4 : 4 + size])
         else:
-            told = _SIZE.unpack_from(request, 4)[0] if flags & _HAS_SIZE else None
-            self._transfer = _Download(self._objects.admit(*self._place, told))
+            size_said = _SIZE.unpack_from(request, 4)[0] if flags & _HAS_SIZE else None
+            self._transfer = _Download(self._objects.admit(*self._place, size_said))
         return self._named(0x60, b'')
 
     def _take_segment(self, request: bytes) -> bytes:

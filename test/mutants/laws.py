@@ -431,7 +431,7 @@ LAWS = (
         8,
         'a late answer of a CANopen node is believed',
         'nfo_sinus_driver/link/canopen_link.py',
-        '        if sdo.is_among(told, self._late.quarantined(unit, now)) or (',
+        '        if sdo.is_among(found, self._late.quarantined(unit, now)) or (',
         '        if (',
         ('test/unit/link/test_canopen_link.py',),
     ),

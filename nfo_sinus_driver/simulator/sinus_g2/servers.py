@@ -443,7 +443,7 @@ class TelegramServer(telegram1.Server):
         """Return the parameters of PROFIdrive [M0 table 8], and the error log [M0 table 9]."""
         faults, number = self._drive.faults, self._drive.memory.number
         firmware = round(100 * number('fieldbus.sw_ver'))
-        told = {
+        readable = {
             918: (lambda: self._drive.address,),
             922: (lambda: 1,),
             924: (lambda: 2, lambda: 15),
@@ -460,7 +460,7 @@ class TelegramServer(telegram1.Server):
             (log.first + n, 0): ParameterEntry(functools.partial(faults.log_entry, n), size=4)
             for n in range(log.limit)
         }
-        for pnu, reads in told.items():
+        for pnu, reads in readable.items():
             found |= {(pnu, sub): ParameterEntry(read) for sub, read in enumerate(reads)}
         return found
 

@@ -47,7 +47,7 @@ class Phase(enum.Enum):
 @dataclass(frozen=True)
 class Conditions:
     """
-    What the state machine is told about the rest of the drive.
+    What the state machine knows of the rest of the drive.
 
     :ivar initialised: the self-test is over.
     :ivar fault: a fault is present, or not yet acknowledged.

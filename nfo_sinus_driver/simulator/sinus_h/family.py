@@ -69,7 +69,7 @@ class Server(telegram1.Server):
     def _profile(self) -> dict[tuple[int, int], ParameterEntry]:
         """Return the parameters of PROFIdrive [M3 §8]."""
         unit = self._unit
-        told: dict[int, tuple[Callable[[], int], ...]] = {
+        readable: dict[int, tuple[Callable[[], int], ...]] = {
             922: (lambda: _VENDOR_TELEGRAM if self._vendor else 1,),
             944: (lambda: len(unit.faults.log),),
             947: tuple(self._message(index) for index in range(_MESSAGES)),
@@ -81,7 +81,7 @@ class Server(telegram1.Server):
         }
         found = {
             (pnu, sub): ParameterEntry(read)
-            for pnu, reads in told.items()
+            for pnu, reads in readable.items()
             for sub, read in enumerate(reads)
         }
         for number in range(4):

@@ -138,20 +138,20 @@ def test_frames_as_lines():
         (Frame(0x100, bytes(2), remote=True, extended=True), b'R000001002\r'),
     ):
         adapter = opened()
-        assert adapter.told(frame, 0.0) == line
-        assert opened(b'Z1').told(frame, 61.5) == line[:-1] + b'05DC\r'
+        assert adapter.text_of(frame, 0.0) == line
+        assert opened(b'Z1').text_of(frame, 61.5) == line[:-1] + b'05DC\r'
         assert list(adapter.take(line)) == [frame]
 
 
 def test_acceptance_filters():
     # the first filter lets 581 through, the second 701, and nothing counts of the data
     adapter = opened(b'MB020E020', b'm001F001F')
-    heard = [n for n in range(0x800) if adapter.told(Frame(n, b'\x12'), 0.0)]
+    heard = [n for n in range(0x800) if adapter.text_of(Frame(n, b'\x12'), 0.0)]
     assert heard == [0x581, 0x701]
     # data counts: filter 1 wants 581 with a first byte of 43h
     adapter = opened(b'MB0240003', b'm0010FF10')
-    assert adapter.told(Frame(0x581, b'\x43\x00'), 0.0)
-    assert not adapter.told(Frame(0x581, b'\x80\x00'), 0.0)
+    assert adapter.text_of(Frame(0x581, b'\x43\x00'), 0.0)
+    assert not adapter.text_of(Frame(0x581, b'\x80\x00'), 0.0)
 
 
 @given(st.data())
