@@ -8,7 +8,7 @@ Start the driver with a parameter file such as `config/conveyor.yaml`, and then:
 
     python3 examples/conveyor.py --drives /infeed /middle --frequency 20
 
-A drive drops out when it has a fault, is disabled by somebody else, does not respond, or when
+A drive drops out when it has a fault, is disabled by another client, does not respond, or when
 its status is older than `--status-timeout`. Name every drive of the bus that the driver may
 command: `/nfo_sinus_bus/enable_all` enables those that are not named, too. Ctrl-C stops all.
 Exit status 0: ended by Ctrl-C, and every stop is confirmed.

@@ -185,7 +185,7 @@ class Drive:
 
         :param status_timeout: how old the newest status may be, s.
         """
-        # by the steady clock and not by the stamps: nobody can set it
+        # by the steady clock and not by the stamps: no client can set it
         age = time.monotonic() - self._status_at
         if age > status_timeout:
             return f'{self.name}: no status for {age:.1f} s'
@@ -194,7 +194,7 @@ class Drive:
         if self.status.fault:
             return f'{self.name}: the drive has a fault'
         if not self.status.enabled:
-            return f'{self.name}: not enabled, or stopped by somebody else'
+            return f'{self.name}: not enabled, or stopped by another client'
         return ''
 
     def _on_status(self, status: DriveStatus) -> None:

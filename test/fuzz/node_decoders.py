@@ -114,7 +114,7 @@ def _node(random: Random, frames: int) -> None:
         said = [*node.act(now), *node.receive(frame, now)]
         answers = [one for one in said if one.identifier == 0x580 + _NODE]
         others = {one.identifier for one in said} - {0x580 + _NODE}
-        assert others <= {0x080 + _NODE, 0x700 + _NODE}, f'a frame of nobody: {others}'
+        assert others <= {0x080 + _NODE, 0x700 + _NODE}, f'frames of no known kind: {others}'
         asked = identifier == 0x600 + _NODE and not frame.remote
         assert len(answers) <= asked and all(len(one.data) == 8 for one in answers)
         for answer in answers:

@@ -119,7 +119,7 @@ LAWS = (
     ),
     Mutant(
         2,
-        'a tuning is taken for a motor that nobody enabled',
+        'a tuning is taken for a motor that was not enabled',
         TABLE,
         ', ControlState.PROCEDURE',
         '',
@@ -333,7 +333,7 @@ LAWS = (
     ),
     Mutant(
         7,
-        'what nobody measured is 0',
+        'what was not measured is 0',
         'nfo_sinus_driver/drive/snapshot.py',
         'NAN = math.nan',
         'NAN = 0.0',

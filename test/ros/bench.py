@@ -173,7 +173,7 @@ class Process:
         return self._process.wait(PATIENCE)
 
     def has_not_crashed(self, waiting_for: str) -> None:
-        """Fail, with what it said, if it has ended and nobody in the test ended it."""
+        """Fail, with what it said, if it has ended and the test did not end it."""
         assert self.running or self._may_end, (
             f'ended by itself ({self._process.returncode}), no use waiting for {waiting_for}:\n'
             f'{self.text}'
@@ -429,8 +429,8 @@ class Client(contextlib.ExitStack):
             thread.join()
 
     def publish(self, value: float) -> None:
-        """Publish one set-point, once somebody listens."""
-        wait_until(lambda: self._setpoint.get_subscription_count(), 'somebody listens')
+        """Publish one set-point, once there is a subscriber."""
+        wait_until(lambda: self._setpoint.get_subscription_count(), 'there is a subscriber')
         self._setpoint.publish(Float32(data=float(value)))
 
     def call_async(self, service: str, type_: type, **fields: Any) -> Any:
@@ -540,7 +540,7 @@ def seconds(stamp: Time) -> float:
 
 @contextlib.contextmanager
 def _reserved() -> Iterator[int]:
-    """Have the number of a TCP port that nobody else is given, and that can yet be served."""
+    """Have the number of a TCP port that is given to nothing else, and that can yet be served."""
     with socket.socket() as claim:
         claim.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         claim.bind(('127.0.0.1', 0))

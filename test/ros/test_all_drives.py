@@ -51,7 +51,7 @@ def test_all_drives_are_enabled_and_stopped_but_the_one_that_is_only_watched(ben
         assert answer.success, answer.message
         assert 'left: stopp' in answer.message and 'right: stopp' in answer.message
         wait_until(lambda: running(simulator) == [False, False, False], 'both stand')
-        # set-points go on arriving, and nobody follows them
+        # set-points go on arriving, and no drive follows them
         states = [simulator.state(address) for address in (1, 2)]
         assert not any(state['turning'] for state in states)
     assert simulator.state(3)['writes'] == {}

@@ -33,7 +33,7 @@ class Walk(contextlib.ExitStack):
     """
     One history, and the law: nothing turns without an enable and set-points since the last loss.
 
-    :ivar enabled: somebody enabled it, and nothing has happened since that ends that.
+    :ivar enabled: it was enabled, and nothing has happened since that ends that.
     """
 
     def __init__(self, drives: Drives, drive: Simulated, client: Client) -> None:
@@ -42,7 +42,7 @@ class Walk(contextlib.ExitStack):
         self._drive = drive
         self._client = client
         self.enabled = False
-        #: Somebody publishes set-points.
+        #: A client publishes set-points.
         self._sends = False
         self._sending = self.enter_context(contextlib.ExitStack())
 

@@ -130,8 +130,8 @@ def _checks_in_order(driver: Process, *words: str) -> None:
 def test_nobody_at_the_address_names_what_to_check_in_order(bench: Bench) -> None:
     drive = bench.simulator('--address', '3')
     driver = bench.driver('-p', 'address:=4')
-    _says(driver, bench.way.nobody[0], '4', 'retrying')
-    _checks_in_order(driver, *bench.way.nobody)
+    _says(driver, bench.way.no_answer[0], '4', 'retrying')
+    _checks_in_order(driver, *bench.way.no_answer)
     client = bench.client()
     assert 'has not answered yet' in client.enable().message
     _untouched(drive)
@@ -191,7 +191,7 @@ def test_a_setpoint_beyond_the_limit_is_clamped_with_one_warning(bench: Bench) -
         assert status.setpoint == -12.0
         client.wait_for('status', lambda status: abs(status.actual + 12) < 0.3, '-12 Hz')
         _says(driver, 'set-point -4000 is limited to -12')
-        # as far as the drive goes, where somebody says that the motor may
+        # as far as the drive goes, where a setting says that the motor may
         assert client.set_parameters(setpoint_max=1000.0).successful
         most = bench.drives.most
         client.wait_for('status', lambda status: status.setpoint == -most, "the drive's limit")
@@ -219,7 +219,7 @@ def test_a_setpoint_in_the_wrong_unit_does_not_race_the_motor(bench: Bench) -> N
         said = f'set-point 500 is limited to {nominal:g} Hz, which is nominal for this motor'
         wait_until(lambda: driver.text.count(said) == 2, 'said once for each run')
         assert 'set setpoint_max of /nfo_sinus' in driver.text
-    # more, where somebody says so
+    # more, where a setting says so
     assert client.set_parameters(setpoint_max=nominal - 10.0).successful
     assert client.enable().success
     with client.setpoints(500.0):

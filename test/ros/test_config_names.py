@@ -36,7 +36,7 @@ Names = dict[str, str]
 
 @pytest.fixture(scope='module')
 def client(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Client]:
-    """A client of a driver and its drive, which nobody commands."""
+    """A client of a driver and its drive, which no client commands."""
     with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('names'), way) as bench:
         bench.simulator()
         bench.driver()

@@ -36,7 +36,7 @@ _STOP = '0602980000'
 
 
 class Conveyor:
-    """A driver with all these drives, and somebody who sees and commands them."""
+    """A driver with all these drives, and a client that watches and commands them."""
 
     def __init__(self, bench: Bench) -> None:
         self.simulator = bench.simulator(
@@ -93,14 +93,14 @@ class Conveyor:
         assert answer.message.count(': enabled') == len(NAMES)
         wait_until(
             lambda: all(one.get_subscription_count() for one in self._setpoints),
-            'somebody listens to each', period=0.1,
+            'each has a subscriber', period=0.1,
         )
         for publisher in self._setpoints:
             publisher.publish(Float32(data=20.0))
         wait_until(lambda: not self.who_do_not(), 'all follow', period=0.1)
 
     def sleeps(self) -> None:
-        """See that nothing wakes the driver while nobody asks, and that it wakes then."""
+        """See that nothing wakes the driver while no request comes, and that it wakes then."""
         counts = [0]
 
         def settled() -> bool:

@@ -110,7 +110,7 @@ def test_motors_can_do_what_the_controller_may_ask_for() -> None:
     assert rpm('velocity') <= every['setpoint_max']
     # a motor of two pole pairs makes 1500 rpm at its f-Nom of 50 Hz
     assert rpm('acceleration') <= 1500 / every['control']['accel']
-    # many cycles, so that one that is late stops nobody; and the controller stops before
+    # many cycles, so that one that is late stops no drive; and the controller stops before
     assert every['setpoint_timeout'] >= 10 / _RATE
     assert wheels['cmd_vel_timeout'] <= every['setpoint_timeout'] < every['drive_timeout']
 
@@ -209,7 +209,7 @@ def test_wheels_follow_the_controller_and_stop_when_it_is_gone(bench: Bench) -> 
 def test_silence_while_state_equals_command_starves_a_motor_that_runs(bench: Bench) -> None:
     _, _, parts = start(bench)
     for part in parts:
-        # as it is where nobody says otherwise
+        # as it is where no setting says otherwise
         del part.parameters['trigger_joint_command_threshold']
     with Hardware(bench.client('/left_wheel'), parts, _RATE):
         # standing: nothing is sent, nothing is missed

@@ -52,7 +52,7 @@ class Rig:
         self.client: Client = bench.client().connected()
 
     def stands(self) -> None:
-        """Wait until the motor stands and nobody will have it turn."""
+        """Wait until the motor stands and nothing will make it turn."""
         self.drive.wait_for(_stands, timeout=PATIENCE)
 
     def stays_still(self) -> None:

@@ -30,7 +30,7 @@ from ways import needs
 _FOLDER = Path(__file__).parents[2] / 'examples'
 _CPP = _FOLDER / 'cpp_client'
 _DOCS = Path(__file__).parents[2] / 'docs' / 'examples.md'
-#: What nobody has to wait for: a machine may rest for longer than a drive may be silent.
+#: What no test has to wait for: a machine may rest for longer than a drive may be silent.
 _PATIENT = '--status-timeout', f'{PATIENCE:g}'
 _NOT_CONFIRMED = 'THE STOP IS NOT CONFIRMED'
 
@@ -133,14 +133,14 @@ def test_rides_that_end_early_leave_the_motor_stopped(bench: Bench) -> None:
     assert not bench.drives.commanded(drive.state())
     assert 'interrupted' in process.text and _NOT_CONFIRMED not in process.text
     stands(drive)
-    # somebody else stops it
+    # another client stops it
     process = ride(bench)
     runs(process, drive, 20.0)
     assert bench.client().call('stop').success
     assert process.wait() == 1, process.text
-    assert 'stopped by somebody else' in process.text
+    assert 'stopped by another client' in process.text
     stands(drive)
-    # nobody confirms the stop
+    # nothing confirms the stop
     process = ride(bench)
     runs(process, drive, 20.0)
     drive.inject('silence', 3600.0)
@@ -292,7 +292,7 @@ def test_a_robot_follows_twists_and_stops_when_they_end_or_a_wheel_does(bench: B
     with steered(client, 0.3, 0.2):
         runs(process, drives, hertz(0.3 - 0.2 * _TRACK / 2), 1)
         runs(process, drives, -hertz(0.3 + 0.2 * _TRACK / 2), 2)
-    # nobody steers any more
+    # no set-points come any more
     for name in ('left', 'right'):
         wait_until(
             lambda name=name: re.search(rf'{name}.*no set-point for 1 s', bench.log),
@@ -319,7 +319,7 @@ def test_a_robot_follows_twists_and_stops_when_they_end_or_a_wheel_does(bench: B
         runs(process, drives, hertz(_TRACK / 2), 2)
         assert client.call('stop').success
         assert process.wait() == 1, process.text
-    assert '/left: not enabled, or stopped by somebody else' in process.text
+    assert '/left: not enabled, or stopped by another client' in process.text
     assert not bench.drives.commanded(drives.state(2))
     stands(drives, 2)
 

@@ -53,7 +53,7 @@ def frequencies(simulator) -> list[int]:
 def setpoints_for_all(client: Client, value: float) -> Iterator[None]:
     """Publish a set-point for all drives over and over."""
     publisher = client.node.create_publisher(Float32, '/nfo_sinus_bus/setpoint_all', 1)
-    wait_until(publisher.get_subscription_count, 'somebody listens')
+    wait_until(publisher.get_subscription_count, 'there is a subscriber')
     ended = threading.Event()
 
     def publish() -> None:
@@ -152,7 +152,7 @@ def test_drives_are_taken_away_and_added_while_the_others_follow(bench: Bench) -
         assert simulator.state(2)['source'] == 'stop'
         asked = sum(request.startswith('02') for request in bench.requests())
         holds_for(A_WHILE, turn_on, 'the others follow')
-        # it is left alone altogether, as one that somebody takes off the line
+        # it is left alone altogether, as one that is taken off the line
         assert sum(request.startswith('02') for request in bench.requests()) == asked
         simulator.inject('silence', 3600.0, address=2)
         assert not middle.change_state(Transition.TRANSITION_CONFIGURE)

@@ -125,7 +125,7 @@ def test_bus_statistics_and_diagnostics_flow_before_anybody_answers(bench: Bench
     assert math.isnan(client.newest('status').actual)
     wait_until(lambda: _diagnosis(client, 'nfo_sinus: drive'), 'diagnostics of the drive')
     wait_until(lambda: _diagnosis(client, 'nfo_sinus_bus: line'), 'diagnostics of the line')
-    first, *others = bench.way.nobody
+    first, *others = bench.way.no_answer
     wait_until(lambda: first in driver.text, 'advice in the log')
     advice = driver.text[driver.text.index(first) :]
     order = [advice.index(word) for word in others]
@@ -147,7 +147,7 @@ def test_diagnostics_of_an_address_where_nobody_is_are_steady(bench: Bench) -> N
     bench.simulator('--address', '7')
     driver = bench.driver(*FULL_RATE)
     client = bench.client()
-    first, *others = bench.way.nobody
+    first, *others = bench.way.no_answer
 
     def shown() -> bool:
         status = _diagnosis(client, 'nfo_sinus: drive')

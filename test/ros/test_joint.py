@@ -60,7 +60,7 @@ def start(bench: Bench, *arguments: str, mode: str = 'Freque') -> tuple:
 @needs('nominal')
 @pytest.mark.parametrize('ratio', [1.0, -5.0])
 def test_joint_command_turns_the_shaft_and_its_state_says_so(bench: Bench, ratio: float) -> None:
-    # where nobody tells the motor's poles, Hz are no speed
+    # where the motor's poles are not known, Hz are no speed
     mode = 'Freque' if bench.way.tells else 'Speed'
     simulator, client = start(
         bench, '-p', f'gear_ratio:={ratio}', '-p', 'joint_name:=belt', mode=mode

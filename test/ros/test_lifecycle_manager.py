@@ -94,7 +94,7 @@ def test_start_pause_resume_reset_and_shutdown(bench: Bench) -> None:
         holds_for(
             A_WHILE,
             lambda: not any(simulator.state(address)['turning'] for address in (1, 2)),
-            'nobody has enabled them',
+            'they are not enabled',
         )
         assert everybody.call('enable_all').success
         wait_until(lambda: simulator.state(1)['turning'], 'it turns')

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a drive tells and nobody can set: on ``~/measured``, or as a read-only parameter."""
+"""What a drive measures and no client can set: on ``~/measured``, or as a read-only parameter."""
 
 from __future__ import annotations
 

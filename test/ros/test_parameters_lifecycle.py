@@ -163,7 +163,7 @@ def test_two_drives_have_parameters_of_their_own(bench: Bench) -> None:
         written('control.retard', (7000, 0), unit=2),
         written('freque.f_fix1', (600,), unit=2),
     ])
-    # what both have or one of them: nobody is warned
+    # what both have or one of them: there is no warning
     assert 'there is none of that name' not in driver.text
     assert set_one(clients[0], 'control.st_mode', 'Release').successful
     assert wire.written() == [written('control.st_mode', (0,), unit=1)]

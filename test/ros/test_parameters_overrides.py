@@ -154,7 +154,7 @@ def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
 
 def test_a_drive_that_comes_later_is_brought_into_the_state_then(bench: Bench) -> None:
     driver = bench.driver(*COUNTED, '-p', 'control.accel:=6', '-p', 'control.acel:=7.0')
-    wait_until(lambda: bench.way.absent[0] in driver.text, 'there is nobody yet')
+    wait_until(lambda: bench.way.absent[0] in driver.text, 'no drive answers yet')
     bench.simulator(paced=False)
     client = bench.client().connected()
     assert Wire(bench).writes() == [written('control.accel', (6000, 0))]

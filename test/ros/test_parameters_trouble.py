@@ -202,7 +202,7 @@ def test_every_third_request_for_a_setting_refused_leaves_ros_and_the_drive_the_
     _agree(client, stubborn)
 
 
-# --- nobody answers -----------------------------------------------------------------------------
+# --- no answer ---------------------------------------------------------------------------------
 
 
 def test_a_drive_that_goes_silent_in_the_middle_is_known_again_when_it_is_back(

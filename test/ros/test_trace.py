@@ -53,7 +53,7 @@ def test_a_ride_breaks_no_law_on_the_wire(bench: Bench) -> None:
         assert client.enable().success
     driver.signal(signal.SIGTERM)
     assert driver.wait() == 0, driver.text
-    # the fifth is that of the enable that was refused, where nobody knows before
+    # the fifth is that of the enable that was refused, where it is not known before
     assert run_commands(way, _requests(bench)) == 4 + (not bench.drives.tells_run_input)
     gap = LineSettings(way.baud_rate).frame_gap
     assert violations(bench.frames(), gap, way.model, way.protocol) == []

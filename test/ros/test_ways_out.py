@@ -72,7 +72,7 @@ def test_the_end_of_the_launch_that_started_it_stops_the_motor(bench: Bench) -> 
         client = bench.client().connected()
         with client.run_at(20.0):
             assert drive.state()['turning']
-            # it says nothing to the driver, and nobody waits for it
+            # it says nothing to the driver, and no process waits for it
             launch.kill()
             assert driver.wait() == 0, driver.text
             state = drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
@@ -296,8 +296,8 @@ def test_an_exit_does_not_wait_for_a_reader_that_does_not_read(bench: Bench) -> 
     drive = bench.simulator(*bench.drives.ramps(1))
     pipe = bench.folder / 'pipe'
     os.mkfifo(pipe)
-    with open(os.open(pipe, os.O_RDWR | os.O_NONBLOCK), 'wb', buffering=0) as nobody:
-        while nobody.write(b'.'):
+    with open(os.open(pipe, os.O_RDWR | os.O_NONBLOCK), 'wb', buffering=0) as full:
+        while full.write(b'.'):
             continue
         into_the_pipe = ('sh', '-c', f'exec "$@" >{pipe} 2>&1', 'sh')
         driver = bench.driver('--log-level', 'debug', through=into_the_pipe)

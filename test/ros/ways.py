@@ -39,7 +39,7 @@ WITHOUT = {
     'identity': 'nothing there tells which drive it is',
     'own': 'it goes the one way that its command goes',
     'canopen': 'it is about CANopen',
-    'characters': 'nobody sees a damaged frame of this bus: it is sent again at once',
+    'characters': 'no program sees a damaged frame of this bus: it is sent again at once',
     'direct': 'a PLC is between, and the telegram tells little: see test_telegram1_ros.py',
     'watched': 'its telegram tells its state to who commands it alone',
     'keypad': 'no manual tells how STW1 has control again after STOP at the keypad of this drive',
@@ -54,7 +54,7 @@ UNFRAMED: Mapping[str, Callable[[bytes], bytes]] = {
     'modbus_ascii': lambda frame: bytes.fromhex(frame[1:-4].decode()),
     'modbus_tcp': lambda frame: frame[6:],
 }
-#: What a driver says where nobody answers, and what is to be checked, in order.
+#: What a driver says where no drive answers, and what is to be checked, in order.
 SILENCE = 'no response', 'BusType', 'jumper S5', 'the address,', 'baud', 'parity'
 _SILENCE_OF_OTHERS = 'no response', 'protocol', 'RS485', 'the address,', 'baud', 'parity'
 _SILENCE_OF_MOVITRACS = 'no response', 'power', 'USS 11A', 'P880', 'P842', 'wires'
@@ -132,8 +132,8 @@ class Way:
         return 'does not exist', 'plugged in'
 
     @property
-    def nobody(self) -> tuple[str, ...]:
-        """What a driver says where nobody has its address, and what is to be checked, in order."""
+    def no_answer(self) -> tuple[str, ...]:
+        """What a driver says where no drive answers, and what is to be checked, in order."""
         if self.protocol == 'modbus_tcp':
             return 'has no path to unit', 'table of units', 'serial port'
         if self.protocol == 'canopen':

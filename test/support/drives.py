@@ -41,7 +41,7 @@ class Drives(abc.ABC):
     :ivar overload: a fault, likewise the others.
     :ivar silence: the text of the fault of its own time-out.
     :ivar no_timeout: the options of a simulated drive that runs on when the bus is silent.
-    :ivar stopped: the text that it shows when nobody has it run.
+    :ivar stopped: the text that it shows when nothing has it run.
     :ivar running: the text while it runs under control of the bus.
     :ivar most: the highest set-point, Hz.
     :ivar nominal: what its motor is made for, Hz; `most` where the drive does not tell it.
@@ -102,7 +102,7 @@ class Drives(abc.ABC):
 
     @abc.abstractmethod
     def run_by_terminals(self, drive: Simulated) -> None:
-        """Have somebody else change who controls it, and run it by its terminals."""
+        """Have another master change who controls it, and run it by its terminals."""
 
     @abc.abstractmethod
     def end_run_by_terminals(self, drive: Simulated) -> None:

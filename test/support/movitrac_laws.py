@@ -61,7 +61,7 @@ class MovitracJudge:
 
     def _judge_write(self, request: Request, words: tuple[int, ...]) -> Iterator[str]:
         if request.place in _NEVER:
-            yield f'index {request.place} is written, which starts what nobody asked for'
+            yield f'index {request.place} is written, which starts what was not requested'
         if request.place == _CONTROL_MODE:
             looked = self._between.pop(request.unit, set())
             put_back = words == _STANDARD and looked >= _STANDS

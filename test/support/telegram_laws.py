@@ -43,7 +43,7 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
             continue
         number, function = data[:2], data[7]
         if frame['direction'] == 'request':
-            # of what was not answered nobody knows
+            # of what was not answered nothing is known
             for _, unanswered in asked.values():
                 if unanswered is not None:
                     yield unanswered
@@ -144,7 +144,7 @@ class Judge(abc.ABC):
             yield f'{shown}: the life counter stood still'
         stood = before.stw1 if before is not None else 0
         if now.stw1 & ~self.known:
-            yield f'{shown}: bits that nobody knows'
+            yield f'{shown}: bits that are not known'
         if now.setpoint and not now.stw1 & self.run:
             yield f'{shown}: set-point {now.setpoint} beside no run command'
         rises = now.stw1 & ~stood

@@ -113,7 +113,7 @@ class _Judge:
         self._stands: dict[int, bool] = {}
         #: How each unit was commanded at first.
         self._methods: dict[int, str] = {}
-        #: Who was spoken to, and who of them was given a run command that nobody has removed.
+        #: Who was spoken to, and who of them was given a run command that was not removed.
         self._known: set[int] = set()
         self._running: set[int] = set()
 

@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / 'nfo_sinus_driver'
 PAGE = ROOT / 'docs' / 'troubleshooting.md'
 
-#: Answers of commands that succeed, and changes that somebody asked for: nothing is wrong.
+#: Answers of commands that succeed, and changes that were requested: nothing is wrong.
 SUCCESSES = {
     *(Cause.ENABLED, Cause.ENABLED_ALREADY, Cause.STOPPED, Cause.STOPPING, Cause.COASTING),
     *(Cause.RAMPING, Cause.QUICK_STOPPED, Cause.RAPID_STOPPING),

@@ -139,7 +139,7 @@ def test_the_simulators_of_a_page_start_as_typed(page: list[Typed], tmp_path: Pa
     free = str(_free())
     with contextlib.ExitStack() as running:
         for command in page:
-            # not where somebody else may have one
+            # not where another program may have one
             text = command.text.replace('/tmp/', f'{tmp_path}/')
             text = re.sub(r'(--tcp |modbus_tcp:)\d+', lambda found: f'{found[1]}{free}', text)
             words = shlex.split(text)[1:]

@@ -309,7 +309,7 @@ def test_slot_that_has_nothing_to_say_any_more(bus: Bus, link: FakeLink) -> None
 
 
 def test_slots_take_turns(bus: Bus, link: FakeLink) -> None:
-    # one that is asked for again and again keeps nobody waiting
+    # one that is asked for again and again keeps no other waiting
     hasty, calm = Writer(bus, 50), Writer(bus, 51)
     count = 0
 

@@ -99,7 +99,7 @@ def test_a_stop_goes_between_two_questions(link: _Link, bus: Bus) -> None:
 
 
 @pytest.mark.parametrize(
-    'error', [Refused(1), NoAnswer('nobody'), DamagedAnswer('noise'), LinkError('a mistake')]
+    'error', [Refused(1), NoAnswer('no unit'), DamagedAnswer('noise'), LinkError('a mistake')]
 )
 def test_what_fails_stays_unknown(link: _Link, bus: Bus, error: LinkError) -> None:
     link.answer = _failing(error, _FIRST)

@@ -145,7 +145,7 @@ def test_close_ends_everything(link: FakeLink) -> None:
     for future in futures:
         assert isinstance(failure(future), Cancelled)
     sent = len(link.done)
-    # nobody who comes too late waits for ever
+    # what comes too late does not wait without end
     assert isinstance(failure(ask(bus, 2, Priority.STOP)), Cancelled)
     assert len(link.done) == sent
     assert bus.port_error is not None

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Nobody who asks for much keeps those from the line who ask for little."""
+"""A drive that is asked for much keeps none from the line that is asked for little."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_set_points_that_never_end_leave_every_other_turn_to_the_polls() -> None
     bus = Bus(link, now=link.now)
 
     def write() -> Transfer:
-        # wanted again before it is written: somebody publishes faster than the line can carry
+        # wanted again before it is written: set-points come faster than the line can carry
         for slot in slots:
             bus.request(slot)
         return Transfer(1, register(_SETPOINT), Priority.SETPOINT, packed(1))

@@ -282,11 +282,11 @@ def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
     scheduler.took(_READ)
     assert scheduler.take() is silent
     scheduler.took(0.2)
-    # nobody else waits
+    # nothing else waits
     scheduler.add(silent)
     assert scheduler.take() is silent
     scheduler.took(0.2)
-    # a stop of somebody else goes first of all
+    # a stop of another unit goes first of all
     for waiting in (silent, poll, other):
         scheduler.add(waiting)
     assert scheduler.take() is other
@@ -425,7 +425,7 @@ def test_a_stop_in_vain_goes_ahead_again_once_the_unit_answers() -> None:
     assert scheduler.take(missing=False) is before
     scheduler.took(_READ)
     scheduler.add(other)
-    # somebody else has asked it meanwhile
+    # it has been asked by another request meanwhile
     missing.clear()
     assert scheduler.take(missing=False) is repeated
     assert scheduler.take(missing=False) is other

@@ -67,7 +67,7 @@ def test_who_is_missing_is_asked_seldom_as_long_as_others_answer() -> None:
     assert silences.is_missing(1, 13.2)
     # the others keep nine tenths of the time at least
     assert silences.missing_from >= 13.2 + 9 * 0.2
-    # and where nobody answers there is nobody to spare
+    # and where no unit answers there is none to spare
     silences.note(2, 13.4, NoAnswer(), 0.2)
     silences.note(3, 13.6, NoAnswer(), 0.2)
     assert silences.missing_from <= 15.0

@@ -45,7 +45,7 @@ class Done(NamedTuple):
     err: str
 
 
-#: Short ramps: nobody wants to wait for a motor; but its stop is to be seen.
+#: Short ramps: a test does not wait long for a motor; but its stop is to be seen.
 QUICK = {'control.accel': 0.2, 'control.retard': 2.5}
 _RUN = 0x101
 _BUS = 3
@@ -97,7 +97,7 @@ class Bench:
 
     @property
     def stopped(self) -> bool:
-        """The motor stands, and nobody has control of it."""
+        """The motor stands, and no master has control of it."""
         state = self.state()
         return not state['driven'] and not state['turning'] and state['source'] == 'stop'
 

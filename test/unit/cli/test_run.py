@@ -53,7 +53,7 @@ def read_until(stream: Any, text: str) -> str:
 
 
 def nothing_commanded(bench: Bench) -> bool:
-    """Nobody has told the drive anything."""
+    """Nothing was written to the drive."""
     return bench.writes() == [] and not bench.state()['command_writes']
 
 
@@ -314,7 +314,7 @@ def test_a_terminal_that_is_closed(bench: Bench) -> None:
 
 
 def test_a_terminal_that_stands_still(bench: Bench) -> None:
-    # Ctrl-S; and somebody elsewhere who wants it to end
+    # Ctrl-S; and a signal from elsewhere that ends it
     terminal = Terminal(bench, 'run', 10)
     terminal.read('38 Bus Run')
     terminal.type('\x13')

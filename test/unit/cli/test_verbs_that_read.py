@@ -235,7 +235,7 @@ def test_scan_finds_nobody(nfo: Nfo) -> None:
     [
         ('drop', (), 1, False),
         ('drop', ('--retries', 1), 2, True),
-        # somebody is there, whatever was said
+        # a drive is there, whatever was said
         ('damage', (), 2, True),
     ],
 )

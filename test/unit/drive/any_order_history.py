@@ -70,7 +70,7 @@ class History:
         self._ours = False
         #: A run command stood in the drive when it was looked at last.
         self._stood = False
-        #: The run command that stands is somebody else's.
+        #: The run command that stands is another master's.
         self._foreign = False
         self.active = self.watched = False
         self._watched_at = self._active_at = self._commanded_at = rig.clock.now
@@ -158,11 +158,11 @@ class History:
         self._no_run_from = max(self._no_run_from, self.now + within + later)
 
     def disturbed(self) -> None:
-        """Take note that somebody else did something to the drive."""
+        """Take note that another master did something to the drive."""
         self.disturbed_at = self.now
 
     def started_by_another(self) -> None:
-        """Take note that somebody else has given a run command over the bus."""
+        """Take note that another master has given a run command over the bus."""
         self.disturbed_at = self.now
         self._foreign = True
 
@@ -186,7 +186,7 @@ class History:
 
     @property
     def enabling(self) -> bool:
-        """Somebody has enabled it, or is about to."""
+        """It is enabled, or is about to be."""
         return self.pending('enable') or self.enabled_at is not None
 
     def pending(self, name: str) -> bool:
@@ -261,7 +261,7 @@ class History:
         for_good = self.now - self._broken_since > lost and not self._rig.line.losses
         if for_good and (self.enabled_at is not None or self._ended_by_fault is not None):
             self.lose(self.times.taken_back)
-        # nobody can stop it now
+        # nothing can stop it now
         self._no_run_from = max(self._no_run_from, self.now + self.times.taken_back)
 
     def _watch_noise(self) -> None:

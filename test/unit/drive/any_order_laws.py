@@ -146,7 +146,7 @@ class Laws(History):
         else:
             late = self._no_run_from
         if self.now > late:
-            raise Broken(f'a run command stands that nobody wants since {self.lost_at:.3f}')
+            raise Broken(f'a run command stands that is not wanted since {self.lost_at:.3f}')
         self._require_word_of_it()
 
     def _judge_setpoint(self, enabled_at: float) -> None:
@@ -173,7 +173,7 @@ class Laws(History):
         # the line that is lost was broken before
         from_when = since if self._broken_since is None else min(since, self._broken_since)
         if self.now > since + SAID and not self._said(from_when, Cause.CANNOT_STOP):
-            raise Broken(f'it runs since {since:.3f}, and nobody says that it cannot be stopped')
+            raise Broken(f'it runs since {since:.3f}, with no message that it cannot be stopped')
 
     def _said(self, since: float, what: Cause) -> bool:
         return any(
@@ -334,7 +334,7 @@ def _has(seen: Any, name: str) -> bool:
 
 
 def _agree(told: Any, value: Any) -> bool:
-    """Tell whether what is told is true; of what nobody knows, ``None``, all is."""
+    """Tell whether what is shown is true; of what is not known, ``None``, all is."""
     if value is None:
         return True
     if isinstance(value, float):

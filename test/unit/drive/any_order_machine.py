@@ -104,7 +104,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     def until_noticed(self) -> None:
         """Let what has happened last be noticed, if it can be."""
-        # a drive without power answers nobody, and is not seen before it has started
+        # a drive without power does not answer, and is not noticed before it has started
         while not self.rig.far.listening and self.rig.line.whole:
             self.rig.pass_time(0.1)
         self.rig.pass_time(self.laws.noticed)

@@ -157,7 +157,7 @@ class SinusOrder(AnyOrder):
 
     @rule(mode=st.sampled_from((1, 2, 3)), wait=WAITS)
     def write_mode(self, mode: int, wait: float = 0.4) -> None:
-        """Let somebody else write MODE."""
+        """Let another master write MODE."""
         self.by_another(('fieldbus.mode', mode))
         if mode == MODE_BUS:
             self.laws.forgotten()
@@ -363,7 +363,7 @@ class MovitracOrder(AnyOrder):
 
     @rule(boot=BOOT_TIMES, wait=WAITS)
     def power_cycle(self, boot: float, wait: float = 1.0) -> None:
-        """Take the mains away, and hold the motor by its brake; for longer where nobody sees it."""
+        """Take the mains away, and hold the motor by its brake; longer where no status shows it."""
         super().power_cycle(boot if boot > _SHORT_BOOT or self._is_seen else 1.5, 0.0)
         self.rig.far.motor.rotor = 0.0
         self.let(wait)

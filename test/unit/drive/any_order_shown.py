@@ -155,7 +155,7 @@ class Shown(abc.ABC):
 
     @abc.abstractmethod
     def facts(self) -> dict[str, Any]:
-        """Return what is true of the drive now; ``None``: nobody knows what it tells."""
+        """Return what is true of the drive now; ``None``: what it says is not known."""
 
     def patience(self, name: str) -> float:
         """Return how much later than others a fact may be told, s."""
@@ -196,7 +196,7 @@ class ShownSinus(Shown):
             'code': self._unit.status_code,
             'fault': bool(far.faults),
             'by bus': self.by_bus,
-            # nobody says what a tuning shows of it
+            # no manual says what a tuning shows of it
             'running': None if self.tuning else self.running,
             'limit': far.motor.limited,
             'frequency': round(far.motor.frequency, 1),

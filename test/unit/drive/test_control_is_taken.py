@@ -25,7 +25,7 @@ class Left:
     A drive in which an earlier session has left a set-point and a run command.
 
     That the drive waits for a command once the bus has control says [M0 table 17]; that it has
-    forgotten the one from before says nobody, and this one has not.
+    forgotten the one from before says none, and this one has not.
 
     :ivar driven: for how long the motor has been energised, s.
     :ivar turned: it has turned.

@@ -58,7 +58,7 @@ from nfo_sinus_driver.link.modbus_pdu import Request
         (b'', ''),
         (b'\x00\xff\n', ''),
         (b'Sinus\x00\x00', 'Sinus'),
-        # nobody writes a second line into our log, or colours it
+        # no text of a drive writes a second line into the log, or colours it
         (b'a\nERROR \x1b[31mb', 'a ERROR [31mb'),
     ],
 )

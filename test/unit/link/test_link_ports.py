@@ -141,7 +141,7 @@ def test_every_baud_rate_is_set(pty: Pty, baud: int) -> None:
 
 
 def test_line_is_set_raw(pty: Pty) -> None:
-    # somebody has left echo and line editing on
+    # another program has left echo and line editing on
     attributes = termios.tcgetattr(pty.far)
     attributes[0] |= termios.ICRNL | termios.IXON | termios.ISTRIP
     attributes[1] |= termios.OPOST | termios.ONLCR

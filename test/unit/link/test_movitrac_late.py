@@ -14,7 +14,7 @@ import pytest
 
 from nfo_sinus_driver.link.interface import DamagedAnswer, LinkError, NoAnswer, NotReady, Refused
 
-#: A drive that nobody knows yet is waited for two time-outs.
+#: A drive that is not known yet is waited for two time-outs.
 LATE = [2.2, 3.0, 4.0]
 DROP = Fate(what='drop')
 

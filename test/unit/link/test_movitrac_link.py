@@ -140,7 +140,7 @@ def time_out(bench: Bench) -> float:
 def test_how_long_a_drive_is_waited_for_follows_its_response_time(response_time: float) -> None:
     bench = Bench(Fate(what='drop'), *[Fate()] * 5, Fate(what='drop'))
     bench.drive.response_time = response_time
-    # nobody knows it yet
+    # its time is not known yet
     assert time_out(bench) == pytest.approx(0.2 + TIMEOUT, abs=0.003)
     bench.wire.now += 10
     for _ in range(5):

@@ -21,7 +21,7 @@ from nfo_sinus_driver.link import Address, BusSettings, NoAnswer, Refused
 PATIENT = 10.0
 RAMP = Address('index', 25, None, 4)
 RATIO = Address('index', 263, None, 8)
-NOBODY = 5
+ABSENT = 5
 
 
 class Drive:
@@ -117,11 +117,11 @@ def test_a_drive_is_read_and_written(kind: str, request: pytest.FixtureRequest) 
         link.close()
 
 
-def test_nobody_answers(serial: str) -> None:
+def test_no_answer(serial: str) -> None:
     link = BusSettings(serial, 'movitrac', response_timeout=0.05).open()
     link.open()
     try:
         with pytest.raises(NoAnswer, match='unit 5 did not answer'):
-            link.read(NOBODY, RAMP)
+            link.read(ABSENT, RAMP)
     finally:
         link.close()

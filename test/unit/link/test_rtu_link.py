@@ -410,7 +410,7 @@ NAMES = {'A': A, 'B': B, 'C': C, 'D': D}
 
 
 def lumps_or_doubles(fates: list[Fate]) -> Iterator[Fate]:
-    """Double no answer that comes in a lump late: nobody could tell it from the right one."""
+    """Double no answer that comes in a lump late: nothing distinguishes it from the right one."""
     for fate in fates:
         twice = fate.what in ('double', 'refuse twice')
         yield Fate(fate.delay, fate.what, fate.lump and not twice)

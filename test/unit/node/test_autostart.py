@@ -49,7 +49,7 @@ def test_it_tries_until_it_works_and_then_no_more(error: Exception | None) -> No
     assert threading.active_count() == before
     assert tries.left == 0
     assert tries.autostart.over
-    # the operator is somebody else
+    # another client is the operator
     assert tries.by_itself == [True] * 4
     assert not tries.autostart.trying
 

@@ -12,7 +12,7 @@ from nfo_sinus_driver.simulator.endpoints import endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
 
 _LINE = re.compile(rb'([tr])([0-9A-F]{3})(\d)((?:[0-9A-F]{2})*)\r')
-#: How often drives catch up while nobody asks them, s.
+#: How often drives catch up while no request comes, s.
 _TICK = 0.01
 
 
@@ -77,7 +77,7 @@ class Bus:
             trace=None,
         )
         self.frames: list[tuple[float, Frame]] = []
-        # nobody hears their boot-up
+        # no master hears their boot-up
         self.wait(0.1)
         if is_open:
             self.say(b'S4\rO\r')
