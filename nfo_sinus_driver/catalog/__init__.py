@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What the manuals say: tables and pure functions on them. No I/O beyond that, no ROS."""
 
 from nfo_sinus_driver.catalog.codec import Number, Text, codec_of, to_bytes, to_words

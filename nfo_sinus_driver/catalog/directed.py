@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Set-points whose direction is a command of its own, beside a size."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Where the error log of a drive stands: an area of entries, not parameters of their own."""
 
 from __future__ import annotations

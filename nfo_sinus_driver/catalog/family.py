@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 A drive family: its parameters, status codes and profile, read from its folder in ``families/``.
 

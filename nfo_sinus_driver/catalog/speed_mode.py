@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What a telegram is in Speed mode that has one place for frequencies and speeds."""
 
 from __future__ import annotations

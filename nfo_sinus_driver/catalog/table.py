@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Reading the tables of a family; whatever is wrong in one is named by its file and line."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What a drive does on a command while its motor stands: tune, erase, reset [M0 table 18]."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Tuning: the drive measures its motor, or calculates what it should be [M0 table 18]."""
 
 from __future__ import annotations

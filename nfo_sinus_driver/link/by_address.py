@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 Parameters of a drive by its own addresses: PNU 1000 to 1003, each by the mailbox [M3 §10].
 

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 The mailbox of a PLC: parameters of a drive on its fieldbus, one at a time, by PNU and sub-index.
 

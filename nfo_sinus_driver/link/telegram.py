@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 Telegram 1 behind a PLC or gateway: a block of registers, one telegram each way.
 

@@ -227,6 +227,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         names = {field.name for field in dataclasses.fields(DriveSettings)}
         wanted = {name: value for name, value in values.items() if name in names}
         retries = self._bus_context.retries
+        # ROS has checked the types as they were declared
         settings = DriveSettings(**wanted, retries=retries)  # type: ignore[arg-type]
         settings.require_line(self._bus_context.bus.protocol)
         place = settings.address, settings.block_address

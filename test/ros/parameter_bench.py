@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What the tests of the drives' parameters share: services, and what arrives at the drives."""
 
 from __future__ import annotations

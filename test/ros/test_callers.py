@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """A command that was given is answered, whatever its line in the log runs into."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """The errands through ROS, over a way of each kind; what a drive has not, the answer says."""
 
 from __future__ import annotations

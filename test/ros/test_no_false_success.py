@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """No stop, transition or exit is a success while the motor has current and no stop is confirmed."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """The names of ROS parameters, those of the nodes and of all families together."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Settings through ROS: both ends of one of each kind, beyond and between; what arrives there."""
 
 from __future__ import annotations

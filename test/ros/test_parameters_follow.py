@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What changes at the drive shows in ROS: at the keypad, by a reset, beyond what a manual says."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Parameters of drives through the life of a node: monitor, clean-up, dump and load, two drives."""
 
 from __future__ import annotations

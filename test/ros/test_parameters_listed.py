@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """The settings of a drive as ROS parameters: which there are, of which type, and how described."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """A drive that has no settings on the bus: the node's own parameters do all the same."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Parameters of a drive in a parameter file: the state it is brought into once, and no more."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Setting parameters of a drive through ROS: what is taken for what, and all of it or nothing."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Parameters that cannot be set: the answer says why, and ROS and the drive have the same."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 Through a PLC by telegram 1, with ROS: the laws over Optimal, Sinus H and G2.
 

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """The ways into a drive: which protocol, dialect and model a test is run over."""
 
 from __future__ import annotations

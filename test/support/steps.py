@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Playing the sequences of a profile by hand: no bus, no drive, each step and its answer named."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 Judges the control words in the block of a PLC, by the tables of the manuals and nothing else.
 

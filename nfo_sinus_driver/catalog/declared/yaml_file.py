@@ -134,8 +134,9 @@ class Node:
     def number(self, key: str) -> Fraction | None:
         """Return a number; ``None`` where none stands."""
         found = self.get(key).scalar
-        is_number = isinstance(found, (int, Fraction)) and not isinstance(found, bool)
-        return Fraction(found) if is_number else None  # type: ignore[arg-type]
+        if isinstance(found, (int, Fraction)) and not isinstance(found, bool):
+            return Fraction(found)
+        return None
 
     def flag(self, key: str, default: bool = False) -> bool:
         """Return true or false."""

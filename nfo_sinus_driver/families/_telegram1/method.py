@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 Telegram 1 through a PLC or gateway: what is the same in every family [M1, M3, M0 §6.3].
 

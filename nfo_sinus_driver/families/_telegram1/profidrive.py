@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 STW1 and ZSW1 of PROFIdrive, standard telegram 1, as far as drives share them ([M3 §7.2], [C111]).
 

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 Words of the MOVITRAC 31: function bits (index 281), terminals (index 13), inverter status (index
 284), and who controls it [M4 §4].

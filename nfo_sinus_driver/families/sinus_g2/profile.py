@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 How a Sinus G2 is commanded: by MODE and SCMD [M0 §7.2 tables 17 and 18], or by the control word of
 the generic state machine [M0 §7.1 tables 14 to 16].

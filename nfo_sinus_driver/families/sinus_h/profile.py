@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 How a Sinus H is commanded: by telegram 1, through a PLC on PROFINET [M3].
 

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 How a Sinus Optimal is commanded: by MODE and SMODE, or by Drive Control [M1].
 

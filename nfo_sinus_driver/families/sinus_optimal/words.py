@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 Control and status words of the Sinus Optimal, and the codes of its MODE and SMODE [M1].
 

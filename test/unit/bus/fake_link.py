@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """A link made of plain Python, and waiting without luck."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """How the steps of a profile come to the bus: in order, with a priority, and what they end by."""
 
 from __future__ import annotations

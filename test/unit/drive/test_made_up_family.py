@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 A family that is nothing but a folder: found, enabled, turned, reversed, faulted and stopped.
 

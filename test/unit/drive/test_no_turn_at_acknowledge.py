@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """No turn at an acknowledgement, whatever the drive does with its run command in a fault [C98]."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Pymodbus's opinion on RTU frames, in its words of 3.6.9 and of today."""
 
 from __future__ import annotations

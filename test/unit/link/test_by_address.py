@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Parameters by PNU 1000 to 1003: the steps of the manual, refusals, losses [M3 §10]."""
 
 from __future__ import annotations

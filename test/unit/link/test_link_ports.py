@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Real ports: pseudo-terminals, and a TCP socket on this machine."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """The mailbox of a PLC: registers by hand, numbers, losses, who else asks, what is given up."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What each protocol is, by its name, and how its lines are set."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """Modbus RTU frames: the same as pymodbus's, and nothing false is ever believed."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """One transaction after the other on a line in virtual time."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """The block of registers of a PLC as one telegram: freshness, life counters, gaps, refusals."""
 
 from __future__ import annotations

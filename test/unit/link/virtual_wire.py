@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """A line and a slave in virtual time: nothing here ever waits."""
 
 from __future__ import annotations

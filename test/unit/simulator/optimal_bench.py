@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """A simulated Sinus Optimal, asked by registers and codes copied from its manual [M1] by hand."""
 
 import struct

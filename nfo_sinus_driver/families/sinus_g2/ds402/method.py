@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """How a G2 is commanded by the drive profile of its CANopen module ([M0 table 11], [C121])."""
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """A G2 as its drive profile shows it: what is another than by the other control methods."""
 
 from __future__ import annotations

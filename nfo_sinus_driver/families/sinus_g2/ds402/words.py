@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 ControlWord, StatusWord and Error_Code of DS402 [M0 table 11].
 

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 How a G2 is commanded by telegram 1, through a PLC on PROFIBUS [M0 §6.3].
 

@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 How an Optimal is commanded by telegram 1, through a PLC [M1].
 

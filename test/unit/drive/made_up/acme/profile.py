@@ -1,7 +1,6 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """How an Acme is commanded: a control word, a direction, and the size of a frequency."""
 
 from __future__ import annotations
