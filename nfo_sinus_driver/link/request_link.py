@@ -42,8 +42,11 @@ _IN_PIECES = (
     'answers come in pieces with long pauses: the adapter, or the device server, holds bytes back; '
     'set its latency timer or packing time to the least, or use another one'
 )
-#: A pause within an answer of which the operator hears, s: more than a good adapter makes.
+#: A pause within an answer that is more than a good adapter makes, s; so many of them are reported,
+#: each of which is forgotten by and by: on a busy machine there is one now and then.
 _LONG_PAUSE = 0.03
+_MANY_PAUSES = 3
+_KEPT_OF_PAUSES = 0.9
 
 _Request = TypeVar('_Request')
 _Answer = TypeVar('_Answer')
@@ -139,6 +142,8 @@ class RequestLink(ABC, Generic[_Request]):
         self._echo = Echo()
         #: When the last byte was on the line, as far as we know.
         self._line_end = 0.0
+        #: How many of the last answers had long pauses.
+        self._in_pieces = 0.0
 
     @classmethod
     def on_port(cls: type[_Self], port: str, settings: LineSettings) -> _Self:
@@ -352,11 +357,13 @@ class RequestLink(ABC, Generic[_Request]):
             if now >= until:
                 return data
 
-    def _report_pause(self, longest: float) -> bool:
-        """Report the longest pause, s, within an answer if it was too long; tell whether it was."""
-        if longest > _LONG_PAUSE:
+    def _note_pause(self, longest: float) -> bool:
+        """Take note of the longest pause, s, within a whole answer; tell whether it is too long."""
+        too_long = longest > _LONG_PAUSE
+        self._in_pieces = self._in_pieces + 1 if too_long else _KEPT_OF_PAUSES * self._in_pieces
+        if self._in_pieces >= _MANY_PAUSES:
             self.remarks.add(_IN_PIECES)
-        return longest > _LONG_PAUSE
+        return too_long
 
 
 class _Ambiguous(DamagedAnswer):
@@ -535,7 +542,7 @@ class CodecLink(RequestLink[Any]):
                 if codec.kind(message) not in quarantined and not doubtful:
                     behind = b''.join(map(codec.encode, messages[number:])) + reader.rest
                     if not stray:
-                        self._report_pause(pause)
+                        self._note_pause(pause)
                     return message, now, behind
                 if isinstance(request, codec.select):
                     raise _Ambiguous(f'unit {unit} answered, but perhaps to an earlier request')

@@ -377,7 +377,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
     def _learn_pause(self, longest: float) -> None:
         """Take note of the longest pause, s, within an answer that came whole, and of no other."""
-        if self._report_pause(longest):
+        if self._note_pause(longest):
             self._pause = max(self._pause, min(2 * longest, _MOST_PAUSE))
 
     def _lacks_first_byte(self, request: Request[_T], frame: bytes, came: bytes) -> bool:
