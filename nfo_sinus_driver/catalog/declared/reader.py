@@ -26,6 +26,7 @@ from nfo_sinus_driver.catalog.declared.description import (
     Timeout,
     status_code,
 )
+from nfo_sinus_driver.catalog.declared.parameter_table import with_parameters
 from nfo_sinus_driver.catalog.declared.places import WORD, Places, Told, internal
 from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
@@ -51,6 +52,8 @@ def read(path: Path) -> Description:
     """
     root, problems = load(path)
     schema.check(root, problems)
+    problems.require_none()
+    root = with_parameters(root, problems)
     problems.require_none()
     made = _Reader(path, root, problems).description()
     problems.require_none()

@@ -46,6 +46,11 @@ def check(root: Node, problems: Problems) -> None:
     _Checker(problems).check(root, schema(), 'the file')
 
 
+def check_parameters(node: Node, problems: Problems) -> None:
+    """Check the parameters of a file that stand in another one."""
+    _Checker(problems).check(node, schema()['properties']['parameters'], 'the parameters')
+
+
 class _Checker:
     """Checks one file."""
 

@@ -34,8 +34,10 @@ class Settings:
         self.parameters: dict[str, Parameter] = {}
         self.roles: dict[Role, str] = {}
         self.defaults: dict[str, Value] = {}
-        for key, node in root.get('parameters').mapping.items():
-            self._add(key, node)
+        parameters = root.get('parameters')
+        with problems.of(parameters.path):
+            for key, node in parameters.mapping.items():
+                self._add(key, node)
 
     def _add(self, key: str, node: Node) -> None:
         if key.partition('.')[0] in _TAKEN:

@@ -11,6 +11,7 @@ Numbers are exact (:class:`~fractions.Fraction`, or ``int`` in decimal, ``0x`` o
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+import contextlib
 from dataclasses import dataclass, field
 from fractions import Fraction
 import math
@@ -27,9 +28,10 @@ Scalar = bool | int | Fraction | str | None
 _DEEPEST = 20
 #: More than this no description has: one whose anchors multiply.
 _MOST_NODES = 50_000
-_INTEGER = re.compile(r'[+-]?(0|[1-9][0-9]*|0x[0-9a-fA-F]+|0b[01]+)')
+# Python converts no number of thousands of digits
+_INTEGER = re.compile(r'[+-]?(0|[1-9][0-9]{0,99}|0x[0-9a-fA-F]+|0b[01]+)')
 _ZEROS = re.compile(r'[+-]?0[0-9]+')
-_NUMBER = re.compile(r'[+-]?([0-9]+|[0-9]*\.[0-9]+([eE][+-]?[0-9]{1,3})?|[0-9]+\.)')
+_NUMBER = re.compile(r'[+-]?([0-9]{0,99}\.[0-9]{1,99}([eE][+-]?[0-9]{1,2})?|[0-9]{1,99}\.)')
 _WORDS = {'true': True, 'false': False, 'null': None, '~': None, '': None}
 
 
@@ -56,6 +58,15 @@ class Problems:
         """Take note of a sentence about a line."""
         self.found[f'{self.path}, line {line}: {text}'] = None
 
+    @contextlib.contextmanager
+    def of(self, path: Path | None) -> Iterator[None]:
+        """Have what is added meanwhile be about another file, if one is given."""
+        before, self.path = self.path, path or self.path
+        try:
+            yield
+        finally:
+            self.path = before
+
     def require_none(self) -> None:
         """Raise :class:`DescriptionError` if there is any."""
         if self.found:
@@ -70,11 +81,13 @@ class Node:
     :ivar content: nodes by key, nodes in order, or the scalar.
     :ivar line: the first one is 1.
     :ivar name: the key or the number under which it stands, for messages.
+    :ivar path: the file where it stands, if that is another one than that of what is around it.
     """
 
     content: Mapping[str, Node] | Sequence[Node] | Scalar
     line: int
     name: str = ''
+    path: Path | None = None
 
     @property
     def mapping(self) -> Mapping[str, Node]:
@@ -221,19 +234,24 @@ class _Converter:
         text = str(node.value)
         if getattr(node, 'style', None) is not None:
             return text
-        if text.lower() in _WORDS and text in (text.lower(), text.capitalize()):
-            return _WORDS[text.lower()]
-        if _INTEGER.fullmatch(text):
-            return int(text, 0)
-        if _ZEROS.fullmatch(text):
-            self._problems.add(
-                line, f'{text} begins with 0: write it without, or with 0x if it is hexadecimal'
-            )
-        elif _NUMBER.fullmatch(text):
-            return Fraction(text)
-        elif text.lower() in ('.nan', '.inf', '-.inf', '+.inf'):
-            self._problems.add(line, f'{text} is no number that a drive has')
-        return text
+        return scalar_of(text, line, self._problems)
+
+
+def scalar_of(text: str, line: int, problems: Problems) -> Scalar:
+    """Return what a text without quotes means; a number that is none goes to the problems."""
+    if text.lower() in _WORDS and text in (text.lower(), text.capitalize()):
+        return _WORDS[text.lower()]
+    if _INTEGER.fullmatch(text):
+        return int(text, 0)
+    if _ZEROS.fullmatch(text):
+        problems.add(
+            line, f'{text} begins with 0: write it without, or with 0x if it is hexadecimal'
+        )
+    elif _NUMBER.fullmatch(text):
+        return Fraction(text)
+    elif text.lower() in ('.nan', '.inf', '-.inf', '+.inf'):
+        problems.add(line, f'{text} is no number that a drive has')
+    return text
 
 
 def shown(number: Fraction | float) -> str:
