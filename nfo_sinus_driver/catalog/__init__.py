@@ -5,6 +5,7 @@
 
 from nfo_sinus_driver.catalog.codec import Number, Text, codec_of, to_bytes, to_words
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
+from nfo_sinus_driver.catalog.factory_line import with_factory_line
 from nfo_sinus_driver.catalog.family import (
     Family,
     example_setting,
@@ -74,4 +75,5 @@ __all__ = [
     'to_bytes',
     'to_words',
     'usual_family',
+    'with_factory_line',
 ]

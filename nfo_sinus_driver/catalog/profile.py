@@ -543,7 +543,8 @@ class Profile:
     :ivar line_check: what to look at, in this order, while a drive of it has never answered, by the
         protocol; where one is not there, what the protocol says itself.
     :ivar measured: the usual ones of ``~/measured``: what matters beside the telemetry.
-    :ivar line: of the factory, by its manual: ``baud_rate``, ``char_format``, ``address``.
+    :ivar line: of the factory, by its manual: ``protocol``, ``baud_rate``, ``char_format`` and
+        ``address``.
     :ivar refusals: what exception codes mean that say something of their own; by the code.
     :ivar busy: exception codes by which it says that it may take the request the next moment.
     :ivar stops_at_timeout: by this value of the role ``stop_at_timeout`` the motor stops.

@@ -11,7 +11,7 @@ import math
 import shlex
 from typing import Any, TypeVar
 
-from nfo_sinus_driver.catalog import load_profile
+from nfo_sinus_driver.catalog import load_profile, with_factory_line
 from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.drive.settings import AUTO, MONITOR
 from nfo_sinus_driver.link import BIT_RATES, BusSettings
@@ -25,6 +25,8 @@ LINE_AND_DRIVE = (
     'port', 'protocol', 'address', 'model', 'family', 'baud_rate', 'char_format',
     'response_timeout', 'retries', 'control_method', 'block_address', 'telegram_words',
 )
+#: What of them a family may say, as it leaves the factory.
+LINE = ('protocol', 'baud_rate', 'char_format', 'address')
 DEFAULTS = {name: SETTINGS[name].default for name in LINE_AND_DRIVE}
 #: What is as short as it can be for each of 247 addresses.
 OF_SCAN = {'response_timeout': 0.1, 'retries': 0}
@@ -63,9 +65,9 @@ def take_family(options: argparse.Namespace) -> None:
         return
     given = {'family': family, 'model': getattr(options, 'model', DEFAULTS['model'])}
     options.model = DriveSettings(**given).model
-    for name, value in load_profile(options.model).line.items():
-        if not hasattr(options, name):
-            setattr(options, name, value)
+    given = {name: getattr(options, name, None) for name in LINE}
+    for name, value in with_factory_line(given, load_profile(options.model).line).items():
+        setattr(options, name, value)
 
 
 def command_line(options: argparse.Namespace, *words: str) -> str:

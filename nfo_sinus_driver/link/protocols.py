@@ -159,14 +159,14 @@ class BusSettings:
     baud_rate: int = setting(
         0,
         'bit rate of the line in bit/s, that of the drive',
-        zero='the factory setting of the protocol',
+        zero='the factory setting of the described drive, or of the protocol',
         also=f'0 or one of {", ".join(map(str, BIT_RATES))}, as the protocol has it',
         change=FIXED,
     )
     char_format: str = setting(
         '',
         'data bits, parity and stop bits, those of the drive',
-        zero='the factory setting of the protocol',
+        zero='the factory setting of the described drive, or of the protocol',
         also='such as 8E1, 8O1, 8N2; with 7 for modbus_ascii',
         change=FIXED,
     )

@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import time
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import BusStatistics
@@ -19,9 +21,13 @@ from nfo_sinus_driver.link import BusSettings
 from nfo_sinus_driver.node import diagnostics, messages
 from nfo_sinus_driver.node.all_drives import AllDrives
 from nfo_sinus_driver.node.bus_context import BusContext
-from nfo_sinus_driver.node.declaring import declare
+from nfo_sinus_driver.node.declaring import coerce, declare
+from nfo_sinus_driver.node.factory_settings import line_of
+from nfo_sinus_driver.node.overrides import families_of
 from nfo_sinus_driver.node.qos import RELIABLE
+from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
+from nfo_sinus_driver.setting import Setting
 
 _PERIOD = 1.0
 #: How long it is waited for at the start that the port opens, and how often it is looked, s.
@@ -32,13 +38,19 @@ NAME = 'nfo_sinus_bus'
 
 
 class BusNode(Node):
-    """The node of one bus; a ValueError says which settings make no sense."""
+    """
+    The node of one bus; a ValueError says which settings make no sense.
 
-    def __init__(self, overrides: Sequence[Parameter] = ()) -> None:
+    :param single_name: the name of the drive, where one was given to the whole process.
+    """
+
+    def __init__(self, overrides: Sequence[Parameter] = (), single_name: str = '') -> None:
         super().__init__(NAME, parameter_overrides=list(overrides))
-        values = declare(self, BUS_SETTINGS)
-        self.drive_names: list[str] = list(values.pop('drives'))
-        settings = BusSettings(**values)
+        known = dict(BUS_SETTINGS)
+        drives = declare(self, {'drives': known.pop('drives')})['drives']
+        self.drive_names: list[str] = list(drives)
+        names = [single_name] if single_name else self.drive_names
+        settings = BusSettings(**self._declare_line(known, families_of(names)))
         self._port = settings.port
         link = settings.open()
         limit = settings.max_requests if link.protocol.most_requests else 0.0
@@ -52,6 +64,20 @@ class BusNode(Node):
         self._statistics = self.create_publisher(BusStatistics, '~/statistics', RELIABLE)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
         self.bus_context.publish_queue.put_every(_PERIOD, self._report)
+
+    def _declare_line(
+        self, known: Mapping[str, Setting], families: Mapping[str, object]
+    ) -> dict[str, Any]:
+        """Declare the settings of the line, as its drives leave the factory where not given."""
+        given = {
+            name: coerce(one, known).value for name, one in overrides_of(self).items()
+        }
+        line = line_of(families, given)
+        values = declare(self, {
+            name: replace(one, default=line.get(name, one.default)) for name, one in known.items()
+        })
+        # a parameter file may say the factory setting, too
+        return values | {name: value for name, value in line.items() if not values[name]}
 
     def start(self) -> None:
         """Open the port and begin to report."""

@@ -23,9 +23,11 @@ from nfo_sinus_driver.node.callers import Call
 from nfo_sinus_driver.node.commands import Commands, ErrorLogServices, TuningServices
 from nfo_sinus_driver.node.declaring import coerce, declare
 from nfo_sinus_driver.node.drive_parameters import DriveParameters, wanted_state
+from nfo_sinus_driver.node.factory_settings import with_factory_address
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
 from nfo_sinus_driver.node.messages import Joint
+from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.scale import Scale, require_scale
 from nfo_sinus_driver.node.setpoints import Setpoints
@@ -69,7 +71,9 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._ending = False
         #: Who moves the node through its states.
         self.lifecycle = Lifecycle(self)
-        values = declare(self, DRIVE_SETTINGS)
+        family = overrides_of(self).get('family')
+        known = with_factory_address(DRIVE_SETTINGS, None if family is None else family.value)
+        values = declare(self, known)
         _require_gear_ratio(values)
         require_scale(values)
         joint = Joint(

@@ -75,7 +75,7 @@ class DriverProcess:
             names = self._bus_node.drive_names
         else:
             _check_name(single_name)
-            self._bus_node = BusNode(bus_overrides(single_name))
+            self._bus_node = BusNode(bus_overrides(single_name), single_name)
             names = _renamed(self._bus_node.drive_names, single_name)
         _check_names(names)
         self._context = self._bus_node.bus_context

@@ -6,11 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+import contextlib
 import itertools
 from pathlib import Path
 import re
 from typing import Any
 
+from rclpy.exceptions import InvalidNodeNameException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.utilities import remove_ros_args
@@ -41,6 +43,17 @@ def bus_overrides(name: str) -> list[Parameter]:
         for key in BUS_SETTINGS
         if key in given and (key not in for_all or given[key].value != for_all[key].value)
     ]
+
+
+def families_of(names: Iterable[str]) -> Mapping[str, object]:
+    """Return what was given as ``family`` to the drives of these names, before there are any."""
+    found: dict[str, object] = {}
+    for name in names:
+        # a name that is none is refused when its node is made
+        with contextlib.suppress(InvalidNodeNameException):
+            given = _given_to(name).get('family')
+            found[name] = None if given is None else given.value
+    return found
 
 
 def _given_to(name: str) -> Mapping[str, Parameter]:

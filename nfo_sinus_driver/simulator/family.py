@@ -36,6 +36,7 @@ class SimulatedFamily:
     :ivar machine: adds to the tables what a drive of this family keeps beside.
     :ivar servers: makes what answers the requests to a drive, by the protocols of the tables.
     :ivar injections: what can be made to happen to it.
+    :ivar line: how its line leaves the factory, where that is not as usual of its protocol.
     """
 
     control_unit: Callable[..., ControlUnit]
@@ -46,6 +47,7 @@ class SimulatedFamily:
         default_factory=lambda: {'modbus': modbus.Server}
     )
     injections: type[Injections] = Injections
+    line: Mapping[str, int | str] = field(default_factory=dict)
 
     @property
     def options(self) -> tuple[Option, ...]:

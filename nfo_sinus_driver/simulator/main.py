@@ -12,8 +12,9 @@ import dataclasses
 import json
 import signal
 import sys
+from typing import Any
 
-from nfo_sinus_driver.catalog import CatalogError, Value
+from nfo_sinus_driver.catalog import CatalogError, Value, with_factory_line
 from nfo_sinus_driver.catalog.finding import find
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator.control import Client, ControlError, control_path
@@ -21,6 +22,7 @@ from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, PROTOCOLS
 from nfo_sinus_driver.simulator.family import (
     every_injection,
     every_option,
+    load,
     machine_of,
     simulated,
 )
@@ -43,6 +45,8 @@ RUN input, the keypad, a power cycle, noise on the line; see "simulator inject -
 
 #: The options of a PLC, by the names of its settings.
 _OF_THE_PLC = tuple(field.name for field in dataclasses.fields(PlcSetting))
+
+_USUAL_LINE = {'protocol': 'modbus_rtu', 'address': 1, 'baud_rate': None, 'char_format': None}
 
 _ROS_ARGS = '--ros-args'
 
@@ -118,14 +122,15 @@ def _simulator(options: argparse.Namespace) -> Simulator:
     if options.link is not None and options.tcp is not None:
         raise ValueError('--link and --tcp exclude each other')
     chosen = {name: getattr(options, name) for name in every_option()}
+    line = _line(options)
     return Simulator(
-        options.address or [1],
+        options.address or [line['address']],
         model=options.model,
-        protocol=options.protocol,
+        protocol=line['protocol'],
         link=options.link,
         tcp=options.tcp,
-        baud=options.baud_rate,
-        char_format=options.char_format,
+        baud=line['baud_rate'],
+        char_format=line['char_format'],
         also=options.also,
         echo=options.echo,
         gateway_timeout=options.gateway_timeout,
@@ -140,6 +145,12 @@ def _simulator(options: argparse.Namespace) -> Simulator:
         plc=_plc(options),
         **{name: value for name, value in chosen.items() if value is not None},
     )
+
+
+def _line(options: argparse.Namespace) -> dict[str, Any]:
+    """Return how the line is set: as the options say, or else as the drive leaves the factory."""
+    given = {name: getattr(options, name) for name in ('protocol', 'baud_rate', 'char_format')}
+    return {**_USUAL_LINE, **with_factory_line(given, load(options.model).line)}
 
 
 def _plc(options: argparse.Namespace) -> PlcSetting | None:
@@ -218,7 +229,7 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
-    add('--protocol', default='modbus_rtu', choices=PROTOCOLS, help='default: modbus_rtu')
+    add('--protocol', choices=PROTOCOLS, help='default: modbus_rtu; with --family as its file says')
     add('--model', default=USUAL, choices=simulated(), help=f'default: {USUAL}')
     add(
         '--family',
@@ -234,7 +245,7 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
         action='extend',
         metavar='LIST',
         help='addresses of the drives, as their protocol has them, such as 1-10,20; may be '
-        'repeated (default: 1)',
+        'repeated (default: 1; with --family as its file says)',
     )
     add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal')
     add('--tcp', type=_tcp, metavar='PORT', help='serve a TCP port of 127.0.0.1 (0: any free one)')
@@ -251,12 +262,14 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
     add(
         '--baud-rate',
         type=int,
-        help='default: 19200, of classic and movitrac 9600, of canopen 125000 (bit/s)',
+        help='default: 19200, of classic and movitrac 9600, of canopen 125000 (bit/s); with '
+        '--family as its file says',
     )
     add(
         '--char-format',
         metavar='FORMAT',
-        help='default: 8E1, of classic and modbus_ascii 7E1, of movitrac 8N1',
+        help='default: 8E1, of classic and modbus_ascii 7E1, of movitrac 8N1; with --family as its '
+        'file says',
     )
     add('--echo', action='store_true', help='return every byte, as a half-duplex adapter does')
     add(

@@ -72,6 +72,20 @@ def test_a_ride(bench: Bench, file: Path, family: str) -> None:
     assert 'Traceback' not in bench.log
 
 
+def test_line_and_address_are_those_of_the_file_where_none_is_given(bench: Bench) -> None:
+    bench.simulator('--family', 'yaskawa_v1000')
+    bench.bare_driver(
+        *('-p', f'port:={bench.port}', '-p', 'family:=yaskawa_v1000'),
+        *('-p', 'nfo_sinus_bus:char_format:=8N2'),
+        through=('env',),
+    )
+    drive, bus = bench.client().connected(), bench.client('/nfo_sinus_bus')
+    assert drive.parameter('address') == 31
+    assert [bus.parameter(name) for name in ('protocol', 'baud_rate', 'char_format')] == [
+        'modbus_rtu', 9600, '8N2',
+    ]
+
+
 def test_a_family_that_is_none_is_refused_with_what_to_do(bench: Bench, tmp_path: Path) -> None:
     for family, said in (
         ('nowhere', "there is no family 'nowhere': choose one of abb_acs355"),

@@ -200,6 +200,7 @@ class LineDefaults:
     :ivar exceptions: what its exception codes mean; :ivar busy: those that mean to try again.
     """
 
+    protocol: str = 'modbus_rtu'
     baud_rate: int = 0
     char_format: str = ''
     address: int = 0
@@ -211,9 +212,10 @@ class LineDefaults:
 
     @property
     def factory(self) -> Mapping[str, int | str]:
-        """What of speed, format and address the file has."""
+        """The protocol, and what of speed, format and address the file has."""
         found: dict[str, int | str] = {
-            'baud_rate': self.baud_rate, 'char_format': self.char_format, 'address': self.address,
+            'protocol': self.protocol, 'baud_rate': self.baud_rate,
+            'char_format': self.char_format, 'address': self.address,
         }
         return {name: value for name, value in found.items() if value}
 

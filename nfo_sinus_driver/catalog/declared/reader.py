@@ -68,6 +68,7 @@ class _Reader:
         self._root = root
         self._problems = problems
         self._line = _line(root.get('line'))
+        self._require_format()
         self._places = Places(root, self._line, problems)
         self._told: dict[str, Told] = {}
 
@@ -119,6 +120,15 @@ class _Reader:
             accel=settings.known(root.get('simulated').get('accel')),
             decel=settings.known(root.get('simulated').get('decel')),
         )
+
+    def _require_format(self) -> None:
+        line = self._line
+        bits = '7' if line.protocol == 'modbus_ascii' else '8'
+        if line.char_format and line.char_format[0] != bits:
+            self._problems.add(
+                self._root['line']['char_format'].line,
+                f'{line.protocol} has {bits} data bits: write {bits}{line.char_format[1:]}',
+            )
 
     # --- status ---
 
@@ -347,6 +357,7 @@ def _line(node: Node) -> LineDefaults:
     }
     busy = frozenset(one.scalar for one in node.get('busy').items if isinstance(one.scalar, int))
     return LineDefaults(
-        node.integer('baud_rate'), node.text('char_format'), node.integer('address'),
-        node.text('check'), write, node.integer('most_registers', 123), exceptions, busy,
+        node.text('protocol', LineDefaults.protocol), node.integer('baud_rate'),
+        node.text('char_format'), node.integer('address'), node.text('check'), write,
+        node.integer('most_registers', 123), exceptions, busy,
     )

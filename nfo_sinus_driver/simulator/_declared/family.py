@@ -48,4 +48,5 @@ def family_of(path: str) -> SimulatedFamily:
         factory=file.defaults,
         servers={'modbus': functools.partial(Server, file=file)},
         injections=DeclaredInjections,
+        line=file.line.factory,
     )

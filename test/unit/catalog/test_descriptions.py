@@ -149,6 +149,9 @@ BAD = {
     'a text for a number': ('most: 60', 'most: fast', 'a number'),
     'a loop': ('line: {', 'line: &line {check: *line, ', 'leads to itself'),
     'a parity that is none': ("char_format: '8N1'", 'char_format: 8N7', 'choose one of'),
+    'data bits of another protocol': (
+        'address: 5', 'address: 5, protocol: modbus_ascii', 'write 7N1',
+    ),
     'address 0': ('address: 5', 'address: 0', '1 at least'),
     'read-only time-out': ('{register: 32, factor: 0.1, unit: s}',
                            '{register: 32, factor: 0.1, unit: s, access: r}', 'access: rw'),

@@ -48,6 +48,12 @@ def test_the_line_is_that_of_the_file_where_nothing_else_is_given() -> None:
     assert (options.address, options.baud_rate, options.char_format) == (31, 9600, '8N1')
     options = parse(['info', '--family', 'yaskawa_v1000', '--address', '2', '--baud-rate', '1200'])
     assert (options.address, options.baud_rate, options.char_format) == (2, 1200, '8N1')
+    assert options.protocol == 'modbus_rtu'
+    # its speed is none of another protocol
+    options = parse(['--family', 'yaskawa_v1000', '--protocol', 'modbus_tcp', 'info'])
+    assert (options.address, options.baud_rate, options.protocol) == (31, 0, 'modbus_tcp')
+    options = parse(['--family', 'yaskawa_v1000', '--baud-rate', '0', 'info'])
+    assert options.baud_rate == 9600
     assert options.model == str(SHIPPED['yaskawa_v1000'])
 
 

@@ -72,6 +72,18 @@ def inject(capsys):
 # ---- processes ----
 
 
+def test_a_described_drive_is_served_as_it_leaves_the_factory(start, link):
+    family = ['--family', 'yaskawa_v1000', '--link', link]
+    assert f'modbus_rtu at 9600 8N1 on {link}, drive 31;' in start(*family)[1]
+
+
+def test_a_described_drive_is_served_as_it_is_said(start):
+    said = ['--tcp', '0', '--protocol', 'modbus_tcp', '--address', '2']
+    assert re.search(r'modbus_tcp at 19200 8E1 on .*, drive 2;', start(
+        '--family', 'yaskawa_v1000', *said
+    )[1])
+
+
 def test_it_says_what_it_serves_and_leaves_nothing_behind(start, link, open_master):
     process, line = start('--link', link, '--address', '1-2,5', '--address', '7')
     assert line == (
