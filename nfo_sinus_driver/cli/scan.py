@@ -13,7 +13,7 @@ import json
 from pathlib import Path
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Role, load_family
+from nfo_sinus_driver.catalog import Role, load_family, load_parameter
 from nfo_sinus_driver.cli.console import (
     CliError,
     UsageError,
@@ -232,12 +232,13 @@ _HEAD = """\
 #   ros2 run nfo_sinus_driver driver --ros-args --params-file FILE
 #
 # Rename the drives as you like, in `drives` and in front of their sections. Every parameter is
-# listed in docs/interface.md; what is left out here keeps its default. This one is worth a thought:
-# each drive stops by itself when it has heard nothing for so long, s. It is written to the drives.
-#
-# /**:
-#   ros__parameters:
-#     drive_timeout: 2.0
+# listed in docs/interface.md; what is left out here keeps its default.
+
+# What holds for every drive; the sections below may say otherwise.
+/**:
+  ros__parameters:
+    # The driver ramps the motor down when no fresh set-point came for this long, s.
+    setpoint_timeout: 2.5
 
 /**/nfo_sinus_bus:
   ros__parameters:
@@ -248,6 +249,11 @@ _DRIVE = """
   ros__parameters:
     address: {address}
     model: {model}
+"""
+_TIMEOUT = """\
+    # The drive stops the motor by itself when it has heard nothing for this long, s. The driver
+    # writes it to the drive ({written}) with the first enable.
+    drive_timeout: 2.0
 """
 #: What is written only if it is not what the driver takes by itself.
 _IF_OTHER = ('response_timeout', 'retries')
@@ -285,9 +291,20 @@ def _driver_params(
         _DRIVE.format(
             named=_named(facts), name=names[address], address=address, model=facts['model']
         )
+        + _timeout(facts['model'])
         for address, facts in sorted(found.items())
     ]
     return ''.join((_HEAD.format(count=count, date=date), *settings, *drives))
+
+
+def _timeout(model: str) -> str:
+    """Return what the file says of the time-out of the drive itself, where a model has one."""
+    timeout = None if model == AUTO else load_parameter(model, Role.COMMUNICATION_TIMEOUT)
+    if timeout is None:
+        return ''
+    stop = load_parameter(model, Role.STOP_AT_TIMEOUT)
+    written = timeout.name if stop is None else f'{timeout.name}, and {stop.name} = ON'
+    return _TIMEOUT.format(written=written)
 
 
 def _named(facts: Mapping[str, str]) -> str:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import contextlib
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role, Value
@@ -14,7 +15,7 @@ from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
-from nfo_sinus_driver.drive.settings import DRIVE_TIMEOUT_MARGIN
+from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN, DRIVE_TIMEOUT_MARGIN
 from nfo_sinus_driver.link import LinkError
 
 
@@ -32,51 +33,49 @@ class CommunicationWatchdog:
         self._state = state
         self._parameters = parameters
         self._commanded = commanded
-        self._told: Report | None = None
-        #: It could not be set yet.
-        self._due = False
+        #: What was said last of each kind.
+        self._told: dict[Cause, Report] = {}
+        #: What it was set to since the drive was connected, s; ``None``: not yet.
+        self._settled: float | None = None
         #: What this driver has changed: what was found before, and what it has set.
         self._found: dict[str, Value] = {}
         self._set: dict[str, Value] = {}
+        #: No setting asked for that, so nothing of it stays.
+        self._unasked = False
 
-    async def prepare(self) -> None:
-        """
-        Set it as the settings want it; later, if the drive takes nothing now.
-
-        That is so while a fault is active, which could not be acknowledged without a connection;
-        and, where settings need bus control [C100], while others have it.
-        """
-        self._due = True
-        try:
-            await self.require_set()
-        except DriveError as error:
-            state, status = self._state, self._state.status
-            barred = state.nameplate.is_older and status is not None and not status.from_bus
-            if not barred and (status is None or not status.faulted):
-                raise
-            self._state.tell(Severity.WARNING, Cause.OWN_TIMEOUT_LATER, why=error.report)
+    def connected(self) -> None:
+        """Have it set with the next enable (DriveError: it is asked for, and there is none)."""
+        self._settled = None
+        if self._state.settings.drive_timeout > 0:
+            self._require_possible()
 
     async def require_set(self) -> None:
-        """Set it if that could not be done before: nothing runs without it."""
-        if self._due:
-            await self.set_now(self._state.settings.drive_timeout)
-            self._due = False
+        """Set it, if that was not done yet; what no setting asks for keeps no motor from it."""
+        settings = self._state.settings
+        if self._settled == settings.own_timeout:
+            return
+        if settings.drive_timeout == AS_THE_DRIVE_CAN:
+            await self._try_usual(settings.own_timeout)
+        else:
+            await self.set_now(settings.own_timeout)
+        self._settled = settings.own_timeout
+        self._tell_watching()
 
     async def set_now(self, seconds: float) -> Sequence[Change]:
-        """Set and verify it; 0 leaves it as it is. Tells what was changed."""
+        """
+        Set and verify it, and have it stop the motor; tells what was changed.
+
+        0 leaves it as it is, and :data:`AS_THE_DRIVE_CAN` leaves it to the next enable.
+        """
         if not self._commanded:
             raise DriveError(Cause.MONITOR_ONLY)
-        if not seconds:
+        if seconds <= 0:
             return ()
-        state = self._state
-        if state.plc_time:
-            raise DriveError(Report(Cause.OWN_TIMEOUT_OF_PLC, seconds=state.plc_time))
+        self._require_possible()
+        state, key = self._state, self._state.model.key
         await state.timeout.watch(seconds)
-        key = state.model.key
         wanted: dict[str, Value] = {}
         if not state.timeout.watched_by:
-            if not state.timeout.can_be_set:
-                raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
             wanted[key(Role.COMMUNICATION_TIMEOUT)] = seconds
         if state.nameplate.has(key(Role.STOP_AT_TIMEOUT)):
             wanted[key(Role.STOP_AT_TIMEOUT)] = state.model.profile.stops_at_timeout
@@ -87,35 +86,84 @@ class CommunicationWatchdog:
             if faulted or not state.bus.supervised:
                 raise
             # whether a drive has any means at all is nowhere written for such a line [C102]
-            report = state.report(Cause.OWN_TIMEOUT_NOT_TAKEN, why=error.report)
-            state.tell(Severity.WARNING, report)
+            self._tell_not_taken(error)
             return ()
         for change in changes:
             self._found.setdefault(change.key, change.old)
             self._set[change.key] = change.new
+        self._settled, self._unasked = seconds, False
         return changes
 
-    async def put_back(self) -> None:
-        """
-        Put back what was found, at a clean end after which the drive would go on watching.
+    def _require_possible(self) -> None:
+        state = self._state
+        if state.plc_time:
+            raise DriveError(Report(Cause.OWN_TIMEOUT_OF_PLC, seconds=state.plc_time))
+        if not state.timeout.can_be_set and not state.bus.supervised:
+            raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
 
-        What another master has set meanwhile is left alone. Tells why the drive will have a fault,
-        if it will; nothing of that keeps the driver from ending.
+    async def _try_usual(self, seconds: float) -> None:
+        """
+        Set the usual one, where the drive may stop its motor by itself.
+
+        Whether it may is left as it is, and so is a shorter time-out: both were decided by others.
+        """
+        timeout = self._state.timeout
+        if not seconds or self._state.plc_time:
+            return
+        try:
+            await timeout.read()
+            if not timeout.stops_motor:
+                return
+            await timeout.watch(seconds)
+            if not timeout.watched_by and not 0 < timeout.seconds <= seconds:
+                await self._write_usual(seconds)
+        except (LinkError, DriveError) as error:
+            self._tell_not_taken(error)
+
+    async def _write_usual(self, seconds: float) -> None:
+        timeout, key = self._state.timeout, self._state.model.key(Role.COMMUNICATION_TIMEOUT)
+        # before it is written: a stop may come between, and then it stands there all the same
+        self._found.setdefault(key, timeout.seconds)
+        self._set[key] = seconds
+        self._unasked = True
+        await self._change({key: seconds})
+        await timeout.read()
+
+    async def undo(self) -> None:
+        """Put back what no setting asked for, while the drive may take settings yet."""
+        if self._unasked:
+            with contextlib.suppress(LinkError, DriveError):
+                await self._restore()
+
+    async def put_back(self, *, goes_on: bool) -> None:
+        """
+        Put back what was found, at a clean end.
+
+        What another master has set meanwhile is left alone, and so is what was asked for where the
+        drive does not go on watching. Tells why the drive will have a fault, if it will; nothing of
+        that keeps the driver from ending.
+
+        :param goes_on: the bus keeps control, so that the drive goes on watching.
         """
         state = self._state
         await self._end_watch()
-        if not state.timeout.can_be_set:
+        if not state.timeout.can_be_set or not (goes_on or self._unasked):
             return
         try:
-            for key in reversed(self._found):
-                if await state.params.read(key, Priority.SERVICE) == self._set[key]:
-                    await self._change({key: self._found[key]})
-            await state.timeout.read()
+            await self._restore()
+            if goes_on:
+                await state.timeout.read()
         except (LinkError, DriveError) as error:
-            self._tell_left(explain_failure(error, state))
+            self._tell_left(explain_failure(error, state), goes_on=goes_on)
         else:
-            if state.timeout.seconds and state.timeout.stops_motor:
-                self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS))
+            if goes_on and state.timeout.seconds and state.timeout.stops_motor:
+                self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS), goes_on=True)
+
+    async def _restore(self) -> None:
+        for key in reversed(tuple(self._found)):
+            if await self._state.params.read(key, Priority.SERVICE) == self._set[key]:
+                await self._change({key: self._found[key]})
+            del self._found[key]
 
     async def _end_watch(self) -> None:
         state = self._state
@@ -133,38 +181,61 @@ class CommunicationWatchdog:
             wanted, guarded=False, told_as=Cause.CHANGED_FOR_TIMEOUT
         )
 
-    def _tell_left(self, why: Report) -> None:
+    def _tell_not_taken(self, error: LinkError | DriveError) -> None:
+        why = explain_failure(error, self._state)
+        self._say(Severity.WARNING, self._state.report(Cause.OWN_TIMEOUT_NOT_TAKEN, why=why))
+
+    def _tell_watching(self) -> None:
+        """Tell after what time the drive stops the motor by itself; once for each in a row."""
+        timeout, model = self._state.timeout, self._state.model
+        if timeout.shortest and timeout.stops_motor:
+            name = timeout.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
+            watching = Report(Cause.OWN_TIMEOUT_SET, name=name, timeout=timeout.shortest)
+            self._say(Severity.INFO, watching)
+
+    def _tell_left(self, why: Report, *, goes_on: bool) -> None:
+        cause = Cause.OWN_TIMEOUT_LEFT if goes_on else Cause.OWN_TIMEOUT_NOT_PUT_BACK
         key = self._state.model.key(Role.COMMUNICATION_TIMEOUT)
         name, timeout = self._state.model[key].name, self._state.timeout.seconds
-        self._state.tell(
-            Severity.WARNING, Cause.OWN_TIMEOUT_LEFT, key=key, name=name, timeout=timeout, why=why
-        )
+        self._state.tell(Severity.WARNING, cause, key=key, name=name, timeout=timeout, why=why)
 
     def warn_if_unfit(self) -> None:
         """Tell that it is missing, or strikes too soon; once for each reason in a row."""
         complaint = self._complaint() if self._commanded else None
-        if complaint is not None and complaint != self._told:
-            self._told = complaint
-            self._state.tell(Severity.WARNING, complaint)
+        if complaint is not None:
+            kept = complaint.cause is Cause.OWN_TIMEOUT_KEPT
+            self._say(Severity.INFO if kept else Severity.WARNING, complaint)
+
+    def _say(self, severity: Severity, what: Report) -> None:
+        if self._told.get(what.cause) != what:
+            self._told[what.cause] = what
+            self._state.tell(severity, what)
 
     def _complaint(self) -> Report | None:
-        state, model = self._state, self._state.model
+        """Return what is wrong with it as it will be with the next enable, or why it stays."""
+        state, model, settings = self._state, self._state.model, self._state.settings
         timeout, margin = state.timeout.shortest, DRIVE_TIMEOUT_MARGIN
-        least = state.settings.lost_after + margin
-        method = state.settings.method_class
+        method = settings.method_class
         if method.plc_time:
             caution = method.caution
             return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=caution) if caution else None
+        if settings.drive_timeout > 0:
+            # else it is refused
+            return None
         if not state.timeout.can_be_set and not state.timeout.watched_by:
             return state.report(Cause.NO_OWN_TIMEOUT)
         name = state.timeout.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
-        if not timeout:
-            return Report(Cause.OWN_TIMEOUT_OFF, name=name)
+        asked = settings.drive_timeout
+        if not timeout and not settings.own_timeout:
+            return Report(Cause.OWN_TIMEOUT_OFF, name=name, asked=asked)
         if not state.timeout.stops_motor:
             stop = model[model.key(Role.STOP_AT_TIMEOUT)].name
             return Report(Cause.OWN_TIMEOUT_STOPS_NOTHING, name=stop)
-        if timeout < least - 1e-9:
+        least = settings.lost_after + margin
+        if 0 < timeout < least - 1e-9:
             return Report(
                 Cause.OWN_TIMEOUT_SHORT, name=name, timeout=timeout, margin=margin, least=least
             )
+        if not asked:
+            return Report(Cause.OWN_TIMEOUT_KEPT, name=name, timeout=timeout)
         return None

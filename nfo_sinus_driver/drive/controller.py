@@ -11,7 +11,7 @@ Every command, everything that the status shows and every loss is an event of
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 import math
 
@@ -31,7 +31,7 @@ from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.drive.following import Following
 from nfo_sinus_driver.drive.setpoint import Setpoint
-from nfo_sinus_driver.drive.starting import StartSequence
+from nfo_sinus_driver.drive.starting import Prepare, StartSequence
 from nfo_sinus_driver.drive.stop_reason import StopReason, reason_of
 from nfo_sinus_driver.drive.stopping import StopSequence
 from nfo_sinus_driver.link import LinkError, Refused
@@ -210,9 +210,7 @@ class Controller:
 
     # --- commands -----------------------------------------------------------------------------
 
-    async def enable(
-        self, prepare: Callable[[], Awaitable[None]], requested_at: float = math.inf
-    ) -> Report:
+    async def enable(self, prepare: Prepare, requested_at: float = math.inf) -> Report:
         """
         Take control and run at set-point 0, then follow set-points that arrive from now on.
 
@@ -251,9 +249,7 @@ class Controller:
             self._control.dispatch(ControlEvent.REFUSED)
             raise DriveError(report_of(error)) from error
 
-    async def _start(
-        self, control_mode: str, limits: Limits, prepare: Callable[[], Awaitable[None]]
-    ) -> None:
+    async def _start(self, control_mode: str, limits: Limits, prepare: Prepare) -> None:
         """Start the motor, and follow set-points from then on; else remove the run command."""
         try:
             await self._starting.start(control_mode, prepare)
@@ -421,7 +417,7 @@ class Controller:
             return Report(Cause.ACKNOWLEDGED_DETAILED, status=acknowledged, details=details)
         return Report(Cause.ACKNOWLEDGED, status=acknowledged)
 
-    async def release(self, timeout: float, why: Report) -> Report:
+    async def release(self, timeout: float, why: Report, prepare: Prepare) -> Report:
         """
         Give control back once the motor stands.
 
@@ -429,6 +425,7 @@ class Controller:
         time-out of its own that goes on it is released, for else that would end the ramp with a
         fault.
 
+        :param prepare: does what has to be done before, while the bus has control.
         :raises DriveError: the drive does not confirm that it stops.
         """
         # a run command may be on its way, whoever has control at this moment; and where the bus has
@@ -437,20 +434,22 @@ class Controller:
         may_run = self.commanded or self.stopping or (status is not None and status.from_bus)
         # no client can enable it until the motor stands
         with self._sequence.external_stop(why):
-            return await self._release(timeout, may_run=may_run)
+            return await self._release(timeout, prepare, may_run=may_run)
 
-    async def _release(self, timeout: float, *, may_run: bool) -> Report:
+    async def _release(self, timeout: float, prepare: Prepare, *, may_run: bool) -> Report:
         stopped = await self.stop() if may_run else None
         if not await self.method.in_control(Priority.SERVICE):
             return stopped or Report(Cause.NOT_IN_CONTROL)
         stopped = stopped or await self.stop()
         if self.blocked_by_fault:
             raise DriveError(self._state.report(Cause.RELEASE_BLOCKED))
+        stands = True
         try:
-            await self._state.wait_until(
-                lambda status: not status.driven, Priority.SERVICE, timeout
-            )
+            await self._state.wait_until(lambda now: not now.driven, Priority.SERVICE, timeout)
         except DriveError:
+            stands = False
+        await prepare()
+        if not stands:
             await self._state.timeout.read()
             if not self._state.timeout.shortest or self.method.control_retained:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)

@@ -92,7 +92,9 @@ class Drive:
         self.log = ErrorLog(self.state, procedures)
         self._error_log_monitor = ErrorLogMonitor(self.state, self.log)
         self._fault_namer = FaultNamer(self.state)
-        self._tuning = Tuning(self.state, self.parameters, procedures)
+        self._tuning = Tuning(
+            self.state, self.parameters, procedures, self._watchdog.require_set
+        )
         #: It has said who it is, and is of this family.
         self._recognised = False
         bus.on_restart(self._unit, self._watch.restarted)
@@ -264,10 +266,10 @@ class Drive:
         try:
             if self._controller is None:
                 return Report(Cause.ONLY_WATCHED)
-            answer = await self._controller.release(timeout, why)
+            answer = await self._controller.release(timeout, why, self._watchdog.undo)
             # whoever has control at this moment: it may come back to the bus by itself
-            if self._controller.method.control_retained:
-                await self._watchdog.put_back()
+            goes_on = bool(self._controller.method.control_retained)
+            await self._watchdog.put_back(goes_on=goes_on)
             return answer
         finally:
             self._bus.cancel(self._parameters_task)
@@ -445,7 +447,7 @@ class Drive:
         state.require_fresh(await state.read_status(Priority.SERVICE))
         if self._controller is not None:
             await self._controller.secure_found()
-            await self._watchdog.prepare()
+            self._watchdog.connected()
         if not early:
             await self._read_nameplate()
         self._watch.connected()

@@ -285,9 +285,20 @@ class Cause(enum.Enum):
     NO_OWN_TIMEOUT = _NO_TIMEOUT.format(
         why='none is known of this model', remedy='use the {enable_input}'
     )
-    OWN_TIMEOUT_OFF = _NO_TIMEOUT.format(why='{name} is 0', remedy='{call.set_drive_timeout}')
+    OWN_TIMEOUT_OFF = _NO_TIMEOUT.format(
+        why='{name} is 0, and {call.drive_timeout} {asked:g} leaves it so',
+        remedy='{call.set_drive_timeout}',
+    )
     OWN_TIMEOUT_STOPS_NOTHING = _NO_TIMEOUT.format(
-        why='{name} is OFF', remedy='{call.set_drive_timeout}'
+        why='{name} is OFF', remedy='{call.set_drive_timeout}, which turns it ON'
+    )
+    OWN_TIMEOUT_KEPT = (
+        '{call.drive_timeout} is 0: the time-out of the drive itself ({name} {timeout:g} s) stays '
+        'as it is'
+    )
+    OWN_TIMEOUT_SET = (
+        'if this {call.program} is killed or the cable is cut, the drive stops the motor after '
+        '{timeout:g} s ({name})'
     )
     OWN_TIMEOUT_UNKNOWN = (
         'the PLC stops the motor if this {call.program} dies; what the drive does if the PLC '
@@ -297,9 +308,6 @@ class Cause(enum.Enum):
         'the time-out of the drive itself ({name} {timeout:g} s) is less than lost_after + '
         '{margin:g} s: noise that this {call.program} waits out may stop the motor; '
         '{call.set_drive_timeout}, at least {least:g} s'
-    )
-    OWN_TIMEOUT_LATER = (
-        '{call.drive_timeout} cannot be set yet, and will be when it is enabled: {why}'
     )
     OWN_TIMEOUT_IMPOSSIBLE = (
         '{call.drive_timeout}: this model has no time-out of its own that can be set, so it must '
@@ -314,6 +322,10 @@ class Cause(enum.Enum):
         'control stays with the bus, and the time-out of the drive itself ({name} {timeout:g} s) '
         'goes on: {why}. So it will have a fault when nothing is said to it for so long; set '
         '{key} to 0 if it shall not'
+    )
+    OWN_TIMEOUT_NOT_PUT_BACK = (
+        'the time-out of the drive itself ({name}) stays {timeout:g} s, which this {call.program} '
+        'has set: {why}. Set {key} as it was before, if another master needs that'
     )
     OWN_TIMEOUT_NOT_OURS = 'this {call.program} has not set it, and leaves it as it is'
     WATCH_LEFT = (

@@ -102,6 +102,9 @@ LAST_BLOCK = 0x10000 - BLOCK_SIZE
 #: How much longer than ``lost_after`` the drive's own time-out is, s: else it would stop the motor
 #: in noise that the driver waits out.
 DRIVE_TIMEOUT_MARGIN = 0.5
+#: ``drive_timeout`` where nothing is said of it: the usual one, as far as the drive has one.
+AS_THE_DRIVE_CAN = -1.0
+_USUAL_DRIVE_TIMEOUT = 2.0
 
 
 @dataclass(frozen=True)
@@ -206,9 +209,11 @@ class DriveSettings:
         0, 30000, unit='rpm', zero='not given', change=UNCONFIGURED,
     )
     drive_timeout: float = setting(
-        0.0, "the drive's own time-out: it stops the motor when this driver dies", 0,
-        LONGEST_DRIVE_TIMEOUT, unit='s', zero='leave it as it is',
-        also='0 or at least lost_after + 0.5; the most and the step are those of the drive',
+        AS_THE_DRIVE_CAN,
+        "the drive's own time-out: it stops the motor when this driver dies; -1: 2 s, or "
+        'lost_after + 0.5 if that is more, where the drive has one that may stop the motor',
+        AS_THE_DRIVE_CAN, LONGEST_DRIVE_TIMEOUT, unit='s', zero='leave it as it is',
+        also='-1, 0 or at least lost_after + 0.5; the most and the step are those of the drive',
     )
     stop_with: Sequence[str] = setting(
         ('',),
@@ -364,18 +369,37 @@ class DriveSettings:
             raise ValueError(f'family {self.family} cannot be used: {error}') from error
         return found
 
+    @functools.cached_property
+    def own_timeout(self) -> float:
+        """What the time-out of the drive itself is to be, s; 0: it is left as it is."""
+        if self.drive_timeout != AS_THE_DRIVE_CAN:
+            return self.drive_timeout
+        for longest, step in _own_timeouts(self.model):
+            seconds = self._least_drive_timeout(step, _USUAL_DRIVE_TIMEOUT)
+            return seconds if seconds <= longest else 0.0
+        return 0.0
+
+    def _least_drive_timeout(self, step: Fraction, usual: float = 0.0) -> float:
+        """Return the least in steps of the drive that noise does not reach, or a usual one, s."""
+        least = max(usual, self.lost_after + DRIVE_TIMEOUT_MARGIN)
+        return float(math.ceil((least - 1e-7) / step) * step)
+
     def _check_drive_timeout(self) -> None:
+        if self.drive_timeout == AS_THE_DRIVE_CAN:
+            # the table of the drive is read now, and not when the motor is to run
+            assert self.own_timeout >= 0
+            return
         # a drive that has none refuses any, with the reason
         own = _own_timeouts(self.model) or _own_timeouts(AUTO)
         longest, step = max(most for most, _ in own), min(least for _, least in own)
         whose = f' with {self.model}' if len(own) == 1 else ''
         declared = settings_of(DriveSettings)['drive_timeout']
-        replace(declared, high=float(longest), unit=f's{whose}').check(self.drive_timeout)
-        least = self.lost_after + DRIVE_TIMEOUT_MARGIN
-        if 0 < self.drive_timeout < least - 1e-9:
+        declared = replace(declared, low=0, high=float(longest), unit=f's{whose}')
+        declared.check(self.drive_timeout)
+        if 0 < self.drive_timeout < self.lost_after + DRIVE_TIMEOUT_MARGIN - 1e-9:
             raise ValueError(
                 f'drive_timeout {self.drive_timeout:g} s: at least '
-                f'{float(math.ceil((least - 1e-7) / step) * step):g} s, half a second more than '
+                f'{self._least_drive_timeout(step):g} s, half a second more than '
                 f'lost_after ({self.lost_after:g} s), so that noise which the driver waits out '
                 'does not stop the motor'
             )

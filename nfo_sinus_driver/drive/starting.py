@@ -21,6 +21,9 @@ from nfo_sinus_driver.link import Refused
 #: How long all that a start waits for may take together, s, what the drive itself waits for aside.
 _START_TIMEOUT = 4.0
 
+#: Does what has to be done first.
+Prepare = Callable[[], Awaitable[None]]
+
 
 class _StepTime:
     """
@@ -88,7 +91,7 @@ class StartSequence:
         await read_scales(state)
         return control_mode, await read_limits(state, control_mode)
 
-    async def start(self, control_mode: str, prepare: Callable[[], Awaitable[None]]) -> None:
+    async def start(self, control_mode: str, prepare: Prepare) -> None:
         """
         Take control and run at set-point 0; after an error a run command may stand all the same.
 
@@ -98,7 +101,9 @@ class StartSequence:
         await self._await_status(lambda now: now.from_bus)
         if self._state.settings.follows_setpoints:
             await self._method.zero_setpoint(control_mode, Priority.SERVICE)
+        begun = self._state.bus.now()
         await prepare()
+        self._deadline += self._state.bus.now() - begun
         await self._method.run(self._await_start)
         run_at = self._state.bus.now()
         # behind a PLC a status from before the run command is shown for a while

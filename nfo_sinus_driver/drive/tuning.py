@@ -17,6 +17,7 @@ from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
+from nfo_sinus_driver.drive.starting import Prepare
 
 #: How often the drive is asked how far it is; the polls go on beside it, s.
 _LOOK_PERIOD = 0.05
@@ -65,14 +66,23 @@ class Tuned:
 
 
 class Tuning:
-    """Has one drive tune; used on the bus alone."""
+    """
+    Has one drive tune; used on the bus alone.
+
+    :param prepare: does what has to be done before a motor is energised.
+    """
 
     def __init__(
-        self, state: DriveState, parameters: Parameters, procedures: Procedures
+        self,
+        state: DriveState,
+        parameters: Parameters,
+        procedures: Procedures,
+        prepare: Prepare,
     ) -> None:
         self._state = state
         self._parameters = parameters
         self._procedures = procedures
+        self._prepare = prepare
 
     async def tune_now(self, procedure: Procedure, progress: Progress) -> Tuned:
         """
@@ -87,6 +97,9 @@ class Tuning:
         # from here on a stop is one of the tuning, too
         with self._procedures.begun(procedure) as access:
             await self._require_motor_plate(what)
+            if not self._state.nameplate.is_older:
+                # that takes settings under bus control alone, which only an enable has
+                await self._prepare()
             motor = self._state.model.group_of(Role.NOMINAL_POWER)
             keys = [key for key in self._parameters.available() if key in motor]
             async with self._parameters.left_to_the_drive(keys) as changes:

@@ -303,8 +303,8 @@ LAWS = (
         4,
         'a monitor writes',
         DRIVE,
-        '            await self._watchdog.prepare()',
-        '        await self._watchdog.prepare()',
+        '            self._watchdog.connected()',
+        '        await self._watchdog.set_now(2.0)',
         (INTERFACE, '-k', 'monitor'),
         # the watchdog refuses a monitor, and so does every write of a setting
         (

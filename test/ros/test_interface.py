@@ -36,7 +36,7 @@ _SETTINGS = {
     'setpoint_timeout': 2.5,
     'setpoint_max': 0.0,
     'expected_control_mode': '',
-    'drive_timeout': 0.0,
+    'drive_timeout': -1.0,
     'lost_after': 1.0,
     'shutdown_timeout': 4.0,
     'frame_id': '',
@@ -302,8 +302,12 @@ def test_settings_take_effect_at_once_and_integers_are_taken_for_doubles(bench: 
 def test_what_the_drive_has_already_is_not_written(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.timeout(2))
     bench.driver(*FULL_RATE, '-p', 'drive_timeout:=2.0')
-    bench.client().connected()
+    client = bench.client().connected()
     assert not drive.state()['writes']
+    assert client.enable().success
+    assert not {'serial.sio_tot', 'serial.auto_stop', 'serial.pc_timeout'} & {
+        *drive.state()['writes']
+    }
 
 
 def test_an_integer_on_the_command_line_is_taken_for_a_double(bench: Bench) -> None:

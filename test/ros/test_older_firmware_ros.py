@@ -37,15 +37,14 @@ def test_settings_are_written_and_control_is_given_back(bench: Bench) -> None:
     drive = bench.simulator(*_QUICK, paced=False)
     bench.driver('-p', 'drive_timeout:=14.0', '-p', 'freque.f_fix2:=21.5')
     client: Client = bench.client().connected()
-    state = drive.state()
-    assert state['parameters']['serial.sio_tot'] == 14.0
-    assert state['parameters']['serial.auto_stop'] is True
+    assert drive.state()['parameters']['serial.sio_tot'] == 0.0, 'it was not enabled'
     wait_until(lambda: client.parameter('freque.f_fix2') == 21.5, 'what was given to the node')
     _untouched(drive)
     assert set_one(client, 'freque.f_fix1', 12.5).successful
     assert drive.state()['parameters']['freque.f_fix1'] == 12.5
     assert client.set_parameters(drive_timeout=15.0).successful
     assert drive.state()['parameters']['serial.sio_tot'] == 15.0
+    assert drive.state()['parameters']['serial.auto_stop'] is True
     _untouched(drive)
     writes = sum(drive.state()['command_writes'].values())
     assert set_one(client, 'freque.f_fix1', 12.5).successful

@@ -104,7 +104,7 @@ def test_drive_timeout_that_is_refused_takes_the_parameters_back(
     refused(result, 'drive_timeout', 'serial.auto_stop', 'put back')
     assert stubborn.parameters() == before
     assert values(client, *stubborn.names) == before
-    assert client.parameter('drive_timeout') == 0.0
+    assert client.parameter('drive_timeout') == -1.0
 
 
 def test_what_cannot_be_put_back_is_named_and_shown(stubborn: Stubborn, client: Client) -> None:

@@ -186,7 +186,8 @@ class Rig:
     :param options: of the simulated drives, beside those that make it hardest for the driver.
     :param line: of :class:`Line`, such as ``baud`` or ``response_timeout``.
     :param own: settings of one drive, by its address.
-    :param settings: of every drive, as the driver has them.
+    :param settings: of every drive, as the driver has them; its own time-out is left alone where
+        they do not say otherwise.
     :ivar fars: the simulated drives, by address; :ivar far: the first.
     :ivar drives: the driver's, by address; :ivar drive: the first.
     :ivar looked: called whenever something may have happened; an ``AssertionError`` of it ends the
@@ -234,7 +235,7 @@ class Rig:
                 far.control_unit.switch(terminal, True)
         usual = {
             'model': way.model, 'control_method': way.method, 'reference': way.reference,
-            'poll_rate': 20.0, **way.driver, **settings,
+            'poll_rate': 20.0, 'drive_timeout': 0.0, **way.driver, **settings,
         }
         self._settings = {
             address: DriveSettings(**{**usual, 'address': address, **(own or {}).get(address, {})})

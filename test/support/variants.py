@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from nfo_sinus_driver import families
+from nfo_sinus_driver.catalog import Role, load_family
 from nfo_sinus_driver.catalog.declared import SUFFIX, read
 
 _HARDEST = {
@@ -49,3 +51,10 @@ def ramps(model: str, up: float, down: float) -> dict[str, float]:
         file = read(Path(model))
         return {key: time for key, time in ((file.accel, up), (file.decel, down)) if key}
     return dict(zip(_RAMPS[model], (up, down), strict=True))
+
+
+def stopping_at_timeout(model: str, method: str) -> dict[str, Any]:
+    """Return the setting of a drive by which its own time-out stops the motor, if there is one."""
+    family = load_family(model, method)
+    key = family.key(Role.STOP_AT_TIMEOUT)
+    return {key: family.profile.stops_at_timeout} if key else {}

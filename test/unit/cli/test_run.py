@@ -117,14 +117,14 @@ def test_the_set_point_stays_fresh(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize(
-    ('options', 'why'),
-    [({}, 'SioTot is 0'), ({'serial.sio_tot': 5}, 'AutoStop is OFF')],
+    ('typed', 'why'),
+    [((), 'AutoStop is OFF'), (('--drive-timeout', 0), 'SioTot is 0, and --drive-timeout 0 leav')],
 )
 def test_it_warns_once_of_a_drive_without_a_time_out(
-    make_bench: MakeBench, options: dict[str, Any], why: str
+    make_bench: MakeBench, typed: tuple[object, ...], why: str
 ) -> None:
-    bench = make_bench(settings={**QUICK, **options})
-    done = bench.run('run', 10, '--for', 0.3)
+    bench = make_bench(settings=QUICK)
+    done = bench.run('run', 10, '--for', 0.3, *typed)
     assert done.status == 0
     assert done.err.count('the drive has no time-out of its own') == 1
     assert why in done.err and '--drive-timeout' in done.err
@@ -134,6 +134,17 @@ def test_it_does_not_warn_of_a_drive_that_has_one(make_bench: MakeBench) -> None
     settings = {**QUICK, 'serial.sio_tot': 5, 'serial.auto_stop': True}
     done = make_bench(settings=settings).run('run', 10, '--for', 0.3)
     assert done.status == 0 and 'time-out' not in done.err
+
+
+def test_by_default_a_time_out_that_may_stop_the_motor_is_set_for_the_run(
+    make_bench: MakeBench,
+) -> None:
+    bench = make_bench(settings={**QUICK, 'serial.auto_stop': True})
+    with bench.riding('--for', 1) as process:
+        wait_until(lambda: bench.value('serial.sio_tot') == 2.0)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0 and 'time-out' not in err
+    assert bench.value('serial.sio_tot') == 0.0
 
 
 def test_json(bench: Bench) -> None:

@@ -259,6 +259,7 @@ def test_scan_writes_a_parameter_file_for_the_driver(
     assert f'--params-file {file}' in done.err
     written = yaml.safe_load(file.read_text())
     assert written == {
+        '/**': {'ros__parameters': {'setpoint_timeout': 2.5}},
         '/**/nfo_sinus_bus': {
             'ros__parameters': {
                 'port': bench.simulator.port,
@@ -269,9 +270,14 @@ def test_scan_writes_a_parameter_file_for_the_driver(
                 'drives': ['drive_1', 'drive_2'],
             }
         },
-        '/**/drive_1': {'ros__parameters': {'address': 1, 'model': 'sinus_g2'}},
-        '/**/drive_2': {'ros__parameters': {'address': 2, 'model': 'sinus_g2'}},
+        '/**/drive_1': {
+            'ros__parameters': {'address': 1, 'model': 'sinus_g2', 'drive_timeout': 2.0}
+        },
+        '/**/drive_2': {
+            'ros__parameters': {'address': 2, 'model': 'sinus_g2', 'drive_timeout': 2.0}
+        },
     }
+    assert 'writes it to the drive (SioTot, and AutoStop = ON)' in file.read_text()
     assert '# NFO Sinus 1.50/400, firmware 4.38 / 4018, serial NFO1001\n' in file.read_text()
     # it may have been edited since
     file.write_text('mine')
@@ -287,7 +293,7 @@ def test_scan_writes_a_parameter_file_for_the_driver(
 def test_scan_writes_the_file_to_the_standard_output_alone(nfo: Nfo) -> None:
     done = nfo('scan', '--addresses', '1', '--params', '-', '--retries', 1)
     assert done.status == 0, done.err
-    assert list(yaml.safe_load(done.out)) == ['/**/nfo_sinus_bus', '/**/drive_1']
+    assert list(yaml.safe_load(done.out)) == ['/**', '/**/nfo_sinus_bus', '/**/drive_1']
     assert 'NFO1001' in done.err
 
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 
 from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 from nfo_sinus_driver.simulator.family import load
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE, FUNCTION_BITS, SETPOINT
 from nfo_sinus_driver.simulator.movitrac31.parameters import Bit, Mode
@@ -55,7 +56,7 @@ class SinusOrder(AnyOrder):
         brake=st.booleans(),
         slow=st.booleans(),
         delay=st.sampled_from((0, 0, 1)),
-        drive_timeout=st.sampled_from((0.0, 0.0, 2.0)),
+        drive_timeout=st.sampled_from((0.0, AS_THE_DRIVE_CAN, 2.0)),
         restart_after=st.sampled_from((None, None, 0, 1, 2)),
         keeps=st.booleans(),
         refuses=st.sampled_from((ALL, ALL, SCMD, NOTHING)),
@@ -90,6 +91,8 @@ class SinusOrder(AnyOrder):
             'control.retard': 3.0 if slow else 0.3,
             'control.run_dly': delay,
         }
+        if drive_timeout < 0 and not optimal:
+            parameters['serial.auto_stop'] = True
         if restart_after is not None and not optimal:
             parameters.update(dict.fromkeys(TRIES.values(), 3))
             parameters.update({'error.rst_dly': restart_after, 'error.tr_time': 1})
@@ -256,7 +259,7 @@ class MovitracOrder(AnyOrder):
         left_behind=st.booleans(),
         slow=st.booleans(),
         response_time=st.sampled_from((0.0, 0.0, 0.0, 30.0)),
-        drive_timeout=st.sampled_from((0.0, 0.0, 2.0)),
+        drive_timeout=st.sampled_from((0.0, AS_THE_DRIVE_CAN, 2.0)),
         resets_itself=st.booleans(),
         magnetizes=st.booleans(),
         **SWITCHES,
@@ -286,7 +289,7 @@ class MovitracOrder(AnyOrder):
         settings: dict[str, Any] = {
             # what no setting can change later has to be so from the beginning
             CONTROL_MODE: 'Remote control' if needs else stored,
-            'serial.pc_timeout': drive_timeout if needs else 0.0,
+            'serial.pc_timeout': 2.0 if needs and drive_timeout else 0.0,
             'serial.response_time': response_time,
             'ramp.t11_up': 3.0 if slow else 0.3,
             'ramp.t11_down': 3.0 if slow else 0.3,

@@ -76,7 +76,6 @@ def timed_out() -> Rig:
 
 def test_a_serial_fault_that_stands_keeps_no_driver_from_acknowledging_it() -> None:
     with timed_out() as rig:
-        assert rig.notes.said(Cause.OWN_TIMEOUT_LATER, Severity.WARNING)
         assert 'Sio Fail is active' in rig.answer(rig.drive.enable())
         assert rig.answer(rig.drive.acknowledge()).startswith('acknowledged 14 Sio Fail')
         rig.asked.clear()

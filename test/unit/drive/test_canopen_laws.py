@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 from nfo_sinus_driver.simulator.can_frames import Frame
 from nfo_sinus_driver.simulator.canopen import Server
 
@@ -32,7 +33,7 @@ SHAPES = {
 OVERLOAD = 5
 #: The fault of a drive that has lost its master, by heartbeat and by guarding.
 MASTER_LOST = ([14], [15])
-SIO_TOT = 'serial.sio_tot'
+SIO_TOT, AUTO_STOP = 'serial.sio_tot', 'serial.auto_stop'
 
 
 def shaped(shape: str, way: str = 'canopen', **more: Any) -> Rig:
@@ -63,6 +64,7 @@ def test_every_shape_of_the_node_is_commanded_and_left_as_it_was_found(
 ) -> None:
     with shaped(shape, way, drive_timeout=4.0) as rig:
         rig.connect()
+        rig.enable()
         assert not rig.notes.said(Cause.OWN_TIMEOUT_NOT_TAKEN)
         rig.turn(-10.0)
         rig.far.trip(OVERLOAD)
@@ -104,14 +106,34 @@ def test_the_drive_stops_when_the_driver_is_gone_also_before_the_motor_starts(
 def test_the_watch_outlives_an_idle_driver() -> None:
     with Rig('canopen', drive_timeout=8.0, poll_rate=0.2, telemetry_rate=0.0) as rig:
         rig.connect()
+        rig.enable()
+        rig.answer(rig.drive.stop())
         asked = len(rig.asked)
         rig.pass_time(30.0)
         assert len(rig.asked) > asked + 2 and not rig.far.faults.codes
 
 
+def test_by_default_it_watches_from_the_first_enable_to_the_end() -> None:
+    with Rig('canopen', parameters={AUTO_STOP: True}, drive_timeout=AS_THE_DRIVE_CAN) as rig:
+        watch = server_of(rig)
+        rig.connect(parameters=True)
+        assert watch.read(0x1016, 1) == bytes(4)
+        rig.enable()
+        assert watch.read(0x1016, 1)[:2] == (2000).to_bytes(2, 'little')
+        assert rig.notes.said('after 2 s (consumer heartbeat, object 1016h)', Severity.INFO)
+        assert not rig.written(SIO_TOT)
+        # no set-point, and hardly a poll: the heartbeat alone
+        rig.pass_time(20.0)
+        assert rig.drive.following and not rig.far.faults.codes
+        rig.answer(rig.drive.disconnect(4.0))
+        assert watch.read(0x1016, 1) == bytes(4)
+
+
 def test_a_watch_that_could_not_be_changed_is_ended_all_the_same() -> None:
     with Rig('canopen', drive_timeout=5.0) as rig:
         rig.connect()
+        rig.enable()
+        rig.answer(rig.drive.stop())
         rig.line.state = 'silent'
         assert 'did not answer' in rig.answer(rig.drive.set_drive_timeout(6.0))
         rig.line.mend()
@@ -124,6 +146,7 @@ def test_a_watch_that_could_not_be_changed_is_ended_all_the_same() -> None:
 def test_a_lost_answer_to_the_end_of_the_watch_is_no_failed_clean_up() -> None:
     with Rig('canopen', drive_timeout=5.0, retries=0) as rig:
         rig.connect()
+        rig.enable()
         rig.line.plan = lambda data: 'drop' if b'161001' in data else None
         assert 'the bus keeps control' in rig.answer(rig.drive.disconnect(4.0))
         assert rig.notes.said(Cause.WATCH_LEFT)

@@ -196,9 +196,13 @@ def test_every_row_is_visited(monkeypatch: pytest.MonkeyPatch) -> None:
             state.break_line('gone', wait=1.0)
             state.mend_line(wait=2.5)
             state.let(15.0)
-    with Rig('classic v5.0', drive_timeout=4.0) as rig:
-        # firmware that has to be under control to take a setting, while it is connected to
+    with Rig('classic v5.0') as rig:
+        # firmware that has to be under control to take a setting, before it is connected to again
         rig.connect()
+        rig.line.state = 'silent'
+        rig.wait_until(lambda: not rig.drive.snapshot.connected)
+        rig.line.mend()
+        rig.result(rig.drive.parameters.change({'control.accel': 2.0}))
     table = set(visited)
     unvisited = sorted(f'{event.name} in {state.name}' for state, event in table - visited.rows)
     assert unvisited == []

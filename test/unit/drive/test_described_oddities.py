@@ -328,8 +328,8 @@ def test_its_own_time_out_is_set_and_stops_it_when_the_driver_is_gone(tmp_path: 
     file = described(tmp_path, parameters=parameters, timeout=timeout)
     with DescribedRig(file, drive_timeout=2.0) as rig:
         rig.connect()
-        assert (rig.far.peek('serial.timeout'), rig.far.peek('serial.action')) == (2.0, 'Stop')
         rig.enable()
+        assert (rig.far.peek('serial.timeout'), rig.far.peek('serial.action')) == (2.0, 'Stop')
         rig.follow(20.0)
         rig.kill()
         rig.line.go_to(rig.clock.now + 10.0)

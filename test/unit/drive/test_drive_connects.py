@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from support.rig import Rig
 from support.said import said
+from support.variants import shipped
 
 from nfo_sinus_driver.catalog import Kind, Role
 from nfo_sinus_driver.drive import Cause, DriveSettings, Severity
@@ -174,6 +175,25 @@ def test_exit_leaves_a_slow_motor_to_its_ramp_unless_a_fault_would_end_it(
         assert rig.far.faults.codes == []
 
 
+@pytest.mark.parametrize(
+    ('model', 'lost_after', 'own'),
+    [
+        ('sinus_g2', 1.0, 2.0),
+        ('sinus_g2', 1.5, 2.0),
+        ('sinus_g2', 1.55, 2.1),
+        ('sinus_g2', 60.0, 0.0),
+        ('movitrac31', 9.5, 10.0),
+        ('movitrac31', 9.6, 0.0),
+        (shipped('toshiba_vf_s11'), 1.6, 3.0),
+        ('sinus_optimal', 1.0, 0.0),
+    ],
+)
+def test_the_default_is_what_the_drive_and_lost_after_allow(
+    model: str, lost_after: float, own: float
+) -> None:
+    assert DriveSettings(model=model, lost_after=lost_after).own_timeout == own
+
+
 NO_SENSE: list[tuple[dict[str, Any], str]] = [
     ({'address': 248}, 'allowed are 0 to 247'),
     ({'model': 'sinus_x'}, "'sinus_g2', "),
@@ -222,6 +242,8 @@ def test_settings_that_do() -> None:
         DriveSettings(drive_timeout=timeout / 10)
         DriveSettings(drive_timeout=(timeout - 8) / 10, lost_after=(timeout - 13) / 10)
     DriveSettings(drive_timeout=10.0, model='movitrac31')
+    with pytest.raises(ValueError, match=r'drive_timeout -0.5: allowed are 0 to 25 s'):
+        DriveSettings(drive_timeout=-0.5)
     # it may be the one that takes it
     DriveSettings(drive_timeout=25.0, model='auto')
     DriveSettings(drive_timeout=0.0, setpoint_timeout=0.0, poll_rate=1000.0)

@@ -213,11 +213,12 @@ def test_what_is_stored_is_written_once_and_reported_and_kept() -> None:
 
 def test_a_time_out_that_always_stops_needs_nothing_else() -> None:
     with Bench(drive_timeout=4.0).connect() as rig:
+        rig.result(rig.drive.enable())
         assert rig.bolt.registers[PATIENT] == 40
         assert rig.drive.state.timeout.seconds == 4.0 and rig.drive.state.timeout.stops_motor
         assert not rig.notes.said('time-out of its own')
     with Bench().connect() as rig:
-        assert rig.notes.said('no time-out of its own (T BUS is 0)')
+        assert rig.notes.said('no time-out of its own (T BUS is 0, and')
 
 
 def test_a_set_point_is_limited_to_the_one_direction() -> None:

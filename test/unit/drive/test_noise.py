@@ -10,7 +10,10 @@ import random
 from typing import Any
 
 import pytest
-from support.rig import Rig
+from support.rig import WAYS, Rig
+from support.variants import stopping_at_timeout
+
+from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 
 #: The driver gave the motor up, whether or not it could say so to the drive.
 _ENDS = ('lost: ', 'stopped: ', 'stopping: ')
@@ -74,10 +77,15 @@ def test_damaged_answers_stop_nothing(line: str, share: float, most: int) -> Non
 
 @_each_line
 @pytest.mark.parametrize('length', [0.3, 0.8, 0.99])
-def test_a_burst_shorter_than_lost_after_stops_nothing(line: str, length: float) -> None:
-    # the time-out of the drive itself is the shortest there may be
-    with made(line, drive_timeout=1.5) as rig:
+@pytest.mark.parametrize('timeout', [1.5, AS_THE_DRIVE_CAN], ids=['the shortest', 'default'])
+def test_a_burst_shorter_than_lost_after_stops_nothing(
+    line: str, length: float, timeout: float
+) -> None:
+    way = WAYS[LINES[line][0]]
+    stops = stopping_at_timeout(way.model, way.method)
+    with made(line, drive_timeout=timeout, parameters=stops) as rig:
         rig.turn()
+        assert rig.drive.state.timeout.seconds == (2.0 if timeout < 0 else timeout)
         for number in range(10):
             # at another moment of the round each time
             drown(rig, length, after=0.1 + 0.0154 * number)

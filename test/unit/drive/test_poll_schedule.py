@@ -280,5 +280,7 @@ def test_a_motor_that_ramps_or_that_another_master_runs_is_not_idle() -> None:
 def test_the_idle_rate_keeps_the_time_out_of_the_drive_from_striking() -> None:
     with Rig(poll_rate=20.0, idle_poll_rate=0.1, drive_timeout=1.5) as rig:
         rig.connect()
+        rig.enable()
+        rig.answer(rig.drive.stop())
         rig.pass_time(10.0)
         assert polls(rig, 10.0) >= 20

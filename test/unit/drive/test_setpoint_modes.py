@@ -241,16 +241,18 @@ def timeouts(rig: Rig) -> tuple[int, int]:
 
 def test_drive_timeout_is_set() -> None:
     with Rig(drive_timeout=2.5).connect() as rig:
+        assert timeouts(rig) == (0, 0) and not rig.notes.said(Cause.OWN_TIMEOUT_OFF)
+        rig.enable()
         assert timeouts(rig) == (25, 1)
-        assert rig.far.writes == {TOT: 1, STOP: 1}
+        assert [rig.far.writes[key] for key in (TOT, STOP)] == [1, 1]
         assert rig.notes.said('serial.sio_tot: 0 -> 2.5 s (drive_timeout)')
         assert rig.notes.said('serial.auto_stop: false -> true (drive_timeout)')
-        assert not rig.notes.said(Cause.OWN_TIMEOUT_OFF)
+        assert rig.notes.said('the drive stops the motor after 2.5 s (SioTot)', Severity.INFO)
         # parameters live in EEPROM: what is right is not written again
         assert rig.result(rig.drive.set_drive_timeout(2.5)) == ()
         (change,) = rig.result(rig.drive.set_drive_timeout(3.0))
         assert str(change) == 'serial.sio_tot: 2.5 -> 3 s'
-        assert rig.far.writes == {TOT: 2, STOP: 1}
+        assert [rig.far.writes[key] for key in (TOT, STOP)] == [2, 1]
 
 
 def test_a_time_out_of_the_drive_that_strikes_before_it_is_lost_is_said() -> None:
@@ -283,4 +285,5 @@ def test_drive_timeout_that_no_manual_allows() -> None:
     with Rig(drive_timeout=2.0) as rig:
         rig.far.memory.put(TOT, 300)
         rig.connect()
+        rig.enable()
         assert timeouts(rig) == (20, 1)
