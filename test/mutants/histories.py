@@ -176,7 +176,7 @@ HISTORIES = (
         3,
         'in any order: a clean-up does not stop the motor',
         DRIVE,
-        '            answer = await self._controller.release(timeout, why)\n',
+        '            answer = await self._controller.release(timeout, why, self._watchdog.undo)\n',
         '            answer = Report(Cause.ONLY_WATCHED)\n',
         OPTIMAL_SCMD,
     ),
