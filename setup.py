@@ -42,7 +42,8 @@ setup(
     zip_safe=False,
     maintainer='NFO Sinus driver developers',
     maintainer_email='nfo-sinus-driver@example.org',
-    description='Driver for NFO Sinus and other variable-frequency drives (VFDs) on a bus',
+    description='Driver for variable-frequency drives (VFDs): NFO Sinus and others',
+    keywords=['ROS', 'VFD', 'variable-frequency drive', 'frequency inverter', 'Modbus', 'CANopen'],
     license='Apache-2.0',
     entry_points={
         'console_scripts': [

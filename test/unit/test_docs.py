@@ -186,6 +186,16 @@ def all_launch_arguments() -> set[str]:
     return {name for path in LAUNCH_FILES for name in launch_arguments(read(path))}
 
 
+def test_the_first_sentence_says_what_it_drives_by_the_word_that_people_look_for() -> None:
+    for name, begin in (
+        ('README.md', r'# nfo_sinus_driver\s+'), ('docs/README.md', r'# Documentation\s+'),
+        ('docs/index.html', '<title>'), ('package.xml', r'<description>\s*'),
+        ('msg_defs/package.xml', r'<description>\s*'), ('setup.py', "description='"),
+    ):
+        first = re.search(rf'{begin}([^.]*)', (ROOT / name).read_text(encoding='utf-8'))
+        assert first is not None and 'variable-frequency drives (VFDs' in first[1], name
+
+
 def test_what_is_public_is_documented() -> None:
     topics = {
         name for path in (PACKAGE / 'node').glob('*.py') for name in topics_and_services(read(path))
