@@ -171,6 +171,11 @@ def families() -> tuple[str, ...]:
     return tuple(sorted(_folders()))
 
 
+def is_family(name: str) -> bool:
+    """Tell whether a name is that of a folder, or the path of a file that describes a drive."""
+    return is_described(name) or name in _folders()
+
+
 def is_described(name: str) -> bool:
     """Tell whether a family is one that a file describes: its name is the path of the file."""
     return name.endswith(DESCRIBED)

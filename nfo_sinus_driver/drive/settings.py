@@ -17,7 +17,7 @@ from nfo_sinus_driver.catalog import (
     Profile,
     Role,
     families,
-    is_described,
+    is_family,
     load_family,
     load_parameter,
     load_profile,
@@ -321,7 +321,7 @@ class DriveSettings:
         settings = settings_of(DriveSettings)
         if self.family:
             object.__setattr__(self, 'model', self._model_of_family())
-        elif not is_described(self.model):
+        elif not is_family(self.model):
             _one_of('model', self.model, (*families(), AUTO))
         if self.control_method:
             _one_of('control_method', self.control_method, _control_methods(self.model))

@@ -224,6 +224,28 @@ def test_every_file_keeps_the_rules_of_the_house() -> None:
     assert {path: rules for path, rules in found.items() if rules} == {}
 
 
+def described_drives_in(source: str, path: str) -> list[str]:
+    """What a file imports that is about drives which files describe."""
+    about = re.compile(r'[._](declared|described)\b|DESCRIBED')
+    return [name for name in imports_of(ast.parse(source), path) if about.search(name)]
+
+
+def test_who_drives_knows_not_that_files_describe_drives() -> None:
+    found = {
+        path: described_drives_in(source, path)
+        for path, source in package_sources().items()
+        if room_of(path) in ('bus', 'drive', 'link', 'node')
+    }
+    assert {path: names for path, names in found.items() if names} == {}
+    for name in ('catalog.declared.read', 'catalog.is_described', 'families._declared.profile'):
+        room, _, what = name.rpartition('.')
+        assert described_drives_in(f'from {PACKAGE}.{room} import {what}', 'drive/a.py')
+
+
+def test_the_one_profile_of_described_drives_is_short() -> None:
+    assert package_sources()['families/_declared/profile.py'].count('\n') <= 300
+
+
 def test_no_object_writes_the_fields_of_another() -> None:
     found = {
         path: list(foreign_writes(ast.parse(source)))

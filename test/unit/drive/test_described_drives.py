@@ -12,6 +12,7 @@ import textwrap
 import pytest
 from support.described import SHIPPED, DescribedRig
 
+from nfo_sinus_driver.catalog.declared import read
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.simulator._declared.control_unit import DeclaredControlUnit
 
@@ -29,6 +30,15 @@ def fault_of(rig: DescribedRig) -> int:
     """Return a fault of the drive, by its file."""
     listed = [*rig.file.faults, *(fault.code for _, fault in rig.file.flags)]
     return listed[0] if listed else 198
+
+
+def test_ten_files_have_all_that_a_ride_is_about() -> None:
+    files = [read(path) for path in SHIPPED.values()]
+    assert len(files) >= 10
+    for file in files:
+        assert file.reset and (file.setpoint.signed or file.setpoint.direction), file.name
+    # which parameters its registers are is to be set at the drive
+    assert [file.name for file in files if not file.accel] == ['lenze_i500']
 
 
 @pytest.mark.parametrize(('name', 'protocol'), RIDES)
