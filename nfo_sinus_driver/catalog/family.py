@@ -66,6 +66,7 @@ class Family(Mapping[str, Parameter]):
     :ivar status_codes: its inverter status codes, by number.
     :ivar error_logs: where its error log stands, by protocol; empty where no manual says.
     :ivar profile: how it is commanded, and what is to be known of it beside its tables.
+    :ivar unlisted: what any other status code means; ``None``: nothing is known of it.
     """
 
     name: str
@@ -74,6 +75,7 @@ class Family(Mapping[str, Parameter]):
     status_codes: Mapping[int, StatusCode]
     error_logs: Mapping[str, ErrorLogArea]
     profile: Profile
+    unlisted: StatusCode | None = None
 
     def __getitem__(self, key: str) -> Parameter:
         return self.parameters[key]
@@ -119,9 +121,13 @@ class Family(Mapping[str, Parameter]):
 
     def status_code(self, code: int) -> StatusCode:
         """Return what an inverter status code means; an unknown code is shown as its number."""
-        unlisted = 'Status code that the manual does not list'
         found = self.status_codes.get(code)
-        return found or StatusCode(code, f'Code {code}', description=unlisted)
+        if found is not None:
+            return found
+        if self.unlisted is not None:
+            return replace(self.unlisted, code=code, text=f'{self.unlisted.text} {code}')
+        unlisted = 'Status code that the manual does not list'
+        return StatusCode(code, f'Code {code}', description=unlisted)
 
     def codes(self, meaning: Meaning) -> tuple[StatusCode, ...]:
         """Return the inverter status codes that mean something."""
@@ -331,7 +337,8 @@ def _described(path: str) -> Family:
     drive = declared.read(Path(path))
     profile = importlib.import_module(f'{_FAMILIES}._declared.profile').profile_of(drive)
     codes = declared.status_codes(drive)
-    return Family(drive.name, drive.parameters, drive.roles, codes, {}, profile)
+    unlisted = codes[declared.Code.FAULT]
+    return Family(drive.name, drive.parameters, drive.roles, codes, {}, profile, unlisted)
 
 
 @functools.cache

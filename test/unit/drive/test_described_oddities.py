@@ -248,8 +248,9 @@ def test_a_fault_that_the_file_does_not_list_is_shown_by_its_number(tmp_path: Pa
         rig.far.control_unit._number = lambda code: 77  # type: ignore[attr-defined]
         rig.far.trip(1)
         rig.pass_time(0.5)
-        assert rig.drive.snapshot.text == 'Code 77'
-        assert rig.drive.snapshot.status.faulted
+        shown = rig.drive.snapshot
+        assert shown.text == 'Fault 77' and shown.status.faulted and shown.requires_ack
+        assert shown.remedy == 'Look at its keypad which one it is, and remove its cause'
 
 
 def test_a_number_that_means_none_is_no_value(tmp_path: Path) -> None:
