@@ -10,6 +10,7 @@ from pathlib import Path
 import shutil
 import signal
 import subprocess
+import termios
 
 from bench import Bench, holds_for
 from nfo_sinus_msgs.msg import DriveStatus
@@ -21,6 +22,8 @@ pytestmark = needs('own')
 
 #: The package that has the file, and the name of the family.
 PACKAGE, NAME = 'their_robot', 'their_drive'
+#: The parameter file with which the launch file starts a driver.
+SINGLE = Path(__file__).resolve().parents[2] / 'config' / 'single.yaml'
 
 
 def _installed(prefix: Path) -> Path:
@@ -72,18 +75,20 @@ def test_a_ride(bench: Bench, file: Path, family: str) -> None:
     assert 'Traceback' not in bench.log
 
 
-def test_line_and_address_are_those_of_the_file_where_none_is_given(bench: Bench) -> None:
+@pytest.mark.parametrize('shipped', [(), ('--params-file', str(SINGLE))], ids=['bare', 'file'])
+def test_line_and_address_are_those_of_the_file_where_none_is_given(
+    bench: Bench, shipped: tuple[str, ...]
+) -> None:
     bench.simulator('--family', 'yaskawa_v1000')
-    bench.bare_driver(
-        *('-p', f'port:={bench.port}', '-p', 'family:=yaskawa_v1000'),
-        *('-p', 'nfo_sinus_bus:char_format:=8N2'),
-        through=('env',),
-    )
-    drive, bus = bench.client().connected(), bench.client('/nfo_sinus_bus')
+    given = {'port': bench.port, 'family': 'yaskawa_v1000', 'nfo_sinus_bus:char_format': '8N2'}
+    words = [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
+    bench.bare_driver(*shipped, *words, through=('env',))
+    drive = bench.client().connected()
     assert drive.parameter('address') == 31
-    assert [bus.parameter(name) for name in ('protocol', 'baud_rate', 'char_format')] == [
-        'modbus_rtu', 9600, '8N2',
-    ]
+    with open(bench.port, 'rb', buffering=0) as port:
+        _, _, control, _, speed, *_ = termios.tcgetattr(port)
+    assert speed == termios.B9600
+    assert control & termios.CSTOPB and not control & termios.PARENB
 
 
 def test_a_family_that_is_none_is_refused_with_what_to_do(bench: Bench, tmp_path: Path) -> None:
