@@ -24,6 +24,8 @@ from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
 
 #: The schema of a description.
 PATH = Path(__file__).parent / 'vfd.schema.json'
+#: So many characters of a text are shown, for what is wrong may be of any length.
+_SHOWN = 60
 _KINDS = {
     'object': 'a mapping (key: value)',
     'array': 'a list',
@@ -112,12 +114,14 @@ class _Checker:
         value = node.scalar
         if 'enum' in rule and value not in rule['enum']:
             allowed = ', '.join(str(one) for one in rule['enum'])
-            self._problems.add(node.line, f'{where} is {value}: choose one of {allowed}')
+            given = str(value)[:_SHOWN]
+            self._problems.add(node.line, f'{where} is {given}: choose one of {allowed}')
         elif isinstance(value, str):
             pattern = rule.get('pattern', '')
             if pattern and not re.search(pattern, value):
                 hint = rule.get('description', f'it has to match {pattern}')
-                self._problems.add(node.line, f'{where} cannot be {value!r}: {hint}')
+                said = f'{where} cannot be {value[:_SHOWN]!r}: {hint}'
+                self._problems.add(node.line, said)
         elif isinstance(value, (int, Fraction)) and not isinstance(value, bool):
             self._check_number(node, value, rule, where)
 

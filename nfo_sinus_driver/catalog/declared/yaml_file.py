@@ -28,10 +28,10 @@ Scalar = bool | int | Fraction | str | None
 _DEEPEST = 20
 #: More than this no description has: one whose anchors multiply.
 _MOST_NODES = 50_000
-# Python converts no number of thousands of digits
-_INTEGER = re.compile(r'[+-]?(0|[1-9][0-9]{0,99}|0x[0-9a-fA-F]+|0b[01]+)')
+# what is longer is no number that a drive has, and may be more than Python converts
+_INTEGER = re.compile(r'[+-]?(0|[1-9][0-9]{0,18}|0x[0-9a-fA-F]{1,16}|0b[01]{1,64})')
 _ZEROS = re.compile(r'[+-]?0[0-9]+')
-_NUMBER = re.compile(r'[+-]?([0-9]{0,99}\.[0-9]{1,99}([eE][+-]?[0-9]{1,2})?|[0-9]{1,99}\.)')
+_NUMBER = re.compile(r'[+-]?([0-9]{0,18}\.[0-9]{1,99}([eE][+-]?[0-9]{1,2})?|[0-9]{1,18}\.)')
 _WORDS = {'true': True, 'false': False, 'null': None, '~': None, '': None}
 
 

@@ -226,6 +226,30 @@ def test_what_the_file_does_not_give_the_drive_does_not_have(tmp_path: Path) -> 
     assert not family.profile.status_word.by_frequency
 
 
+#: Where a number stands in the good file, and what may be mistaken for one.
+NUMBERS = (
+    'baud_rate: 9600', 'address: 5', 'value: 1', 'wait: 0.1', 'unit: Hz, most: 60', 'bit: 0',
+    'register: 20', 'minimum: 0.1', 'maximum: 60', 'default: 5', 'codes: {1', 'register: 30',
+    'type: int16, factor: 0.1',
+)
+NO_NUMBERS = (
+    '0x' + 'f' * 400, '9' * 5000, '-' + '9' * 99, '0b' + '1' * 5000, '1.0e99', '1.0e400',
+    '0.' + '0' * 98 + '1', '1/' + '9' * 5000, '9' * 5000 + '/1', '.5', '5.', '!!int "7"',
+    '2001-01-01', '1:30', '~', '"\\0"', '{}', '[]',
+)
+
+
+@pytest.mark.parametrize('number', NUMBERS)
+def test_whatever_stands_for_a_number_nothing_but_a_sentence_comes(
+    tmp_path: Path, number: str
+) -> None:
+    assert number in GOOD
+    for other in NO_NUMBERS:
+        key = re.sub(r'[\d.]+$', '', number)
+        for one in complaints(tmp_path, GOOD.replace(number, key + other, 1)):
+            assert re.match(r'.*made_up\.vfd\.yaml(, line \d+)?: \S.*', one), one
+
+
 # --- fuzz ---
 
 _SCALARS = st.one_of(
