@@ -217,8 +217,9 @@ class DriveSettings:
     )
     stop_with: Sequence[str] = setting(
         ('',),
-        'names of drives of this line that stop when this one is stopped, whatever the reason; a '
-        'set-point time-out is no stop: it stays enabled',
+        'names of drives that stop when this one is stopped, whatever the reason; those of another '
+        'line by their full names, such as /line2/right; a set-point time-out is no stop: it stays '
+        'enabled',
         zero='none',
     )
     shutdown_timeout: float = setting(

@@ -27,6 +27,8 @@ from nfo_sinus_driver.node.factory_settings import with_factory_address
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
 from nfo_sinus_driver.node.messages import Joint
+from nfo_sinus_driver.node.other_lines import OtherLines, is_elsewhere, stop_of
+from nfo_sinus_driver.node.overrides import did_you_mean
 from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.scale import Scale, require_scale
@@ -97,6 +99,12 @@ class DriveNode(LifecycleNodeMixin, Node):
             self.lifecycle,
             self._stop_others,
         )
+        self._other_lines = OtherLines(
+            self,
+            queue,
+            lambda: self.managed.settings.stop_with,
+            lambda: self.managed.drive.snapshot.enabled,
+        )
         try:
             self._wanted = wanted_state(self, self.managed.drive)
         except DriveError as error:
@@ -118,6 +126,7 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _stop_others(self, why: Report) -> None:
         """Stop the drives that stop with this one; called on the bus."""
+        self._other_lines.stop()
         reason = Report(Cause.STOPPED_WITH, drive=self.get_fully_qualified_name(), why=why)
         self._bus_context.stop_beside(self.managed.settings.stop_with, reason)
 
@@ -247,10 +256,13 @@ class DriveNode(LifecycleNodeMixin, Node):
     def _require_known(self, names: Sequence[str]) -> None:
         known = self._bus_context.names
         for name in filter(None, names):
-            if name not in known:
+            if is_elsewhere(name):
+                stop_of(self, name)
+            elif name not in known:
                 raise ValueError(
                     f'stop_with: there is no drive {name!r} on this line: '
-                    f'choose of {", ".join(known)}'
+                    f'choose of {", ".join(known)}, or write the full name of one of another '
+                    f'line, such as /line2/right{did_you_mean(name, known)}'
                 )
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
@@ -325,6 +337,7 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _take_settings(self, parameters: list[Parameter]) -> None:
         self.managed.change_settings(self._settings_with(parameters))
+        self._other_lines.follow()
 
 
 def _require_gear_ratio(values: Mapping[str, object]) -> None:

@@ -43,7 +43,7 @@ from nfo_sinus_driver.signals import ENDING, HeldSignals, OtherProcess, signal_n
 
 #: Threads that callbacks of one drive may keep waiting: one for each of its callback groups, but
 #: more for ``~/enable``.
-_GROUPS_OF_A_DRIVE = 15 + CALLS_OF_ENABLE
+_GROUPS_OF_A_DRIVE = 16 + CALLS_OF_ENABLE
 _GROUPS_OF_THE_BUS = 6
 #: With many threads and a busy one among them, this keeps the bus on time, s.
 _SWITCH_INTERVAL = 0.0002

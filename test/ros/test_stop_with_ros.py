@@ -1,19 +1,40 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""``stop_with``: the drives that a drive names stop when it is stopped."""
+"""``stop_with``: the drives that a drive names stop when it is stopped, on whichever line."""
 
 from __future__ import annotations
 
-from bench import Bench
+from collections.abc import Callable, Iterator
+import contextlib
+import signal
+import time
+from typing import NamedTuple
+
+from bench import A_WHILE, Bench, Client, Process, holds_for, wait_until
 from nfo_sinus_msgs.msg import DriveStatus
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+from std_srvs.srv import Trigger
 from ways import needs
+
+from nfo_sinus_driver.node.other_lines import PERIOD
+from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _TWO = """
 /**/nfo_sinus_bus: {ros__parameters: {drives: [infeed, outfeed]}}
 /**/infeed: {ros__parameters: {setpoint_timeout: 0.0, stop_with: [outfeed]}}
 /**/outfeed: {ros__parameters: {address: 2, setpoint_timeout: 0.0, stop_with: [infeed]}}
 """
+#: SCMD = Stop, by Modbus.
+_STOP = '0602980000'
+#: Within what time the drive of another line is told to stop, s: some 10 ms on a machine at rest.
+_SOON = 0.5
+#: What is said of a drive of another line that is not there, and of one that comes then.
+_MISSED = 'does not stop with it'
+_FOUND = 'is there now: it stops with this drive'
 
 
 @needs('own')
@@ -34,6 +55,157 @@ def test_a_drive_stops_those_that_it_names_and_says_why(bench: Bench) -> None:
         'it stops with the other',
     )
     # a name that no drive has is refused, with those that there are
-    answer = infeed.set_parameters(stop_with=['outfeed', 'nobody'])
+    answer = infeed.set_parameters(stop_with=['outfeed', 'outfed'])
     assert not answer.successful
-    assert "no drive 'nobody' on this line: choose of infeed, outfeed" in answer.reason
+    assert "no drive 'outfed' on this line: choose of infeed, outfeed" in answer.reason
+    assert answer.reason.endswith('did you mean outfeed?')
+
+
+class Line(NamedTuple):
+    """A line of its own: a simulated drive, its driver and a client."""
+
+    bench: Bench
+    simulator: Simulated
+    driver: Process
+    client: Client
+
+    def turn(self) -> None:
+        """Have the motor turn."""
+        assert self.client.connected().enable().success
+        self.client.publish(10.0)
+        wait_until(lambda: self.simulator.state()['frequency'] > 9, 'it turns')
+        wait_until_found(self.driver)
+
+    def stops_since(self, moment: float) -> list[float]:
+        """Return when its drive was told to stop, s."""
+        return [
+            frame['first']
+            for frame in self.bench.frames()
+            if frame['first'] > moment and frame['hex'][2:].startswith(_STOP)
+        ]
+
+
+def wait_until_found(driver: Process, absent: int = 0) -> None:
+    """Wait until a driver that enables has found the drives of other lines, but for the absent."""
+    time.sleep(2 * PERIOD)
+    wait_until(
+        lambda: driver.text.count(_MISSED) == driver.text.count(_FOUND) + absent, 'it found them'
+    )
+
+
+@pytest.fixture
+def lines(bench: Bench) -> Iterator[tuple[Line, Line]]:
+    """Two lines whose drives name each other, ``/drive`` and ``/line2/drive``."""
+    folder = bench.folder / 'second'
+    folder.mkdir()
+    with Bench(bench.domain, folder, bench.way) as second:
+        yield _line(bench, '', 'line2/drive'), _line(second, '/line2', '/drive')
+
+
+def _line(bench: Bench, namespace: str, other: str) -> Line:
+    place = ('-r', f'__ns:={namespace or "/"}', '-r', '__node:=drive')
+    settings = ('-p', 'setpoint_timeout:=0.0', '-p', f'stop_with:=[{other}]')
+    return Line(
+        bench,
+        bench.simulator(*bench.drives.ramps(1)),
+        bench.driver(*place, *settings),
+        bench.client(f'{namespace}/drive'),
+    )
+
+
+_STOPS: dict[str, Callable[[Line], object]] = {
+    'stop': lambda line: line.client.call('stop'),
+    'fault': lambda line: line.simulator.inject('fault', 5),
+    'lost line': lambda line: line.simulator.inject('hangup', 60.0),
+    'end of the driver': lambda line: line.driver.signal(signal.SIGINT),
+}
+
+
+@needs('own')
+@pytest.mark.parametrize('stop', _STOPS)
+def test_whatever_stops_a_drive_stops_the_one_of_another_line(
+    lines: tuple[Line, Line], stop: str
+) -> None:
+    first, second = lines
+    for line in lines:
+        line.turn()
+    begun = time.monotonic()
+    _STOPS[stop](first)
+    told = wait_until(lambda: second.stops_since(begun), 'the other is told to stop')
+    # nothing can be told to a drive whose line is gone
+    own = [begun] if stop == 'lost line' else first.stops_since(begun)
+    assert told[0] - own[0] < _SOON
+    second.client.wait_for(
+        'status', lambda one: one.stop_reason == DriveStatus.REASON_STOP, 'it says why'
+    )
+    assert '/line2/drive/stop called by ' in second.client.newest('status').stop_text
+    wait_until(lambda: second.simulator.state()['frequency'] == 0, 'it stands')
+
+
+@needs('own')
+def test_two_that_name_each_other_stop_once_and_can_be_enabled_again(
+    lines: tuple[Line, Line]
+) -> None:
+    first, second = lines
+    for line in lines:
+        line.turn()
+    first.simulator.inject('fault', 5)
+    second.client.wait_for('status', lambda one: not one.enabled, 'the other stops')
+    assert second.client.newest('status').stop_text.endswith('/line2/drive/stop called by /drive')
+    wait_until(lambda: '/drive stops with it: ' in second.driver.text, 'and has it stopped')
+    assert first.client.call('fault_ack').success
+    for line in lines:
+        line.turn()
+    holds_for(A_WHILE, lambda: all(line.client.newest('status').enabled for line in lines), 'runs')
+
+
+@needs('own')
+def test_what_does_not_stop_with_it_is_said_and_keeps_no_stop(bench: Bench) -> None:
+    bench.simulator()
+    driver = bench.driver('-p', 'stop_with:=[/missing/drive, /deaf/drive, /refusing/drive]')
+    client = bench.client().connected()
+    client.node.create_service(Trigger, '/refusing/drive/stop', _refuse)
+    with deaf(bench.domain, '/deaf/drive/stop'):
+        assert client.enable().success
+        warned = (
+            '/missing/drive does not stop with it: nothing offers /missing/drive/stop; start its '
+            'driver, or correct stop_with'
+        )
+        wait_until(lambda: warned in driver.text, 'a warning while it is enabled')
+        wait_until_found(driver, absent=1)
+        assert client.call('stop').success
+        for said in (
+            '/missing/drive does NOT stop with it: nothing offers /missing/drive/stop; use its',
+            '/refusing/drive does NOT stop with it: it cannot; use its enable input',
+            '/deaf/drive does NOT stop with it: no answer of /deaf/drive/stop in 3 s; use its',
+        ):
+            wait_until(lambda said=said: said in driver.text, said)
+    assert driver.text.count(warned) == 1
+    # and what cannot be a name is refused
+    answer = client.set_parameters(stop_with=['/line 2/right'])
+    assert not answer.successful
+    assert "stop_with: '/line 2/right' cannot be the name of a drive" in answer.reason
+    # without them nothing is called any more
+    assert client.set_parameters(stop_with=['']).successful
+    before = driver.text.count('does NOT stop with it')
+    assert client.enable().success and client.call('stop').success
+    holds_for(A_WHILE, lambda: driver.text.count('does NOT stop with it') == before, 'silence')
+
+
+def _refuse(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    response.message = 'it cannot'
+    return response
+
+
+@contextlib.contextmanager
+def deaf(domain: int, service: str) -> Iterator[None]:
+    """Offer a service that never answers."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = Node('deaf', context=context)
+    node.create_service(Trigger, service, _refuse)
+    try:
+        yield
+    finally:
+        node.destroy_node()
+        rclpy.shutdown(context=context)
