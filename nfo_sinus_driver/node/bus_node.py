@@ -12,6 +12,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import BusStatistics
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float32
@@ -23,7 +24,7 @@ from nfo_sinus_driver.node.all_drives import AllDrives
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.declaring import coerce, declare
 from nfo_sinus_driver.node.factory_settings import line_of
-from nfo_sinus_driver.node.overrides import families_of
+from nfo_sinus_driver.node.overrides import families_of, require_declared
 from nfo_sinus_driver.node.qos import RELIABLE
 from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
@@ -92,6 +93,15 @@ class BusNode(Node):
         self.bus_context.publish_queue.put(
             lambda: self._log_port(None if error is None else str(error))
         )
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set parameters; of a name that is none the reason has what is most like it."""
+        try:
+            for parameter in parameter_list:
+                require_declared(self, parameter.name)
+        except ValueError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return super().set_parameters_atomically(parameter_list)
 
     def _on_setpoint_all(self, message: Float32) -> None:
         for take in self.bus_context.on_setpoint_all:

@@ -16,13 +16,14 @@ from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import Family, Parameter as CatalogParameter, Value
 from nfo_sinus_driver.drive import Change, Drive
-from nfo_sinus_driver.node.overrides import declared_names, did_you_mean
+from nfo_sinus_driver.node.overrides import require_declared
 from nfo_sinus_driver.node.rclpy_internals import overrides_of, writable
 from nfo_sinus_driver.node.wording import NodeError
 
 #: How long a change may wait for the bus before it is said that it is not known, s.
 _LONGEST_CHANGE = 30.0
 
+_LATER = '; those of the drive are there once the node is configured'
 _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text'}
 
 
@@ -107,13 +108,7 @@ class DriveParameters:
         return drive is not None and name in self._declared and not drive.model[name].is_setting
 
     def _admit(self, parameter: Parameter) -> Parameter:
-        if not self._node.has_parameter(parameter.name):
-            # rclpy refuses it too, but its message leaves out the name
-            near = did_you_mean(parameter.name, declared_names(self._node))
-            raise ValueError(
-                f'{parameter.name}: there is no such parameter; those of the drive are there once '
-                f'the node is configured{near}'
-            )
+        require_declared(self._node, parameter.name, _LATER)
         drive = self._drive
         unset = parameter.type_ is Parameter.Type.NOT_SET
         if drive is None or unset or parameter.name not in self._declared:

@@ -98,6 +98,18 @@ def declared_names(node: Node) -> set[str]:
     return set(node.get_parameters_by_prefix('')) | set(later)
 
 
+def require_declared(node: Node, name: str, hint: str = '') -> None:
+    """
+    Make sure that a node has a parameter.
+
+    :param hint: what else to say of one that is not there.
+    :raises ValueError: it has not; rclpy refuses it too, but has no other name to offer.
+    """
+    if not node.has_parameter(name):
+        near = did_you_mean(name, declared_names(node))
+        raise ValueError(f'{name}: there is no such parameter{hint}{near}')
+
+
 def unknown_nodes(arguments: list[str], names: Iterable[str]) -> Iterator[str]:
     """Return a warning for each section of a parameter file that no node is named by."""
     names = set(names)

@@ -16,6 +16,7 @@ import sys
 import time
 
 from bench import A_WHILE, EXECUTED, PATIENCE, Bench, Client, Process, holds_for, wait_until
+from parameter_bench import refused, set_one
 import pytest
 from ways import SILENCE, Way, needs
 
@@ -384,6 +385,21 @@ def test_a_name_for_the_whole_process_becomes_the_name_of_the_single_drive(bench
     assert 'belt' in nodes
     assert 'nfo_sinus_bus' in nodes
     assert nodes.count('belt') == 1
+
+
+@needs('own')
+def test_a_name_that_is_none_is_answered_with_the_one_most_like_it(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver()
+    drive, bus = bench.client().connected(), bench.client('/nfo_sinus_bus')
+    for client, name, near in (
+        (drive, 'setpoint_timout', 'setpoint_timeout'),
+        (drive, 'control.acel', 'control.accel'),
+        (bus, 'respons_timeout', 'response_timeout'),
+    ):
+        # by the service that ros2 param set calls, and by the other one
+        for answer in (set_one(client, name, 1.0), client.set_parameters(**{name: 1.0})):
+            refused(answer, f'{name}: there is no such parameter', f'did you mean {near}')
 
 
 @pytest.mark.parametrize(
