@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass, field
 import threading
+from typing import Any
 
+from rclpy.node import Node
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.bus import Bus
@@ -18,6 +20,7 @@ from nfo_sinus_driver.drive.settings import BLOCK_SIZE
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
+from nfo_sinus_driver.node.wrong_types import PERIOD, WrongTypes
 
 #: How long the bus waits for what is to begin at once, s; no drive times out by then.
 _LONGEST_GATHERING = 0.1
@@ -46,6 +49,15 @@ class BusContext:
         for one in self.drives:
             if one.name in names:
                 one.drive.stop_beside(why)
+
+    def subscribe(
+        self, node: Node, topics: Mapping[str, tuple[type, Callable[[Any], None]]]
+    ) -> None:
+        """Take the set-points of topics, each of a type and for a function; warn of other types."""
+        for topic, (type_, callback) in topics.items():
+            self.setpoint_subscriber.subscribe(node, type_, topic, callback)
+        types = {topic: type_ for topic, (type_, _) in topics.items()}
+        self.publish_queue.put_every(PERIOD, WrongTypes(node, types).look)
 
     def add(self, drive: ManagedDrive) -> None:
         """Take in another drive."""

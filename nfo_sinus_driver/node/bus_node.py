@@ -57,8 +57,7 @@ class BusNode(Node):
         limit = settings.max_requests if link.protocol.most_requests else 0.0
         self.bus_context = BusContext(Bus(link, limit), settings.retries)
         AllDrives(self, self.bus_context)
-        subscribe = self.bus_context.setpoint_subscriber.subscribe
-        subscribe(self, Float32, '~/setpoint_all', self._on_setpoint_all)
+        self.bus_context.subscribe(self, {'~/setpoint_all': (Float32, self._on_setpoint_all)})
         self._logged_port: str | None = ''
         self._logged_remarks: set[str] = set()
         self._last_diagnosis: tuple[bytes, str] | None = None

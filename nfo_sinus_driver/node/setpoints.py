@@ -51,10 +51,14 @@ class Setpoints:
         self._logged_idle = False
         self._told_other_joint = False
         self._joint_command = node.resolve_topic_name('~/joint_command')
-        subscribe = context.setpoint_subscriber.subscribe
-        subscribe(node, Float32, '~/setpoint', self._on_setpoint)
-        subscribe(node, Setpoint, '~/setpoint_stamped', self._on_stamped)
-        subscribe(node, JointState, '~/joint_command', self._on_joint_command)
+        context.subscribe(
+            node,
+            {
+                '~/setpoint': (Float32, self._on_setpoint),
+                '~/setpoint_stamped': (Setpoint, self._on_stamped),
+                '~/joint_command': (JointState, self._on_joint_command),
+            },
+        )
         context.on_setpoint_all.append(self._on_setpoint_all)
 
     def be_quiet(self, quiet: bool) -> None:

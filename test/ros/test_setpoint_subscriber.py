@@ -6,15 +6,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import time
 
 from bench import FULL_RATE, Bench, wait_until
 import pytest
 import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import Float32
+from std_msgs.msg import Float32, Float64
 
 from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
+from nfo_sinus_driver.node.wrong_types import PERIOD
 
 
 @pytest.fixture
@@ -81,3 +83,36 @@ def test_it_ends_though_nobody_ever_spoke(node: Node) -> None:
     assert subscriber.alive
     subscriber.close()
     assert not subscriber.alive
+
+
+def test_who_publishes_another_type_is_warned_of_once_with_what_to_type(
+    bench: Bench, node: Node
+) -> None:
+    bench.simulator()
+    driver = bench.driver('-r', '__ns:=/plant', '-r', '~/setpoint:=/hand/speed')
+    bench.client('/plant/nfo_sinus').connected()
+    wrong = {
+        '/hand/speed': (Float64, 'std_msgs/msg/Float32', '{data: 0.0}'),
+        '/plant/nfo_sinus/setpoint_stamped': (
+            Float32, 'nfo_sinus_msgs/msg/Setpoint', '{value: 0.0, unit: 0}'
+        ),
+        '/plant/nfo_sinus/joint_command': (
+            Float32, 'sensor_msgs/msg/JointState', '{name: [joint], velocity: [0.0]}'
+        ),
+        '/plant/nfo_sinus_bus/setpoint_all': (Float64, 'std_msgs/msg/Float32', '{data: 0.0}'),
+    }
+    publishers = [node.create_publisher(type_, topic, 1) for topic, (type_, _, _) in wrong.items()]
+    warnings = [
+        f'/test_subscriber publishes {topic} as std_msgs/msg/{type_.__name__}, which never arrives '
+        f'here: publish it as {wanted}, such as by ros2 topic pub -r 10 {topic} {wanted} '
+        f"'{written}'"
+        for topic, (type_, wanted, written) in wrong.items()
+    ]
+    for warning in warnings:
+        wait_until(lambda warning=warning: warning in driver.text, warning)
+    time.sleep(2 * PERIOD)
+    assert all(driver.text.count(warning) == 1 for warning in warnings)
+    # one that begins anew is another one
+    node.destroy_publisher(publishers[0])
+    node.create_publisher(Float64, '/hand/speed', 1)
+    wait_until(lambda: driver.text.count(warnings[0]) == 2, 'it is warned of again')
