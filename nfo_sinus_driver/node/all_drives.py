@@ -39,6 +39,7 @@ class AllDrives:
         self._context = context
         for name, callback in (
             ('~/stop_all', self._stop),
+            # the name of older versions
             ('~/disable_all', self._stop),
             ('~/enable_all', self._enable),
         ):
