@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 import math
+import re
 import shlex
 from typing import Any, TypeVar
 
@@ -86,6 +87,10 @@ def add_setting(group: argparse._ActionsContainer, name: str, option: str, **mor
     setting = SETTINGS[name]
 
     def value(text: str) -> object:
+        if name == 'address' and re.fullmatch('[0-9]+[-,][-,0-9]*', text):
+            raise argparse.ArgumentTypeError(
+                f'{text}: this is one drive; scan and monitor take --addresses {text}'
+            )
         given = type(setting.default)(text)
         try:
             setting.check(given)
@@ -157,9 +162,10 @@ def addresses(text: str) -> tuple[int, ...]:
     found: set[int] = set()
     for part in text.split(','):
         first, _, last = part.partition('-')
-        found.update(range(address(first), address(last or first) + 1))
-    if not found:
-        raise argparse.ArgumentTypeError(f'{text} is no list of addresses, such as 1-10,20')
+        span = range(address(first), address(last or first) + 1)
+        if not span:
+            raise argparse.ArgumentTypeError(f'{text} is no list of addresses, such as 1-10,20')
+        found.update(span)
     return tuple(sorted(found))
 
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 import dataclasses
 import json
@@ -427,17 +427,23 @@ def inject(argv: Sequence[str]) -> int:
     try:
         with Client(path) as client:
             if options.verb == 'state':
-                one = options.address is not None
-                state = client.state(options.address) if one else client.states()
-                print(json.dumps(state, indent=2, ensure_ascii=False))
+                print(json.dumps(_state(client, options.address), indent=2, ensure_ascii=False))
             else:
                 names = [argument.name for argument in every_injection()[options.verb].arguments]
                 given = {name: getattr(options, name) for name in names}
-                client.inject(options.verb, address=options.address, **given)
+                for address in options.address or (None,):
+                    client.inject(options.verb, address=address, **given)
     except ControlError as error:
         print(f'simulator inject: {error}', file=sys.stderr)
         return 1
     return 0
+
+
+def _state(client: Client, addresses: Sequence[int]) -> Mapping[Any, Any]:
+    """Return the state of one drive, or those of several or all by address."""
+    if len(addresses) == 1:
+        return client.state(addresses[0])
+    return {one: client.state(one) for one in addresses} or client.states()
 
 
 def _inject_parser() -> argparse.ArgumentParser:
@@ -452,9 +458,10 @@ def _inject_parser() -> argparse.ArgumentParser:
     parser.add_argument('--control', metavar='PATH', help='its control channel')
     parser.add_argument(
         '--address',
-        type=int,
-        metavar='N',
-        help='the drive; needed where there are several and it happens to one',
+        type=_addresses,
+        default=(),
+        metavar='LIST',
+        help='the drives, such as 1-10,20; needed where there are several and it happens to one',
     )
     verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True)
     for name, verb in every_injection().items():

@@ -178,6 +178,8 @@ def test_there_is_no_such_port(nfo: Nfo) -> None:
         (['diff', 'a', '--against', '2'], 'one file, or two, or --against'),
         (['diff', '--against', '1'], 'the same drive'),
         (['scan', '--addresses', '5-3'], 'list of addresses'),
+        (['scan', '--addresses', '1,5-3'], 'list of addresses'),
+        (['scan', '--address', '1-32'], 'scan and monitor take --addresses 1-32'),
         (['load', 'a', '--put-back', '--keep'], 'not allowed with'),
     ],
 )

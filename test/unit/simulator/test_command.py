@@ -216,6 +216,16 @@ def test_what_the_manuals_leave_open_is_chosen_by_options(start, inject, open_ma
 # ---- in this process ----
 
 
+def test_inject_takes_a_list_of_addresses(link, inject):
+    with Simulator((1, 2, 3, 4), link=link, control=''):
+        assert inject('--link', link, '--address', '1-2,4', 'run', 'off') == (0, '', '')
+        states = json.loads(inject('--link', link, 'state')[1])
+        assert [states[at]['run_input'] for at in '1234'] == [False, False, True, False]
+        two = json.loads(inject('--link', link, '--address', '2-3', 'state')[1])
+        assert list(two) == ['2', '3']
+        assert inject('--link', link, '--address', '4-6', 'state')[0] == 1
+
+
 def test_inject_does_every_verb_and_says_what_is_wrong(link, inject):
     with Simulator((1, 2), link=link, control=''):
 
