@@ -132,8 +132,9 @@ def test_whatever_stops_a_drive_stops_the_one_of_another_line(
     begun = time.monotonic()
     _STOPS[stop](first)
     told = wait_until(lambda: second.stops_since(begun), 'the other is told to stop')
-    # nothing can be told to a drive whose line is gone
-    own = [begun] if stop == 'lost line' else first.stops_since(begun)
+    own = [begun]
+    if stop != 'lost line':
+        own = wait_until(lambda: first.stops_since(begun), 'the first is told to stop')
     assert told[0] - own[0] < _SOON
     second.client.wait_for(
         'status', lambda one: one.stop_reason == DriveStatus.REASON_STOP, 'it says why'
