@@ -24,7 +24,7 @@ from nfo_sinus_driver.node.all_drives import AllDrives
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.declaring import coerce, declare
 from nfo_sinus_driver.node.factory_settings import line_of
-from nfo_sinus_driver.node.overrides import families_of, require_declared
+from nfo_sinus_driver.node.overrides import families_of, require_parameter
 from nfo_sinus_driver.node.qos import RELIABLE
 from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
@@ -97,7 +97,7 @@ class BusNode(Node):
         """Set parameters; of a name that is none the reason has what is most like it."""
         try:
             for parameter in parameter_list:
-                require_declared(self, parameter.name)
+                require_parameter(self, parameter.name)
         except ValueError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return super().set_parameters_atomically(parameter_list)

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import Family, Parameter as CatalogParameter, Value
 from nfo_sinus_driver.drive import Change, Drive
-from nfo_sinus_driver.node.overrides import require_declared
+from nfo_sinus_driver.node.overrides import require_parameter
 from nfo_sinus_driver.node.rclpy_internals import overrides_of, writable
 from nfo_sinus_driver.node.wording import NodeError
 
@@ -108,7 +108,7 @@ class DriveParameters:
         return drive is not None and name in self._declared and not drive.model[name].is_setting
 
     def _admit(self, parameter: Parameter) -> Parameter:
-        require_declared(self._node, parameter.name, _LATER)
+        require_parameter(self._node, parameter.name, _LATER)
         drive = self._drive
         unset = parameter.type_ is Parameter.Type.NOT_SET
         if drive is None or unset or parameter.name not in self._declared:

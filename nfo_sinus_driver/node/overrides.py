@@ -98,7 +98,7 @@ def declared_names(node: Node) -> set[str]:
     return set(node.get_parameters_by_prefix('')) | set(later)
 
 
-def require_declared(node: Node, name: str, hint: str = '') -> None:
+def require_parameter(node: Node, name: str, hint: str = '') -> None:
     """
     Make sure that a node has a parameter.
 

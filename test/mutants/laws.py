@@ -544,8 +544,8 @@ LAWS = (
         9,
         'a time-out goes on where control is kept',
         'nfo_sinus_driver/drive/drive.py',
-        '            if self._controller.method.control_retained:',
-        '            if False:',
+        '            await self._watchdog.put_back(goes_on=goes_on)\n',
+        '',
         ('test/unit/drive/test_movitrac_commands.py', '-k', 'clean_end'),
     ),
     Mutant(
