@@ -115,10 +115,16 @@ class CommunicationWatchdog:
             if not timeout.stops_motor:
                 return
             await timeout.watch(seconds)
-            if not timeout.watched_by and not 0 < timeout.seconds <= seconds:
+            if not timeout.watched_by and not self._is_kept(seconds):
                 await self._write_usual(seconds)
         except (LinkError, DriveError) as error:
             self._tell_not_taken(error)
+
+    def _is_kept(self, seconds: float) -> bool:
+        """Tell whether others have set one that is no longer."""
+        found = self._state.timeout.seconds
+        ours = self._set.get(self._state.model.key(Role.COMMUNICATION_TIMEOUT))
+        return 0 < found <= seconds and found != ours
 
     async def _write_usual(self, seconds: float) -> None:
         timeout, key = self._state.timeout, self._state.model.key(Role.COMMUNICATION_TIMEOUT)

@@ -544,8 +544,8 @@ LAWS = (
         9,
         'a time-out goes on where control is kept',
         'nfo_sinus_driver/drive/drive.py',
-        '            await self._watchdog.put_back(goes_on=goes_on)\n',
-        '',
+        'goes_on = bool(self._controller.method.control_retained)',
+        'goes_on = False',
         ('test/unit/drive/test_movitrac_commands.py', '-k', 'clean_end'),
     ),
     Mutant(

@@ -13,6 +13,7 @@ from support.rig import Rig
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 
 
 @dataclass(frozen=True)
@@ -253,6 +254,37 @@ def test_drive_timeout_is_set() -> None:
         (change,) = rig.result(rig.drive.set_drive_timeout(3.0))
         assert str(change) == 'serial.sio_tot: 2.5 -> 3 s'
         assert [rig.far.writes[key] for key in (TOT, STOP)] == [2, 1]
+
+
+def test_a_time_out_that_is_to_stay_as_it_is_is_a_decision_that_is_said_once() -> None:
+    for found, cause, severity in (
+        (0.0, Cause.OWN_TIMEOUT_OFF, Severity.WARNING),
+        (5.0, Cause.OWN_TIMEOUT_KEPT, Severity.INFO),
+    ):
+        with Rig(parameters={TOT: found, STOP: True}, drive_timeout=0.0) as rig:
+            rig.connect()
+            rig.far.power_cycle()
+            rig.pass_time(10.0)
+            rig.enable()
+            said = [one for one in rig.notes.events if 'drive_timeout' in one.text]
+            assert [(one.severity, cause in one.text.causes) for one in said] == [(severity, True)]
+            assert 'drive_timeout' in said[0].text and ' 0' in said[0].text
+            assert timeouts(rig) == (10 * found, 1)
+
+
+def test_the_default_follows_what_lost_after_asks_for() -> None:
+    with Rig(parameters={STOP: True}, drive_timeout=AS_THE_DRIVE_CAN) as rig:
+        rig.connect()
+        seen = []
+        for lost_after in (1.0, 3.0, 1.0):
+            rig.drive.settings = replace(rig.drive.settings, lost_after=lost_after)
+            rig.enable()
+            rig.answer(rig.drive.stop())
+            seen.append(timeouts(rig))
+        assert seen == [(20, 1), (35, 1), (20, 1)]
+        # a time that is asked for stays in the drive, and one that was not does not
+        rig.answer(rig.drive.disconnect(4.0))
+        assert timeouts(rig) == (0, 1)
 
 
 def test_a_time_out_of_the_drive_that_strikes_before_it_is_lost_is_said() -> None:
