@@ -111,6 +111,6 @@ def require_packages(needed: Mapping[str, str], find: Callable[[str], object]) -
         except LookupError:
             missing.append(name)
     if missing:
-        told = ', '.join(f'{name} ({needed[name]})' for name in missing)
+        listed = ', '.join(f'{name} ({needed[name]})' for name in missing)
         debs = ' '.join(f'ros-jazzy-{name.replace("_", "-")}' for name in missing)
-        raise ValueError(f'packages are missing: {told}; sudo apt install {debs}')
+        raise ValueError(f'packages are missing: {listed}; sudo apt install {debs}')

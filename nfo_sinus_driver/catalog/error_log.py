@@ -92,7 +92,7 @@ class ErrorLogArea:
         return self.first + self.stride * entry
 
     def place(self, entry: int) -> tuple[str, int, int | None, int]:
-        """Return what a link is told of an entry: space, index, sub-index and size in bytes."""
+        """Return where a link finds an entry: space, index, sub-index and size in bytes."""
         index = self.address(entry)
         # on Classic the high word has the next id
         sub_index = index + 1 if self.space == 'id' else None

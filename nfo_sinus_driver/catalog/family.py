@@ -153,8 +153,8 @@ class Family(Mapping[str, Parameter]):
             return value in self.profile.holders
         if role is Role.STATUS_WORD:
             word, status_word = int(value), self.profile.status_word
-            told = status_word.code is None or status_word.code(word) in self.status_codes
-            return told and status_word.may_say(word)
+            listed = status_word.code is None or status_word.code(word) in self.status_codes
+            return listed and status_word.may_say(word)
         if isinstance(value, str):
             return not parameter.labels or value in parameter.labels.values()
         if math.isnan(value):

@@ -157,16 +157,16 @@ class InverterStatus:
         slows = self.by_frequency and (self.frequency == 0 or falls)
         return self.runs_by_bus and not may_stop and not slows
 
-    def keeps_running_since(self, told: float) -> bool:
+    def keeps_running_since(self, stopped_at: float) -> bool:
         """
-        Tell whether it keeps running, although it was told to stop.
+        Tell whether it keeps running, although it was given a stop.
 
-        :param told: when, s of ``time.monotonic``: a frequency that fell before says nothing.
+        :param stopped_at: when, s of ``time.monotonic``: a frequency that fell before says nothing.
         """
         if not self.by_frequency:
             return self.keeps_running
-        stands = self.at > told and self.frequency == 0
-        stops = stands or self.fell[0] > told
+        stands = self.at > stopped_at and self.frequency == 0
+        stops = stands or self.fell[0] > stopped_at
         if self._only_frequency:
             # energised at set-point 0 it stands, too
             return self.from_bus and not (stops and not self.runs)
@@ -205,8 +205,8 @@ class InverterStatus:
     @property
     def local(self) -> bool:
         """The code says that keypad or terminals have control, and no word that the bus has."""
-        told = self.means(Meaning.TERMINALS, Meaning.KEYPAD)
-        return told and not self.means(Meaning.ANONYMOUS) and not self.from_bus
+        elsewhere = self.means(Meaning.TERMINALS, Meaning.KEYPAD)
+        return elsewhere and not self.means(Meaning.ANONYMOUS) and not self.from_bus
 
     @property
     def driven(self) -> bool:

@@ -79,7 +79,7 @@ class Address:
 
     @property
     def place(self) -> tuple[str, int, int | None, int, bool | None]:
-        """What a link is told: space, index, sub-index, size in bytes, whether it has a sign."""
+        """What a link needs: space, index, sub-index, size in bytes, whether it has a sign."""
         signed = self.codec.signed if isinstance(self.codec, Number) else None
         return self.space, self.index, self.sub_index, self.codec.size, signed
 

@@ -101,7 +101,7 @@ class AcknowledgeThenWrite:
     """
     Read a parameter whose reading acknowledges, and write another as the very next frame.
 
-    What became of the reading is not told.
+    What became of the reading is not returned.
     """
 
     key: str

@@ -172,8 +172,8 @@ class StatusWord:
     def valid(self) -> Fact:
         """The facts that this family tells at all; of the others nothing is known."""
         valid = Fact.ALARM  # where no bit tells it, the inverter status does
-        for told in (self.by_bit, self.by_state, self.by_clear_bit):
-            for fact in told.values():
+        for facts in (self.by_bit, self.by_state, self.by_clear_bit):
+            for fact in facts.values():
                 valid |= fact
         return valid
 
@@ -201,16 +201,16 @@ class StatusWord:
         return Fact.ALARM in self.by_bit.values()
 
     @functools.cached_property
-    def _told(self) -> tuple[tuple[int, bool, int], ...]:
+    def _facts_of_bits(self) -> tuple[tuple[int, bool, int], ...]:
         # plain numbers: this is done with every poll, and flags take their time
-        told = ((True, self.by_bit), (False, self.by_clear_bit))
+        sources = ((True, self.by_bit), (False, self.by_clear_bit))
         return tuple(
-            (int(bit), is_set, int(fact)) for is_set, bits in told for bit, fact in bits.items()
+            (int(bit), is_set, int(fact)) for is_set, bits in sources for bit, fact in bits.items()
         )
 
     def _bits(self, word: int) -> Fact:
         facts = 0
-        for bit, is_set, fact in self._told:
+        for bit, is_set, fact in self._facts_of_bits:
             if bool(word & bit) is is_set:
                 facts |= fact
         return Fact(facts)

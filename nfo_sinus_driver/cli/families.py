@@ -61,8 +61,8 @@ def notes(family: catalog.Family) -> list[str]:
         found.append('it has no coast: quick_stop is an ordinary stop, or a quick ramp')
     if not family.key(catalog.Role.COMMUNICATION_TIMEOUT):
         found.append('it has no time-out of its own: the motor runs on when the driver is gone')
-    told = catalog.Fact.NETWORK_CONTROL in profile.status_word.valid
-    if not (told or profile.holders):
+    shown = catalog.Fact.NETWORK_CONTROL in profile.status_word.valid
+    if not (shown or profile.holders):
         found.append(
             'nothing tells who has control: a motor that runs is stopped when the driver connects'
         )

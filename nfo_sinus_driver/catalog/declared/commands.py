@@ -19,7 +19,7 @@ from nfo_sinus_driver.catalog.declared.description import (
     Step,
     Steps,
 )
-from nfo_sinus_driver.catalog.declared.places import WORD, Places, Told
+from nfo_sinus_driver.catalog.declared.places import WORD, PlacedCondition, Places
 from nfo_sinus_driver.catalog.declared.settings import Settings
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
 
@@ -47,18 +47,18 @@ class StepReader:
         self._places = places
         self._settings = settings
         self._problems = problems
-        self._told: dict[int, Told] = {}
+        self._awaited: dict[int, PlacedCondition] = {}
         self._status = StatusPlace((0,))
 
-    def awaited(self) -> Iterator[Told]:
+    def awaited(self) -> Iterator[PlacedCondition]:
         """Yield the conditions that steps wait for."""
         for name in NAMES:
             for node in self._root['control'].get(name).items:
                 if 'until' in node:
-                    told = self._places.condition(node['until'], f'until of {name}')
-                    if told is not None:
-                        self._told[id(node)] = told
-                        yield told
+                    condition = self._places.condition(node['until'], f'until of {name}')
+                    if condition is not None:
+                        self._awaited[id(node)] = condition
+                        yield condition
 
     def use(self, status: StatusPlace) -> None:
         """Take where the status stands."""
@@ -149,10 +149,10 @@ class StepReader:
         if name in (*_AT_ONCE, 'after_write'):
             self._problems.add(node.line, f'{name} waits for nothing: a stop is never delayed')
             return None
-        told = self._told.get(id(node))
+        condition = self._awaited.get(id(node))
         within = node.number('within')
         seconds = _WITHIN if within is None else float(within)
-        return Await(told.in_place(self._status), seconds) if told is not None else None
+        return Await(condition.in_place(self._status), seconds) if condition is not None else None
 
     def _word(self, node: Node) -> int:
         raw = node.scalar if isinstance(node.scalar, int) else 0

@@ -28,7 +28,7 @@ _MOST_OF_STATUS = 8
 
 
 @dataclass(frozen=True)
-class Told:
+class PlacedCondition:
     """A condition as the file has it: the bits of one register, or one coil."""
 
     register: int
@@ -94,7 +94,7 @@ class Places:
 
     # --- conditions ---
 
-    def condition(self, node: Node, what: str) -> Told | None:
+    def condition(self, node: Node, what: str) -> PlacedCondition | None:
         """Return what a condition says; ``None`` if it is none."""
         try:
             return self._condition(node, what)
@@ -102,7 +102,7 @@ class Places:
             self._problems.add(node.line, str(error))
             return None
 
-    def _condition(self, node: Node, what: str) -> Told:
+    def _condition(self, node: Node, what: str) -> PlacedCondition:
         coil = 'coil' in node
         place = node.get('coil') if coil else node.get('register')
         if place.scalar is None and not coil:
@@ -115,7 +115,7 @@ class Places:
             )
         mask, values, inverted = self._bits(node, what, coil=coil)
         number = self.coil(place) if coil else self.register(place)
-        return Told(number, coil, mask, values, inverted, node.line)
+        return PlacedCondition(number, coil, mask, values, inverted, node.line)
 
     def _bits(
         self, node: Node, what: str, *, coil: bool
@@ -185,9 +185,11 @@ class Places:
             address = Address('modbus', space, index, None, codec_of(codec), Fraction(1), '')
             self.made[key] = internal(key, address, Access.READ_WRITE)
 
-    def status(self, told: Iterable[Told], block: Node, registers: Iterable[int]) -> StatusPlace:
+    def status(
+        self, conditions: Iterable[PlacedCondition], block: Node, registers: Iterable[int]
+    ) -> StatusPlace:
         """Return where the status stands, with a parameter that reads it as one."""
-        found = list(told)
+        found = list(conditions)
         wanted = {one.register for one in found} | set(registers)
         if any(one.coil for one in found):
             return self._coils(found, block)
@@ -221,12 +223,12 @@ class Places:
         self.made[STATUS_KEY] = internal(STATUS_KEY, address, Access.READ)
         return StatusPlace(tuple(one for run in blocks for one in run))
 
-    def _coils(self, told: Sequence[Told], block: Node) -> StatusPlace:
-        if not all(one.coil for one in told):
+    def _coils(self, conditions: Sequence[PlacedCondition], block: Node) -> StatusPlace:
+        if not all(one.coil for one in conditions):
             self._problems.add(
                 block.line, 'the status stands in registers and in coils: only one of both is read'
             )
-        coils = [one.register for one in told if one.coil]
+        coils = [one.register for one in conditions if one.coil]
         first = min(coils)
         count = 16 if max(coils) - first < 16 else 32
         if max(coils) - first >= count:
@@ -234,7 +236,7 @@ class Places:
         codec = codec_of(f'uint{count}_le')
         address = Address('modbus', 'coil', first, None, codec, Fraction(1), '')
         self.made[STATUS_KEY] = internal(STATUS_KEY, address, Access.READ)
-        registers = [one.register for one in told]
+        registers = [one.register for one in conditions]
         return StatusPlace((*range(first, first + count), *registers), coils=True)
 
     # --- values ---

@@ -27,7 +27,7 @@ from nfo_sinus_driver.catalog.declared.description import (
     status_code,
 )
 from nfo_sinus_driver.catalog.declared.parameter_table import with_parameters
-from nfo_sinus_driver.catalog.declared.places import WORD, Places, Told, internal
+from nfo_sinus_driver.catalog.declared.places import WORD, PlacedCondition, Places, internal
 from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
 from nfo_sinus_driver.catalog.parameter import Access, Parameter, Value
@@ -70,27 +70,28 @@ class _Reader:
         self._line = _line(root.get('line'))
         self._require_format()
         self._places = Places(root, self._line, problems)
-        self._told: dict[str, Told] = {}
+        self._conditions: dict[str, PlacedCondition] = {}
 
     def description(self) -> Description:
         """Return what the file says; what is wrong goes to the problems."""
         root, control = self._root, self._root['control']
         settings = Settings(root, self._places, self._problems)
         flags = list(self._flags())
-        self._told = dict(self._facts())
+        self._conditions = dict(self._facts())
         steps = StepReader(root, self._places, settings, self._problems)
         codes_at = self._codes_register()
-        running = [one for name, one in self._told.items() if name == 'running']
-        told = [*running, *self._told.values(), *(one for one, _ in flags), *steps.awaited()]
+        running = [one for name, one in self._conditions.items() if name == 'running']
+        of_flags = (one for one, _ in flags)
+        conditions = [*running, *self._conditions.values(), *of_flags, *steps.awaited()]
         registers = [] if codes_at is None else [codes_at]
-        status = self._places.status(told, root['status'].get('block'), registers)
-        facts = {name: one.in_place(status) for name, one in self._told.items()}
+        status = self._places.status(conditions, root['status'].get('block'), registers)
+        facts = {name: one.in_place(status) for name, one in self._conditions.items()}
         self._require_apart(facts)
         steps.use(status)
         setpoint = self._setpoint(settings)
         commands = Commands(control, steps, setpoint.direction, self._problems)
         measured, roles = self._measured(facts)
-        self._require_control_told(control, settings)
+        self._require_one_holder(control, settings)
         after_write = tuple(self._after_write(steps))
         parameters = {**settings.parameters, **measured, **self._places.made}
         return Description(
@@ -132,17 +133,17 @@ class _Reader:
 
     # --- status ---
 
-    def _facts(self) -> Iterator[tuple[str, Told]]:
+    def _facts(self) -> Iterator[tuple[str, PlacedCondition]]:
         for name, node in self._root['status'].mapping.items():
             if name not in _OF_STATUS:
-                told = self._places.condition(node, f'status {name}')
-                if told is not None:
-                    yield name, told
+                condition = self._places.condition(node, f'status {name}')
+                if condition is not None:
+                    yield name, condition
 
     def _require_apart(self, facts: Mapping[str, Condition]) -> None:
         seen: dict[Condition, str] = {}
         for name, fact in facts.items():
-            line = self._told[name].line
+            line = self._conditions[name].line
             other = seen.setdefault(fact, name)
             if other != name:
                 self._problems.add(
@@ -154,15 +155,15 @@ class _Reader:
             for one in (opposite, turned):
                 if one in seen and {name, seen[one]} != {'remote', 'local'}:
                     self._problems.add(
-                        line, f'{name} is true whenever {seen[one]} is not: say only what is told'
+                        line, f'{name} is true whenever {seen[one]} is not: say one of both'
                     )
 
-    def _require_control_told(self, control: Node, settings: Settings) -> None:
-        told = [name for name in ('remote', 'local') if name in self._told]
-        if 'holder' in control and told:
+    def _require_one_holder(self, control: Node, settings: Settings) -> None:
+        shown_by = [name for name in ('remote', 'local') if name in self._conditions]
+        if 'holder' in control and shown_by:
             self._problems.add(
                 control['holder'].line,
-                f'who has control is told by status {told[0]}, too: remove one of both',
+                f'who has control is shown by status {shown_by[0]}, too: remove one of both',
             )
 
     # --- faults ---
@@ -201,14 +202,14 @@ class _Reader:
                 self._problems.add(fault.line, f'fault {text} cannot be: {none} means no fault')
             yield _fault(fault, status_code(number))
 
-    def _flags(self) -> Iterator[tuple[Told, Fault]]:
+    def _flags(self) -> Iterator[tuple[PlacedCondition, Fault]]:
         flags = self._root.get('faults').get('flags')
         if len(flags.items) > _MOST_FAULTS:
             self._problems.add(flags.line, f'faults has more than {_MOST_FAULTS} flags')
         for number, node in enumerate(flags.items):
-            told = self._places.condition(node, f'fault flag {node.text("text")!r}')
-            if told is not None:
-                yield told, _fault(node, status_code(_FLAGS_FROM + number))
+            condition = self._places.condition(node, f'fault flag {node.text("text")!r}')
+            if condition is not None:
+                yield condition, _fault(node, status_code(_FLAGS_FROM + number))
 
     def _alarm(self, node: Node) -> Fault:
         usual = Description.alarm

@@ -67,7 +67,7 @@ class Words(StatusWord):
 
 def words_of(drive: Description) -> Words:
     """Return what the status of a drive means."""
-    told = tuple((drive.facts[name], fact) for name, fact in _FACTS.items() if name in drive.facts)
+    facts = tuple((drive.facts[name], fact) for name, fact in _FACTS.items() if name in drive.facts)
     measured = drive.parameters.get(drive.roles.get(Role.ACTUAL_FREQUENCY, ''))
     unsigned = measured is not None and not measured.at('modbus').number.signed
     return Words(
@@ -77,7 +77,7 @@ def words_of(drive: Description) -> Words:
         code=functools.partial(_code, drive),
         by_frequency=measured is not None and 'stopping' not in drive.facts,
         tells_sign='reverse' in drive.facts and unsigned,
-        facts_of=told,
+        facts_of=facts,
         unless=drive.facts.get('local'),
     )
 

@@ -16,7 +16,7 @@ known of the drive:
   synchronous operation, in which this driver does not enable; or 19, coast, shown as 13, rapid
   stop: the motor is not commanded in either.
 - A fault code is binary if that is one that the manual lists, else decimal. So fault 45, a time-out
-  of the line, is always told; some others mean one fault this way and another that way, and P060
+  of the line, is always shown; some others mean one fault this way and another that way, and P060
   tells for certain which it is.
 """
 

@@ -96,7 +96,7 @@ class Ds402(ControlMethod):
         """
         Switch off, so that a run command is an edge later, under control of the bus.
 
-        The module holds the drive in bus mode [M0 §6.4]; a drive that has left it is told to be.
+        The module holds the drive in bus mode [M0 §6.4]; one that has left it is put back.
 
         :raises NotPossible: it is tuning.
         """

@@ -95,7 +95,7 @@ STATUS_WORD = StatusWord(
     by_frequency=True,
 )
 
-#: What the first digit of Error_Code says, and by which class the rest is told [CiA 402].
+#: What the first digit of Error_Code says, and by which class the rest is named [CiA 402].
 _CLASSES = {
     0x1: 'generic',
     0x2: 'current',
