@@ -250,6 +250,8 @@ class Silences:
     def __init__(self) -> None:
         self._heard_at: dict[int, float] = {}
         self._since: dict[int, float] = {}
+        #: The longest time from one valid frame to the next.
+        self._longest: dict[int, float] = {}
         #: When any unit was heard.
         self._anybody_at = -math.inf
         self._pause_ends = -math.inf
@@ -257,6 +259,8 @@ class Silences:
     def note(self, unit: int, now: float, error: LinkError | None, seconds: float = 0.0) -> None:
         """Take note of how a request ended that kept the line for so long, s."""
         if error is None or error.heard or isinstance(error, Refused):
+            pause = now - self._heard_at.get(unit, now)
+            self._longest[unit] = max(self._longest.get(unit, 0.0), pause)
             self._heard_at[unit] = self._anybody_at = now
             self._since.pop(unit, None)
         elif self.is_missing(unit, now):
@@ -271,6 +275,10 @@ class Silences:
     def heard_at(self, unit: int) -> float:
         """Return when the last valid frame of a unit came."""
         return self._heard_at.get(unit, -math.inf)
+
+    def take_longest(self, unit: int) -> float:
+        """Return the longest time between two valid frames of a unit since this was last asked."""
+        return self._longest.pop(unit, 0.0)
 
     def lasts(self, unit: int, now: float) -> float:
         """Return for how long a unit has been silent; 0 if it answers."""

@@ -125,6 +125,8 @@ class DriveState:
         self._in_vain = self._asked_in_vain = False
         #: How far apart the last statuses were, s, the newest last.
         self._intervals: deque[float] = deque((0.0,), maxlen=4)
+        #: The longest time without a valid frame before the newest one, s.
+        self._alone = 0.0
         #: Called when a fault comes that did not stand before.
         self._on_fault: Callable[[], None] = lambda: None
         #: The status that first showed the fault that stands, and whether that was soon.
@@ -336,15 +338,22 @@ class DriveState:
             if not self.unnamed:
                 self._named = None
             self._intervals.append(status.at - before.at if before else 0.0)
+            self._alone = self.bus.silences.take_longest(self.settings.address)
             self._asked_in_vain, self._in_vain = self._in_vain, False
             self._note_fault(before)
         return status
+
+    async def keep_alive(self) -> None:
+        """Keep the drive from stopping by itself, with one request (LinkError: in vain)."""
+        has_word = self.nameplate.has(self.word_key)
+        key = self.word_key if has_word else self.model.key(Role.STATUS_CODE)
+        await self.params.read_data(key, Priority.SERVICE, retry=False)
 
     @property
     def left_alone(self) -> bool:
         """Before the newest status the drive was not asked for longer than its own time-out."""
         timeout = self.timeout
-        alone = self._intervals[-1] if not self._asked_in_vain else 0.0
+        alone = self._alone if not self._asked_in_vain else 0.0
         return timeout.stops_motor and 0 < timeout.shortest <= alone
 
     @property

@@ -96,16 +96,20 @@ class ParameterWriter:
         self._procedures = procedures
         self._access = WriteAccess(state, procedures)
 
-    async def write(self, wanted: Mapping[str, bytes]) -> tuple[Change, ...]:
+    async def write(
+        self, wanted: Mapping[str, bytes], pace: Priority = Priority.POLL
+    ) -> tuple[Change, ...]:
         """
         Write what differs, all of it or nothing: after an error what was written is put back.
 
         Values that bound each other, such as I-magn and I-limt [C34], may come in any order.
+
+        :param pace: the priority with which each one is begun.
         """
         done: list[Written] = []
         async with self._access.granted() as allow:
             try:
-                await self._write_all(wanted, done.append, allow)
+                await self._write_all(wanted, done.append, allow, pace)
             except ParameterError as error:
                 if not done:
                     raise
@@ -123,17 +127,21 @@ class ParameterWriter:
     ) -> None:
         """Write what differs, telling of each; what was written before a refusal stays."""
         async with self._access.granted() as allow:
-            await self._write_all(wanted, wrote, allow)
+            await self._write_all(wanted, wrote, allow, Priority.POLL)
 
     async def _write_all(
-        self, wanted: Mapping[str, bytes], wrote: Callable[[Written], None], allow: Allow
+        self,
+        wanted: Mapping[str, bytes],
+        wrote: Callable[[Written], None],
+        allow: Allow,
+        pace: Priority,
     ) -> None:
         waiting = sorted(wanted, key=self._order)
         while waiting:
             refused: dict[str, _BadValue] = {}
             for key in waiting:
                 try:
-                    for written in await self._write_one(key, wanted[key], allow):
+                    for written in await self._write_one(key, wanted[key], allow, pace):
                         wrote(written)
                 except _BadValue as error:
                     refused[key] = error
@@ -173,10 +181,11 @@ class ParameterWriter:
         model = self._params.model
         return key in model.communication, not model[key].stopped
 
-    async def _write_one(self, key: str, data: bytes, allow: Allow) -> Iterable[Written]:
+    async def _write_one(
+        self, key: str, data: bytes, allow: Allow, pace: Priority
+    ) -> Iterable[Written]:
         try:
-            # between any two parameters, everybody who polls has a turn
-            before = await self._params.read_data(key, Priority.POLL)
+            before = await self._params.read_data(key, pace)
         except LinkError as error:
             raise not_changed(key, explain_failure(error, self._state)) from error
         if before == data:

@@ -311,7 +311,9 @@ class Parameters:
         async with self._alone(data):
             await self._require_standstill(data)
             try:
-                changes = await self._writer.write(data)
+                # between any two, everybody who polls has a turn, unless the motor waits for it
+                pace = Priority.POLL if guarded else Priority.SERVICE
+                changes = await self._writer.write(data, pace)
             except ParameterError as error:
                 hint = after_change({key: exact[key] for key in error.left}, self._state.model)
                 if hint is None:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Coroutine
+import contextlib
 import logging
 import math
 from typing import Any, TypeVar
@@ -37,6 +38,8 @@ _RECONNECT_PERIOD = 1.0
 _SLOWEST_RECONNECT = 4.0
 #: The bus is silent for no more than this share of the drive's own time-out.
 _KEEP_ALIVE_SHARE = 1 / 3
+#: After this share of it the drive is asked ahead of everything but stops and set-points.
+_LATEST_SHARE = 0.5
 #: So long before its own time-out stops it, a drive that is lost is tried again and again, s.
 _LAST_CHANCE = 0.6
 #: How often at most, if the port is gone too, s.
@@ -86,6 +89,7 @@ class Poller:
         self._controller = controller
         self._connect = connect
         self._task: Task | None = None
+        self._keep_alive_task: Task | None = None
         #: Poll at full rate.
         self.active = False
         #: The newest poll.
@@ -113,12 +117,16 @@ class Poller:
     def begin(self) -> None:
         """Poll from now on."""
         self._task = self._bus.spawn(self._poll_repeatedly())
+        if self._keep_alive_task is None and self._controller is not None:
+            self._keep_alive_task = self._bus.spawn(self._keep_alive())
 
     def end(self) -> None:
         """Leave the drive alone."""
         if self._task is not None:
             task, self._task = self._task, None
             self._bus.cancel(task)
+        self._bus.cancel(self._keep_alive_task)
+        self._keep_alive_task = None
         self._bus.recorder.cycle(self._unit, math.nan)
         self._publish(None)
 
@@ -217,6 +225,25 @@ class Poller:
                     self._bus.recorder.cycle(self._unit, started - polled_at)
                 polled_at = started
             await self._bus.sleep(self._pause(polled_at))
+
+    async def _keep_alive(self) -> None:
+        """
+        Ask the drive something before its own time-out strikes, where polls wait for too long.
+
+        They give way to commands, and to have many drives enabled at once takes seconds.
+        """
+        state = self._state
+        while True:
+            patience = state.timeout.seconds * _LATEST_SHARE
+            if not state.connected or not patience:
+                await self._bus.sleep(_WATCH_PERIOD)
+                continue
+            left = self._bus.silences.heard_at(self._unit) + patience - self._bus.now()
+            if left <= 0:
+                with contextlib.suppress(LinkError):
+                    await state.keep_alive()
+                left = patience / 2
+            await self._bus.sleep(left)
 
     def _pause(self, polled_at: float) -> float:
         """Return how long to wait until the drive is asked again, s."""

@@ -331,6 +331,14 @@ LAWS = (
     ),
     Mutant(
         9,
+        'a drive whose polls wait for others is not asked in time',
+        WATCH,
+        '_LATEST_SHARE = 0.5',
+        '_LATEST_SHARE = 50.0',
+        ('test/unit/drive/test_laws.py', '-k', 'all_others'),
+    ),
+    Mutant(
+        9,
         'the usual time-out of the drive is not set',
         WATCHDOG,
         '            await self._try_usual(settings.own_timeout)',

@@ -462,6 +462,19 @@ def test_9_by_default_a_motor_stands_soon_after_its_driver_was_killed(way: str) 
         assert rig.turns == has_none
 
 
+@pytest.mark.parametrize(('way', 'drives', 'baud'), [('rtu', 32, 19200), ('classic', 16, 9600)])
+def test_9_a_drive_hears_the_driver_in_time_while_all_others_are_enabled(
+    way: str, drives: int, baud: int
+) -> None:
+    # so many that its polls wait for seconds
+    with by_default(way, drives=drives, line={'baud': baud}) as rig:
+        rig.connect()
+        rig.enable(1, 2)
+        rig.enable(*range(3, drives + 1))
+        assert not any(far.faults for far in rig.fars.values())
+        assert all(drive.following for drive in rig.drives.values())
+
+
 @timed
 @pytest.mark.parametrize('found', [0.0, 1.0, 6.0])
 def test_9_the_end_leaves_the_time_out_of_a_drive_as_it_was_found(way: str, found: float) -> None:
