@@ -66,6 +66,8 @@ class ParameterAccess:
         self.unanswered = 0
         #: What cannot be, and what the drive says all the same, read more than once.
         self._odd: dict[str, bytes] = {}
+        #: What steps of a profile have written last and no reading has shown yet.
+        self._own: dict[str, bytes] = {}
         #: What this drive does not have.
         self._lacking: frozenset[str] = frozenset()
         #: What it has refused because no option card for it is there, each time in a row.
@@ -239,7 +241,19 @@ class ParameterAccess:
         """Write as a profile says, unless ``require_wanted`` raises when its turn has come."""
         address, data = self.target(step)
         priority = Priority.STOP if step.head else priority
-        await self._ask(address, priority, data, step.retry, require_wanted)
+        self._own[step.key] = data
+        try:
+            await self._ask(address, priority, data, step.retry, require_wanted)
+        except Refused:
+            self._own.pop(step.key, None)
+            raise
+
+    def is_own(self, key: str, data: bytes) -> bool:
+        """Tell once whether a step of a profile has written what a parameter has now."""
+        if self._own.get(key) != data:
+            return False
+        del self._own[key]
+        return True
 
     async def write_data(
         self, key: str, data: bytes, priority: Priority, *, retry: bool = True

@@ -421,6 +421,7 @@ class Parameters:
 
     def _learn(self, key: str, data: bytes, *, quiet: bool = False) -> None:
         """Take what the drive has for a parameter, and tell it if it is news."""
+        own = self._params.is_own(key, data)
         if self._data.get(key) == data:
             return
         # others may be reading the old ones just now
@@ -434,14 +435,14 @@ class Parameters:
             self._state.tell(Severity.WARNING, Cause.NOT_POSSIBLE, why=str(error))
         self._values = values
         if not quiet and before is not None and key in values:
-            self._tell_news(Change(key, before, values[key], self._state.model[key].unit))
+            self._tell_news(Change(key, before, values[key], self._state.model[key].unit), own)
         try:
             self._told((key,))
         except Exception:
             _log.exception('a new value of %s could not be told', key)
 
-    def _tell_news(self, change: Change) -> None:
-        if not self._wanted.tell_drift(change.key):
+    def _tell_news(self, change: Change, own: bool) -> None:
+        if not self._wanted.tell_drift(change.key) and not own:
             self._state.tell(Severity.INFO, Cause.CHANGED_AT_DRIVE, change=change)
 
 

@@ -297,6 +297,25 @@ def test_what_makes_a_setting_take_effect_is_written_after_it(tmp_path: Path) ->
         assert written[-2:] == ['ramp.accel', 'line.r0032']
 
 
+def test_a_change_at_the_keypad_is_said_and_one_of_the_driver_is_not(tmp_path: Path) -> None:
+    parameters = {
+        **PLAIN['parameters'],
+        'source.command': {'register': 51, 'choices': {0: 'Keypad', 1: 'Net'}, 'default': 'Keypad'},
+    }
+    requires = [{'parameter': 'source.command', 'value': 'Net', 'write': True}]
+    control = {**PLAIN['control'], 'requires': requires}
+    with DescribedRig(described(tmp_path, parameters=parameters, control=control)) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        rig.pass_time(12.0)
+        assert rig.drive.parameters.values['source.command'] == 'Net'
+        assert not rig.notes.said(Cause.CHANGED_AT_DRIVE), rig.notes.events
+        for value in ('Keypad', 'Net'):
+            rig.far.set_from_keypad('source.command', value)
+            rig.pass_time(12.0)
+            assert rig.notes.said(f'Keypad -> {value}' if value == 'Net' else 'Net -> Keypad')
+
+
 def test_the_stop_mode_says_whether_a_stop_coasts(tmp_path: Path) -> None:
     parameters = {
         **PLAIN['parameters'],

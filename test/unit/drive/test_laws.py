@@ -28,6 +28,8 @@ from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 
 #: How soon a loss has to be noticed and the motor has to be stopped, beyond lost_after, s.
 _SOON = 1.5
+#: After so long each setting was read again, s.
+_ROUND = 12.0
 #: The set-point of a ride, Hz.
 _SPEED = 20.0
 
@@ -377,6 +379,18 @@ def test_4_a_ride_writes_no_setting_but_what_control_needs(way: str) -> None:
         # what stands so already is not written again
         assert dict(rig.far.writes) == first
         assert len(first) <= 1
+
+
+@every_way
+def test_4_what_the_driver_writes_is_no_change_at_the_drive(way: str) -> None:
+    with Rig(way) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        rig.pass_time(_ROUND)
+        rig.result(rig.drive.stop())
+        rig.result(rig.drive.deactivate())
+        rig.pass_time(_ROUND)
+        assert not rig.notes.said(Cause.CHANGED_AT_DRIVE), rig.notes.events
 
 
 @every_way
