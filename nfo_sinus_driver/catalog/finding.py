@@ -47,8 +47,8 @@ class Found:
     def title(self) -> str:
         """What its maker calls it, or what is wrong with it."""
         try:
-            return load_profile(self.model).title
-        except (CatalogError, ImportError) as error:
+            return load_profile(_usable(self.model)).title
+        except (CatalogError, ImportError, ValueError) as error:
             return f'cannot be used: {error}'.replace('\n', '; ')
 
 
@@ -68,7 +68,7 @@ def find(text: str) -> str:
             f'there is no family {text!r}: choose one of {", ".join(sorted(found))}, the path of a '
             f'file NAME{DESCRIBED}, or package://PACKAGE/PATH'
         )
-    return found[text]
+    return _usable(found[text])
 
 
 def every() -> Iterator[Found]:
@@ -93,6 +93,10 @@ def _folder(name: str) -> Path:
 
 def _name(path: Path) -> str:
     return path.name.removesuffix(DESCRIBED)
+
+
+def _usable(model: str) -> str:
+    return _file(Path(model), model) if os.sep in model else model
 
 
 def _file(path: Path, text: str) -> str:
@@ -125,7 +129,7 @@ def _told_by_packages() -> Iterator[tuple[str, Path]]:
         index = prefix / 'share' / 'ament_index' / 'resource_index' / GROUP
         for resource in sorted(index.glob('*')):
             share = prefix / 'share' / resource.name
-            for line in resource.read_text(encoding='utf-8').split('\n'):
+            for line in resource.read_text(encoding='utf-8', errors='replace').split('\n'):
                 if line.strip():
                     yield resource.name, share / line.strip()
 

@@ -6,11 +6,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 import sys
 
 from nfo_sinus_driver import catalog
-from nfo_sinus_driver.catalog.finding import Found, every
+from nfo_sinus_driver.catalog.finding import Found, every, find
 from nfo_sinus_driver.cli.console import columns, put
 from nfo_sinus_driver.cli.options import Verb
 
@@ -23,7 +22,10 @@ class Family(Verb):
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Take what to do, and the files."""
         parser.add_argument('action', choices=('check', 'list'), help='what to do')
-        parser.add_argument('files', nargs='*', metavar='FILE', help='with check: NAME.vfd.yaml')
+        parser.add_argument(
+            'files', nargs='*', metavar='FILE',
+            help='with check: NAME.vfd.yaml, package://PACKAGE/PATH, or the name of a family',
+        )
 
     def main(self, options: argparse.Namespace) -> int:
         """Do it; check fails where a file is wrong."""
@@ -37,14 +39,14 @@ class Family(Verb):
 def check(name: str) -> bool:
     """Check a file, print what is wrong in it or what it describes; tell whether it is right."""
     try:
-        family = catalog.load_family(str(Path(name).absolute()))
+        model = find(name)
+        family = catalog.load_family(model)
     except (catalog.CatalogError, ValueError) as error:
         put(str(error))
         return False
     profile = family.profile
-    has = f'{len(family.settings)} settings, {len(family.measured)} measured values'
-    put(f'{name}: {profile.title}, {has}')
-    for note in notes(family):
+    put(f'{name}: {profile.title}, {len(family.settings)} settings')
+    for note in notes(family) if catalog.is_described(model) else ():
         put(f'  {note}')
     return True
 

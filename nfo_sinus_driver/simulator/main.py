@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 import dataclasses
 import json
+import os
 import signal
 import sys
 from typing import Any
@@ -427,7 +428,7 @@ def inject(argv: Sequence[str]) -> int:
     try:
         with Client(path) as client:
             if options.verb == 'state':
-                print(json.dumps(_state(client, options.address), indent=2, ensure_ascii=False))
+                _put(json.dumps(_state(client, options.address), indent=2, ensure_ascii=False))
             else:
                 names = [argument.name for argument in every_injection()[options.verb].arguments]
                 given = {name: getattr(options, name) for name in names}
@@ -437,6 +438,16 @@ def inject(argv: Sequence[str]) -> int:
         print(f'simulator inject: {error}', file=sys.stderr)
         return 1
     return 0
+
+
+def _put(text: str) -> None:
+    """Print a text, as far as there is a reader."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        # Python would complain once more at the end
+        with open(os.devnull, 'w', encoding='utf-8') as nowhere:
+            os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def _state(client: Client, addresses: Sequence[int]) -> Mapping[Any, Any]:

@@ -15,6 +15,7 @@ from nfo_sinus_driver.catalog.declared.description import (
     SetpointPlace,
     Step,
     Steps,
+    drive_number,
 )
 from nfo_sinus_driver.catalog.declared.places import STATUS_KEY
 from nfo_sinus_driver.catalog.declared.reader import SUFFIX, read
@@ -37,6 +38,7 @@ __all__ = [
     'SetpointPlace',
     'Step',
     'Steps',
+    'drive_number',
     'read',
     'status_codes',
 ]

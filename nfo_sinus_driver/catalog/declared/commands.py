@@ -242,8 +242,8 @@ class Commands:
         if not any(takes_back(run[key], stop[key]) for key in run if key in stop):
             self._problems.add(
                 line,
-                f'{name} neither stops nor coasts: it leaves what run has written; write to the '
-                'same register or coil, without the run command',
+                f'{name} leaves the run command standing, so that the motor may start again by '
+                'itself: have it take back, too, what run has written to the same register or coil',
             )
 
 
@@ -263,6 +263,11 @@ def left_by(steps: Sequence[Step]) -> dict[str, tuple[int, int]]:
 
 
 def takes_back(run: tuple[int, int], stop: tuple[int, int]) -> bool:
-    """Tell whether what a stop leaves differs from what run does."""
-    both = run[1] & stop[1]
-    return (run[0] ^ stop[0]) & both != 0
+    """
+    Tell whether what a stop leaves differs from what run does.
+
+    A whole word may be a number. Where a stop only sets and clears bits, it has to clear one that
+    run has set: with another one set the motor stands, and starts again when that one is cleared.
+    """
+    changed = (run[0] ^ stop[0]) & run[1] & stop[1]
+    return (changed if stop[1] == -1 else changed & (run[0] or -1)) != 0

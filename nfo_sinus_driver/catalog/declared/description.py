@@ -25,6 +25,11 @@ def status_code(number: int) -> int:
     return number + _MOVED_BY if number in STATES else number
 
 
+def drive_number(code: int) -> int:
+    """Return the drive's own number of the fault with a status code."""
+    return code - _MOVED_BY if code - _MOVED_BY in STATES else code
+
+
 @dataclass(frozen=True)
 class Condition:
     """

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from nfo_sinus_driver.catalog import Kind, Role
-from nfo_sinus_driver.catalog.declared import STATUS_KEY, Description
+from nfo_sinus_driver.catalog.declared import STATUS_KEY, Description, drive_number
 from nfo_sinus_driver.simulator._declared.orders import Place, orders_of
 from nfo_sinus_driver.simulator._declared.status import Wish, compose
 from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
@@ -29,7 +29,6 @@ _QUICKER = 0.25
 _SIZES = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED, Role.ACTUAL_TORQUE, Role.OUTPUT_POWER)
 #: The number of a fault of which the file says nothing but that it is one.
 _UNNAMED = 1
-_MOVED = 1000
 
 
 @dataclass(frozen=True)
@@ -186,8 +185,25 @@ class DeclaredControlUnit(ControlUnit):
         return compose(wishes, codes.mask, number << codes.shift)
 
     def _number(self, code: int) -> int:
-        known = code in self._drive.faults
-        return (code - _MOVED if code > _MOVED + 100 and known else code) if known else _UNNAMED
+        return _UNNAMED if code in self._flags else drive_number(code)
+
+    @property
+    def _flags(self) -> list[int]:
+        return [fault.code for _, fault in self._drive.flags]
+
+    def trip(self, code: int, *, cause_present: bool = False) -> None:
+        """Let a fault happen, or a warning (ValueError: the drive cannot show it)."""
+        if self.memory.model.status_code(code).kind is Kind.FAULT and not self._can_show(code):
+            known = ', '.join(str(drive_number(one)) for one in (*self._drive.faults, *self._flags))
+            raise ValueError(f'its status cannot show fault {code}: its file has {known}')
+        super().trip(code, cause_present=cause_present)
+
+    def _can_show(self, code: int) -> bool:
+        codes = self._drive.codes
+        if code in self._flags or (codes is None and not self._flags):
+            return True
+        number = drive_number(code)
+        return codes is not None and number != codes.none and number <= codes.mask >> codes.shift
 
     def _truths(self) -> dict[str, bool]:
         motor, fault = self.motor, bool(self.faults)

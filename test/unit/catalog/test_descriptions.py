@@ -67,6 +67,11 @@ def test_the_good_one_is(tmp_path: Path) -> None:
     assert complaints(tmp_path, GOOD) == []
 
 
+def test_a_coast_by_a_bit_takes_back_that_of_run_too(tmp_path: Path) -> None:
+    coast = 'coast: [{register: 10, set: 4, clear: 1}]\n  reset:'
+    assert complaints(tmp_path, GOOD.replace('reset:', coast)) == []
+
+
 #: What is replaced by what, and what is said of it.
 BAD = {
     'no YAML': ('vfd: 1', 'vfd: [1', 'is no YAML'),
@@ -96,11 +101,14 @@ BAD = {
     ),
     'register and coil': ('fault: {bit: 3}', 'fault: {register: 1, coil: 2}', 'one of both'),
     'a stop that stops nothing': ('stop: [{register: 10, value: 0}]',
-                                  'stop: [{register: 10, value: 1}]', 'neither stops nor coasts'),
+                                  'stop: [{register: 10, value: 1}]', 'leaves the run command'),
     'a stop elsewhere': ('stop: [{register: 10, value: 0}]',
-                         'stop: [{register: 12, value: 0}]', 'neither stops nor coasts'),
+                         'stop: [{register: 12, value: 0}]', 'leaves the run command'),
     'an empty stop': ('stop: [{register: 10, value: 0}]', 'stop: []', 'writes nothing'),
-    'a coast that runs': ('  reset:', '  coast: [{register: 10, value: 1}]\n  reset:', 'neither'),
+    'a coast that runs': ('  reset:', '  coast: [{register: 10, value: 1}]\n  reset:', 'leaves the run'),
+    'a coast by a bit beside that of run': (
+        '  reset:', '  coast: [{register: 10, set: 4}]\n  reset:', 'the motor may start again',
+    ),
     'a stop that waits': ('stop: [{register', 'stop: [{wait: 0.1}, {register', 'never delayed'),
     'a stop that awaits': ('stop: [{register', 'stop: [{until: {bit: 1}}, {register', 'delayed'),
     'a pause too long': ('{wait: 0.1}', '{wait: 30}', 'pauses for more than'),

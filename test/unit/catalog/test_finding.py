@@ -51,6 +51,27 @@ def test_by_name(prefix: Path) -> None:
     assert find('delta_vfd_el') == str(DELTA)
 
 
+@pytest.mark.parametrize(
+    ('line', 'name', 'said'),
+    [
+        ('config/kx.yaml', 'kx.yaml', 'ends with .vfd.yaml'),
+        ('config/gone.vfd.yaml', 'gone', 'there is no such file'),
+        ('\udcff.yaml', '\ufffd.yaml', 'ends with .vfd.yaml'),
+    ],
+)
+def test_a_bad_line_of_a_package_spoils_no_other_family(
+    prefix: Path, line: str, name: str, said: str
+) -> None:
+    index = prefix / 'share' / 'ament_index' / 'resource_index' / GROUP / 'robot'
+    text = f'{line}\nconfig/theirs.vfd.yaml\n'
+    index.write_bytes(text.encode(errors='surrogateescape'))
+    found = {one.name: one for one in every()}
+    assert found[name].title.startswith('cannot be used: ') and said in found[name].title
+    assert found['theirs'].title == 'Delta VFD-EL' and find('theirs')
+    with pytest.raises(ValueError, match=said):
+        find(name)
+
+
 def test_by_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copy(DELTA, tmp_path / 'mine.vfd.yaml')
     monkeypatch.chdir(tmp_path)

@@ -27,7 +27,11 @@ def test_a_file_is_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert main(['family', 'check', V20, str(bad)]) == 1
     assert f'{bad}, line 41: fault and running mean the same bits' in capsys.readouterr().out
     assert main(['family', 'check', str(tmp_path / 'none.vfd.yaml')]) == 1
-    assert 'No such file' in capsys.readouterr().out
+    assert 'no such file' in capsys.readouterr().out
+    # as --family takes it
+    assert main(['family', 'check', 'siemens_v20', 'sinus_g2']) == 0
+    said = capsys.readouterr().out
+    assert 'siemens_v20: Siemens SINAMICS V20' in said and 'sinus_g2: NFO Sinus G2' in said
 
 
 def test_families_are_listed(

@@ -245,12 +245,30 @@ def test_a_fault_that_the_file_does_not_list_is_shown_by_its_number(tmp_path: Pa
     file = described(tmp_path, faults={'register': 21, 'codes': {1: {'text': 'hot'}}})
     with DescribedRig(file) as rig:
         rig.connect()
-        rig.far.control_unit._number = lambda code: 77  # type: ignore[attr-defined]
-        rig.far.trip(1)
+        rig.far.trip(77)
         rig.pass_time(0.5)
         shown = rig.drive.snapshot
         assert shown.text == 'Fault 77' and shown.status.faulted and shown.requires_ack
         assert shown.remedy == 'Look at its keypad which one it is, and remove its cause'
+
+
+_HOT: dict[str, Any] = {'register': 21, 'codes': {3: {'text': 'hot'}}}
+
+
+@pytest.mark.parametrize(
+    ('faults', 'code', 'listed'),
+    [
+        (_HOT, 0, '3'), (_HOT, 0x10000, '3'), ({**_HOT, 'bits': [0, 3]}, 16, '3'),
+        (ODD['faults as bits']['faults'], 99, '100, 101'),
+    ],
+)
+def test_a_fault_that_the_status_cannot_show_is_not_simulated(
+    tmp_path: Path, faults: dict[str, Any], code: int, listed: str
+) -> None:
+    with DescribedRig(described(tmp_path, faults=faults)) as rig:
+        with pytest.raises(ValueError, match=listed):
+            rig.far.trip(code)
+        assert not rig.far.faults
 
 
 def test_a_number_that_means_none_is_no_value(tmp_path: Path) -> None:

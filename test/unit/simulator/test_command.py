@@ -226,6 +226,18 @@ def test_inject_takes_a_list_of_addresses(link, inject):
         assert inject('--link', link, '--address', '4-6', 'state')[0] == 1
 
 
+def test_a_reader_that_has_gone_is_no_error(link):
+    with Simulator((1,), link=link, control=''):
+        reading, writing = os.pipe()
+        os.close(reading)
+        command = [*COMMAND, 'inject', '--link', link, 'state']
+        with open(writing, 'w') as out:
+            done = subprocess.run(
+                command, cwd=ROOT, stdout=out, stderr=subprocess.PIPE, timeout=PATIENCE
+            )
+        assert (done.returncode, done.stderr) == (0, b'')
+
+
 def test_inject_does_every_verb_and_says_what_is_wrong(link, inject):
     with Simulator((1, 2), link=link, control=''):
 
