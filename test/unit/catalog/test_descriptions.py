@@ -105,7 +105,9 @@ BAD = {
     'a stop elsewhere': ('stop: [{register: 10, value: 0}]',
                          'stop: [{register: 12, value: 0}]', 'leaves the run command'),
     'an empty stop': ('stop: [{register: 10, value: 0}]', 'stop: []', 'writes nothing'),
-    'a coast that runs': ('  reset:', '  coast: [{register: 10, value: 1}]\n  reset:', 'leaves the run'),
+    'a coast that runs': (
+        '  reset:', '  coast: [{register: 10, value: 1}]\n  reset:', 'leaves the run',
+    ),
     'a coast by a bit beside that of run': (
         '  reset:', '  coast: [{register: 10, set: 4}]\n  reset:', 'the motor may start again',
     ),
