@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog import Meaning, Role
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, Report, Severity
 from nfo_sinus_driver.drive.setpoint import Setpoint
@@ -25,6 +25,8 @@ _REACTION = 1.0
 #: By this share of a set-point, and so much more, slip, its compensation and overshoot go beyond.
 _BEYOND = 0.1
 _BEYOND_BY = 3.0
+#: A motor that slows down by more than that, so far from its set-points, goes to a stop: Hz.
+_SHORT = 1.0
 #: What is compared with set-points, and what one of its units is for 1 Hz of a four-pole motor.
 _COMPARED = {'Freque': (Role.ACTUAL_FREQUENCY, 1.0), 'Speed': (Role.ACTUAL_SPEED, 30.0)}
 
@@ -60,7 +62,9 @@ class Following:
         #: In which direction all set-points of late point; 0: in none, or in both.
         self._way = 0
         self._wrong_way = 0
-        self._told = False
+        #: How fast it was before, and how many values in a row show that it goes to a stop.
+        self._size, self._short = 0.0, 0
+        self._reported = False
 
     def judge(self) -> Report | None:
         """Return why the motor has to be stopped, for what was measured last; tell what else is."""
@@ -78,6 +82,8 @@ class Following:
             cause = Cause.NOT_SLOWER_AFTER_TIME_OUT
         elif role is not None and self._turns_back(frequency, measured.at, least, most):
             cause = Cause.TURNS_BACKWARDS
+        elif role is not None and self._goes_to_a_stop(actual.value, least, most, unit):
+            cause = Cause.STOPPED_BY_ITSELF
         elif role is not None:
             self._look_beyond(actual.value, measured.at, max(-least, most), unit)
         turning = self._state.turning
@@ -116,19 +122,35 @@ class Following:
         # one value that cannot be stops no motor
         return self._wrong_way > 1
 
+    def _goes_to_a_stop(self, actual: float, least: float, most: float, unit: float) -> bool:
+        """
+        Tell whether the drive slows the motor down although all set-points of late are beyond it.
+
+        Where no status word distinguishes a ramp to a stop from a run.
+        """
+        status = self._state.status
+        if status is None or not (status.word is None or status.by_frequency):
+            return False
+        way = 1 if least > 0 else -1 if most < 0 else 0
+        size, wanted = way * actual, min(abs(least), abs(most))
+        slows = status.means(Meaning.SLOWING) and 0 < size < self._size - _FALL * unit
+        self._short = self._short + 1 if slows and size < wanted - _SHORT * unit else 0
+        self._size = size
+        return self._short > 1
+
     def _look_beyond(self, value: float, at: float, most: float, unit: float) -> None:
         """Tell of a motor that turns faster than it was told, and give the set-point again."""
         size, margin = abs(value), _BEYOND_BY * unit
         if not size > most * (1 + _BEYOND) + margin:
-            self._beyond, self._told = _Fall(), False
+            self._beyond, self._reported = _Fall(), False
             return
         endless = self._beyond.take(size, at, _FALL * unit)
-        if self._told or not (endless or size > self._beyond.least + margin):
+        if self._reported or not (endless or size > self._beyond.least + margin):
             return
-        self._told = True
-        told, name = self._setpoint.commanded, self._state.unit
+        self._reported = True
+        wanted, name = self._setpoint.commanded, self._state.unit
         report = self._state.report(
-            Cause.FASTER_THAN_SETPOINT, now=value, setpoint=told, unit=name
+            Cause.FASTER_THAN_SETPOINT, now=value, setpoint=wanted, unit=name
         )
         self._state.tell(Severity.WARNING, report)
         self._setpoint.write_again()

@@ -299,7 +299,7 @@ class Laws(History):
         running, since = self._truth['running']
         late = self.noticed + self.shown.patience('running')
         long_since = self.now - max(since, known_since) > late
-        if snapshot.enabled and not running and long_since:
+        if snapshot.enabled and running is False and long_since:
             raise Broken('it is told as enabled, and it does not run')
 
     def _differing(self, truth: dict[str, Any], told: dict[str, Any]) -> list[str]:

@@ -275,10 +275,18 @@ class ShownG2(ShownSinus):
 class ShownDs402(ShownG2):
     """What a G2 shows by the drive profile of its CANopen module."""
 
+    @property
+    def _ramps(self) -> bool:
+        """It ramps to a stop, and may show that it runs."""
+        return self._unit.state in ('DISABLE', 'SHUTDOWN')
+
+    @property
+    def standing(self) -> bool:
+        return super().standing and not (self._ramps and self._far.motor.driven)
+
     def facts(self) -> dict[str, Any]:
         facts = super().facts()
-        if self._unit.state in ('DISABLE', 'SHUTDOWN'):
-            # while it ramps to a stop, it may show that it runs
+        if self._ramps:
             facts['running'] = None
         return {**facts, 'control mode': _OPERATION_MODES[facts['control mode']]}
 

@@ -25,6 +25,47 @@ def is_setpoint(rig: Rig, key: str) -> bool:
     )
 
 
+#: Ways whose status word, if there is any, shows a ramp to a stop as a run.
+UNTOLD = ('classic v5.0', 'canopen, no DriveStatus', 'canopen, ds402')
+
+
+# --- a drive that stops by itself ---
+
+
+@pytest.mark.parametrize('way', UNTOLD)
+@pytest.mark.parametrize('value', [20.0, -20.0])
+def test_a_run_input_that_is_back_before_the_motor_stands_does_not_start_it(
+    way: str, value: float
+) -> None:
+    with Rig(way, parameters={'control.accel': 0.3, 'control.retard': 10.0}) as rig:
+        rig.turn()
+        rig.send(value)
+        rig.pass_time(15.0)
+        rig.far.set_run_input(False)
+        rig.pass_time(2.0)
+        size = abs(rig.far.motor.frequency)
+        assert 5.0 < size < 19.0, 'it ramps to a stop'
+        rig.far.set_run_input(True)
+        rig.pass_time(1.0)
+        assert abs(rig.far.motor.frequency) < size, 'it goes on to a stop'
+        assert rig.notes.said(Cause.STOPPED_BY_ITSELF)
+        rig.pass_time(12.0)
+        assert not rig.turns and not rig.drive.following
+
+
+@pytest.mark.parametrize('way', UNTOLD)
+def test_a_motor_that_ramps_to_other_set_points_does_not_stop_by_itself(way: str) -> None:
+    with Rig(way, parameters={'control.accel': 1.5, 'control.retard': 4.0}) as rig:
+        rig.turn()
+        for value in (5.0, 20.0, -20.0, 12.0, 20.0, 3.0, -8.0, -20.0, 20.0):
+            rig.send(value)
+            rig.pass_time(1.7)
+            assert rig.drive.following
+        rig.far.motor.load = 0.9
+        rig.pass_time(5.0)
+        assert rig.drive.following
+
+
 # --- after a set-point time-out -------------------------------------------------------------------
 
 
