@@ -13,6 +13,9 @@ from nfo_sinus_driver.catalog.finding import Found, every, find
 from nfo_sinus_driver.cli.console import columns, put
 from nfo_sinus_driver.cli.options import Verb
 
+#: What many manuals print for the register that is sent as 0.
+_PRINTED_FROM = 40001
+
 
 class Family(Verb):
     """Check files that describe drives (NAME.vfd.yaml), or list the families that are found."""
@@ -63,6 +66,13 @@ def notes(family: catalog.Family) -> list[str]:
         found.append('it has no coast: quick_stop is an ordinary stop, or a quick ramp')
     if not family.key(catalog.Role.COMMUNICATION_TIMEOUT):
         found.append('it has no time-out of its own: the motor runs on when the driver is gone')
+    addresses = [one.at('modbus') for one in family.values() if 'modbus' in one.addresses]
+    registers = [one.index for one in addresses if one.space != 'coil']
+    if min(registers, default=0) >= _PRINTED_FROM:
+        found.append(
+            f'its registers are sent as {min(registers)} and above: if the first one that its '
+            f'manual prints is {_PRINTED_FROM}, add numbering: {_PRINTED_FROM} under line'
+        )
     shown = catalog.Fact.NETWORK_CONTROL in profile.status_word.valid
     if not (shown or profile.holders):
         found.append(

@@ -239,11 +239,17 @@ class Commands:
         if all(value == 0 for value, _ in run.values()):
             # edges, which the drive keeps
             return
-        if not any(takes_back(run[key], stop[key]) for key in run if key in stop):
+        runs = [run]
+        if self._direction is not None:
+            runs.append({**run, self._direction.key: (self._direction.reverse, WORD)})
+        if not all(
+            any(takes_back(left[key], stop[key]) for key in left if key in stop) for left in runs
+        ):
             self._problems.add(
                 line,
                 f'{name} leaves the run command standing, so that the motor may start again by '
-                'itself: have it take back, too, what run has written to the same register or coil',
+                'itself: have it take back what run has written there, too (such as clear, with '
+                'the bits that run sets)',
             )
 
 

@@ -41,6 +41,7 @@ _MODES = {'Hz': 'Freque', 'rpm': 'Speed'}
 #: Where faults that are bits begin to be counted.
 _FLAGS_FROM = 100
 _MOST_FAULTS = 64
+_SIGN = 0x8000
 _OF_STATUS = ('register', 'block')
 
 
@@ -293,7 +294,30 @@ class _Reader:
             parameter = internal(key, address, Access.READ, _UNITS.get(name, ''))
             made[key] = settings(node, parameter)
             roles[role] = key
+        self._require_own_registers(made)
         return made, roles
+
+    def _require_own_registers(self, measured: Mapping[str, Parameter]) -> None:
+        """See to it that no two values stand in one register, and none in that of status bits."""
+        # the highest bit may be the sign of a value
+        taken = {
+            one.register: f'status {name}'
+            for name, one in self._conditions.items()
+            if not one.coil and one.mask not in (WORD, _SIGN)
+        }
+        for key, parameter in measured.items():
+            name, address = key.partition('.')[2], parameter.at('modbus')
+            node = self._root['measured'][name]
+            if 'bits' in node or not address.space.startswith('register'):
+                continue
+            for register, *_ in address.occupied:
+                other = taken.setdefault(register, name)
+                if other != name:
+                    self._problems.add(
+                        node.line,
+                        f'{name} and {other} stand in the same register: check its number and its '
+                        'type; some bits of one are said with bits',
+                    )
 
     def _requires(self, control: Node, settings: Settings) -> Iterator[Requirement]:
         for node in control.get('requires').items:

@@ -72,6 +72,46 @@ def test_a_coast_by_a_bit_takes_back_that_of_run_too(tmp_path: Path) -> None:
     assert complaints(tmp_path, GOOD.replace('reset:', coast)) == []
 
 
+def test_a_stop_by_bits_takes_back_both_directions(tmp_path: Path) -> None:
+    text = GOOD.replace('type: int16, factor: 0.1, unit: Hz', 'factor: 0.1, unit: Hz')
+    for reverse, clear, right in ((3, 1, True), (2, 1, False), (2, 3, True)):
+        direction = f'direction: {{register: 10, forward: 1, reverse: {reverse}}}}}'
+        found = complaints(
+            tmp_path,
+            text.replace('signed: true}', direction).replace(
+                'stop: [{register: 10, value: 0}]', f'stop: [{{register: 10, clear: {clear}}}]'
+            ),
+        )
+        assert (found == []) is right, found
+
+
+MEASURED = 'actual_frequency: {register: 22, type: int16, factor: 0.1}'
+
+
+@pytest.mark.parametrize(
+    ('measured', 'right'),
+    [
+        ('output_current: {register: 23}', True),
+        ('output_current: {register: 22}', False),
+        ('output_current: {register: 21, type: uint32}', False),
+        ('output_current: {register: 20}', False),
+        ('output_current: {register: 22, table: input}', True),
+        ('output_current: {register: 20, bits: [8, 15]}', True),
+        ('output_current: {register: 23, bits: [0, 7]}\n  output_voltage: {register: 23, bits: '
+         '[8, 15]}', True),
+    ],
+)  # fmt: skip
+def test_a_value_has_a_register_of_its_own(tmp_path: Path, measured: str, right: bool) -> None:
+    found = complaints(tmp_path, GOOD.replace(MEASURED, f'{MEASURED}\n  {measured}'))
+    assert (found == []) is right, found
+    assert right or 'stand in the same register' in found[0]
+
+
+def test_a_status_may_be_the_size_or_the_sign_of_a_value(tmp_path: Path) -> None:
+    status = 'running: {register: 22, except: [0]}\n  reverse: {register: 22, bit: 15}'
+    assert complaints(tmp_path, GOOD.replace('running: {bit: 0}', status)) == []
+
+
 #: What is replaced by what, and what is said of it.
 BAD = {
     'no YAML': ('vfd: 1', 'vfd: [1', 'is no YAML'),

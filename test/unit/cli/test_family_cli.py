@@ -34,6 +34,16 @@ def test_a_file_is_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert 'siemens_v20: Siemens SINAMICS V20' in said and 'sinus_g2: NFO Sinus G2' in said
 
 
+def test_a_forgotten_numbering_is_remarked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / 'printed.vfd.yaml'
+    file.write_text(Path(V20).read_text().replace('  numbering: 40001\n', ''))
+    for path, remarked in ((V20, False), (str(file), True)):
+        assert main(['family', 'check', path]) == 0
+        assert ('add numbering: 40001' in capsys.readouterr().out) is remarked
+
+
 def test_families_are_listed(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
