@@ -53,6 +53,8 @@ DESCRIBED = '.vfd.yaml'
 _WIDEST_WORD = 0xFFFFFFFF
 #: A motor may be overhauled by so much, as a share of the greatest set-point.
 _BEYOND_SETPOINTS = 1.1
+#: What a parameter of the line is for a drive, whatever its group.
+_OF_LINE = (Role.BUS_PROTOCOL, Role.BUS_ADDRESS, Role.BAUD_RATE, Role.CHARACTER_FORMAT)
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,8 @@ class Family(Mapping[str, Parameter]):
     @functools.cached_property
     def communication(self) -> frozenset[str]:
         """The keys of the settings of the line, by which the drive may be lost."""
-        return self.group_of(Role.BUS_ADDRESS)
+        of_line = {self.key(role) for role in _OF_LINE if role in self.roles}
+        return self.group_of(Role.BUS_ADDRESS) | of_line
 
     def can_be(self, key: str, value: Value) -> bool:
         """Tell whether a drive can have a value, as far as the manual says: else it was spoiled."""

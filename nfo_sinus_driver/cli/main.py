@@ -112,7 +112,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     try:
         take_family(options)
     except ValueError as error:
-        parser.error(str(error))
+        parser.exit(_USAGE, f'{parser.prog}: error: {error}\n')
     VERBS[options.verb].complete(options)
     for name, default in DEFAULTS.items():
         if not hasattr(options, name):

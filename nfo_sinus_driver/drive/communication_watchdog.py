@@ -236,7 +236,9 @@ class CommunicationWatchdog:
             return Report(Cause.OWN_TIMEOUT_OFF, name=name, asked=asked)
         if not state.timeout.stops_motor:
             stop = model[model.key(Role.STOP_AT_TIMEOUT)].name
-            return Report(Cause.OWN_TIMEOUT_STOPS_NOTHING, name=stop)
+            value = model.profile.stops_at_timeout
+            found, stops = ('OFF', 'ON') if value is True else (f'not {value}', value)
+            return Report(Cause.OWN_TIMEOUT_STOPS_NOTHING, name=stop, found=found, stops=stops)
         least = settings.lost_after + margin
         if 0 < timeout < least - 1e-9:
             return Report(

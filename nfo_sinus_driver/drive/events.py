@@ -20,10 +20,10 @@ class Severity(enum.Enum):
     ERROR = 'error'
 
 
-_NO_TIMEOUT = (
-    'the drive has no time-out of its own ({why}): if this {{call.program}} is killed or the cable '
-    'is cut, the motor runs on; {remedy}'
+_RUNS_ON = (
+    '({why}): if this {{call.program}} is killed or the cable is cut, the motor runs on; {remedy}'
 )
+_NO_TIMEOUT = f'the drive has no time-out of its own {_RUNS_ON}'
 _REMEDY = '{fault.description}. {fault.remedy}'
 _GO_ON = 'then {call.enable} to go on'
 _EMERGENCY = 'Use the {enable_input} or the emergency stop if it turns'
@@ -289,8 +289,11 @@ class Cause(enum.Enum):
         why='{name} is 0, and {call.drive_timeout} {asked:g} leaves it so',
         remedy='{call.set_drive_timeout}',
     )
-    OWN_TIMEOUT_STOPS_NOTHING = _NO_TIMEOUT.format(
-        why='{name} is OFF', remedy='{call.set_drive_timeout}, which turns it ON'
+    OWN_TIMEOUT_STOPS_NOTHING = (
+        'the time-out of the drive itself does not stop the motor '
+        + _RUNS_ON.format(
+            why='{name} is {found}', remedy='{call.set_drive_timeout}, which makes it {stops}'
+        )
     )
     OWN_TIMEOUT_KEPT = (
         '{call.drive_timeout} is 0: the time-out of the drive itself ({name} {timeout:g} s) stays '
@@ -399,7 +402,7 @@ class Cause(enum.Enum):
     CHANGED = '{change}'
     CHANGED_FOR_TIMEOUT = '{change} ({call.drive_timeout})'
     STORED = (
-        '{key} ({name}) was changed to take control, and is stored in the drive: {old} -> {new}'
+        '{key} ({name}) was changed to take control, and stays so: {old} -> {new}'
     )
     CHANGED_AS_WANTED = '{change}, as the parameter file says'
     CHANGED_AT_DRIVE = 'changed at the drive: {change}'

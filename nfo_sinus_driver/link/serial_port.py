@@ -31,6 +31,8 @@ _SERIAL_FLAGS = 4
 _RS485_STRUCT_INTS = 8
 #: Device numbers of pseudo-terminals, which have no parity and no baud rate to set.
 _PTY_MAJORS = range(136, 144)
+#: What a process has open that has the other end of one.
+_PTMX = os.makedev(5, 2)
 
 _READ_SIZE = 512
 
@@ -218,7 +220,11 @@ def _switch_transmitter_by_port(fd: int) -> None:
 
 
 def holders(path: str) -> list[str]:
-    """Return the other processes that have a device open, ``name (pid 123)``, as far as visible."""
+    """
+    Return the other processes that have a device open, ``name (pid 123)``, as far as visible.
+
+    Of a pseudo-terminal not those at its other end, such as a simulator.
+    """
     try:
         device = os.stat(path).st_rdev
     except OSError:
@@ -226,7 +232,7 @@ def holders(path: str) -> list[str]:
     found = []
     for process in Path('/proc').iterdir():
         other = process.name.isdigit() and int(process.name) != os.getpid()
-        if other and _has_open(process, device):
+        if other and _has_open(process, device) and not _is_behind(process, device):
             found.append(f'{_name(process)} (pid {process.name})')
     return sorted(found)
 
@@ -238,6 +244,10 @@ def _has_open(process: Path, device: int) -> bool:
         # ended meanwhile, or not ours to look into
         return False
     return any(_device(descriptor) == device for descriptor in descriptors)
+
+
+def _is_behind(process: Path, device: int) -> bool:
+    return os.major(device) in _PTY_MAJORS and _has_open(process, _PTMX)
 
 
 def _device(descriptor: Path) -> int | None:

@@ -194,12 +194,13 @@ def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
 def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
     """Return what ``ros2 param describe`` shows; its range takes in what the drive has."""
     parameter = drive.model[key]
+    text = ': '.join(filter(None, (parameter.name, parameter.description)))
     unit = f' [{parameter.unit}]' if parameter.unit else ''
     shown = ParameterDescriptor(
         name=key,
         type=Parameter.Type.from_parameter_value(value).value,
         read_only=not parameter.is_setting,
-        description=f'{parameter.name}: {parameter.description}{unit}',
+        description=f'{text}{unit}',
         additional_constraints='; '.join(_constraints(parameter, drive.model)),
     )
     if isinstance(value, (bool, str)):

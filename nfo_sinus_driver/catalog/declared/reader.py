@@ -112,7 +112,7 @@ class _Reader:
             requires=tuple(self._requires(control, settings)),
             holder=settings.holder(control.get('holder')),
             stop_mode=self._stop_mode(control.get('stop_mode'), settings),
-            enable_input=control.text('enable_input', 'enable input'),
+            enable_input=control.text('enable_input', 'enable input').removeprefix('the '),
             codes=self._codes(codes_at, status),
             faults={fault.code: fault for fault in self._faults(root.get('faults'))},
             flags=tuple((one.in_place(status), fault) for one, fault in flags),

@@ -26,6 +26,8 @@ from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
 PATH = Path(__file__).parent / 'vfd.schema.json'
 #: So many characters of a text are shown, for what is wrong may be of any length.
 _SHOWN = 60
+#: So like one another are two words of which one is a slip of the other.
+_NEAR = 0.75
 _KINDS = {
     'object': 'a mapping (key: value)',
     'array': 'a list',
@@ -142,7 +144,7 @@ def _unknown(
     key: str, where: str, known: Mapping[str, Any], rule: Mapping[str, Any]
 ) -> str:
     """Return what to say of a key that is none."""
-    near = difflib.get_close_matches(key, known, 1)
+    near = difflib.get_close_matches(key, known, 1, _NEAR)
     if near:
         return f'{key!r} is no key of {where}: {near[0]!r} may be meant'
     if known:

@@ -118,6 +118,9 @@ BAD = {
     'another version': ('vfd: 1', 'vfd: 2', 'choose one of 1'),
     'no title': ('title: Made up', '', "needs 'title'"),
     'unknown key': ('setpoint: {register', 'setpoint: {regsiter: 1, register', "'register' may be"),
+    'a key like another': (
+        'fault: {bit: 3}', 'fault: {bit: 3}\n  warning: {bit: 5}', 'at_setpoint, alarm',
+    ),
     'missing register': ('setpoint: {register: 11, ', 'setpoint: {', "needs 'register'"),
     'register out of range': ('{register: 10, value: 1}', '{register: 70000, value: 1}', 'be sent'),
     'register below the numbering': ('write: 6', 'numbering: 40001, write: 6', 'cannot be sent'),

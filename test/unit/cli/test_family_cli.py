@@ -79,6 +79,7 @@ def test_a_family_that_is_none_leaves_with_what_to_do(
             parse(command)
         assert left.value.code == 2
     assert 'choose one of' in (said := capsys.readouterr().err) and 'no such file' in said
+    assert 'usage' not in said
     with pytest.raises(SystemExit):
         simulator.main(['--family', 'none'])
     assert "no family 'none'" in capsys.readouterr().err

@@ -126,7 +126,7 @@ def test_it_warns_once_of_a_drive_without_a_time_out(
     bench = make_bench(settings=QUICK)
     done = bench.run('run', 10, '--for', 0.3, *typed)
     assert done.status == 0
-    assert done.err.count('the drive has no time-out of its own') == 1
+    assert done.err.count('the motor runs on') == 1
     assert why in done.err and '--drive-timeout' in done.err
 
 

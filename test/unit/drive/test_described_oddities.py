@@ -334,6 +334,23 @@ def test_a_change_at_the_keypad_is_said_and_one_of_the_driver_is_not(tmp_path: P
             assert rig.notes.said(f'Keypad -> {value}' if value == 'Net' else 'Net -> Keypad')
 
 
+def test_what_the_file_calls_a_setting_of_the_line_is_protected(tmp_path: Path) -> None:
+    parameters = {
+        'line_a.address': {'register': 51, 'role': 'bus_address', 'default': 1},
+        'line_a.timeout': {'register': 52, 'factor': 0.1, 'unit': 's'},
+        'other.speed': {'register': 53, 'role': 'baud_rate'},
+        'other.timeout': {'register': 54, 'factor': 0.1, 'unit': 's'},
+    }
+    file = described(tmp_path, parameters=parameters, simulated={})
+    with DescribedRig(file) as rig:
+        rig.connect(parameters=True)
+        protected = {
+            key for key in parameters
+            if 'not changed unless' in rig.answer(rig.drive.parameters.change({key: 3}))
+        }
+        assert protected == {'line_a.address', 'line_a.timeout', 'other.speed'}
+
+
 def test_the_stop_mode_says_whether_a_stop_coasts(tmp_path: Path) -> None:
     parameters = {
         **PLAIN['parameters'],

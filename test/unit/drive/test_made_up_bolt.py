@@ -197,7 +197,7 @@ def test_what_is_stored_is_written_once_and_reported_and_kept() -> None:
     with Bench() as rig:
         rig.turn_at_40()
         assert rig.notes.said(
-            'bus.source (SOURCE) was changed to take control, and is stored in the drive: '
+            'bus.source (SOURCE) was changed to take control, and stays so: '
             'terminals -> line'
         )
         rig.answer(rig.drive.stop())

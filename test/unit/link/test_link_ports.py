@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import array
 from collections.abc import Iterator
+import contextlib
 import errno
 import fcntl
 import os
@@ -14,6 +15,8 @@ from pathlib import Path
 import re
 import select
 import socket
+import subprocess
+import sys
 import termios
 import threading
 import time
@@ -242,6 +245,33 @@ def test_port_in_use(pty: Pty, port: SerialPort) -> None:
     port.close()
     second.open()
     second.close()
+
+
+_HOLDS = """
+import fcntl, os, sys
+_, slave = os.openpty() if len(sys.argv) == 1 else (0, os.open(sys.argv[1], os.O_RDWR))
+if len(sys.argv) > 1:
+    fcntl.flock(slave, fcntl.LOCK_EX)
+print(os.ttyname(slave), flush=True)
+sys.stdin.read()
+"""
+
+
+def test_who_has_the_other_end_is_not_named_as_having_the_port() -> None:
+    with contextlib.ExitStack() as stack:
+
+        def start(*arguments: str) -> tuple[int, str]:
+            command = [sys.executable, '-c', _HOLDS, *arguments]
+            pipe = subprocess.PIPE
+            process = stack.enter_context(subprocess.Popen(command, stdin=pipe, stdout=pipe))
+            assert process.stdout is not None
+            return process.pid, process.stdout.readline().decode().strip()
+
+        simulator, path = start()
+        holder, _ = start(path)
+        with pytest.raises(PortError, match=rf'in use by .*\(pid {holder}\): end that') as error:
+            SerialPort(path, LineSettings()).open()
+        assert str(simulator) not in str(error.value).replace(path, '')
 
 
 def test_a_pseudo_terminal_stays_open_to_others_than_root(pty: Pty, port: SerialPort) -> None:
