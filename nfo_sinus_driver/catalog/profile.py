@@ -543,12 +543,12 @@ class Profile:
     :ivar line_check: what to look at, in this order, while a drive of it has never answered, by the
         protocol; where one is not there, what the protocol says itself.
     :ivar measured: the usual ones of ``~/measured``: what matters beside the telemetry.
-    :ivar line: of the factory, by its manual: ``protocol``, ``baud_rate``, ``char_format`` and
-        ``address``.
+    :ivar line: of the factory, by its manual, by the names of the driver's settings.
     :ivar refusals: what exception codes mean that say something of their own; by the code.
     :ivar busy: exception codes by which it says that it may take the request the next moment.
     :ivar stops_at_timeout: by this value of the role ``stop_at_timeout`` the motor stops.
     :ivar after_write: what makes settings take effect that were written, or keeps them.
+    :ivar pole_pairs: of the motor, where no parameter tells them; 0: not known.
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
     """
 
@@ -582,6 +582,7 @@ class Profile:
     busy: frozenset[int] = frozenset()
     stops_at_timeout: Value = True
     after_write: Sequence[Write] = ()
+    pole_pairs: int = 0
 
     def seen_by(self, method: str) -> Profile:
         """Return the same as one of its control methods sees it."""

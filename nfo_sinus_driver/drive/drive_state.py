@@ -487,7 +487,11 @@ class DriveState:
         return math.nan if target is None else self._measured.get(target.key, math.nan)
 
     def last_polled(self, role: Role | None) -> Measured:
-        """Return what a poll has measured last."""
+        """Return what a poll has measured last; the speed may follow from the frequency."""
+        pole_pairs = self.model.profile.pole_pairs
+        if role is Role.ACTUAL_SPEED and pole_pairs and role not in self.model.roles:
+            frequency, at = self.last_polled(Role.ACTUAL_FREQUENCY)
+            return Measured(60 * frequency / pole_pairs, at)
         return NOT_MEASURED if role is None else self._polled.get(role, NOT_MEASURED)
 
     @property

@@ -224,7 +224,7 @@ class Joint:
 def _pole_pairs(drive: Drive) -> float:
     """Return how many the motor has, told or from its nominal speed, or a ValueError."""
     values, key = drive.parameters.values, drive.model.key
-    told = float(values.get(key(Role.POLE_PAIRS), 0))
+    told = float(values.get(key(Role.POLE_PAIRS), drive.model.profile.pole_pairs))
     if told:
         return told
     frequency = float(values.get(key(Role.NOMINAL_FREQUENCY), 0))

@@ -255,6 +255,7 @@ class Description:
     :ivar flags: faults that are bits, the gravest first.
     :ivar holder: the parameter that tells who has control, and its values for the line.
     :ivar prepare_stops: no run command stands behind ``prepare``.
+    :ivar pole_pairs: of the motor; 0: not known.
     :ivar stop_mode: the parameter that says how it stops, and its value for coasting.
     :ivar defaults: with what value a parameter leaves the factory, by key.
     """
@@ -289,6 +290,7 @@ class Description:
     alarm: Fault = Fault(0, 'Warning', remedy='Look at its keypad which one it is')
     timeout: Timeout | None = None
     defaults: Mapping[str, Value] = field(default_factory=dict)
+    pole_pairs: int = 0
     accel: str = ''
     decel: str = ''
 

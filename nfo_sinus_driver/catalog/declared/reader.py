@@ -119,6 +119,7 @@ class _Reader:
             alarm=self._alarm(root.get('alarms')),
             timeout=self._timeout(settings),
             defaults=settings.defaults,
+            pole_pairs=root.get('motor').integer('pole_pairs'),
             accel=settings.known(root.get('simulated').get('accel')),
             decel=settings.known(root.get('simulated').get('decel')),
         )

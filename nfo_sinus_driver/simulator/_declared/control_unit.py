@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from nfo_sinus_driver.catalog import Kind, Role
@@ -309,6 +309,8 @@ class DeclaredControlUnit(ControlUnit):
         """Return the motor's data, as far as parameters tell it."""
         get, roles = self.memory.number, self.memory.model.roles
         usual = Nameplate()
+        if self._drive.pole_pairs:
+            usual = replace(usual, speed=usual.speed * usual.pole_pairs / self._drive.pole_pairs)
         frequency = get(roles.get(Role.NOMINAL_FREQUENCY, ''), usual.frequency) or usual.frequency
         speed = get(roles.get(Role.NOMINAL_SPEED, ''), 0.0) or usual.speed * frequency / 50
         return Nameplate(frequency=frequency, speed=speed)

@@ -271,6 +271,21 @@ def test_a_fault_that_the_status_cannot_show_is_not_simulated(
         assert not rig.far.faults
 
 
+def test_the_speed_follows_from_the_frequency_where_only_pole_pairs_are_known(
+    tmp_path: Path,
+) -> None:
+    for name, motor in (('known', {'pole_pairs': 3}), ('unknown', {})):
+        path = tmp_path / name
+        path.mkdir()
+        with DescribedRig(described(path, motor=motor)) as rig:
+            rig.connect(parameters=True)
+            rig.enable()
+            rig.follow(20.0)
+            speed = rig.drive.snapshot.speed
+            assert speed == pytest.approx(400.0, rel=0.03) if motor else math.isnan(speed)
+            assert not motor or rig.far.motor.plate.pole_pairs == 3
+
+
 def test_a_number_that_means_none_is_no_value(tmp_path: Path) -> None:
     measured = {
         **PLAIN['measured'],
