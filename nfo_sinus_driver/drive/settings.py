@@ -178,7 +178,7 @@ class DriveSettings:
     measured: Sequence[str] = setting(
         ('',),
         'what ~/measured has, at telemetry_rate: measured values by the names of their parameters',
-        zero='those that matter of the model',
+        zero='those that matter of the model beside ~/telemetry',
     )
     lost_after: float = setting(
         1.0,
@@ -244,7 +244,8 @@ class DriveSettings:
         1e-6, 1e6, change=UNCONFIGURED,
     )
     allow_communication_changes: bool = setting(
-        False, 'allow changes of the parameters serial.*: the driver may lose the drive by that'
+        False,
+        'allow changes of settings of the line (serial.*): the driver may lose the drive by that',
     )
     classic_dialect: str = setting(
         '',
