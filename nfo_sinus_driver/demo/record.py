@@ -46,6 +46,8 @@ _ON_ITS_WAY = 0.5
 #: How long a signal may wait that came to another thread: Python handles it in the main one, but
 #: does not wake it (s). That is where it comes when the process was suspended.
 _POLL_SIGNALS = 0.2
+#: The folder of the bag in that of a recording.
+_BAG = 'ride'
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -54,7 +56,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = _record_parser()
     options = parser.parse_args(rclpy.utilities.remove_ros_args(['', *given])[1:])
     folder: Path = (options.output or Path(time.strftime('ride_%Y-%m-%d_%H-%M-%S'))).resolve()
-    bag = folder / 'ride'
+    bag = folder / _BAG
     if bag.exists():
         parser.error(f'{bag} is there already, and is not written over')
     if no_bag := bags.why_none():
@@ -84,6 +86,9 @@ def plot(args: Sequence[str] | None = None) -> int:
         print(f'plot: {"; ".join(missing)}', file=sys.stderr)
         return 1
     bag: Path = options.bag.resolve()
+    if not (bag / 'metadata.yaml').exists() and (bag / _BAG).is_dir():
+        # the folder that record was given
+        bag /= _BAG
     drives = [options.drive] if options.drive else []
     if options.explain:
         return _explain(bag, drives)

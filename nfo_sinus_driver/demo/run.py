@@ -22,15 +22,18 @@ The driver is up. In another terminal (`. tools/env.sh`, or your own Jazzy), try
   ros2 topic echo --once /nfo_sinus/inv_st
   ros2 service call /nfo_sinus/fault_ack std_srvs/srv/Trigger
 
+After that nothing turns until the next enable.
+
 Ctrl-C stops the motor and ends both.
 """
 _WITHOUT_ROS2 = """
-The driver is up. The ros2 tool is not installed here. In another terminal try without it:
+The driver is up. The ros2 tool is not installed here. In other terminals try without it:
 
   tools/run python examples/ride.py
   tools/run monitor
   tools/run record
   tools/run simulator inject --link %s fault 5
+  tools/run python examples/ride.py --acknowledge
 
 Ctrl-C stops the motor and ends both.
 """

@@ -11,6 +11,8 @@ from nfo_sinus_driver.demo.recorded import Recording
 
 #: A drive that is no longer enabled was stopped by what is noted within this, s.
 _SAME = 1.5
+#: It is no stop: the next set-point moves the motor.
+_TIME_OUT = 'setpoint timeout'
 
 
 def story(run: Recording) -> Iterator[str]:
@@ -20,7 +22,7 @@ def story(run: Recording) -> Iterator[str]:
     # what was done comes before what came of it in the same moment
     for time, text in sorted(moments, key=lambda moment: moment[0]):
         yield f'{time:9.2f}  {text}'
-    yield f'{run.length:9.2f}  the end: {run.phases[-1].what if run.phases else "not known"}'
+    yield f'{run.length:9.2f}  the end of the recording'
 
 
 def _answers(run: Recording) -> Iterator[tuple[float, str]]:
@@ -51,4 +53,6 @@ def _faults(run: Recording) -> Iterator[tuple[float, str]]:
 
 def _stops(run: Recording) -> Iterator[tuple[float, str]]:
     for stop in run.stops:
-        yield stop.time, f'STOPPED, {stop.reason}: {stop.text}'
+        # at a time-out of the set-points the drive stays enabled
+        what = 'SET TO 0' if stop.reason == _TIME_OUT else 'STOPPED'
+        yield stop.time, f'{what}, {stop.reason}: {stop.text}'

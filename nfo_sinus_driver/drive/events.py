@@ -50,7 +50,7 @@ class Cause(enum.Enum):
     )
     TOO_LATE = 'no answer within {timeout:g} s'
     LOST = 'lost: {why}; retrying'
-    LOST_IN_USE = f'lost: {{why}}; retrying, and stopped as soon as it answers; {_GO_ON}'
+    LOST_IN_USE = f'lost: {{why}}; retrying; it is stopped as soon as it answers; {_GO_ON}'
     OLD_DATA = (
         'the data from the drive stand still in the PLC for {seconds:g} s or more (its life '
         'counter does not change): check the fieldbus between them and that the program of the '
@@ -155,9 +155,9 @@ class Cause(enum.Enum):
     ACKNOWLEDGED_DETAILED = 'acknowledged {status} ({details})'
     STILL_FAULTED = f'{{status}} is still active: {_REMEDY}'
     NEXT_FAULT = 'acknowledged {acknowledged}, but {still}'
-    NOT_IN_CONTROL = 'not under bus control'
+    NOT_IN_CONTROL = 'nothing to stop: the bus has no control of the drive'
     CONTROL_RELEASED = '{stop}; control released'
-    COASTED_FOR_TIMEOUT = 'released to coast, for the time-out of the drive would end the ramp'
+    COASTED_FOR_TIMEOUT = 'the motor coasts, for the time-out of the drive would end the ramp'
     CONTROL_KEPT = '{stop}; the bus keeps control: {why}'
     LEFT_TO_RAMP = '{stop}; it was left to its ramp, under bus control'
     RELEASE_BLOCKED = (

@@ -161,7 +161,7 @@ def _open_device(path: str) -> int:
         whole = path.startswith('/')
         remedy = 'is the adapter plugged in?' if whole else f'should it be /dev/{path}?'
         raise PortError(
-            f'{path} does not exist: {remedy} Ports there are: {", ".join(_ports()) or "none"}'
+            f'{path} does not exist: {remedy} Ports found: {", ".join(_ports()) or "none"}'
         ) from None
     except PermissionError:
         raise PortError(

@@ -17,10 +17,10 @@ from std_msgs.msg import Float32
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.settings import BLOCK_SIZE
+from nfo_sinus_driver.node.graph_watch import PERIOD, GraphWatch
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
-from nfo_sinus_driver.node.wrong_types import PERIOD, WrongTypes
 
 #: How long the bus waits for what is to begin at once, s; no drive times out by then.
 _LONGEST_GATHERING = 0.1
@@ -57,7 +57,7 @@ class BusContext:
         for topic, (type_, callback) in topics.items():
             self.setpoint_subscriber.subscribe(node, type_, topic, callback)
         types = {topic: type_ for topic, (type_, _) in topics.items()}
-        self.publish_queue.put_every(PERIOD, WrongTypes(node, types).look)
+        self.publish_queue.put_every(PERIOD, GraphWatch(node, types).look)
 
     def add(self, drive: ManagedDrive) -> None:
         """Take in another drive."""

@@ -97,7 +97,7 @@ def test_it_is_told_from_the_bag_alone_why_it_stopped_each_time(
     assert plot([str(bag), '--drive', _DRIVE, '--explain']) == 0
     told = capsys.readouterr().out
     assert re.search(r'^ +0\.90  enable: enabled$', told, re.MULTILINE), told
-    stops = re.findall(r'^ +([\d.]+)  STOPPED, ([\w ]+): (.*)$', told, re.MULTILINE)
+    stops = re.findall(r'^ +([\d.]+)  (?:STOPPED|SET TO 0), ([\w ]+): (.*)$', told, re.MULTILINE)
     assert stops == [
         (f'{10 * number + 5}.00', name.lower().replace('_', ' '), text)
         for number, (name, text) in enumerate(_STOPS.items())

@@ -15,8 +15,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float32, Float64
 
+from nfo_sinus_driver.node.graph_watch import PERIOD
 from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
-from nfo_sinus_driver.node.wrong_types import PERIOD
 
 
 @pytest.fixture
@@ -116,3 +116,14 @@ def test_who_publishes_another_type_is_warned_of_once_with_what_to_type(
     node.destroy_publisher(publishers[0])
     node.create_publisher(Float64, '/hand/speed', 1)
     wait_until(lambda: driver.text.count(warnings[0]) == 2, 'it is warned of again')
+
+
+def test_another_node_of_its_name_is_warned_of(bench: Bench, node: Node) -> None:
+    bench.simulator()
+    driver = bench.driver()
+    bench.client().connected()
+    time.sleep(2 * PERIOD)
+    assert 'another node is called' not in driver.text
+    namesake = Node('nfo_sinus')
+    wait_until(lambda: 'another node is called /nfo_sinus, too' in driver.text, 'it is warned of')
+    namesake.destroy_node()

@@ -388,7 +388,7 @@ def templates() -> Iterator[Sentence]:
         (
             CODE.raised,
             (
-                '… does not exist: … Ports there are: …',
+                '… does not exist: … Ports found: …',
                 'port is empty: name a device, such as /dev/ttyUSB0',
                 # a constant
                 'the drive lets no one take control now (MODE is Inhibit: tuning?)',

@@ -418,7 +418,7 @@ def test_a_second_ctrl_c_says_that_the_motor_may_run(bench: Bench) -> None:
     ('settings', 'said'),
     [
         ({}, 'left to its ramp'),
-        ({'serial.sio_tot': 2, 'serial.auto_stop': True}, 'released to coast'),
+        ({'serial.sio_tot': 2, 'serial.auto_stop': True}, 'the motor coasts'),
     ],
 )
 def test_a_second_ctrl_c_ends_the_wait_for_a_ramp(

@@ -147,7 +147,7 @@ def test_why_it_stops_is_said_although_the_line_is_lost_at_once() -> None:
         rig.send(10.0)
         rig.pass_time(2.5)
         assert rig.notes.said('stopping: it refused set-point 10', Severity.WARNING)
-        assert rig.notes.said('retrying, and stopped as soon as it answers', Severity.ERROR)
+        assert rig.notes.said('retrying; it is stopped as soon as it answers', Severity.ERROR)
         rig.meet = lambda key, data: None
         rig.line.mend()
         rig.pass_time(5.0)

@@ -163,7 +163,7 @@ def test_exit_leaves_a_slow_motor_to_its_ramp_unless_a_fault_would_end_it(
         rig.send(None)
         answer = rig.answer(rig.drive.disconnect(0.1))
         if drive_timeout:
-            assert answer.startswith('released to coast')
+            assert answer.startswith('the motor coasts')
             assert not rig.far.motor.driven
         else:
             assert answer == (

@@ -182,10 +182,10 @@ def test_absent_port_names_those_there_are(monkeypatch: pytest.MonkeyPatch) -> N
         port.open()
     assert str(error.value) == (
         '/dev/ttyNONE does not exist: is the adapter plugged in? '
-        'Ports there are: /dev/ttyACM0, /dev/ttyUSB7'
+        'Ports found: /dev/ttyACM0, /dev/ttyUSB7'
     )
     monkeypatch.setattr(serial_port, '_ports', list)
-    with pytest.raises(PortError, match='Ports there are: none'):
+    with pytest.raises(PortError, match='Ports found: none'):
         port.open()
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Messages that never arrive, for they are of another type than the topic: the graph shows it."""
+"""What the graph shows to be wrong: messages that never arrive, and another node of the name."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _WRITTEN = {
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'
 
 
-class WrongTypes:
+class GraphWatch:
     """
-    Warns of publishers of another type on the topics of a node, once of each.
+    Warns of publishers of another type on the topics of a node, and of another node of its name.
 
     :param types: the topics that the node subscribes to, as they were named there.
     """
@@ -36,10 +36,26 @@ class WrongTypes:
         self._log = node.get_logger()
         self._types = types
         #: The publishers that there are and that were warned of.
-        self._told: set[tuple[int, ...]] = set()
+        self._known: set[tuple[int, ...]] = set()
+        self._has_namesake = False
 
     def look(self) -> None:
-        """Warn of those that were not there before."""
+        """Warn of what was not there before."""
+        self._look_at_names()
+        self._look_at_types()
+
+    def _look_at_names(self) -> None:
+        own = self._node.get_name(), self._node.get_namespace()
+        several = self._node.get_node_names_and_namespaces().count(own) > 1
+        if several and not self._has_namesake:
+            self._log.warning(
+                f'another node is called {self._node.get_fully_qualified_name()}, too: a command '
+                'reaches one of both motors, or both; end one, give it another name or namespace, '
+                'or another ROS_DOMAIN_ID'
+            )
+        self._has_namesake = several
+
+    def _look_at_types(self) -> None:
         found = set()
         for topic, type_ in self._types.items():
             wanted = _name(type_)
@@ -47,7 +63,7 @@ class WrongTypes:
                 if publisher.topic_type == wanted or publisher.node_name == _UNKNOWN:
                     continue
                 found.add(tuple(publisher.endpoint_gid))
-                if tuple(publisher.endpoint_gid) not in self._told:
+                if tuple(publisher.endpoint_gid) not in self._known:
                     name = self._node.resolve_topic_name(topic)
                     node = f'{publisher.node_namespace.rstrip("/")}/{publisher.node_name}'
                     self._log.warning(
@@ -55,7 +71,7 @@ class WrongTypes:
                         f'here: publish it as {wanted}, such as by ros2 topic pub -r 10 {name} '
                         f"{wanted} '{_WRITTEN[type_]}'"
                     )
-        self._told = found
+        self._known = found
 
 
 def _name(type_: type) -> str:
