@@ -73,6 +73,12 @@ def test_it_runs_for_a_while_and_stops(make_bench: MakeBench, way: str) -> None:
     assert 'set  10.0 Hz' in out and '10.0 Hz' in out
 
 
+def test_what_was_before_control_was_taken_is_not_shown(bench: Bench) -> None:
+    done = bench.run('run', 10, '--for', 0.5, '--json')
+    assert done.status == 0
+    assert json.loads(done.out.splitlines()[0])['enabled'] is True
+
+
 def test_an_optimal_by_its_control_word(make_bench: MakeBench) -> None:
     bench = make_bench(settings=QUICK, **OPTIMAL)
     method = ('--method', 'drive_control')
