@@ -15,6 +15,7 @@ import termios
 from bench import Bench, holds_for
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
+from rcl_interfaces.srv import DescribeParameters
 from support.described import SHIPPED
 from ways import needs
 
@@ -55,6 +56,8 @@ def test_a_ride(bench: Bench, file: Path, family: str) -> None:
     status = client.newest('status')
     assert status.control_method == DriveStatus.CUSTOM
     assert client.parameter('ramp.accel') == 0.5
+    described = client.call('describe_parameters', DescribeParameters, names=['ramp.accel'])
+    assert described.descriptors[0].description == '01.09 [s]'
     assert client.set_parameters(**{'ramp.decel': 0.5}).successful
     assert drive.state()['parameters']['ramp.decel'] == 0.5
     with client.run_at(20.0):
