@@ -373,7 +373,7 @@ def templates() -> Iterator[Sentence]:
             templates,
             (
                 *('CANNOT STOP THE MOTOR: …', 'the current limit holds the motor back'),
-                *('lost: …; retrying, and stopped as soon', 'the stop is NOT confirmed: …'),
+                *('lost: …; retrying; it is stopped as soon', 'the stop is NOT confirmed: …'),
             ),
         ),
         (
