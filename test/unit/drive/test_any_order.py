@@ -59,6 +59,10 @@ def test_each_event_ends_a_ride(machine: type[AnyOrder]) -> None:
             state.put_right()
         for give in ('', 'stop', 'deactivate'):
             state.lose_line('silent', give, 9.0, wait=2.5)
+        state.put_right()
+        state.ride(wait=1.0)
+        # the next driver finds the motor running
+        state.kill(wait=2.5)
     finally:
         state.teardown()
 
