@@ -339,8 +339,10 @@ class ShownMovitrac(Shown):
 
     @property
     def by_bus(self) -> bool:
-        raw = self._far.memory.raw
-        return self._mode == Mode.REMOTE_CONTROL and not raw(MANUAL)
+        # where it is only watched, the line may give the set-point alone
+        watched = self._method == 'monitor' and self._mode == Mode.REMOTE_SETPOINT
+        remote = self._mode == Mode.REMOTE_CONTROL or watched
+        return remote and not self._far.memory.raw(MANUAL)
 
     @property
     def _mode(self) -> int:
