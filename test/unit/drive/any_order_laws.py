@@ -100,8 +100,8 @@ class Laws(History):
         if not self.watched or self._method == 'monitor':
             return
         self._foreign = self._foreign and standing
-        if self.shown.refuses_stop and self._far.faults:
-            # it refuses the stop, so that it may go on until it was seen to
+        if (self.shown.refuses_stop and self._far.faults) or self.shown.hides_stop:
+            # it refuses the stop or does not show its own, so that it may go on until that is over
             self._no_run_from = max(self._no_run_from, self.now + self.noticed)
         if (standing or running) and self.enabled_at is None:
             self._judge_standing()

@@ -120,6 +120,11 @@ class Shown(abc.ABC):
         self._method = rig.drive.settings.method
 
     @property
+    def hides_stop(self) -> bool:
+        """It stops by itself, and shows that it runs."""
+        return False
+
+    @property
     @abc.abstractmethod
     def by_bus(self) -> bool:
         """The bus controls the drive."""
@@ -276,17 +281,13 @@ class ShownDs402(ShownG2):
     """What a G2 shows by the drive profile of its CANopen module."""
 
     @property
-    def _ramps(self) -> bool:
-        """It ramps to a stop, and may show that it runs."""
-        return self._unit.state in ('DISABLE', 'SHUTDOWN')
-
-    @property
-    def standing(self) -> bool:
-        return super().standing and not (self._ramps and self._far.motor.driven)
+    def hides_stop(self) -> bool:
+        # along its ramp
+        return self._unit.state in ('DISABLE', 'SHUTDOWN') and self._far.motor.driven
 
     def facts(self) -> dict[str, Any]:
         facts = super().facts()
-        if self._ramps:
+        if self._unit.state in ('DISABLE', 'SHUTDOWN'):
             facts['running'] = None
         return {**facts, 'control mode': _OPERATION_MODES[facts['control mode']]}
 
