@@ -230,20 +230,23 @@ class Poller:
         """
         Ask the drive something before its own time-out strikes, where polls wait for too long.
 
-        They give way to commands, and to have many drives enabled at once takes seconds.
+        They give way to commands, and to have many drives enabled at once takes seconds. In a
+        silence it is asked once, for then the polls have to find that it is lost.
         """
         state = self._state
+        asked_after = -math.inf
         while True:
             patience = state.timeout.seconds * _LATEST_SHARE
             if not state.connected or not patience:
                 await self._bus.sleep(_WATCH_PERIOD)
                 continue
-            left = self._bus.silences.heard_at(self._unit) + patience - self._bus.now()
-            if left <= 0:
+            heard_at = self._bus.silences.heard_at(self._unit)
+            left = heard_at + patience - self._bus.now()
+            if left <= 0 and heard_at != asked_after:
+                asked_after = heard_at
                 with contextlib.suppress(LinkError):
                     await state.keep_alive()
-                left = patience / 2
-            await self._bus.sleep(left)
+            await self._bus.sleep(left if left > 0 else patience / 2)
 
     def _pause(self, polled_at: float) -> float:
         """Return how long to wait until the drive is asked again, s."""

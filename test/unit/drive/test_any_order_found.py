@@ -206,3 +206,13 @@ def test_a_stop_waits_for_no_look_whether_the_motor_has_to_be_stopped() -> None:
         state.stop(wait=0.1)
     finally:
         state.rig.close()
+
+
+@pytest.mark.parametrize('way', ['rtu', 'classic', 'movitrac'])
+def test_a_drive_that_is_silent_is_lost_in_time_although_its_own_time_out_is_near(way: str) -> None:
+    with Rig(way, drive_timeout=2.0) as rig:
+        rig.turn()
+        rig.line.state = 'silent'
+        rig.drive.stop()
+        rig.pass_time(4.0)
+        assert not rig.drive.snapshot.connected
