@@ -52,7 +52,7 @@ class CommunicationWatchdog:
     async def require_set(self) -> None:
         """Set it, if that was not done yet; what no setting asks for keeps no motor from it."""
         settings = self._state.settings
-        if self._settled == settings.own_timeout:
+        if self._is_settled(settings.own_timeout):
             return
         if settings.drive_timeout == AS_THE_DRIVE_CAN:
             await self._try_usual(settings.own_timeout)
@@ -60,6 +60,12 @@ class CommunicationWatchdog:
             await self.set_now(settings.own_timeout)
         self._settled = settings.own_timeout
         self._tell_watching()
+
+    def _is_settled(self, seconds: float) -> bool:
+        """Tell whether it was set to that, and nothing else was read since."""
+        key = self._state.model.key(Role.COMMUNICATION_TIMEOUT)
+        ours = self._set.get(key)
+        return self._settled == seconds and self._parameters.values.get(key, ours) == ours
 
     async def set_now(self, seconds: float) -> Sequence[Change]:
         """

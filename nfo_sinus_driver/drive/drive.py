@@ -266,7 +266,12 @@ class Drive:
         try:
             if self._controller is None:
                 return Report(Cause.ONLY_WATCHED)
-            answer = await self._controller.release(timeout, why, self._watchdog.undo)
+            try:
+                answer = await self._controller.release(timeout, why, self._watchdog.undo)
+            except DriveError:
+                if self.state.connected:
+                    await self._watchdog.put_back(goes_on=True)
+                raise
             # whoever has control at this moment: it may come back to the bus by itself
             goes_on = bool(self._controller.method.control_retained)
             await self._watchdog.put_back(goes_on=goes_on)

@@ -22,11 +22,11 @@ _STANDS = 0.5
 _BACKWARDS = 2.0
 #: So long a drive may take to begin to follow another set-point, s.
 _REACTION = 1.0
-#: By this share of a set-point, and so much more, slip, its compensation and overshoot go beyond.
+#: By this share of a set-point slip, its compensation and overshoot go beyond, and so much more.
 _BEYOND = 0.1
 _BEYOND_BY = 3.0
-#: A motor that slows down by more than that, so far from its set-points, goes to a stop: Hz.
-_SHORT = 1.0
+#: A motor that is slowed down by so much, so far below its set-points, goes to a stop: Hz.
+_SHORT, _FALLEN = 1.0, 0.4
 #: What is compared with set-points, and what one of its units is for 1 Hz of a four-pole motor.
 _COMPARED = {'Freque': (Role.ACTUAL_FREQUENCY, 1.0), 'Speed': (Role.ACTUAL_SPEED, 30.0)}
 
@@ -62,8 +62,8 @@ class Following:
         #: In which direction all set-points of late point; 0: in none, or in both.
         self._way = 0
         self._wrong_way = 0
-        #: How fast it was before, and how many values in a row show that it goes to a stop.
-        self._size, self._short = 0.0, 0
+        #: From which size on the drive slows it down, below its set-points.
+        self._falls_from = 0.0
         self._reported = False
 
     def judge(self) -> Report | None:
@@ -126,17 +126,20 @@ class Following:
         """
         Tell whether the drive slows the motor down although all set-points of late are beyond it.
 
-        Where no status word distinguishes a ramp to a stop from a run.
+        Where no status word distinguishes a ramp to a stop from a run. By less the slip of the
+        motor goes below a set-point.
         """
         status = self._state.status
         if status is None or not (status.word is None or status.by_frequency):
             return False
         way = 1 if least > 0 else -1 if most < 0 else 0
         size, wanted = way * actual, min(abs(least), abs(most))
-        slows = status.means(Meaning.SLOWING) and 0 < size < self._size - _FALL * unit
-        self._short = self._short + 1 if slows and size < wanted - _SHORT * unit else 0
-        self._size = size
-        return self._short > 1
+        short = 0 < size < wanted * (1 - _BEYOND) - _SHORT * unit
+        if not (short and status.means(Meaning.SLOWING)):
+            self._falls_from = 0.0
+            return False
+        self._falls_from = max(self._falls_from, size)
+        return size < self._falls_from - _FALLEN * unit
 
     def _look_beyond(self, value: float, at: float, most: float, unit: float) -> None:
         """Tell of a motor that turns faster than it was told, and give the set-point again."""

@@ -78,11 +78,11 @@ class OtherLines:
 
     def follow(self) -> None:
         """Take over what is named now; may be called from any thread."""
-        self._queue.put(self._follow)
+        self._queue.put_first(self._follow)
 
     def stop(self) -> None:
         """Have all of them stopped; may be called from any thread."""
-        self._queue.put(self._stop)
+        self._queue.put_first(self._stop)
 
     def _follow(self) -> None:
         """Have a client for each that is named, and no other."""
@@ -112,7 +112,14 @@ class OtherLines:
 
     def _take_answer(self, future: Future) -> None:
         service, _ = self._calls.pop(future)
-        answer = future.result()
+        try:
+            answer = future.result()
+        except Exception as error:
+            self._complain(service, f'no answer of {service}: {error!r}')
+            return
+        if answer is None:
+            # its client is gone, for it is no longer named
+            return
         if answer.success:
             self._log.info(f'{_drive(service)} stops with it: {answer.message}')
         else:

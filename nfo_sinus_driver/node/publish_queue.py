@@ -32,6 +32,8 @@ class PublishQueue:
 
     def __init__(self) -> None:
         self._waiting: deque[Callable[[], None]] = deque(maxlen=_MOST_WAITING)
+        #: What is never dropped, and goes first.
+        self._urgent: deque[Callable[[], None]] = deque()
         self._schedule = Schedule()
         self._failures = Failures()
         self._something = threading.Event()
@@ -52,9 +54,14 @@ class PublishQueue:
         self._waiting.append(function)
         self._something.set()
 
+    def put_first(self, function: Callable[[], None]) -> None:
+        """Have a function run before all that waits, however much that is; from any thread."""
+        self._urgent.append(function)
+        self._something.set()
+
     def put_every(self, period: float, function: Callable[[], None]) -> None:
         """Have a function run once in every period, s; from any thread."""
-        self.put(lambda: self._schedule.add(time.monotonic(), period, function))
+        self.put_first(lambda: self._schedule.add(time.monotonic(), period, function))
 
     def close(self, timeout: float = 2.0) -> None:
         """Send what is waiting, then end."""
@@ -67,8 +74,8 @@ class PublishQueue:
         while True:
             self._something.wait(self._time_to_spare())
             self._something.clear()
-            while self._waiting:
-                self._run(self._waiting.popleft())
+            while queue := self._urgent or self._waiting:
+                self._run(queue.popleft())
             if self._closing:
                 return
             if (function := self._schedule.take_due(time.monotonic())) is not None:

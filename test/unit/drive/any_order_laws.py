@@ -59,6 +59,8 @@ class Laws(History):
         self._agreed_at: dict[str, float] = {}
         self._compared = Compared({}, {}, [])
         self._last: Snapshot | None = None
+        #: When it was last shown as not enabled.
+        self._not_enabled_at = -math.inf
         self._last_told: dict[str, Any] = {}
         #: How much had been asked when an acknowledgement let the motor go.
         self._turned_from: int | None = None
@@ -296,9 +298,11 @@ class Laws(History):
             agreed_at = self._agreed_at.get(name, known_since)
             if self.now - max(since, known_since, agreed_at) > patience:
                 raise Broken(f'{name} is told as {self._last_told[name]}, and it is {value}')
+        if not snapshot.enabled:
+            self._not_enabled_at = self.now
         running, since = self._truth['running']
         late = self.noticed + self.shown.patience('running')
-        long_since = self.now - max(since, known_since) > late
+        long_since = self.now - max(since, known_since, self._not_enabled_at) > late
         if snapshot.enabled and running is False and long_since:
             raise Broken('it is told as enabled, and it does not run')
 

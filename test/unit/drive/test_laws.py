@@ -504,6 +504,31 @@ def test_9_the_end_leaves_the_time_out_of_a_drive_as_it_was_found(way: str, foun
         )
 
 
+@pytest.mark.parametrize('way', ['rtu', 'movitrac'])
+def test_9_a_time_out_that_was_changed_meanwhile_is_set_again_by_the_next_enable(way: str) -> None:
+    with by_default(way, 0.0) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        assert own_timeout(rig) == 2.0
+        rig.answer(rig.drive.stop())
+        rig.far.set_from_keypad(rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT), 0.0)
+        rig.pass_time(15.0)
+        rig.enable()
+        assert own_timeout(rig) == 2.0
+
+
+@pytest.mark.parametrize('way', ['rtu', 'classic'])
+def test_9_an_end_with_a_fault_puts_the_time_out_back_or_says_that_it_stays(way: str) -> None:
+    with by_default(way, 0.0) as rig:
+        rig.turn()
+        rig.far.trip(rig.a_fault)
+        rig.pass_time(1.0)
+        rig.answer(rig.drive.stop_for_good(4.0))
+        rig.answer(rig.drive.disconnect(4.0))
+        said = (Cause.OWN_TIMEOUT_LEFT, Cause.OWN_TIMEOUT_NOT_PUT_BACK)
+        assert own_timeout(rig) == 0.0 or any(map(rig.notes.said, said))
+
+
 @timed
 def test_9_by_default_a_time_out_that_may_not_stop_the_motor_is_left_alone(way: str) -> None:
     model = load_family(WAYS[way].model, WAYS[way].method)

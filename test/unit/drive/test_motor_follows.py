@@ -34,23 +34,37 @@ UNTOLD = ('classic v5.0', 'canopen, no DriveStatus', 'canopen, ds402')
 
 @pytest.mark.parametrize('way', UNTOLD)
 @pytest.mark.parametrize('value', [20.0, -20.0])
+@pytest.mark.parametrize('retard', [10.0, 80.0])
 def test_a_run_input_that_is_back_before_the_motor_stands_does_not_start_it(
-    way: str, value: float
+    way: str, value: float, retard: float
 ) -> None:
-    with Rig(way, parameters={'control.accel': 0.3, 'control.retard': 10.0}) as rig:
+    parameters = {'control.accel': 0.3, 'control.retard': retard}
+    with Rig(way, parameters=parameters, poll_rate=50.0) as rig:
         rig.turn()
         rig.send(value)
-        rig.pass_time(15.0)
+        rig.pass_time(5.0 + retard)
         rig.far.set_run_input(False)
-        rig.pass_time(2.0)
+        rig.pass_time(retard / 5)
         size = abs(rig.far.motor.frequency)
         assert 5.0 < size < 19.0, 'it ramps to a stop'
         rig.far.set_run_input(True)
         rig.pass_time(1.0)
         assert abs(rig.far.motor.frequency) < size, 'it goes on to a stop'
         assert rig.notes.said(Cause.STOPPED_BY_ITSELF)
-        rig.pass_time(12.0)
+        rig.pass_time(retard)
         assert not rig.turns and not rig.drive.following
+
+
+@pytest.mark.parametrize('way', UNTOLD)
+@pytest.mark.parametrize('retard', [8.0, 20.0])
+def test_a_loaded_motor_that_ramps_down_does_not_stop_by_itself(way: str, retard: float) -> None:
+    with Rig(way, parameters={'control.accel': 0.3, 'control.retard': retard}) as rig:
+        rig.turn()
+        rig.far.motor.load = 1.0
+        for value in (50.0, 45.0, 30.0, 20.0):
+            rig.send(value)
+            rig.pass_time(retard / 2)
+            assert rig.drive.following
 
 
 @pytest.mark.parametrize('way', UNTOLD)

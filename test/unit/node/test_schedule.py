@@ -164,3 +164,17 @@ def test_a_message_that_cannot_be_sent_is_logged_once_and_silences_no_other(
     assert sent.wait(PATIENCE)
     queue.close()
     assert len(caplog.records) == 1
+
+
+def test_what_is_urgent_goes_first_and_is_never_dropped() -> None:
+    done: list[str] = []
+    held = threading.Event()
+    queue = PublishQueue()
+    queue.put(lambda: held.wait(PATIENCE) and None)
+    queue.start()
+    queue.put_first(lambda: done.append('stop'))
+    for _ in range(2000):
+        queue.put(lambda: done.append('status'))
+    held.set()
+    queue.close(PATIENCE)
+    assert done[0] == 'stop' and done.count('stop') == 1
