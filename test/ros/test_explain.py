@@ -145,6 +145,6 @@ def test_a_better_reason_for_the_same_stop_is_no_other_stop(tmp_path: Path) -> N
 def test_what_cannot_be_explained_is_refused(
     bag: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], why: str
 ) -> None:
-    where = bag.parent if 'no bag' in why else bag
+    where = bag / 'none' if 'no bag' in why else bag
     assert plot([str(where), *arguments]) == 1
     assert why in capsys.readouterr().err

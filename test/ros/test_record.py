@@ -104,7 +104,10 @@ def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     assert done.returncode == 0 and _is_picture(folder / 'again.png'), done.stderr
     done = _run(*_PLOT, str(bag), '--drive', 'other')
     assert done.returncode == 1 and '/other was never connected' in done.stderr
-    done = _run(*_PLOT, str(folder))
+    # the folder of the recording has it, too
+    done = _run(*_PLOT, str(folder), '--output', str(folder / 'third.png'))
+    assert done.returncode == 0 and _is_picture(folder / 'third.png'), done.stderr
+    done = _run(*_PLOT, str(folder.parent))
     assert done.returncode == 1 and 'it is no bag' in done.stderr
     again = _run(*_RECORD, '--output', str(folder))
     assert again.returncode == 2 and 'is there already' in again.stderr

@@ -190,9 +190,9 @@ def test_the_first_sentence_says_what_it_drives_by_the_word_that_people_look_for
     for name, begin in (
         ('README.md', r'# nfo_sinus_driver\s+'), ('docs/README.md', r'# Documentation\s+'),
         ('docs/index.html', '<title>'), ('package.xml', r'<description>\s*'),
-        ('msg_defs/package.xml', r'<description>\s*'), ('setup.py', "description='"),
+        (MSG_DEFS / 'package.xml', r'<description>\s*'), ('setup.py', "description='"),
     ):
-        first = re.search(rf'{begin}([^.]*)', (ROOT / name).read_text(encoding='utf-8'))
+        first = re.search(rf'{begin}([^.]*)', read(ROOT / name))
         assert first is not None and 'variable-frequency drives (VFDs' in first[1], name
 
 
