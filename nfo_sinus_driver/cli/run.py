@@ -258,7 +258,7 @@ class _Run:
     def _show(self) -> None:
         now = time.monotonic()
         snapshot, values = self._drive.snapshot, self._control.values
-        # what a poll has seen before control was taken is past
+        # what a poll showed before control was taken is past
         nothing_yet = not snapshot.enabled and self._shown_at < 0
         if nothing_yet or now < self._shown_at + self._options.period:
             return

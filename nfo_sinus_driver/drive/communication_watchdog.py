@@ -171,6 +171,11 @@ class CommunicationWatchdog:
             if goes_on and state.timeout.seconds and state.timeout.stops_motor:
                 self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS), goes_on=True)
 
+    def left(self, error: LinkError | DriveError) -> None:
+        """Tell that what no setting asked for stays: the motor may run, or could run again."""
+        if self._unasked and self._found:
+            self._tell_left(explain_failure(error, self._state), goes_on=False)
+
     async def _restore(self) -> None:
         for key in reversed(tuple(self._found)):
             if await self._state.params.read(key, Priority.SERVICE) == self._set[key]:

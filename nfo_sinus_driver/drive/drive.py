@@ -268,9 +268,8 @@ class Drive:
                 return Report(Cause.ONLY_WATCHED)
             try:
                 answer = await self._controller.release(timeout, why, self._watchdog.undo)
-            except DriveError:
-                if self.state.connected:
-                    await self._watchdog.put_back(goes_on=True)
+            except (LinkError, DriveError) as error:
+                self._watchdog.left(error)
                 raise
             # whoever has control at this moment: it may come back to the bus by itself
             goes_on = bool(self._controller.method.control_retained)

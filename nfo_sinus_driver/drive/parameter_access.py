@@ -249,11 +249,8 @@ class ParameterAccess:
             raise
 
     def is_own(self, key: str, data: bytes) -> bool:
-        """Tell once whether a step of a profile has written what a parameter has now."""
-        if self._own.get(key) != data:
-            return False
-        del self._own[key]
-        return True
+        """Tell whether a step of a profile has written what a parameter has at its next reading."""
+        return self._own.pop(key, None) == data
 
     async def write_data(
         self, key: str, data: bytes, priority: Priority, *, retry: bool = True

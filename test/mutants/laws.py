@@ -327,7 +327,7 @@ LAWS = (
         WATCHDOG,
         '        self._unasked = True\n',
         '',
-        ('test/unit/drive/test_laws.py', '-k', 'as_it_was_found and rtu'),
+        ('test/unit/drive/test_own_timeout.py', '-k', 'as_it_was_found and rtu'),
     ),
     Mutant(
         9,
@@ -335,7 +335,7 @@ LAWS = (
         WATCH,
         '_LATEST_SHARE = 0.5',
         '_LATEST_SHARE = 50.0',
-        ('test/unit/drive/test_laws.py', '-k', 'all_others'),
+        ('test/unit/drive/test_own_timeout.py', '-k', 'all_others'),
     ),
     Mutant(
         9,
@@ -343,7 +343,7 @@ LAWS = (
         WATCHDOG,
         '            await self._try_usual(settings.own_timeout)',
         '            pass',
-        ('test/unit/drive/test_laws.py', '-k', 'was_killed and rtu'),
+        ('test/unit/drive/test_own_timeout.py', '-k', 'was_killed and rtu'),
     ),
     Mutant(
         5,

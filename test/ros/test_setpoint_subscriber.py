@@ -110,6 +110,7 @@ def test_who_publishes_another_type_is_warned_of_once_with_what_to_type(
     ]
     for warning in warnings:
         wait_until(lambda warning=warning: warning in driver.text, warning)
+    # it looks again, and says nothing
     time.sleep(2 * PERIOD)
     assert all(driver.text.count(warning) == 1 for warning in warnings)
     # one that begins anew is another one
@@ -122,6 +123,7 @@ def test_another_node_of_its_name_is_warned_of(bench: Bench, node: Node) -> None
     bench.simulator()
     driver = bench.driver()
     bench.client().connected()
+    # it looks, and says nothing
     time.sleep(2 * PERIOD)
     assert 'another node is called' not in driver.text
     namesake = Node('nfo_sinus')

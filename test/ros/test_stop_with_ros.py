@@ -30,7 +30,7 @@ _TWO = """
 """
 #: SCMD = Stop, by Modbus.
 _STOP = '0602980000'
-#: Within what time the drive of another line is told to stop, s: some 10 ms on a machine at rest.
+#: Within what time the drive of another line gets its stop, s: some 10 ms on a machine at rest.
 _SOON = 0.5
 #: What is said of a drive of another line that is not there, and of one that comes then.
 _MISSED = 'does not stop with it'
@@ -77,7 +77,7 @@ class Line(NamedTuple):
         wait_until_found(self.driver)
 
     def stops_since(self, moment: float) -> list[float]:
-        """Return when its drive was told to stop, s."""
+        """Return when its drive got its stop, s."""
         return [
             frame['first']
             for frame in self.bench.frames()
@@ -87,6 +87,7 @@ class Line(NamedTuple):
 
 def wait_until_found(driver: Process, absent: int = 0) -> None:
     """Wait until a driver that enables has found the drives of other lines, but for the absent."""
+    # nothing is said before it has looked
     time.sleep(2 * PERIOD)
     wait_until(
         lambda: driver.text.count(_MISSED) == driver.text.count(_FOUND) + absent, 'it found them'
@@ -131,11 +132,11 @@ def test_whatever_stops_a_drive_stops_the_one_of_another_line(
         line.turn()
     begun = time.monotonic()
     _STOPS[stop](first)
-    told = wait_until(lambda: second.stops_since(begun), 'the other is told to stop')
+    other = wait_until(lambda: second.stops_since(begun), 'the other gets its stop')
     own = [begun]
     if stop != 'lost line':
-        own = wait_until(lambda: first.stops_since(begun), 'the first is told to stop')
-    assert told[0] - own[0] < _SOON
+        own = wait_until(lambda: first.stops_since(begun), 'the first gets its stop')
+    assert other[0] - own[0] < _SOON
     second.client.wait_for(
         'status', lambda one: one.stop_reason == DriveStatus.REASON_STOP, 'it says why'
     )

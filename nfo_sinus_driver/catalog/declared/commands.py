@@ -248,7 +248,7 @@ class Commands:
             self._problems.add(
                 line,
                 f'{name} leaves the run command standing, so that the motor may start again by '
-                'itself: have it take back what run has written there, too (such as clear, with '
+                'itself: have it clear what run has written there, too (such as clear, with '
                 'the bits that run sets)',
             )
 

@@ -275,13 +275,13 @@ def test_a_time_out_that_is_to_stay_as_it_is_is_a_decision_that_is_said_once() -
 def test_the_default_follows_what_lost_after_asks_for() -> None:
     with Rig(parameters={STOP: True}, drive_timeout=AS_THE_DRIVE_CAN) as rig:
         rig.connect()
-        seen = []
+        found = []
         for lost_after in (1.0, 3.0, 1.0):
             rig.drive.settings = replace(rig.drive.settings, lost_after=lost_after)
             rig.enable()
             rig.answer(rig.drive.stop())
-            seen.append(timeouts(rig))
-        assert seen == [(20, 1), (35, 1), (20, 1)]
+            found.append(timeouts(rig))
+        assert found == [(20, 1), (35, 1), (20, 1)]
         # a time that is asked for stays in the drive, and one that was not does not
         rig.answer(rig.drive.disconnect(4.0))
         assert timeouts(rig) == (0, 1)

@@ -1,0 +1,190 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Law 9: the drive hears the driver in time, and stops by itself when it is gone."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+import itertools
+from typing import Any
+
+import pytest
+from support.own_timeout import TIMED, by_default, own_timeout
+from support.rig import WAYS, Rig
+from support.said import says
+from support.variants import ramps
+
+from nfo_sinus_driver.catalog import Role, load_family
+from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
+
+#: How soon after its time-out a motor has to stand, s.
+_SOON = 1.5
+timed = pytest.mark.parametrize('way', TIMED)
+
+
+@timed
+def test_9_a_drive_that_is_polled_seldom_hears_the_driver_in_time(way: str) -> None:
+    with by_default(way, poll_rate=0.05, telemetry_rate=0.0) as rig:
+        rig.connect()
+        rig.enable()
+        assert own_timeout(rig) == 2.0
+        rig.line.make_noise(0.15, seed=1)
+        begun = rig.clock.now
+        rig.pass_time(12.0)
+        sent = [
+            one['first'] for one in rig.line.frames
+            if one['direction'] == 'request' and one['first'] > begun
+        ]
+        # half the time-out of the drive
+        assert max(two - one for one, two in itertools.pairwise(sent)) <= 1.0
+        assert rig.drive.following and not rig.far.faults
+        rig.line.mend()
+        # a clean exit leaves no fault behind
+        rig.answer(rig.drive.disconnect(4.0))
+        rig.kill()
+        rig.pass_time(6.0)
+        assert not rig.far.faults
+
+
+@pytest.mark.parametrize('way', WAYS)
+def test_9_by_default_a_motor_stands_soon_after_its_driver_was_killed(way: str) -> None:
+    with by_default(way) as rig:
+        rig.connect()
+        has_none = rig.notes.said(Cause.NO_OWN_TIMEOUT, Severity.WARNING)
+        assert has_none == (WAYS[way].model in ('acme', 'sinus_optimal') and not rig.line.plc)
+        rig.turn()
+        rig.kill()
+        rig.line.go_to(rig.clock.now + 2.0 + _SOON)
+        assert rig.turns == has_none
+
+
+@pytest.mark.parametrize(('way', 'drives', 'baud'), [('rtu', 32, 19200), ('classic', 16, 9600)])
+def test_9_a_drive_hears_the_driver_in_time_while_all_others_are_enabled(
+    way: str, drives: int, baud: int
+) -> None:
+    # so many that its polls wait for seconds
+    with by_default(way, drives=drives, line={'baud': baud}) as rig:
+        rig.connect()
+        rig.enable(1, 2)
+        rig.enable(*range(3, drives + 1))
+        assert not any(far.faults for far in rig.fars.values())
+        assert all(drive.following for drive in rig.drives.values())
+
+
+@timed
+@pytest.mark.parametrize('found', [0.0, 1.0, 6.0])
+def test_9_the_end_leaves_the_time_out_of_a_drive_as_it_was_found(way: str, found: float) -> None:
+    with by_default(way, found) as rig:
+        rig.turn()
+        # what is shorter was decided by others
+        assert own_timeout(rig) == (found if found == 1.0 else 2.0)
+        rig.answer(rig.drive.stop_for_good(4.0))
+        rig.answer(rig.drive.disconnect(4.0))
+        assert own_timeout(rig) == found
+        assert rig.far.writes.get(rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT), 0) == (
+            0 if found == 1.0 else 2
+        )
+
+
+@pytest.mark.parametrize('way', ['rtu', 'movitrac'])
+def test_9_a_time_out_that_was_changed_meanwhile_is_set_again_by_the_next_enable(way: str) -> None:
+    with by_default(way, 0.0) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        assert own_timeout(rig) == 2.0
+        rig.answer(rig.drive.stop())
+        rig.far.set_from_keypad(rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT), 0.0)
+        rig.pass_time(15.0)
+        rig.enable()
+        assert own_timeout(rig) == 2.0
+
+
+@pytest.mark.parametrize('way', ['rtu', 'classic'])
+def test_9_an_end_with_a_fault_leaves_the_time_out_and_says_so(way: str) -> None:
+    # a run command may stand in the drive
+    with by_default(way, 0.0) as rig:
+        rig.turn()
+        rig.far.trip(rig.a_fault)
+        rig.pass_time(1.0)
+        rig.answer(rig.drive.stop_for_good(4.0))
+        rig.answer(rig.drive.disconnect(4.0))
+        assert own_timeout(rig) == 2.0
+        assert rig.notes.said(Cause.OWN_TIMEOUT_NOT_PUT_BACK)
+
+
+@pytest.mark.parametrize('way', ['rtu', 'classic'])
+def test_9_an_end_without_a_confirmed_stop_leaves_the_drive_to_stop_by_itself(way: str) -> None:
+    with by_default(way, 0.0) as rig:
+        rig.turn()
+        key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
+        rig.meet = lambda asked, data: 'ignored' if data is not None and asked != key else None
+        rig.answer(rig.drive.stop_for_good(4.0))
+        rig.answer(rig.drive.disconnect(4.0))
+        assert rig.turns and rig.notes.said(Cause.OWN_TIMEOUT_NOT_PUT_BACK)
+        rig.kill()
+        rig.pass_time(4.0)
+        assert not rig.turns
+
+
+@timed
+def test_9_by_default_a_time_out_that_may_not_stop_the_motor_is_left_alone(way: str) -> None:
+    model = load_family(WAYS[way].model, WAYS[way].method)
+    if not model.key(Role.STOP_AT_TIMEOUT):
+        pytest.skip('it always stops the motor')
+    with Rig(way, drive_timeout=AS_THE_DRIVE_CAN) as rig:
+        rig.connect()
+        assert rig.notes.said(Cause.OWN_TIMEOUT_STOPS_NOTHING, Severity.WARNING)
+        before = own_timeout(rig)
+        rig.turn()
+        assert own_timeout(rig) == before
+        rig.answer(rig.drive.set_drive_timeout(2.0))
+        assert own_timeout(rig) == 2.0 and rig.drive.state.timeout.stops_motor
+
+
+@timed
+@pytest.mark.parametrize('what', ['refused', 'unheard', 'ignored'])
+def test_9_a_default_that_the_drive_does_not_take_keeps_no_motor_from_running(
+    way: str, what: str
+) -> None:
+    with by_default(way, 0.0) as rig:
+        rig.connect()
+        key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
+        rig.spoil(what, key, 1000)
+        for _ in range(2):
+            rig.enable()
+            rig.answer(rig.drive.stop())
+        said = [one for one in rig.notes.events if says(one.text, Cause.OWN_TIMEOUT_NOT_TAKEN)]
+        assert [one.severity for one in said] == [Severity.WARNING]
+        assert own_timeout(rig) == 0.0
+
+
+@timed
+def test_9_by_default_a_clean_end_leaves_a_slow_motor_to_its_ramp(way: str) -> None:
+    with by_default(way, 0.0, parameters=ramps(WAYS[way].model, 0.3, 30.0)) as rig:
+        rig.turn()
+        assert 'left to its ramp' in rig.answer(rig.drive.disconnect(0.2))
+        assert own_timeout(rig) == 0.0
+        rig.kill()
+        rig.line.go_to(rig.clock.now + 40.0)
+        assert not rig.far.motor.turning and not rig.far.faults
+
+
+@timed
+def test_9_a_stop_that_comes_while_the_time_out_is_set_is_no_later_and_undoes_it(way: str) -> None:
+    with by_default(way, 0.0) as rig:
+        rig.connect()
+        key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
+        stops: list[Future[Any]] = []
+
+        def stop(asked: str, data: bytes | None) -> None:
+            if asked == key and data is not None and not stops:
+                stops.append(rig.drive.stop())
+
+        rig.meet = stop
+        rig.answer(rig.drive.enable())
+        rig.wait_until(stops[0].done, 1.0)
+        assert not rig.drive.following and not rig.turns
+        rig.answer(rig.drive.disconnect(4.0))
+        assert own_timeout(rig) == 0.0
