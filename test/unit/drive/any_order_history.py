@@ -31,6 +31,8 @@ REFUSED = 0.3
 
 #: Commands that end a ride.
 STOPS = ('stop', 'quick_stop', 'deactivate', 'disconnect', 'stop_for_good')
+#: Commands that may turn the motor.
+_TURN = ('enable', 'tune')
 
 
 @dataclass
@@ -46,6 +48,8 @@ class Command:
     undisturbed: bool
     #: A stop was on its way when it was given.
     overruled: bool
+    #: It stops, and there was nothing to stop: neither a run command nor one on its way.
+    idle: bool
 
 
 class History:
@@ -98,10 +102,14 @@ class History:
     def command(self, name: str, future: Future[Any]) -> None:
         """Take note of a command that was given."""
         undisturbed = self._steady
-        stops = [one for one in self._commands if one.name in STOPS and not one.future.done()]
+        waiting = [one for one in self._commands if not one.future.done()]
+        stops = [one for one in waiting if one.name in STOPS and not one.idle]
         overruled = any(not self._may_be_confirmed(one) for one in stops)
         asked = len(self._rig.asked)
-        self._commands.append(Command(name, future, self.now, asked, undisturbed, overruled))
+        turning = [one for one in waiting if one.name in _TURN] + stops
+        idle = name in STOPS and not (self.enabled_at or self.standing or turning)
+        command = Command(name, future, self.now, asked, undisturbed, overruled, idle)
+        self._commands.append(command)
         if name == 'enable':
             if self.enabled_at is None and not overruled:
                 self.enabled_at = self.now
