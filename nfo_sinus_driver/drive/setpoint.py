@@ -320,7 +320,8 @@ class Setpoint:
         # of several writes each has a turn of its own, and a newer set-point comes between
         address, data = due[0]
         self._may_have(self._meant({**self._standing, address: data}))
-        if self._combining is _Combining.GIVEN_UP or len(due) > 1:
+        by_itself = len(due) > 1 or self._is_once(address)
+        if by_itself or self._combining is _Combining.GIVEN_UP:
             return self._bus.write(self._unit, address, data, Priority.SETPOINT)
         status = self._params.address(self._state.word_key)
         return self._bus.write_and_read(self._unit, address, data, status, Priority.SETPOINT)

@@ -63,7 +63,7 @@ class AllDrives:
                 failed, done = [f'error in the driver: {error}'], []
             response.success = not failed
             response.message = '; '.join((*failed, *done)) or 'no drive is controlled here'
-            call.log(response.message)
+            call.log(response.message, success=response.success)
             return response
 
         return answer

@@ -53,11 +53,15 @@ class Call:
         if not self._look():
             threading.Thread(target=self._keep_looking, daemon=True).start()
 
-    def log(self, outcome: str = '') -> None:
+    def log(self, outcome: str = '', *, success: bool = True) -> None:
         """Log the call and what came of it, as soon as it is known who called."""
         answered = outcome and f': {outcome}'
         log = self._node.get_logger()
-        self._by.add_done_callback(lambda _: log.info(f'{self}{answered}'))
+        # one call site for each level: rclpy forbids another level at the same place
+        if success:
+            self._by.add_done_callback(lambda _: log.info(f'{self}{answered}'))
+        else:
+            self._by.add_done_callback(lambda _: log.warning(f'{self}{answered}'))
 
     def _keep_looking(self) -> None:
         deadline = time.monotonic() + _KNOWN_WITHIN

@@ -101,7 +101,7 @@ class Commands:
     ) -> Any:
         """Give a command, and log who called it and what came of it."""
         self.answer(response, _and_find(call, command), timeout, self._managed.wording.say)
-        call.log(response.message)
+        call.log(response.message, success=response.success)
         return response
 
     def answer(

@@ -19,7 +19,7 @@ SETPOINT, STATUS, INV_ST = 'status.frq_set', 'fieldbus.drive_status', 'fieldbus.
 SCMD = 'fieldbus.scmd'
 SETPOINT_REGISTER = 0x3FC
 OVERLOAD = 5
-WRITE, BOTH = 6, 23
+WRITE, WRITE_SEVERAL, BOTH = 6, 16, 23
 
 
 def functions(rig: Rig, since: int = 0) -> list[int]:
@@ -64,6 +64,20 @@ def refuse_both(rig: Rig, code: int) -> list[int]:
 
     rig.link.write_and_read = refuse  # type: ignore[method-assign]
     return tried
+
+
+def test_a_direction_that_changes_without_a_size_goes_by_itself() -> None:
+    with Rig('rtu, control word') as rig:
+        rig.turn(-20.0)
+        rig.send(0.0)
+        rig.pass_time(1.0)
+        begun = len(rig.line.frames)
+        # less than a step of the drive, in the other direction
+        rig.send(0.004)
+        rig.pass_time(1.0)
+        sent = [bytes.fromhex(one['hex'])[1] for one in requests(rig, begun)]
+        assert WRITE_SEVERAL in sent and BOTH not in sent
+        assert rig.far.control_unit.machine.direction == 1
 
 
 def test_a_set_point_and_the_status_are_one_transaction_but_zero_of_a_stop() -> None:
