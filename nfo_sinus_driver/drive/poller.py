@@ -98,8 +98,8 @@ class Poller:
         self._failing_since = math.inf
         #: How often in a row it could not be connected to.
         self._failures = 0
-        #: How long it took to have one value read, s: long, where the line is full.
-        self._turn = 0.0
+        #: When a value was last asked for, and how long it took, s: long, where the line is full.
+        self._requested_at = self._turn = 0.0
         #: When the control mode was last read.
         self._mode_read_at = 0.0
         self._complaint: Report | None = None
@@ -399,11 +399,10 @@ class Poller:
         if role is state.turning.role and status and not math.isnan(status.frequency):
             # it came with the status
             return state.last_polled(role).value
-        requested_at = self._bus.now()
         value = await self._read_measured(role)
         state.polled(role, value)
         if role in state.model.roles:
-            self._turn = self._bus.now() - requested_at
+            self._turn = self._bus.now() - self._requested_at
         return value
 
     async def _read_measured(self, role: Role) -> float:
@@ -429,6 +428,7 @@ class Poller:
         """
         failing_since = math.inf
         while True:
+            self._requested_at = self._bus.now()
             try:
                 answer = await read()
             except (PortError, Refused, Interrupted, NoData):

@@ -222,6 +222,18 @@ def test_after_a_lost_answer_the_inverter_status_is_read() -> None:
             assert keys[answered + 1] == INV_ST
 
 
+def test_a_lost_answer_makes_nothing_else_older() -> None:
+    # with nothing but the speed to measure
+    with Rig('canopen, ds402', parameters={'control.mode': 'PI-Reg'}) as rig:
+        rig.connect()
+        rig.spoil('drop', SPEED, 2, written=False)
+        rig.pass_time(0.7)
+        begun = len(rig.asked)
+        rig.pass_time(1.2)
+        asked = reads(rig, begun)
+        assert asked[SPEED] >= 4 and asked['fieldbus.modes_of_operation_display'] >= 1
+
+
 def test_a_changed_inverter_status_that_the_word_does_not_show_is_published_soon() -> None:
     with fast({'control.accel': 20.0, 'control.retard': 20.0}) as rig:
         rig.connect()
