@@ -19,24 +19,22 @@ class DirectedTarget(SetpointTarget):
     Where the size of a set-point goes, beside a direction that is a command.
 
     The size is 0 before the direction changes, and the motor ramps through zero. At set-point 0 the
-    direction stays as it was.
+    direction stays as it was. It is written only when it changes: written again beside a size, it
+    could let a motor run that a fault or another master has stopped meanwhile.
 
     :ivar direction: the parameter that takes the direction.
     :ivar forward: what is written to it for a set-point from 0 upwards.
     :ivar reverse: what is written to it for one below.
-    :ivar directs_once: it is written only when it changes: written again beside a size, it could
-        let a motor run that another master has stopped meanwhile.
     """
 
     direction: str = ''
     forward: int = 0
     reverse: int = 0
-    directs_once: bool = False
 
     @property
     def written_once(self) -> frozenset[str]:
-        """The direction, where a set-point that is written again leaves it out."""
-        return frozenset((self.direction,) if self.directs_once else ())
+        """The direction: a set-point that is written again leaves it out."""
+        return frozenset((self.direction,))
 
     def writes(self, value: float, before: float = math.nan) -> Sequence[Write]:
         """
@@ -72,10 +70,8 @@ class DirectedTarget(SetpointTarget):
 def with_direction(
     target: SetpointTarget, direction: str, forward: int, reverse: int
 ) -> DirectedTarget:
-    """Return a target for sizes, with a command for the direction that is written once."""
-    return DirectedTarget(
-        **vars(target), direction=direction, forward=forward, reverse=reverse, directs_once=True
-    )
+    """Return a target for sizes, with a command for the direction."""
+    return DirectedTarget(**vars(target), direction=direction, forward=forward, reverse=reverse)
 
 
 def _is_reverse(value: float) -> bool:

@@ -91,11 +91,11 @@ def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -
         cause = _why_control_is_lost(state, status)
     elif Fact.RUN_INPUT_MISSING in status.facts:
         cause = Cause.RUN_INPUT_LOST
-    elif not status.runs:
-        cause = Cause.STOPPED_BY_ITSELF
     elif state.left_alone:
         # not every drive shows by a fault that its time-out is over, and some then go on
         cause = Cause.DRIVER_PAUSED
+    elif not status.runs:
+        cause = Cause.STOPPED_BY_ITSELF
     return cause and state.report(cause, seconds=state.timeout.shortest)
 
 

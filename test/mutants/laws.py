@@ -158,7 +158,7 @@ LAWS = (
         SETPOINT,
         'self._target is not None and self._keys[address] in self._target.written_once',
         'False',
-        REVERSES,
+        ('test/unit/drive/test_laws.py', '-k', 'no_run_command_again and movitrac'),
     ),
     Mutant(
         2,

@@ -139,6 +139,16 @@ def test_2_the_motor_turns_as_its_set_points_say(way: str) -> None:
         assert rig.drive.following
 
 
+@following
+def test_2_a_set_point_that_is_written_again_gives_no_run_command_again(way: str) -> None:
+    # which could let a motor run that a fault or another master has stopped meanwhile
+    with Rig(way) as rig:
+        rig.turn()
+        begun = len(rig.asked)
+        rig.pass_time(6.0)
+        assert len({key for _, key, data in rig.asked[begun:] if data is not None}) <= 1
+
+
 def lose_line(rig: Rig) -> None:
     rig.line.state = 'silent'
     rig.pass_time(3.0)

@@ -46,6 +46,8 @@ class Told(enum.IntFlag):
 class Frequency(SetpointTarget):
     """A frequency: its direction in one register, its size in another."""
 
+    written_once = frozenset((_TURN,))
+
     def writes(self, value: float, before: float = math.nan) -> Sequence[Write]:
         """Return what is to be written: no size of the one direction is followed in the other."""
         turn = Write(_TURN, 'reverse' if value < 0 else 'forward')
