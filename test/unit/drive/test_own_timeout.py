@@ -16,7 +16,7 @@ from support.said import says
 from support.variants import ramps
 
 from nfo_sinus_driver.catalog import Role, load_family
-from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.drive import Cause, Severity, StopReason
 from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 
 #: How soon after its time-out a motor has to stand, s.
@@ -58,6 +58,19 @@ def test_9_by_default_a_motor_stands_soon_after_its_driver_was_killed(way: str) 
         rig.kill()
         rig.line.go_to(rig.clock.now + 2.0 + _SOON)
         assert rig.turns == has_none
+
+
+@timed
+def test_9_a_driver_that_was_suspended_for_too_long_starts_nothing_when_it_is_back(
+    way: str
+) -> None:
+    with Rig(way, drive_timeout=2.0, setpoint_timeout=0.0) as rig:
+        rig.turn()
+        rig.line.go_to(rig.clock.now + 5.0)
+        for _ in range(200):
+            assert not rig.turns
+            rig.pass_time(0.01)
+        assert rig.drive.snapshot.stop_reason is StopReason.DRIVE_TIMEOUT
 
 
 @pytest.mark.parametrize(('way', 'drives', 'baud'), [('rtu', 32, 19200), ('classic', 16, 9600)])
