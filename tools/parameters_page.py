@@ -46,7 +46,7 @@ parameters of its node, and what it measures and is controlled by, which are
 How to read the tables:
 
 - **Values** are in the unit beside them, on every bus. Where an end is open, or no range is
-  printed, it depends on the inverter, or the manual does not tell: the drive decides.
+  printed, it depends on the inverter, or the manual does not say: the drive decides.
 - A number in parentheses is the code of a value in its register; `false` is 0 and `true` is 1.
 - **Step** is the difference between two values that the drive can hold. Two steps: the one over
   Modbus, then the one over the Classic protocol. The steps of frequencies, speeds, torques and of

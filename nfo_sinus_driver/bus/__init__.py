@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who talks next on one line: the scheduler, what it is given to do, and what it counts."""
+"""What is sent next on one line: the scheduler, its tasks, and its counters."""
 
 from nfo_sinus_driver.bus.statistics import Statistics
 from nfo_sinus_driver.bus.tasks import Cancelled, LatestValue, Priority, Task, Transfer

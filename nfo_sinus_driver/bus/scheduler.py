@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Whose turn it is on one line, and who does not answer.
+What is sent next on one line, and which units do not answer.
 
-What waits for the line, and which of it goes next. No thread, no clock and nothing sent:
-:class:`nfo_sinus_driver.bus.Bus` asks, sends, and says how long that kept the line.
+No thread, no clock and nothing sent: :class:`nfo_sinus_driver.bus.Bus` takes what is next, sends
+it, and reports how long that kept the line.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from nfo_sinus_driver.link import LinkError, PortError, Refused
 
 __all__ = ['BACKGROUND_SHARE', 'Scheduler', 'Waiting']
 
-#: The share of the time that TELEMETRY and REFRESH get, each of them, when everything above asks
-#: for more; of the time that set-points leave, for else these would take nearly all from the polls.
+#: The share of the time that TELEMETRY and REFRESH get, each of them, when everything above wants
+#: more; of the time that set-points leave, for else these would take nearly all from the polls.
 BACKGROUND_SHARE = 1 / 6
 #: The same for all polls of units that do not answer: each of them may cost a whole time-out.
 RETRY_SHARE = 1 / 2
 #: How much of its share each may be owed while it waits for it, s: what it earns by two requests
 #: without a response, when the time-out is that of the factory.
 _MOST_OWED = 0.07
-#: How much it may save up while it asks for nothing, s: less than the shortest transaction takes.
+#: How much it may save up while it is idle, s: less than the shortest transaction takes.
 _MOST_SAVED = 0.005
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
-#: What only wants to know something, and can wait for a unit that does not answer.
-_ASKS = (Priority.POLL, *_BACKGROUND)
+#: What only reads, and can wait for a unit that does not answer.
+_READS = (Priority.POLL, *_BACKGROUND)
 
-#: What is asked of a unit that did not answer the last request.
+#: What is for a unit that did not answer the last request.
 _RETRY: Literal['retry'] = 'retry'
-#: What is said to a unit that has been silent for long.
+#: What is for a unit that has been silent for long.
 _MISSING: Literal['missing'] = 'missing'
 _SLOT: Literal['slot'] = 'slot'
 _Rank = Priority | Literal['slot', 'retry', 'missing']
@@ -60,21 +60,21 @@ class Scheduler:
 
     A stop goes first, its writes ahead of its reads, and a set-point in a slot next, so either
     waits for the transaction on the line and no other. The background, TELEMETRY and REFRESH, goes
-    ahead of all else as long as it is owed its share of the time; who is owed more goes first.
-    Set-points may come faster than the line can carry them, and who then no longer polls does not
-    see the fault that should stop the motor: so after each of them something else has a turn, and
-    the background's share is of the time between them.
+    ahead of all else as long as it is owed its share of the time; what is owed more goes first.
+    Set-points may come faster than the line can carry them, and without polls the fault that should
+    stop the motor goes unnoticed: so after each of them something else has a turn, and the
+    background's share is of the time between them.
 
-    A unit that does not answer keeps the line for a time-out with every poll. They all together
-    have no more than their share of the time as long as anybody else waits. A stop that a unit does
+    A unit that does not answer keeps the line for a time-out with every poll. All of them together
+    have no more than their share of the time as long as any other waits. A stop that a unit does
     not answer is repeated at once, and after each of them another unit has a turn, too: the most
     urgent, whatever the others are owed.
 
-    Those that have been silent for long are missing. What is asked of them, and stops that did
-    not reach them, wait until :meth:`take` may give them out, and then go ahead of other polls.
+    Units that have been silent for long are missing. Reads from them, and stops that did not reach
+    them, wait until :meth:`take` may give them out, and then go ahead of other polls.
 
-    :param is_silent: tells whether a unit has not answered the last request.
-    :param is_missing: tells whether it has been silent for long.
+    :param is_silent: whether a unit has not answered the last request.
+    :param is_missing: whether it has been silent for long.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class Scheduler:
     ) -> None:
         self._is_silent = is_silent
         self._is_missing = is_missing
-        #: In order; the values say nothing.
+        #: In order; the values are not used.
         self._queues: dict[_Rank, dict[LatestValue | Waiting, None]] = {
             rank: {} for rank in (*Priority, _SLOT, _RETRY, _MISSING)
         }
@@ -94,12 +94,12 @@ class Scheduler:
         self._slot_went = False
         #: The unit that was given a stop just now, and the one that did not answer it.
         self._given_stop: int | None = None
-        self._unheard: int | None = None
-        #: Units that were given a stop since they were last known to answer, and said nothing.
-        self._told_in_vain: set[int] = set()
+        self._unanswered: int | None = None
+        #: Units that have not answered a stop since they last answered anything.
+        self._unanswered_stops: set[int] = set()
 
     def add(self, entry: LatestValue | Waiting) -> None:
-        """Let a slot or a transaction wait for its turn, behind its equals."""
+        """Queue a slot or a transaction, behind its equals."""
         self._queues[self._rank(entry)][entry] = None
 
     @property
@@ -130,14 +130,14 @@ class Scheduler:
                 unit = None if isinstance(entry, LatestValue) else entry.transfer.unit
                 self._given_stop = unit if rank in _STOPS else None
                 return entry
-        if self._unheard is None:
+        if self._unanswered is None:
             return None
         # no other unit waits
-        self._unheard = None
+        self._unanswered = None
         return self.take(missing=missing, only_stops=only_stops)
 
     def _release_found(self) -> None:
-        """Put what waits for a unit that answers again where it belongs: it may be a stop."""
+        """Requeue what waits for a unit that answers again: it may be a stop."""
         found = [one for one in self._queues[_MISSING] if self._rank(one) != _MISSING]
         for entry in found:
             del self._queues[_MISSING][entry]
@@ -147,23 +147,23 @@ class Scheduler:
         """Return what goes next of one rank; what is for a unit that is missing by now waits."""
         queue = self._queues[rank]
         while True:
-            entry = next((one for one in queue if not self._is_unheard(one)), None)
+            entry = next((one for one in queue if not self._is_unanswered(one)), None)
             if entry is None or rank == _MISSING or self._rank(entry) != _MISSING:
                 return entry
             del queue[entry]
             self._queues[_MISSING][entry] = None
 
-    def _is_unheard(self, entry: LatestValue | Waiting) -> bool:
-        """Tell whether it is for the unit that did not answer the stop just now."""
-        return isinstance(entry, Waiting) and entry.transfer.unit == self._unheard
+    def _is_unanswered(self, entry: LatestValue | Waiting) -> bool:
+        """Return whether it is for the unit that has just not answered a stop."""
+        return isinstance(entry, Waiting) and entry.transfer.unit == self._unanswered
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
         self._slot_went = self._given == _SLOT
         unit = self._given_stop
-        self._unheard = unit if unit is not None and self._is_silent(unit) else None
-        if self._unheard is not None:
-            self._told_in_vain.add(self._unheard)
+        self._unanswered = unit if unit is not None and self._is_silent(unit) else None
+        if self._unanswered is not None:
+            self._unanswered_stops.add(self._unanswered)
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
                 continue
@@ -176,19 +176,19 @@ class Scheduler:
                 self._owed[rank] = min(owed, most)
 
     def remove(self, entry: Waiting) -> None:
-        """Take out what need not be sent any more."""
+        """Remove what need not be sent any more."""
         for queue in self._queues.values():
             queue.pop(entry, None)
 
     def withdraw(self, task: Task) -> None:
-        """Take out all that a task waits to send."""
+        """Remove all that a task waits to send."""
         for queue in self._queues.values():
             for entry in tuple(queue):
                 if isinstance(entry, Waiting) and entry.task is task:
                     del queue[entry]
 
     def clear(self) -> list[LatestValue | Waiting]:
-        """Take out everything."""
+        """Remove and return everything."""
         entries = [entry for queue in self._queues.values() for entry in queue]
         for queue in self._queues.values():
             queue.clear()
@@ -201,7 +201,7 @@ class Scheduler:
         first, second = _BACKGROUND
         background = _BACKGROUND if self._owed[first] >= self._owed[second] else (second, first)
         # one turn after a stop without an answer: it is for the most urgent of the others
-        between_stops = self._unheard is not None
+        between_stops = self._unanswered is not None
         for priority in background:
             if self._owed[priority] > 0 and not between_stops:
                 yield priority
@@ -218,15 +218,15 @@ class Scheduler:
             return _SLOT
         transfer = entry.transfer
         if not self._is_silent(transfer.unit):
-            self._told_in_vain.discard(transfer.unit)
-        elif transfer.priority in _ASKS:
+            self._unanswered_stops.discard(transfer.unit)
+        elif transfer.priority in _READS:
             return _MISSING if self._is_missing(transfer.unit) else _RETRY
         elif self._is_repeated(transfer) and self._is_missing(transfer.unit):
             return _MISSING
         return transfer.priority
 
     def _is_repeated(self, transfer: Transfer) -> bool:
-        return transfer.priority <= Priority.LOOK and transfer.unit in self._told_in_vain
+        return transfer.priority <= Priority.LOOK and transfer.unit in self._unanswered_stops
 
 
 #: A unit that has been silent for so long counts as missing, s: short enough to spare the others,
@@ -238,30 +238,30 @@ _MISSING_SHARE = 1 / 20
 
 class Silences:
     """
-    How long each unit has said nothing although it was asked; all times are of one clock, s.
+    How long each unit has not answered its requests; all times are of one clock, s.
 
-    Silence begins when the first answer has failed to come, however long it was waited for: a unit
-    that is not asked is not silent, and one lost answer is no silence yet. Any valid frame ends it.
+    Silence begins when the first answer has failed to come, however long the wait was: a unit
+    without requests is not silent, and one lost answer is no silence yet. Any valid frame ends it.
 
     Each request to a unit that is missing costs the others a whole time-out, so there is a pause
-    behind it, in which none of the missing units is asked.
+    behind it, in which none of the missing units gets one.
     """
 
     def __init__(self) -> None:
-        self._heard_at: dict[int, float] = {}
+        self._last_frame_at: dict[int, float] = {}
         self._since: dict[int, float] = {}
         #: The longest time from one valid frame to the next.
         self._longest: dict[int, float] = {}
-        #: When any unit was heard.
-        self._anybody_at = -math.inf
+        #: When the last valid frame of any unit came.
+        self._any_frame_at = -math.inf
         self._pause_ends = -math.inf
 
     def note(self, unit: int, now: float, error: LinkError | None, seconds: float = 0.0) -> None:
-        """Take note of how a request ended that kept the line for so long, s."""
-        if error is None or error.heard or isinstance(error, Refused):
-            pause = now - self._heard_at.get(unit, now)
+        """Note the outcome of a request that kept the line for so long, s."""
+        if error is None or error.responded or isinstance(error, Refused):
+            pause = now - self._last_frame_at.get(unit, now)
             self._longest[unit] = max(self._longest.get(unit, 0.0), pause)
-            self._heard_at[unit] = self._anybody_at = now
+            self._last_frame_at[unit] = self._any_frame_at = now
             self._since.pop(unit, None)
         elif self.is_missing(unit, now):
             self._pause_ends = now + seconds * (1 / _MISSING_SHARE - 1)
@@ -269,15 +269,15 @@ class Silences:
             self._since.setdefault(unit, now)
 
     def is_silent(self, unit: int) -> bool:
-        """Tell whether a unit has not answered the last request to it."""
+        """Return whether a unit has not answered the last request to it."""
         return unit in self._since
 
-    def heard_at(self, unit: int) -> float:
+    def last_frame_at(self, unit: int) -> float:
         """Return when the last valid frame of a unit came."""
-        return self._heard_at.get(unit, -math.inf)
+        return self._last_frame_at.get(unit, -math.inf)
 
     def take_longest(self, unit: int) -> float:
-        """Return the longest time between two valid frames of a unit since this was last asked."""
+        """Return the longest time between two valid frames of a unit since the last call."""
         return self._longest.pop(unit, 0.0)
 
     def lasts(self, unit: int, now: float) -> float:
@@ -285,10 +285,10 @@ class Silences:
         return now - self._since.get(unit, now)
 
     def is_missing(self, unit: int, now: float) -> bool:
-        """Tell whether a unit has been silent for so long that it is asked seldom."""
+        """Return whether a unit has been silent for so long that it gets few requests."""
         return self.lasts(unit, now) >= _MISSING_AFTER
 
     @property
     def missing_from(self) -> float:
-        """From when on a missing unit may be asked again; at any time while no unit responds."""
-        return min(self._pause_ends, self._anybody_at + _MISSING_AFTER)
+        """From when on a missing unit may get a request; at any time while no unit responds."""
+        return min(self._pause_ends, self._any_frame_at + _MISSING_AFTER)

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Counters and times of one line, and of each unit on it."""
+"""The counters and times of one line, and of each unit on it."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _FAILURES = {'timeouts': NoAnswer, 'damaged': DamagedAnswer, 'refused': Refused}
 @dataclass(frozen=True)
 class Statistics:
     """
-    How a line is doing, or one unit on it; times in seconds, NaN where nothing was measured yet.
+    The figures of a line, or of one unit on it; times in seconds, NaN where not measured yet.
 
     :ivar utilisation: share of the last two seconds in which the line was in use, or in use for
         this unit, 0 to 1.
     :ivar cycle_time: how long the last round of polling took; of a line, that of its slowest unit.
     :ivar transactions: requests sent, answered or not.
-    :ivar foreign_frames: requests of another master heard on the line; of one unit always 0.
+    :ivar foreign_frames: requests of another master on the line; of one unit always 0.
     :ivar reconnects: how often the port was opened again, or the unit was connected to again.
     """
 
@@ -143,7 +143,7 @@ class Recorder:
     def statistics(self, unit: int | None = None) -> Statistics:
         """Return the present figures of the line, or of one unit on it."""
         if unit is not None:
-            # who only asks leaves no trace: this is called by any thread
+            # reading changes nothing: this is called by any thread
             tally = self._units.get(unit) or Tally()
             return tally.statistics(tally.cycle_time, self._now())
         cycles = (tally.cycle_time for tally in self._units.copy().values())

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the worker of a bus is given to do: coroutines that await transactions and pauses; slots."""
+"""The tasks of a bus worker: coroutines that await transactions and pauses; slots."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ _TRIES = 5
 
 
 class Priority(enum.IntEnum):
-    """How urgent a transaction is; the least goes first."""
+    """The urgency of a transaction; the least goes first."""
 
     STOP = 0
-    #: Looks whether a motor stops, or has to be stopped: no stop waits for it.
+    #: Reads whether a motor stops, or has to be stopped: no stop waits for it.
     LOOK = 1
     SETPOINT = 2
     SERVICE = 3
@@ -76,7 +76,7 @@ class Transfer:
     source: Address | None = None
 
     def reads(self, unit: int, address: Address) -> bool:
-        """Tell whether it only reads a parameter."""
+        """Return whether it only reads a parameter."""
         reading = self.data is None and self.send is None
         return reading and self.unit == unit and self.address == address
 
@@ -108,20 +108,20 @@ async def consistent_read(unit: int, parts: Sequence[Address], priority: Priorit
 
 
 async def inquire(unit: int, inquiry: Inquiry, priority: Priority) -> Identification:
-    """Ask a unit all questions about itself, each a transaction; return what it said."""
+    """Ask a unit all questions about itself, each a transaction; return its answers."""
     while not inquiry.done:
         try:
             await Transfer(unit, _NOWHERE, priority, send=inquiry.ask)
         except PortError:
             raise
         except LinkError as error:
-            _log.debug('unit %d does not say who it is: %s', unit, error)
+            _log.debug('unit %d does not identify itself: %s', unit, error)
     return inquiry.found
 
 
 async def set_up(unit: int, watch: Watch, priority: Priority, tries: int) -> str:
     """
-    Have a unit watch over this end, each step a transaction; return by what it does.
+    Have a unit watch this end of the line, each step a transaction; return by which means.
 
     :param tries: how often a step without an answer is tried: each may be done again.
     """
@@ -162,7 +162,7 @@ class Task:
         self.cancel_due = False
         #: What it waits for.
         self.awaited: Transfer | Pause | None = None
-        #: Tells timers of earlier pauses from that of the present one.
+        #: Distinguishes the timers of earlier pauses from that of the present one.
         self.pause = 0
         self.asleep = False
         self._joiners: list[Task] = []
@@ -176,7 +176,7 @@ class Task:
 
     @contextlib.contextmanager
     def joined_by(self, other: Task) -> Iterator[None]:
-        """Have another task wait for its end meanwhile."""
+        """Wake another task at its end, meanwhile."""
         self._joiners.append(other)
         try:
             yield
@@ -184,14 +184,14 @@ class Task:
             self._joiners.remove(other)
 
     def cancel(self) -> None:
-        """End it where it awaits: at once, or where it does so next if it is being stepped."""
+        """End it where it awaits: at once, or at the next await if it is being stepped."""
         self.cancelled = True
         self.cancel_due = self.running
         if not self.running:
             self.end_pause()
 
     def take_cancellation(self) -> bool:
-        """Tell whether its cancellation still has to reach it, which is done with it."""
+        """Return whether its cancellation still has to reach it, once."""
         due, self.cancel_due = self.cancel_due, False
         return due
 
@@ -225,7 +225,7 @@ class Task:
 
 
 def log_unexpected(future: Future[Any]) -> None:
-    """Log how a task failed that is not awaited, unless it was cancelled or the line's fault."""
+    """Log the error of a task that is not awaited, unless it was cancelled or the line failed."""
     error = future.exception()
     if error is not None and not isinstance(error, (Cancelled, LinkError)):
         _log.error('a job on the bus failed', exc_info=error)
@@ -239,12 +239,12 @@ class Sleepers:
         self._order = itertools.count()
 
     def add(self, task: Task, until: float) -> None:
-        """Let a task sleep until a moment of the steady clock, s."""
+        """Have a task sleep until a moment of the steady clock, s."""
         task.fall_asleep()
         heapq.heappush(self._pauses, (until, next(self._order), task, task.pause))
 
     def take_due(self, now: float) -> Task | None:
-        """Take out one whose pause is over; ``None`` if all go on."""
+        """Remove and return one whose pause is over; ``None`` if all go on."""
         while self._pauses and self._pauses[0][0] <= now:
             _, _, task, pause = heapq.heappop(self._pauses)
             if task.asleep and task.pause == pause:
@@ -253,7 +253,7 @@ class Sleepers:
 
     @property
     def next_moment(self) -> float:
-        """When to look again, s; infinity if no task sleeps."""
+        """When the next pause is over, s; infinity if no task sleeps."""
         return self._pauses[0][0] if self._pauses else math.inf
 
 
@@ -265,23 +265,23 @@ class LatestValue:
     :ivar make: called by the worker at the moment of sending; returns what to write now, or
         ``None`` if there is nothing to write any more.
     :ivar done: called by the worker with the error, or ``None`` when the unit took it.
-    :ivar told: called after that with the answer of a unit that took it.
+    :ivar answered: called after that with the answer of a unit that took it.
     """
 
     make: Callable[[], Transfer | None]
     done: Callable[[Transfer, LinkError | None], None]
-    told: Callable[[Reply], None] = lambda reply: None
+    answered: Callable[[Reply], None] = lambda reply: None
     pending: bool = False
 
     def ask(self) -> bool:
-        """Have it written; whether that is new."""
-        # only what was read as False is set: the worker may take it out just now
+        """Mark it for writing; return whether that is new."""
+        # only set when read as False: the worker may be taking it out
         if self.pending:
             return False
         self.pending = True
         return True
 
     def take(self) -> Transfer | None:
-        """Take out what is to be written now; ``None`` if there is nothing any more."""
+        """Return what is to be written now; ``None`` if there is nothing any more."""
         self.pending = False
         return self.make()

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Who talks next on one line.
+The worker of one line.
 
-One worker thread owns the link. What has to be said in several steps is a coroutine
+One worker thread owns the link. What takes several transactions is a coroutine
 (``async def``) that awaits :meth:`Bus.read`, :meth:`Bus.write` and :meth:`Bus.sleep`; the worker
 steps all of them and sends one transaction at a time, the most urgent first. So the state that
 coroutines share is only ever touched by the worker, a stop waits for one transaction at most,
@@ -97,16 +97,16 @@ class Bus:
         self._tasks: set[Task] = set()
         #: For coroutines on the worker to count in.
         self.recorder = Recorder(now)
-        #: How many coroutines read parameters again and again; they share the time for it.
+        #: How many coroutines read parameters all the time; they share the time for it.
         self._refreshing = 0
         #: The units whose settings are read for the first time, and those for which that was begun.
-        self._being_introduced: set[int] = set()
-        self._introduced: set[int] = set()
+        self._being_read_first: set[int] = set()
+        self._read_before: set[int] = set()
         self._current: Task | None = None
-        #: Since when the gateway says nothing at all, and how long that may last by each unit, s.
+        #: Since when the gateway has sent nothing, and how long that may last for each unit, s.
         self._mute_since = math.inf
         self._lost_after: dict[int, float] = {}
-        #: Called when a unit has started anew.
+        #: Called when a unit has restarted.
         self._on_restart: dict[int, Callable[[], None]] = {}
         self._thread = threading.Thread(target=self._work, name='bus', daemon=True)
 
@@ -140,18 +140,18 @@ class Bus:
         self._enter(function)
 
     def request(self, slot: LatestValue) -> None:
-        """Ask for a slot to be written; asking again before it is written changes nothing."""
+        """Request that a slot is written; again before it is written changes nothing."""
         if slot.ask():
             self._enter(slot)
 
     @property
     def protocol(self) -> LineProtocol:
-        """What this line speaks."""
+        """The protocol of this line."""
         return self._link.protocol
 
     @property
     def supervised(self) -> bool:
-        """More lives on this line than questions and answers; see :meth:`watch`."""
+        """The line has a heartbeat or guarding, too; see :meth:`watch`."""
         return self._link.supervision is not None
 
     @property
@@ -172,21 +172,21 @@ class Bus:
         return None if self._port.is_open else self._port.error
 
     def use_resync_reads(self, unit: int, addresses: tuple[Address, ...]) -> None:
-        """Tell the link which parameters of a unit it may read to find out if it hears it."""
+        """Give the link the parameters of a unit that it may read to resynchronise."""
         self.call(lambda: self._link.use_resync_reads(unit, addresses))
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What the link has noticed about the line, each in a sentence that says what to do."""
+        """What the link has noticed about the line, in sentences that say what to do."""
         return self._link.remarks.texts
 
     def require_sign_of_life(self, unit: int, seconds: float) -> None:
-        """Look for another way to the far end when nothing came from it for so long, s."""
+        """Try another connection to the far end when nothing came from it for so long, s."""
         self.call(lambda: self._lost_after.update({unit: seconds}))
 
-    def on_restart(self, unit: int, tell: Callable[[], None]) -> None:
-        """Have a function called, on the worker, when a unit says that it has started anew."""
-        self._on_restart[unit] = tell
+    def on_restart(self, unit: int, call: Callable[[], None]) -> None:
+        """Call a function, on the worker, when a unit reports that it has restarted."""
+        self._on_restart[unit] = call
 
     # --- for coroutines on the worker ---------------------------------------------------------
 
@@ -215,7 +215,7 @@ class Bus:
         return Transfer(unit, address, priority, data, source=source)
 
     def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
-        """Give a task a reading that came with something else; false if it waits for none such."""
+        """Give a task a reading that came with another answer; false if it waits for no such."""
         awaited = task.awaited
         if not isinstance(awaited, Transfer) or not awaited.reads(unit, address):
             return False
@@ -236,15 +236,15 @@ class Bus:
         return Transfer(unit, address, priority, data, send)
 
     def identify(self, unit: int, priority: Priority) -> Coroutine[Any, Any, Identification]:
-        """Ask a unit who it is, nothing twice; what it does not say stays empty."""
+        """Read the identity of a unit, each part once; what it does not give stays empty."""
         return inquire(unit, self._link.identify(unit), priority)
 
     async def watch(self, unit: int, seconds: float, priority: Priority, tries: int) -> str:
         """
-        Have a unit notice a silence of so long, s, by what lives on the line; 0: nothing any more.
+        Have a unit watch the heartbeat or guarding, with a time-out, s; 0: no longer.
 
         :param tries: how often each step is tried.
-        :returns: by what it notices; ``''`` if it has nothing for it, or nothing is to be noticed.
+        :returns: by which means; ``''`` if it has none, or for 0.
         """
         supervision = self._link.supervision
         return '' if supervision is None else await set_up(
@@ -270,14 +270,14 @@ class Bus:
         return task.future.done()
 
     def spawn(self, coroutine: Coroutine[Any, Any, Any]) -> Task:
-        """Start a coroutine beside the present one; unexpected errors are logged."""
+        """Start a coroutine in parallel; unexpected errors are logged."""
         task = Task(coroutine)
         task.future.add_done_callback(log_unexpected)
         self._advance(task, None, None)
         return task
 
     def cancel(self, task: Task | None) -> None:
-        """End a task, if any: it sees :class:`Cancelled` where it stands; nothing more is sent."""
+        """End a task, if any: :class:`Cancelled` is raised in it; nothing more is sent."""
         if task is None or task.future.done() or task.cancelled:
             return
         task.cancel()
@@ -292,7 +292,7 @@ class Bus:
 
     @contextlib.contextmanager
     def refreshing(self) -> Iterator[Callable[[], int]]:
-        """Read parameters again and again; calls tell how many do, who share the time for it."""
+        """Count a task that reads parameters all the time; yield a call for their number."""
         self._refreshing += 1
         try:
             yield lambda: self._refreshing
@@ -301,20 +301,20 @@ class Bus:
 
     @contextlib.contextmanager
     def first_reading(self, unit: int) -> Iterator[None]:
-        """Have units that only stand leave the line to this one, if it is read the first time."""
-        first = unit not in self._introduced
-        self._introduced.add(unit)
+        """Have units at standstill leave the line to this one, if it is read the first time."""
+        first = unit not in self._read_before
+        self._read_before.add(unit)
         if first:
-            self._being_introduced.add(unit)
+            self._being_read_first.add(unit)
         try:
             yield
         finally:
             if first:
-                self._being_introduced.discard(unit)
+                self._being_read_first.discard(unit)
 
     def reads_another_first(self, unit: int) -> bool:
-        """Tell whether any other unit is read for the first time just now."""
-        return bool(self._being_introduced - {unit})
+        """Return whether any other unit is being read for the first time."""
+        return bool(self._being_read_first - {unit})
 
     # --- the worker ---------------------------------------------------------------------------
 
@@ -322,7 +322,7 @@ class Bus:
         self._inbox.append(item)
         self._awake.set()
         if self._closed:
-            # the worker may have looked into its inbox for the last time
+            # the worker may have emptied its inbox for the last time
             self._take_in()
 
     def _work(self) -> None:
@@ -331,7 +331,7 @@ class Bus:
             try:
                 self._rest(self.step())
             except BaseException:
-                # a mistake in a callback must not take every drive on the line with it
+                # an error in a callback must not end the worker for every drive on the line
                 _log.exception('error in the bus worker; it goes on')
         self._end()
 
@@ -344,7 +344,7 @@ class Bus:
 
     def step(self) -> float:
         """
-        Do what is due, and send one transaction at most; for who never calls :meth:`start`.
+        Do what is due, and send one transaction at most; public for use without :meth:`start`.
 
         :returns: when there is more to do, s on the steady clock, unless a request comes before.
         """
@@ -364,7 +364,7 @@ class Bus:
         return min(self._sleepers.next_moment, paced_until, missing_from, supervised_at)
 
     def _supervise(self) -> float:
-        """Serve what lives on the line beside questions; return when that is due again, s."""
+        """Serve heartbeat and guarding; return when that is due again, s."""
         supervision = self._link.supervision
         if supervision is None:
             return math.inf
@@ -378,8 +378,8 @@ class Bus:
             try:
                 self._on_restart.get(unit, lambda: None)()
             except Exception:
-                # the other drives of the line have to hear of it all the same
-                _log.exception('a restart could not be told; the bus worker goes on')
+                # the other drives of the line have to be notified all the same
+                _log.exception('a restart could not be reported; the bus worker goes on')
         return supervision.due
 
     def _take_in(self) -> None:
@@ -406,7 +406,7 @@ class Bus:
             self._awake.wait(None if until == math.inf else max(0.0, until - self.now()))
 
     def _advance(self, task: Task, value: Reply | None, error: BaseException | None) -> None:
-        """Step a task and file what it awaits next."""
+        """Step a task and queue what it awaits next."""
         caller, self._current = self._current, task
         awaited = task.step(value, error)
         self._current = caller
@@ -447,7 +447,7 @@ class Bus:
             slot.done(transfer, error)
         else:
             slot.done(transfer, None)
-            slot.told(reply)
+            slot.answered(reply)
 
     def _exchange(self, task: Task, transfer: Transfer) -> None:
         try:
@@ -497,7 +497,7 @@ class Bus:
             self._account(transfer.unit, started, error)
             raise
         except BaseException as error:
-            # a mistake in the link must reach the one who asked, not leave him waiting
+            # an error in the link must reach the caller, not leave it waiting
             _log.exception('error in the link')
             raise LinkError(f'error in the link: {error!r}') from error
         if not reply.requests:
@@ -516,7 +516,7 @@ class Bus:
             self._note_life(now, error)
 
     def _note_life(self, now: float, error: LinkError | None) -> None:
-        """Open the link beside itself where nothing at all has come from a gateway for long."""
+        """Open another connection where nothing at all has come from a gateway for long."""
         if not isinstance(error, GatewaySilent):
             self._mute_since = math.inf
             return
@@ -544,7 +544,7 @@ class Bus:
             if isinstance(entry, LatestValue):
                 self._fail_slot(entry, error)
             elif entry.task.awaited is entry.transfer:
-                # else a listener before has ended it
+                # else an earlier callback has ended it
                 self._advance(entry.task, None, error)
 
     def _fail_slot(self, slot: LatestValue, error: PortError) -> None:
@@ -553,7 +553,7 @@ class Bus:
             if transfer is not None:
                 slot.done(transfer, error)
         except BaseException:
-            # the others have to hear of it all the same
+            # the others have to be notified all the same
             _log.exception('error in a slot; the bus worker goes on')
 
 

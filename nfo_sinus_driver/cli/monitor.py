@@ -27,7 +27,7 @@ from nfo_sinus_driver.cli.options import Verb, add_flag, addresses, period
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, InverterStatus
 from nfo_sinus_driver.link import PortError, Refused
-from nfo_sinus_driver.view import is_terminal, show, why_not
+from nfo_sinus_driver.view import is_terminal, show, why_unavailable
 from nfo_sinus_driver.view.picture import (
     Condition,
     DriveView,
@@ -105,7 +105,7 @@ class Monitor(Verb):
                 raise UsageError('--ros shows the drives of running drivers, with no other option')
             os.execv(sys.executable, [sys.executable, '-m', _ROS_VIEW])
         view = is_terminal() and not (options.json or options.lines or options.count)
-        missing = why_not() if view else ''
+        missing = why_unavailable() if view else ''
         if missing:
             remark(f'{missing}. What it would show comes line by line')
         numbers = options.addresses or (options.address,)

@@ -308,7 +308,7 @@ class Set(Verb):
                 require_names(wanted, values, str(drive), ', nothing was written')
                 for name, value in wanted.items():
                     try:
-                        exact = drive.parameters.exact(name, value)
+                        exact = drive.parameters.coerce(name, value)
                         barred = is_barred(name, drive.model, options)
                         if barred and not same(exact, values.get(name)):
                             wrong.append(f'{name}: {BARRED}')

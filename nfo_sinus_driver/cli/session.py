@@ -106,7 +106,7 @@ class OfflineDrive(EventListener):
 
     def active_control_method(self) -> str:
         """Return the control method by which the bus runs it, or would be able to stop it."""
-        return self._drive.method_in_charge().result()
+        return self._drive.active_control_method().result()
 
     def measure(self, key: str) -> Value:
         """Read one value."""

@@ -14,8 +14,8 @@ from nfo_sinus_driver.link import Address
 
 async def broadcast_stop(bus: Bus, models: Iterable[Family]) -> None:
     """Release the motors of all drives of a line with a broadcast."""
-    everybody = bus.protocol.broadcast
-    assert everybody is not None, 'the protocol has a broadcast'
+    everyone = bus.protocol.broadcast
+    assert everyone is not None, 'the protocol has a broadcast'
     addressing = bus.protocol.addressing
     for model in dict.fromkeys(models):
         stop = model.profile.broadcast_stop
@@ -23,4 +23,4 @@ async def broadcast_stop(bus: Bus, models: Iterable[Family]) -> None:
             parameter = model[stop.key]
             address = Address(*parameter.at(addressing).place)
             data = parameter.encode(stop.value, addressing)
-            await bus.write(everybody, address, data, Priority.STOP)
+            await bus.write(everyone, address, data, Priority.STOP)

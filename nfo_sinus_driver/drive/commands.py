@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Runs on the bus what the profile of a family says.
+Carries out the sequences of a family's profile on the bus.
 
-A control method says what to write, and nothing of when; `controller` decides that.
+A control method says what to write; :mod:`.controller` decides when.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ _T = TypeVar('_T')
 _Condition = Callable[[InverterStatus], bool]
 #: Waits until the drive's status fulfils a condition; raises DriveError if it does not.
 Reached = Callable[[_Condition], Awaitable[None]]
-#: Waits so long for that at most, s; tells whether it does.
-Held = Callable[[_Condition, float], Awaitable[bool]]
+#: Waits for that, for some seconds at most; returns whether it came true.
+Holds = Callable[[_Condition, float], Awaitable[bool]]
 
 
 async def _not_reached(condition: _Condition) -> None:
     raise AssertionError('nothing is awaited here')
 
 
-async def _not_held(condition: _Condition, seconds: float) -> bool:
-    raise AssertionError('nothing is held here')
+async def _not_awaited(condition: _Condition, seconds: float) -> bool:
+    raise AssertionError('no status is awaited here')
 
 
-def _not_told(severity: Severity, report: Report) -> None:
+def _not_stored(severity: Severity, report: Report) -> None:
     raise AssertionError('nothing is stored here')
 
 
@@ -58,8 +58,8 @@ async def carry_out(
     params: ParameterAccess,
     priority: Priority,
     reached: Reached = _not_reached,
-    tell: Callable[[Severity, Report], None] = _not_told,
-    held: Held = _not_held,
+    notify: Callable[[Severity, Report], None] = _not_stored,
+    holds: Holds = _not_awaited,
     *,
     onward: bool = False,
 ) -> _T:
@@ -67,10 +67,10 @@ async def carry_out(
     Carry out a sequence of a profile on the bus.
 
     :param reached: for a sequence that waits for the drive's status between two steps.
-    :param tell: for one that writes to a memory that wears out: told what it has written.
-    :param held: for one that waits for the status for a while.
-    :param onward: a step without an answer counts as refused, so that others follow it, but for
-        a write that has been carried out.
+    :param notify: for one that writes to a memory that wears out: reports what was written.
+    :param holds: for one that waits for the status for a limited time.
+    :param onward: go on after a step without an answer, as if it had been refused, unless it is
+        a write that reading shows to have been carried out.
     :raises DriveError: it cannot be carried out.
     :raises LinkError: the drive does not answer; or it refuses, and the sequence ends by that.
     """
@@ -99,7 +99,7 @@ async def carry_out(
                 params.require_fitted(step.key)
                 brought = await params.read(step.key, priority, retry=step.retry)
             elif isinstance(step, profile.Write) and step.stored:
-                await _store(step, params, priority, tell)
+                await _store(step, params, priority, notify)
             elif isinstance(step, profile.Write):
                 await params.write(step, priority)
             elif isinstance(step, profile.Acknowledge):
@@ -109,7 +109,7 @@ async def carry_out(
             elif isinstance(step, profile.Wait):
                 await params.sleep(step.seconds)
             elif isinstance(step, profile.Hold):
-                brought = await held(after_write(step.condition), step.seconds)
+                brought = await holds(after_write(step.condition), step.seconds)
             else:
                 await reached(after_write(step.condition))
         except (Refused, NoAnswer, DamagedAnswer) as error:
@@ -125,7 +125,7 @@ async def carry_out(
 async def _stands(
     step: profile.Step, params: ParameterAccess, priority: Priority, error: LinkError
 ) -> bool:
-    """Tell whether the drive has taken a write that it did not answer, where that can be read."""
+    """Return whether the drive has taken a write that it did not answer, where that can be read."""
     if isinstance(error, Refused) or not isinstance(step, profile.Write):
         return False
     if params.model[step.key].access is not Access.READ_WRITE:
@@ -140,7 +140,7 @@ async def _stands(
 async def read_scales(state: DriveState) -> None:
     """Read the scale of speeds, and report one that is not the one before."""
     if await state.nameplate.scales.read():
-        state.tell(Severity.INFO, Cause.SPEED_SCALE, scale=str(state.nameplate.scales.speed))
+        state.notify(Severity.INFO, Cause.SPEED_SCALE, scale=str(state.nameplate.scales.speed))
 
 
 async def read_limits(state: DriveState, control_mode: str) -> profile.Limits:
@@ -156,7 +156,7 @@ async def read_limits(state: DriveState, control_mode: str) -> profile.Limits:
     limits = await carry_out(steps, state.params, Priority.SERVICE)
     if not state.params.is_rescaled(target.key):
         return limits
-    # with another scale a word may not carry all that the drive takes
+    # with another scale a word may not hold all that the drive takes
     least, most, _ = state.params.limits(target.key)
     return replace(limits, least=max(limits.least, least), most=min(limits.most, most))
 
@@ -165,9 +165,9 @@ async def _store(
     step: profile.Write,
     params: ParameterAccess,
     priority: Priority,
-    tell: Callable[[Severity, Report], None],
+    notify: Callable[[Severity, Report], None],
 ) -> None:
-    """Write to a memory that wears out, and only what does not stand there; report it."""
+    """Write to a memory that wears out, only what differs, and report it."""
     address, data = params.target(step)
     before = await params.read_from(address, priority)
     if before == data:
@@ -175,12 +175,12 @@ async def _store(
     await params.write(step, priority)
     old, new = params.value(step.key, before), params.value(step.key, data)
     name = params.model[step.key].name
-    tell(Severity.INFO, Report(Cause.STORED, key=step.key, name=name, old=old, new=new))
+    notify(Severity.INFO, Report(Cause.STORED, key=step.key, name=name, old=old, new=new))
 
 
 class Commands:
     """
-    The commands of one drive, by the control method that its settings choose; for the bus.
+    The commands of one drive, by the control method of its settings; on the bus alone.
 
     Each is the sequence of that name in :class:`~nfo_sinus_driver.catalog.profile.ControlMethod`.
 
@@ -196,9 +196,9 @@ class Commands:
         self._method = method(state.settings.reference, state.params.reaches)
         self._state = state
         self._params = state.params
-        #: Why the line has the bus keep control.
-        self._held = state.model.profile.holds_control.get(state.params.protocol, '')
-        self._tell = state.tell
+        #: Why control stays with the bus on this line; ``''``: it does not.
+        self._line_keeps_control = state.model.profile.holds_control.get(state.params.protocol, '')
+        self._notify = state.notify
         self._wait_until = state.wait_until
 
     @property
@@ -213,24 +213,24 @@ class Commands:
 
     @property
     def quick_stop_by(self) -> str:
-        """The setting of the drive that a quick stop goes by; ``''``: it releases the motor."""
+        """The setting of the drive that decides a quick stop; ``''``: it releases the motor."""
         return self._method.quick_stop_by
 
     @property
     def plc_time(self) -> float:
-        """After so long without a word of the driver a PLC stops the drive, s; 0: no PLC."""
+        """How long after the driver's last message a PLC stops the drive, s; 0: no PLC."""
         return self._method.plc_time
 
     @property
     def control_retained(self) -> str:
         """Why control may stay with the bus at :meth:`release`; ``''`` where it does not."""
-        return self._method.control_retained or self._held
+        return self._method.control_retained or self._line_keeps_control
 
     def require_fitted(self) -> None:
         """
-        See to it that the drive has what the control method needs.
+        Make sure that the drive has what the control method needs.
 
-        :raises DriveError: it lacks something, and which control methods there are.
+        :raises DriveError: it lacks something; the message names the other control methods.
         """
         lacking = [key for key in self._method.needs if not self._params.reaches(key)]
         if lacking:
@@ -245,9 +245,9 @@ class Commands:
             return None
         return self._method.setpoint_target(self._params.model.profile.setpoints[control_mode])
 
-    async def kept(self) -> bool:
-        """Tell whether control has stayed with the bus; so it is where the drive does not tell."""
-        if not self._held:
+    async def retains_control(self) -> bool:
+        """Return whether control has stayed with the bus; true if the drive does not answer."""
+        if not self._line_keeps_control:
             return bool(self.control_retained)
         try:
             return await self.in_control(Priority.SERVICE)
@@ -255,49 +255,49 @@ class Commands:
             return True
 
     async def in_control(self, priority: Priority) -> bool:
-        """Tell whether the bus has control of the drive, from us or from whom was here before."""
+        """Return whether the bus has control, taken by this session or an earlier one."""
         return await carry_out(self._method.in_control(), self._params, priority)
 
     async def holder(self, priority: Priority) -> Holder:
-        """Tell who has control of the drive."""
+        """Return who has control of the drive."""
         return await carry_out(self._method.holder(), self._params, priority)
 
     async def require_startable(self) -> None:
-        """See to it that nothing but a fault keeps the motor from being started; only reads."""
+        """Make sure that nothing but a fault prevents a start; only reads."""
         await carry_out(self._method.require_startable(), self._params, Priority.SERVICE)
 
     async def take_control(self, reached: Reached) -> None:
-        """Put the drive under bus control with no run command standing."""
+        """Put the drive under bus control, with no run command active."""
         steps = self._method.take_control()
-        await carry_out(steps, self._params, Priority.SERVICE, reached, self._tell)
+        await carry_out(steps, self._params, Priority.SERVICE, reached, self._notify)
 
     async def zero_setpoint(self, control_mode: str, priority: Priority) -> None:
         """Write set-point 0 in the unit of a control mode, and read it back."""
         await carry_out(self._method.zero_setpoint(control_mode), self._params, priority)
 
     async def run(self, reached: Reached) -> None:
-        """Give the run command; once, for the state before a second one would be unknown."""
+        """Give the run command, once: the state before a second one would be unknown."""
         await carry_out(self._method.run(), self._params, Priority.SERVICE, reached)
 
     async def stop(self, control_mode: str) -> None:
-        """Take the run command back and write set-point 0, at the head of the bus."""
+        """Remove the run command and write set-point 0, ahead of all else on the bus."""
         await carry_out(self._method.stop(control_mode), self._params, Priority.STOP)
 
     async def quick_stop(self, control_mode: str) -> None:
-        """Do the quick stop of the drive, if it has one; control may be given back by it."""
+        """Do the quick stop of the drive, if it has one; it may release control."""
         await carry_out(self._method.quick_stop(control_mode), self._params, Priority.STOP)
 
     async def rapid_stop(self, control_mode: str) -> None:
-        """Have the drive take its stop ramp, if it has one, at the head of the bus."""
+        """Have the drive take its stop ramp, if it has one, ahead of all else on the bus."""
         await carry_out(self._method.rapid_stop(control_mode), self._params, Priority.STOP)
 
     async def force_stop(self, control_mode: str) -> bool:
-        """Stop by all that is left, at the head of the bus; tell whether the drive took it."""
+        """Stop by every means left, ahead of all else; return whether the drive obeyed."""
         steps = self._method.force_stop(control_mode)
         return await carry_out(steps, self._params, Priority.STOP, onward=True)
 
     async def release(self) -> None:
-        """Give control back."""
+        """Release control."""
         await carry_out(self._method.release(), self._params, Priority.SERVICE)
 
     async def remove(self, control_mode: str) -> Removal:
@@ -306,11 +306,11 @@ class Commands:
         return await carry_out(steps, self._params, Priority.SERVICE)
 
     async def acknowledge(self, code: int, control_mode: str) -> str:
-        """Acknowledge the fault shown, run command and set-point first; return its details."""
+        """Remove run command and set-point, acknowledge the fault; return its details."""
         shown = self._params.model.status_code(code)
-        # with what it takes the motor might go on: it is no stop
+        # it is no stop, and does not have the priority of one: the motor might start
         steps = self._method.acknowledge(shown, control_mode)
-        return await carry_out(steps, self._params, Priority.SERVICE, held=self._hold)
+        return await carry_out(steps, self._params, Priority.SERVICE, holds=self._hold)
 
     async def _hold(self, condition: Callable[[InverterStatus], bool], seconds: float) -> bool:
         try:
@@ -321,10 +321,10 @@ class Commands:
 
     async def begin(self, procedure: Procedure | Reset, require_wanted: Callable[[], None]) -> None:
         """
-        Have the drive begin a procedure; once, for the state before a second time would be unknown.
+        Have the drive begin a procedure, once: the state before a second try would be unknown.
 
-        It waits for its turn with the stops, so that one which comes later does not overtake it; if
-        ``require_wanted`` raises then, nothing is written.
+        It queues with the stops, so that no later one overtakes it; if ``require_wanted`` raises
+        at its turn, nothing is written.
         """
         write = self._method.procedures[procedure]
         await self._params.write(write, Priority.STOP, require_wanted)

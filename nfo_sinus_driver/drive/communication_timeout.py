@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a drive does by itself when it hears nothing for a while."""
+"""The time-outs by which a drive notices that the line is silent."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 
 class CommunicationTimeout:
     """
-    The time-outs by which one drive notices silence on the line, as far as they are known.
+    The communication time-outs of one drive, as far as they are known.
 
-    :param has: tells whether the drive has a parameter.
+    :param has: whether the drive has a parameter.
     """
 
     def __init__(
@@ -31,26 +31,26 @@ class CommunicationTimeout:
         self.seconds = 0.0
         #: AutoStop: without it the motor runs on when SioTot has passed [C91].
         self.stops_motor = False
-        #: How long the drive may hear nothing of what lives on the line, s, and by what it notices;
+        #: After how long without a heartbeat or guarding the drive reacts, s, and which of both;
         #: 0: it does not.
         self.watched_for = 0.0
         self.watched_by = ''
 
     @property
     def shortest(self) -> float:
-        """After which silence the drive does something by itself, s; 0: after none."""
+        """The shortest silence after which the drive acts by itself, s; 0: none."""
         return min(filter(None, (self.seconds, self.watched_for)), default=0.0)
 
     @property
     def can_be_set(self) -> bool:
-        """There is one that can be read and set over this line."""
+        """The time-out can be read and set over this line."""
         return self._has(self._seconds_key) and (not self._stop_key or self._has(self._stop_key))
 
     async def watch(self, seconds: float) -> None:
         """
-        Have the drive notice a silence of so long, s, by what lives on the line; 0: no more.
+        Have the drive watch the heartbeat or guarding, with this time-out, s; 0: no longer.
 
-        Where that fails the drive may go on to watch as before, and that is what is known of it.
+        After an error the drive may go on as before, and so does what is known of it.
         """
         self.watched_by = await self._params.watch(seconds, Priority.SERVICE)
         self.watched_for = seconds if self.watched_by else 0.0
@@ -61,16 +61,16 @@ class CommunicationTimeout:
             return
         self.seconds = await self._params.read_number(self._seconds_key, Priority.SERVICE)
         if not self._stop_key:
-            # where nothing can keep it from that, it stops the motor
+            # where no parameter can change that, it stops the motor
             self.stops_motor = True
             return
         data = await self._params.read_data(self._stop_key, Priority.SERVICE)
-        # a code that means neither ON nor OFF is not relied upon
+        # a code that means neither ON nor OFF is not relied on
         self.stops_motor = data == self._params.encode(self._stop_key, self._stops)
 
     def take(self, keys: Collection[str], values: Mapping[str, Value]) -> bool:
         """
-        Take note of parameters that have new values; tell whether SioTot is among them.
+        Note new values of parameters; return whether SioTot is among them.
 
         :param values: of all parameters of the drive, by key.
         """

@@ -21,36 +21,36 @@ from nfo_sinus_driver.link import LinkError
 
 class CommunicationWatchdog:
     """
-    SioTot with AutoStop of one drive [C91], or why not in a :class:`DriveError`; on the bus alone.
+    Sets SioTot with AutoStop of one drive [C91]; a :class:`DriveError` says why not; on the bus
+    alone.
 
-    On a line on which something lives beside questions and answers, such as a heartbeat, the drive
-    watches over that, if it can.
+    On a line with a heartbeat or guarding the drive watches that instead, if it can.
 
-    :param commanded: this driver may command the drive, and not only watch it.
+    :param commanded: this driver may command the drive, and does not only read it.
     """
 
     def __init__(self, state: DriveState, parameters: Parameters, *, commanded: bool) -> None:
         self._state = state
         self._parameters = parameters
         self._commanded = commanded
-        #: What was said last of each kind.
-        self._told: dict[Cause, Report] = {}
+        #: The last report of each cause.
+        self._reported: dict[Cause, Report] = {}
         #: What it was set to since the drive was connected, s; ``None``: not yet.
         self._settled: float | None = None
-        #: What this driver has changed: what was found before, and what it has set.
+        #: What this driver has changed: the values before, and those that it has set.
         self._found: dict[str, Value] = {}
         self._set: dict[str, Value] = {}
-        #: No setting asked for that, so nothing of it stays.
+        #: It is the default of no setting, so it does not stay.
         self._unasked = False
 
     def connected(self) -> None:
-        """Have it set with the next enable (DriveError: it is asked for, and there is none)."""
+        """Have it set with the next enable (DriveError: a setting wants it; there is none)."""
         self._settled = None
         if self._state.settings.drive_timeout > 0:
             self._require_possible()
 
     async def require_set(self) -> None:
-        """Set it, if that was not done yet; what no setting asks for keeps no motor from it."""
+        """Set it, if that was not done yet; failing to set the default prevents no start."""
         settings = self._state.settings
         if self._is_settled(settings.own_timeout):
             return
@@ -59,17 +59,17 @@ class CommunicationWatchdog:
         else:
             await self.set_now(settings.own_timeout)
         self._settled = settings.own_timeout
-        self._tell_watching()
+        self._report_timeout()
 
     def _is_settled(self, seconds: float) -> bool:
-        """Tell whether it was set to that, and nothing else was read since."""
+        """Return whether it was set to this, and no other value was read since."""
         key = self._state.model.key(Role.COMMUNICATION_TIMEOUT)
         ours = self._set.get(key)
         return self._settled == seconds and self._parameters.values.get(key, ours) == ours
 
     async def set_now(self, seconds: float) -> Sequence[Change]:
         """
-        Set and verify it, and have it stop the motor; tells what was changed.
+        Set and verify it, and have it stop the motor; return what was changed.
 
         0 leaves it as it is, and :data:`AS_THE_DRIVE_CAN` leaves it to the next enable.
         """
@@ -91,8 +91,8 @@ class CommunicationWatchdog:
             faulted = state.status is not None and state.status.faulted
             if faulted or not state.bus.supervised:
                 raise
-            # whether a drive has any means at all is nowhere written for such a line [C102]
-            self._tell_not_taken(error)
+            # no manual says whether a drive on such a line has any [C102]
+            self._report_not_taken(error)
             return ()
         for change in changes:
             self._found.setdefault(change.key, change.old)
@@ -109,9 +109,9 @@ class CommunicationWatchdog:
 
     async def _try_usual(self, seconds: float) -> None:
         """
-        Set the usual one, where the drive may stop its motor by itself.
+        Set the default, where the drive is set to stop its motor.
 
-        Whether it may is left as it is, and so is a shorter time-out: both were decided by others.
+        That setting is left as it is, and so is a shorter time-out: others have chosen them.
         """
         timeout = self._state.timeout
         if not seconds or self._state.plc_time:
@@ -124,17 +124,17 @@ class CommunicationWatchdog:
             if not timeout.watched_by and not self._is_kept(seconds):
                 await self._write_usual(seconds)
         except (LinkError, DriveError) as error:
-            self._tell_not_taken(error)
+            self._report_not_taken(error)
 
     def _is_kept(self, seconds: float) -> bool:
-        """Tell whether others have set one that is no longer."""
+        """Return whether others have set one that is no longer than this."""
         found = self._state.timeout.seconds
         ours = self._set.get(self._state.model.key(Role.COMMUNICATION_TIMEOUT))
         return 0 < found <= seconds and found != ours
 
     async def _write_usual(self, seconds: float) -> None:
         timeout, key = self._state.timeout, self._state.model.key(Role.COMMUNICATION_TIMEOUT)
-        # before it is written: a stop may come between, and then it stands there all the same
+        # noted before it is written: a stop may cancel this, and the drive has it all the same
         self._found.setdefault(key, timeout.seconds)
         self._set[key] = seconds
         self._unasked = True
@@ -142,20 +142,20 @@ class CommunicationWatchdog:
         await timeout.read()
 
     async def undo(self) -> None:
-        """Put back what no setting asked for, while the drive may take settings yet."""
+        """Put back the default, while the drive still takes settings."""
         if self._unasked:
             with contextlib.suppress(LinkError, DriveError):
                 await self._restore()
 
     async def put_back(self, *, goes_on: bool) -> None:
         """
-        Put back what was found, at a clean end.
+        Put back the values before, at a clean end.
 
-        What another master has set meanwhile is left alone, and so is what was asked for where the
-        drive does not go on watching. Tells why the drive will have a fault, if it will; nothing of
-        that keeps the driver from ending.
+        What another master has set meanwhile is left alone, and so is what a setting wants where
+        the drive stops watching. A fault to come is reported; no error keeps the driver from
+        ending.
 
-        :param goes_on: the bus keeps control, so that the drive goes on watching.
+        :param goes_on: the bus keeps control, so the drive goes on watching.
         """
         state = self._state
         await self._end_watch()
@@ -166,15 +166,15 @@ class CommunicationWatchdog:
             if goes_on:
                 await state.timeout.read()
         except (LinkError, DriveError) as error:
-            self._tell_left(explain_failure(error, state), goes_on=goes_on)
+            self._report_left(explain_failure(error, state), goes_on=goes_on)
         else:
             if goes_on and state.timeout.seconds and state.timeout.stops_motor:
-                self._tell_left(Report(Cause.OWN_TIMEOUT_NOT_OURS), goes_on=True)
+                self._report_left(Report(Cause.OWN_TIMEOUT_NOT_OURS), goes_on=True)
 
     def left(self, error: LinkError | DriveError) -> None:
-        """Tell that what no setting asked for stays: the motor may run, or could run again."""
+        """Report that the default stays set: the motor may run, or could run again."""
         if self._unasked and self._found:
-            self._tell_left(explain_failure(error, self._state), goes_on=False)
+            self._report_left(explain_failure(error, self._state), goes_on=False)
 
     async def _restore(self) -> None:
         for key in reversed(tuple(self._found)):
@@ -191,45 +191,46 @@ class CommunicationWatchdog:
             await state.timeout.watch(0.0)
         except LinkError as error:
             why = explain_failure(error, state)
-            state.tell(Severity.WARNING, Cause.WATCH_LEFT, why=why, by=by, seconds=seconds)
+            state.notify(Severity.WARNING, Cause.WATCH_LEFT, why=why, by=by, seconds=seconds)
 
     async def _change(self, wanted: Mapping[str, Value]) -> Sequence[Change]:
         return await self._parameters.change_now(
-            wanted, guarded=False, told_as=Cause.CHANGED_FOR_TIMEOUT
+            wanted, guarded=False, report_as=Cause.CHANGED_FOR_TIMEOUT
         )
 
-    def _tell_not_taken(self, error: LinkError | DriveError) -> None:
+    def _report_not_taken(self, error: LinkError | DriveError) -> None:
         why = explain_failure(error, self._state)
-        self._say(Severity.WARNING, self._state.report(Cause.OWN_TIMEOUT_NOT_TAKEN, why=why))
+        not_taken = self._state.report(Cause.OWN_TIMEOUT_NOT_TAKEN, why=why)
+        self._report_once(Severity.WARNING, not_taken)
 
-    def _tell_watching(self) -> None:
-        """Tell after what time the drive stops the motor by itself; once for each in a row."""
+    def _report_timeout(self) -> None:
+        """Report after what time the drive stops the motor by itself; each value once."""
         timeout, model = self._state.timeout, self._state.model
         if timeout.shortest and timeout.stops_motor:
             name = timeout.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
             watching = Report(Cause.OWN_TIMEOUT_SET, name=name, timeout=timeout.shortest)
-            self._say(Severity.INFO, watching)
+            self._report_once(Severity.INFO, watching)
 
-    def _tell_left(self, why: Report, *, goes_on: bool) -> None:
+    def _report_left(self, why: Report, *, goes_on: bool) -> None:
         cause = Cause.OWN_TIMEOUT_LEFT if goes_on else Cause.OWN_TIMEOUT_NOT_PUT_BACK
         key = self._state.model.key(Role.COMMUNICATION_TIMEOUT)
         name, timeout = self._state.model[key].name, self._state.timeout.seconds
-        self._state.tell(Severity.WARNING, cause, key=key, name=name, timeout=timeout, why=why)
+        self._state.notify(Severity.WARNING, cause, key=key, name=name, timeout=timeout, why=why)
 
     def warn_if_unfit(self) -> None:
-        """Tell that it is missing, or strikes too soon; once for each reason in a row."""
+        """Report that it is missing or too short; each reason once."""
         complaint = self._complaint() if self._commanded else None
         if complaint is not None:
             kept = complaint.cause is Cause.OWN_TIMEOUT_KEPT
-            self._say(Severity.INFO if kept else Severity.WARNING, complaint)
+            self._report_once(Severity.INFO if kept else Severity.WARNING, complaint)
 
-    def _say(self, severity: Severity, what: Report) -> None:
-        if self._told.get(what.cause) != what:
-            self._told[what.cause] = what
-            self._state.tell(severity, what)
+    def _report_once(self, severity: Severity, what: Report) -> None:
+        if self._reported.get(what.cause) != what:
+            self._reported[what.cause] = what
+            self._state.notify(severity, what)
 
     def _complaint(self) -> Report | None:
-        """Return what is wrong with it as it will be with the next enable, or why it stays."""
+        """Return what will be wrong with it at the next enable, or why it stays as it is."""
         state, model, settings = self._state, self._state.model, self._state.settings
         timeout, margin = state.timeout.shortest, DRIVE_TIMEOUT_MARGIN
         method = settings.method_class
@@ -237,7 +238,7 @@ class CommunicationWatchdog:
             caution = method.caution
             return Report(Cause.OWN_TIMEOUT_UNKNOWN, what=caution) if caution else None
         if settings.drive_timeout > 0:
-            # else it is refused
+            # one that does not fit is refused
             return None
         if not state.timeout.can_be_set and not state.timeout.watched_by:
             return state.report(Cause.NO_OWN_TIMEOUT)

@@ -4,9 +4,8 @@
 """
 The states of control of one drive, and what leads from one to another.
 
-This is the one place that knows whether the motor may turn, and whether it is being stopped:
-:mod:`.controller` and :mod:`.stopping` dispatch the events. ``docs/control.md`` has the table as it
-is here.
+This alone knows whether the motor may turn, and whether it is being stopped: :mod:`.controller` and
+:mod:`.stopping` dispatch the events. ``docs/control.md`` has the same table.
 """
 
 from __future__ import annotations
@@ -24,18 +23,18 @@ class ControlState(enum.Enum):
 
     OFFLINE = 'the drive is not connected, and nothing has to be stopped'
     IDLE = 'connected; nothing was begun that could make the motor turn'
-    ENABLING = 'an enable is on its way: control is taken, a run command may stand'
+    ENABLING = 'an enable is on its way: control is taken, a run command may be active'
     ENABLED = 'the motor runs and follows set-points, or the reference of the drive'
     PROCEDURE = 'a procedure, such as tuning, has exclusive access to the drive'
-    STOPPING = 'the run command is removed, again and again until the drive says that it stops'
-    BLOCKED = 'a fault keeps the motor still, and the drive from taking the stop until it is over'
+    STOPPING = 'the run command is removed, again and again until the drive confirms that it stops'
+    BLOCKED = 'a fault keeps the motor still, and the drive refuses the stop until it is over'
 
 
 class ControlEvent(enum.Enum):
     """What can happen; the values describe it to users."""
 
     CONNECTED = 'the drive is connected'
-    LOST = 'the drive is lost, or left alone'
+    LOST = 'the drive is lost, or disconnected'
     ENABLE = 'a client enables the motor'
     REFUSED = 'an enable is refused before anything was written'
     RUNNING = 'the status says that the motor runs, at set-point 0'
@@ -75,7 +74,7 @@ def _read(table: str) -> Mapping[tuple[ControlState, ControlEvent], ControlState
     return transitions
 
 
-#: The same, to be looked up; what is not in it changes nothing, or is refused.
+#: The same by state and event; what is missing changes nothing, or is refused.
 TRANSITIONS = _read(_TABLE)
 
 #: Something that the driver has begun may drive the motor.
@@ -90,7 +89,7 @@ class Control:
     :param on_change: called with the state before, after each transition to another one.
     :param on_stop: called with the reason when what may drive the motor is stopped.
     :ivar state: what the driver is doing with the drive.
-    :ivar since: when the last event was, s: a status from before says nothing of it.
+    :ivar since: when the last event came, s: an earlier status says nothing of it.
     :ivar stopped_at: when a stop was confirmed last, s.
     :ivar stopped_for: why the motor was stopped last; ``None`` before the first time.
     """
@@ -121,11 +120,11 @@ class Control:
             self._on_change(before)
 
     def explain(self, why: Report) -> None:
-        """Note a better reason for the stop that is on its way."""
+        """Note a better reason for the stop in progress."""
         self.stopped_for = why
 
     def _note(self, before: ControlState, why: Report | None) -> None:
-        """Note why the motor is stopped; a stop of one that was not commanded explains nothing."""
+        """Note why the motor is stopped, if it was commanded or ran without an enable."""
         commanded = before in COMMANDED or reason_of(why) is StopReason.NOT_ENABLED
         if why is not None and commanded and self.state is ControlState.STOPPING:
             self.stopped_for = why
@@ -147,5 +146,5 @@ class Control:
 
     @property
     def blocked(self) -> bool:
-        """The motor stands by a fault, and the drive refuses the stop until that is over."""
+        """A fault keeps the motor still, and the drive refuses the stop until it is over."""
         return self.state is ControlState.BLOCKED

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Who may make the motor turn, and how it is made to stop.
+What may turn the motor, and how it is stopped.
 
-Every command, everything that the status shows and every loss is an event of
-:mod:`.control_state`. The motor follows set-points only while the state is ENABLED, to which
-:meth:`Controller.enable` alone leads. All of this runs on the bus.
+Every command, every status that matters and every loss is an event of :mod:`.control_state`. The
+motor follows set-points only while the state is ENABLED, to which :meth:`Controller.enable` alone
+leads. All of this runs on the bus.
 """
 
 from __future__ import annotations
@@ -39,38 +39,38 @@ from nfo_sinus_driver.link import LinkError, Refused
 
 class Controller:
     """
-    Enables, stops and judges one drive.
+    Enables, stops and checks one drive.
 
     A :class:`DriveError` says why a command was not carried out. A stop that the drive does not
-    confirm is such an error, too; it is retried until it does.
+    confirm is such an error, too; it is retried until confirmed.
     """
 
     def __init__(self, state: DriveState, method: Commands, setpoint: Setpoint) -> None:
         self._bus = state.bus
         self._state = state
-        #: How the drive is commanded, for a procedure too.
+        #: The commands of the drive, for a procedure too.
         self.method = method
         self._setpoint = setpoint
         #: Called on the bus after a stop was begun, with the reason.
         self._on_stop: Callable[[Report], None] = lambda _: None
-        self._control = Control(self._bus.now, self._changed, self._tell_others)
+        self._control = Control(self._bus.now, self._changed, self._notify_stop)
         #: The driver ends: the motor is stopped, and nothing can start it any more.
         self.closed = False
-        #: What enables, to be cancelled; and what no other procedure and no enable may run beside.
+        #: The task that enables, to be cancelled; the procedure that excludes others and an enable.
         self._enabling: Task | None = None
         self._access: ExclusiveAccess | None = None
         self._starting = StartSequence(state, method)
         self._sequence = StopSequence(state, method, self._control)
         self._following = Following(state, setpoint)
-        #: A set-point that the drive did not take: when, and what it answered.
+        #: A set-point that the drive refused: when, and why.
         self._refusal: tuple[float, Report] | None = None
-        #: The status that was judged last.
-        self._judged: InverterStatus | None = None
+        #: The last status that was checked.
+        self._checked: InverterStatus | None = None
         self._stood_at = -math.inf
-        #: It was lost while it may have followed us.
+        #: It was lost while its motor may have been running by this driver.
         self._lost_in_use = False
 
-    # --- where it stands ----------------------------------------------------------------------
+    # --- the state ----------------------------------------------------------------------------
 
     @property
     def state(self) -> ControlState:
@@ -89,12 +89,12 @@ class Controller:
 
     @property
     def blocked_by_fault(self) -> bool:
-        """The motor stands by a fault, and the drive refuses the stop until it is acknowledged."""
+        """A fault keeps the motor still, and the drive refuses the stop until it is over."""
         return self._control.blocked
 
     @property
     def stop_overdue(self) -> bool:
-        """A stop is not confirmed although there was time; no fault keeps the motor still."""
+        """A stop was not confirmed in time, and no fault keeps the motor still."""
         return self._sequence.overdue
 
     @property
@@ -104,7 +104,7 @@ class Controller:
 
     @property
     def procedure(self) -> str:
-        """What has exclusive access, perhaps stopped and not ended yet; ``''`` if nothing has."""
+        """The procedure that has exclusive access, also while it is ending; ``''``: none."""
         return '' if self._access is None else self._access.what
 
     @property
@@ -114,12 +114,12 @@ class Controller:
 
     @property
     def changing(self) -> bool:
-        """The driver is waiting for the drive to say something else than before."""
+        """The driver waits for the status to change."""
         return self.stopping or (self.commanded and not self.enabled)
 
     @property
     def may_run(self) -> bool:
-        """The motor runs by us, or may do so, or at least the bus has control of it."""
+        """The motor runs by the bus, or may do so, or at least the bus has control."""
         status = self._state.status
         commanded = self.commanded or self.stopping
         return commanded or status is None or status.from_bus or status.tuning
@@ -127,7 +127,7 @@ class Controller:
     # --- transitions --------------------------------------------------------------------------
 
     def _changed(self, before: ControlState) -> None:
-        """Do what leaving a state means."""
+        """Clean up after the state that was left."""
         if before is ControlState.ENABLED:
             self._setpoint.stop_following()
         elif before is ControlState.ENABLING:
@@ -139,22 +139,22 @@ class Controller:
             self._control.dispatch(ControlEvent.LOST)
 
     def on_stop(self, call: Callable[[Report], None]) -> None:
-        """Have something called on the bus whenever the motor is stopped, with the reason."""
+        """Call a function on the bus whenever the motor is stopped, with the reason."""
         self._on_stop = call
 
-    def _tell_others(self, why: Report) -> None:
-        # once what stops this motor is on its way
+    def _notify_stop(self, why: Report) -> None:
+        # after the stop of this motor is on its way
         self._bus.call(lambda: self._on_stop(why))
 
     def stop_beside(self, why: Report) -> None:
-        """Stop the motor, if something may drive it, because another drive stops."""
+        """Stop the motor, if this driver may run it, because another drive stops."""
         if self.commanded:
             self._sequence.start(why)
-            self._tell_stopped(why)
+            self._report_stop(why)
 
     @contextlib.contextmanager
     def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
-        """Have the drive for a procedure: a stop ends that, and its preparations."""
+        """Give a procedure exclusive access; a stop ends it, during its preparations too."""
         self.require_idle(what)
         self._access = access = ExclusiveAccess(what)
         self._control.dispatch(ControlEvent.BEGIN)
@@ -165,7 +165,7 @@ class Controller:
             self._control.dispatch(ControlEvent.END)
 
     def require_idle(self, what: str) -> None:
-        """See to it that a procedure may begin."""
+        """Make sure that a procedure may begin."""
         if self.closed:
             raise DriveError(Cause.ENDING)
         if self._access is not None:
@@ -181,18 +181,18 @@ class Controller:
 
     def require_newer(self, requested_at: float) -> None:
         """
-        See to it that no stop was confirmed since a client asked for a motion, s, monotonic.
+        Make sure that no stop was confirmed since a client requested a motion, s, monotonic.
 
-        The request for a motion and that for a stop after it may arrive in the other order.
+        A request for a motion and a later one for a stop may arrive in the other order.
         """
         if requested_at < self._control.stopped_at:
             raise DriveError(Cause.STOPPED_SINCE_ASKED)
 
     async def _require_enable(self) -> None:
         """
-        See to it that an enable may begin.
+        Make sure that an enable may begin.
 
-        A stop that is not confirmed forbids it: the client may not know of that.
+        A stop that is not confirmed forbids it: the client may not know of it.
         """
         if self.closed:
             raise DriveError(Cause.NOT_ACTIVE)
@@ -214,7 +214,7 @@ class Controller:
         """
         Take control and run at set-point 0, then follow set-points that arrive from now on.
 
-        :param prepare: does what has to be done before a run command, once the bus has control.
+        :param prepare: runs before the run command, once the bus has control.
         :param requested_at: when the client requested it, s, monotonic.
         """
         self.require_newer(requested_at)
@@ -237,9 +237,9 @@ class Controller:
 
     async def _check(self) -> tuple[str, Limits]:
         """
-        See to it that nothing keeps the motor from being started.
+        Make sure that nothing prevents a start.
 
-        :returns: the control mode, and what its set-points may be.
+        :returns: the control mode, and the limits of its set-points.
         """
         try:
             if self._refusal is not None:
@@ -250,7 +250,7 @@ class Controller:
             raise DriveError(report_of(error)) from error
 
     async def _start(self, control_mode: str, limits: Limits, prepare: Prepare) -> None:
-        """Start the motor, and follow set-points from then on; else remove the run command."""
+        """Start the motor and follow set-points; after an error remove the run command."""
         try:
             await self._starting.start(control_mode, prepare)
             self._control.dispatch(ControlEvent.RUNNING)
@@ -260,16 +260,16 @@ class Controller:
             self._setpoint.follow(control_mode, limits, target)
             self._following.begin()
         except Exception as error:
-            # whatever went wrong, a run command may stand by now
+            # whatever went wrong, a run command may be active by now
             self._sequence.start(Report(Cause.ENABLE_FAILED, why=report_of(error)))
             await self._settle()
             raise DriveError(report_of(error)) from error
 
     async def stop(self, why: Report | None = None, patience: float | None = None) -> Report:
         """
-        Stop as the drive's StMode says; control is kept. Tells whether it ramps or coasts [C97].
+        Stop as the drive's StMode says, keep control, and return whether it ramps or coasts [C97].
 
-        :param why: needed where something may drive the motor.
+        :param why: needed where something may run the motor.
         :param patience: how long the drive may take to confirm it, s.
         """
         self._sequence.start(why)
@@ -280,7 +280,7 @@ class Controller:
         if status is not None and status.faulted and not status.driven:
             return self._state.report(Cause.STOPPED_BY_FAULT)
         if status is not None and self._sequence.forced:
-            # control may have been taken away by that
+            # a stop by force may have given control away
             return self._state.report(Cause.STOPPING if status.driven else Cause.STOPPED)
         if status is None or not status.from_bus:
             return self._no_control(status)
@@ -294,7 +294,7 @@ class Controller:
         return Report(Cause.COASTING if coasts else Cause.RAMPING)
 
     async def take_control(self, control_mode: str) -> None:
-        """Put the drive under bus control for a procedure, with no run command standing."""
+        """Put the drive under bus control for a procedure, with no run command active."""
         await self._starting.take_control(control_mode)
 
     async def withdraw_run_command(self, ended: Report | None) -> None:
@@ -304,10 +304,10 @@ class Controller:
 
     async def quick_stop(self, why: Report) -> Report:
         """
-        Release the motor at once: it coasts; by MODE and SCMD control is given back, too.
+        Release the motor at once, so that it coasts; MODE and SCMD release control, too.
 
-        Where the quick stop of the drive goes by a setting, the motor may ramp down; where there is
-        none, stop as usual [C96].
+        Where a setting of the drive decides, the motor may ramp down; where the drive has no quick
+        stop, stop as usual [C96].
         """
         if not self.method.coasts:
             return Report(Cause.NO_QUICK_STOP, stop=await self.stop(why))
@@ -320,7 +320,7 @@ class Controller:
                     await self.method.quick_stop(self._state.control_mode)
                     await self._await_quick_stop(self._bus.now())
             except Exception as error:
-                # even after a mistake of ours the motor is not left as it is
+                # even after an error in the driver the motor is stopped
                 self._sequence.start()
                 with contextlib.suppress(LinkError):
                     await self._state.read_status(Priority.LOOK)
@@ -339,9 +339,9 @@ class Controller:
 
     async def rapid_stop(self, why: Report) -> Report:
         """
-        Stop along the stop ramp of the drive, if it has one, else as usual; control is kept.
+        Stop along the stop ramp of the drive, if it has one, else as usual; keep control.
 
-        The stop goes on as any other, whatever becomes of the request for that ramp.
+        The stop goes on as any other, even if the request for that ramp fails.
         """
         if not self.method.stop_ramp:
             return Report(Cause.NO_RAPID_STOP, stop=await self.stop(why))
@@ -356,16 +356,16 @@ class Controller:
             return self._state.report(Cause.RAPID_STOPPING)
         return self._state.report(Cause.NOT_RAPID, stop=stopped)
 
-    async def _await_quick_stop(self, told_at: float) -> None:
+    async def _await_quick_stop(self, sent_at: float) -> None:
         """Wait until the motor is released, or on its way to a stop where a setting decides."""
         by = self.method.quick_stop_by
 
         def stops(status: InverterStatus) -> bool:
-            return not (status.keeps_running_since(told_at) if by else status.driven)
+            return not (status.keeps_running_since(sent_at) if by else status.driven)
 
-        # a PLC whose data stand still goes on showing what was before
+        # a PLC with old data goes on showing the status before
         await self._state.wait_until(
-            lambda status: status.at >= told_at and stops(status), Priority.LOOK
+            lambda status: status.at >= sent_at and stops(status), Priority.LOOK
         )
 
     def _quick_stopped(self) -> Report:
@@ -377,7 +377,7 @@ class Controller:
         return Report(Cause.QUICK_STOP_RAMPS if ramps else Cause.QUICK_STOP_OFF, by=by)
 
     async def acknowledge(self, why: Report) -> Report:
-        """Acknowledge a fault, run command and set-point first, where the drive lets us."""
+        """Acknowledge a fault; remove run command and set-point first, if the drive allows it."""
         state = self._state
         status = await state.read_status(Priority.SERVICE)
         fault = status.listed
@@ -391,7 +391,7 @@ class Controller:
         state = self._state
         acknowledged = state.describe()
         if status.state is State.FAULT_REACTION_ACTIVE:
-            # what comes before FAULTED acknowledges nothing [M0 table 16]
+            # before FAULTED an acknowledgement has no effect [M0 table 16]
             with contextlib.suppress(DriveError):
                 await self._state.wait_until(
                     lambda now: now.state is not State.FAULT_REACTION_ACTIVE, Priority.SERVICE
@@ -419,20 +419,19 @@ class Controller:
 
     async def release(self, timeout: float, why: Report, prepare: Prepare) -> Report:
         """
-        Give control back once the motor stands.
+        Release control once the motor stands still.
 
-        A motor that still ramps after ``timeout`` is left to its ramp. Only if the drive has a
-        time-out of its own that goes on it is released, for else that would end the ramp with a
-        fault.
+        A motor that still ramps after ``timeout`` is left to its ramp. Only where a time-out of the
+        drive would end the ramp with a fault, it is released instead.
 
-        :param prepare: does what has to be done before, while the bus has control.
+        :param prepare: runs before, while the bus has control.
         :raises DriveError: the drive does not confirm that it stops.
         """
-        # a run command may be on its way, whoever has control at this moment; and where the bus has
-        # it, one may stand that an acknowledgement has not come to remove yet
+        # a run command may be on its way, whatever has control now; and where the bus has it, one
+        # may be active that an acknowledgement has not removed yet
         status = self._state.status
         may_run = self.commanded or self.stopping or (status is not None and status.from_bus)
-        # no client can enable it until the motor stands
+        # no client can enable it until the motor stands still
         with self._sequence.external_stop(why):
             return await self._release(timeout, prepare, may_run=may_run)
 
@@ -455,15 +454,15 @@ class Controller:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
             stopped = Report(Cause.COASTED_FOR_TIMEOUT)
         await self.method.release()
-        if await self.method.kept():
+        if await self.method.retains_control():
             return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.control_retained)
         return Report(Cause.CONTROL_RELEASED, stop=stopped)
 
     async def leave(self, timeout: float) -> None:
         """
-        Behind a PLC, whose block keeps the last word, leave it that of a motor that stands.
+        Behind a PLC, whose block keeps the last command, leave the one for a motor at standstill.
 
-        :param timeout: how long the motor may take to stand, s.
+        :param timeout: how long the motor may take to stand still, s.
         """
         if not self.method.plc_time or self.blocked_by_fault:
             return
@@ -477,9 +476,9 @@ class Controller:
         if self.may_run:
             self._sequence.start(why)
 
-    # --- what happens by itself ---------------------------------------------------------------
+    # --- events of the drive ------------------------------------------------------------------
 
-    async def secure_found(self) -> None:
+    async def stop_unexpected_run(self) -> None:
         """Stop a motor that runs under bus control and was not enabled since."""
         state, status = self._state, self._state.status
         if await self.method.in_control(Priority.SERVICE):
@@ -487,31 +486,31 @@ class Controller:
             found = None
             if turns and not self.stopping:
                 found = state.report(Cause.FOUND_RUNNING)
-                state.tell(Severity.WARNING, found)
+                state.notify(Severity.WARNING, found)
             self._sequence.restart(found)
         elif self._lost_in_use and status is not None and not status.faulted:
             why = state.report(Cause.CONTROL_LOST_WHILE_AWAY)
-            state.tell(Severity.WARNING, why)
+            state.notify(Severity.WARNING, why)
             self._control.explain(why)
         self._lost_in_use = False
 
     def connected(self) -> None:
-        """Take note that the drive is connected."""
+        """Note that the drive is connected."""
         self._control.dispatch(ControlEvent.CONNECTED)
 
     def disconnected(self, why: Report) -> None:
-        """Take note that the drive is left alone; what still drives the motor is stopped."""
+        """Note that the drive is disconnected; stop the motor if it may still run."""
         self._control.dispatch(ControlEvent.LOST, why)
         if self.stopping:
             self._sequence.start()
 
     def lost(self, why: Report) -> bool:
-        """Take note that the drive does not answer any more; true if it may have followed us."""
+        """Note that the drive is lost; return whether this driver may have run its motor."""
         self._lost_in_use = self.commanded or self._refusal is not None
         if self._refusal is not None:
-            # no status will come that could tell a better reason
+            # no status will come to show a better reason
             (_, reason), self._refusal = self._refusal, None
-            self._state.tell(Severity.WARNING, Cause.STOPPING_BECAUSE, why=reason)
+            self._state.notify(Severity.WARNING, Cause.STOPPING_BECAUSE, why=reason)
         known = reason_of(why) is not StopReason.OTHER
         self._control.dispatch(ControlEvent.LOST, why if known else Report(Cause.LOST, why=why))
         if self._lost_in_use:
@@ -519,14 +518,14 @@ class Controller:
         return self._lost_in_use
 
     def alarmed_by(self, status: InverterStatus) -> bool:
-        """Tell whether a status is a reason to stop."""
+        """Return whether a status is a reason to stop."""
         follows = self.enabled and status.at >= self._control.since
         return follows and self._why_stopped(status) is not None
 
-    def judge(self, status: InverterStatus) -> bool:
-        """Judge what the drive says about itself; true if a person was told of it."""
+    def on_status(self, status: InverterStatus) -> bool:
+        """Check a status, and stop the motor if it says so; return whether that was reported."""
         self._setpoint.answered()
-        before, self._judged = self._judged, status
+        before, self._checked = self._checked, status
         if self.blocked_by_fault and not status.faulted:
             self._sequence.restart()
         if self._explain_refusal(status):
@@ -537,12 +536,12 @@ class Controller:
         if self.enabled:
             reason = self._why_stopped(status) or self._why_slower(status, before)
             if reason is None and self._state.settings.follows_setpoints:
-                reason = self._following.judge()
+                reason = self._following.check()
         elif not (self.commanded or self.stopping) and self._runs_unasked(status):
             reason = Report(Cause.RUNS_UNASKED)
         if reason is not None:
             self._sequence.start(reason)
-            self._tell_stopped(reason)
+            self._report_stop(reason)
         return reason is not None
 
     def _runs_unasked(self, status: InverterStatus) -> bool:
@@ -553,30 +552,30 @@ class Controller:
         return status.keeps_running and not (ramps and status.at - since < TIMEOUT)
 
     def refused(self, reason: Report) -> None:
-        """Stop because of a set-point; the next status may tell a better reason."""
+        """Stop because of a set-point; the next status may show a better reason."""
         self._sequence.start(reason)
         self._refusal = (self._bus.now(), reason)
 
     def _explain_refusal(self, status: InverterStatus) -> bool:
         if self._refusal is None or status.at <= self._refusal[0]:
             return False
-        # it was told to stop when it refused; a drive with a fault refuses everything
+        # the stop was begun when it refused; a drive with a fault refuses everything
         (_, reason), self._refusal = self._refusal, None
         if status.faulted:
             reason = explain_fault(self._state, status)
             self._control.explain(reason)
-        self._tell_stopped(reason)
+        self._report_stop(reason)
         return True
 
-    def _tell_stopped(self, reason: Report) -> None:
+    def _report_stop(self, reason: Report) -> None:
         status = self._state.status
         if status is not None and status.faulted:
-            self._state.tell(Severity.ERROR, Cause.STOPPED_BECAUSE_OF_FAULT, why=reason)
+            self._state.notify(Severity.ERROR, Cause.STOPPED_BECAUSE_OF_FAULT, why=reason)
         else:
-            self._state.tell(Severity.WARNING, Cause.STOPPED_BECAUSE, why=reason)
+            self._state.notify(Severity.WARNING, Cause.STOPPED_BECAUSE, why=reason)
 
     async def _settle(self) -> None:
-        """Let a stop that comes with something else be confirmed, so that enable can follow."""
+        """Wait for the confirmation of a stop, so that an enable can follow."""
         with contextlib.suppress(DriveError):
             await self._sequence.wait_confirmed()
 

@@ -16,8 +16,8 @@ async def detect_model(bus: Bus, unit: int) -> str:
     """
     Find out which model a drive is, for coroutines on the bus.
 
-    It is the only one that speaks the protocol of the line; or the one that tells who it is; or
-    the one that has a parameter which no other has; or the only one that is left.
+    It is the only one with the protocol of the line, or the one that identifies itself, or the one
+    with a parameter that no other has, or the only one left.
 
     :raises DriveError: it does not answer, or several are left; the message says what to do.
     """

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a failed transaction or a status means, and what of a status is told when it begins."""
+"""What a failed transaction or a status means, and which conditions are reported."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from nfo_sinus_driver.link import (
     Unconfirmed,
 )
 
-#: What is wrong is not the drive, nor the settings of its line.
+#: Errors that say what to do: neither the drive nor the settings of its line are wrong.
 _SAYS_WHAT_TO_DO = (
     PortError, Refused, GatewaySilent, GatewayLate, GatewayFault, NoPath, NoData, Interrupted,
     MailboxSilent, Unconfirmed,
@@ -37,7 +37,7 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
     """
     Return what a failed transaction means.
 
-    :param check: what to look at while the drive has never answered; ``None``: it has, so that its
+    :param check: what to check while the drive has never answered; ``None``: it has, so its
         settings are right [C93].
     """
     if isinstance(error, _SAYS_WHAT_TO_DO):
@@ -58,7 +58,7 @@ def explain_failure(error: LinkError | DriveError, state: DriveState) -> Report:
 
 
 def report_of(error: Exception) -> Report:
-    """Return what an error says, as far as that is known."""
+    """Return the report of an error."""
     if isinstance(error, DriveError):
         return error.report
     if isinstance(error, LinkError):
@@ -78,7 +78,7 @@ def require_no_fault(state: DriveState, status: InverterStatus) -> None:
 
 
 def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -> Report | None:
-    """Return why the motor no longer follows us, who enabled it in a control mode, if so."""
+    """Return why a motor that was enabled in a control mode does not run any more, if so."""
     if state.control_mode != control_mode:
         mode, unit = state.control_mode, state.unit
         return Report(Cause.CONTROL_MODE_CHANGED, mode=mode, unit=unit)
@@ -92,7 +92,7 @@ def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -
     elif Fact.RUN_INPUT_MISSING in status.facts:
         cause = Cause.RUN_INPUT_LOST
     elif state.left_alone:
-        # not every drive shows by a fault that its time-out is over, and some then go on
+        # not every drive shows a fault after its time-out, and some then run on
         cause = Cause.DRIVER_PAUSED
     elif not status.runs:
         cause = Cause.STOPPED_BY_ITSELF
@@ -107,7 +107,7 @@ def _why_control_is_lost(state: DriveState, status: InverterStatus) -> Cause:
     if status.means(Meaning.KEYPAD):
         return Cause.KEYPAD_IN_CONTROL
     if status.runs:
-        # the current limit, for one, shows instead of who runs it
+        # the current limit, for one, hides what runs it
         return Cause.OTHERS_IN_CONTROL
     return Cause.POWER_CYCLED if state.missed_reply else Cause.CONTROL_LOST
 
@@ -116,23 +116,23 @@ def explain_fall(
     state: DriveState, before: InverterStatus, status: InverterStatus, least: float
 ) -> Report | None:
     """
-    Return why a motor turns slower than it was told to, if it does so after a silence.
+    Return why a motor turns slower than commanded after a silence, if it does.
 
-    A drive that keeps its run command without power turns the motor by it when it is back, from
-    standstill on. Where the status word shows the same then as before, the frequency alone tells.
+    A drive that keeps its run command without power starts the motor from standstill when it is
+    back. Where the status word is the same as before, only the frequency shows it.
 
     :param before: the status before the silence.
-    :param least: Hz, the slowest that the drive can have been told to turn since then.
+    :param least: Hz, the lowest frequency that can have been commanded since then.
     """
     was = min(abs(before.frequency), least)
     away = status.at - before.at
     if state.plc_time:
-        # the PLC answers all the while, and a drive that is back may catch a motor that coasts
+        # the PLC answers all the time, and a drive that is back may catch a coasting motor
         silent = away >= _LIFE_STOOD + state.usual_interval
         most = min(was - _LEAST_FALL, was * _CAUGHT)
     else:
         silent, most = state.missed_reply and away >= _SHORTEST_POWER_OFF, was / 2
-    # where the frequency is not read with the status, nothing falls
+    # where the frequency is not read with the status, it is NaN and does not fall
     if not (silent and was >= _LEAST_FALL and abs(status.frequency) < most):
         return None
     return state.report(
@@ -143,38 +143,38 @@ def explain_fall(
     )
 
 
-#: No drive is off and on again, and answers, within less, s; a single lost answer takes less.
+#: No drive is switched off and on, and answers, within less, s; a lost answer takes less.
 _SHORTEST_POWER_OFF = 0.4
-#: A PLC's life counter that stands for so much longer than it is looked at is a silence of the
-#: drive, s [C125].
+#: A PLC's life counter that stands still for this much longer than the poll interval is a silence
+#: of the drive, s [C125].
 _LIFE_STOOD = 0.2
-#: A motor that is caught turns at no more than this share of what it did.
+#: A motor that is caught turns at no more than this share of its speed before.
 _CAUGHT = 0.95
-#: A frequency from which on a fall is looked at, Hz: what is less may be a wobble.
+#: A smaller fall of the frequency may be a fluctuation, Hz.
 _LEAST_FALL = 0.5
-#: What comes and goes is told again only when it was away for so long, s.
+#: A condition that comes and goes is reported again only after so long without it, s.
 _AGAIN_AFTER = 10.0
 
 
 class Conditions:
-    """Tells of alarms, the current limit and sleep of one drive; nothing is stopped by them."""
+    """Reports alarms, the current limit and sleep of one drive; they stop nothing."""
 
     def __init__(self, state: DriveState) -> None:
         self._state = state
-        #: When each was last there.
-        self._seen_at: dict[tuple[Cause, int], float] = {}
-        #: An alarm stood when it was last looked at, with a code that is no alarm's.
+        #: When each was last present.
+        self._last_at: dict[tuple[Cause, int], float] = {}
+        #: The last status had an alarm, with a code that is no alarm's.
         self._unnamed = False
 
     def take(self, status: InverterStatus) -> None:
-        """Tell what has begun."""
+        """Report the conditions that have begun."""
         for severity, report in self._reports(status):
             # each alarm by its code
             name = (report.cause, status.code if report.cause is Cause.ALARM else 0)
-            before = self._seen_at.get(name, -math.inf)
-            self._seen_at[name] = status.at
+            before = self._last_at.get(name, -math.inf)
+            self._last_at[name] = status.at
             if status.at - before > _AGAIN_AFTER:
-                self._state.tell(severity, report)
+                self._state.notify(severity, report)
         self._unnamed = status.kind is Kind.ALARM and not status.listed.remedy
 
     def _reports(self, status: InverterStatus) -> Iterator[tuple[Severity, Report]]:
@@ -187,7 +187,7 @@ class Conditions:
             if status.listed.remedy:
                 yield Severity.WARNING, self._state.report(Cause.ALARM, alarm=status.listed)
             elif self._unnamed and not limited:
-                # once only, it came or went between the two readings
+                # a single one came or went between the two readings
                 yield Severity.WARNING, self._state.report(Cause.ALARM_UNNAMED)
         if Fact.SLEEPING in status.facts:
             yield Severity.INFO, self._state.report(Cause.ASLEEP)

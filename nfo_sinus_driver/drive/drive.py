@@ -36,11 +36,11 @@ from nfo_sinus_driver.link import LinkError, Refused
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
 
-#: How long an exit waits for the first answer of a drive that has never answered yet, s.
+#: How long an exit waits for the first answer of a drive that has never answered, s.
 _FIRST_ANSWER = 1.0
-#: What the unit of set-points follows from.
+#: The parameters that decide the unit of set-points.
 _MODE_ROLES = (Role.CONTROL_MODE, Role.PROCESS_UNIT)
-#: Why a motor is stopped by a command of which no more is said.
+#: Why a motor is stopped by a command that gives no reason.
 _BY = 'the program'
 _STOP = Report(Cause.STOP_REQUESTED, by=_BY)
 _QUICK_STOP = Report(Cause.QUICK_STOP_REQUESTED, by=_BY)
@@ -55,14 +55,14 @@ class Drive:
 
     All public methods may be called from any thread. Those that take time return a future; its
     exception is a :class:`DriveError`, which says what is wrong. Those that stop the motor take
-    why: who requested it is a value of that report.
+    the reason: a report whose values name the caller.
 
-    :param listener: told about every poll and event, on the worker of the bus.
+    :param listener: called with every poll and event, on the worker of the bus.
     :ivar model: what the catalog knows of its family.
     :ivar state: what is known of it; its methods, and those of the following, are for coroutines
         on the bus.
     :ivar params: its parameters.
-    :ivar setpoint: what it is to follow.
+    :ivar setpoint: its set-point.
     :ivar log: its error log.
     :ivar parameters: its settings.
     """
@@ -76,12 +76,12 @@ class Drive:
         self.setpoint = Setpoint(
             self.state,
             lambda reason: self._controller.refused(reason) if self._controller else None,
-            lambda reply: self._watch.told(reply),
+            lambda reply: self._poller.take_status(reply),
         )
         self._controller: Controller | None = None
         if settings.method != 'monitor':
             self._controller = Controller(self.state, Commands(self.state), self.setpoint)
-        self._watch = Poller(
+        self._poller = Poller(
             self.state, self.setpoint, self._controller, lambda: self._connect(retry=False)
         )
         self._procedures = procedures = Procedures(self.state, self._controller)
@@ -95,11 +95,11 @@ class Drive:
         self._tuning = Tuning(
             self.state, self.parameters, procedures, self._watchdog.require_set
         )
-        #: It has said who it is, and is of this family.
+        #: It has identified itself as one of this family.
         self._recognised = False
-        bus.on_restart(self._unit, self._watch.restarted)
+        bus.on_restart(self._unit, self._poller.restarted)
         bus.require_sign_of_life(self._unit, settings.lost_after)
-        #: What goes on while it is connected, and while it is active.
+        #: The tasks that run while it is connected, and while it is active.
         self._parameters_task: Task | None = None
         self._telemetry_task: Task | None = None
 
@@ -107,7 +107,7 @@ class Drive:
 
     @property
     def settings(self) -> DriveSettings:
-        """How the drive is treated; address, model and control method never change."""
+        """Its settings; address, model and control method never change."""
         return self.state.settings
 
     @settings.setter
@@ -118,7 +118,7 @@ class Drive:
     @property
     def snapshot(self) -> Snapshot:
         """The newest poll."""
-        return self._watch.snapshot
+        return self._poller.snapshot
 
     @property
     def identity(self) -> Identity | None:
@@ -128,7 +128,7 @@ class Drive:
     @property
     def ever_responded(self) -> bool:
         """A drive has answered at its address at least once."""
-        return self._bus.silences.heard_at(self._unit) > -math.inf
+        return self._bus.silences.last_frame_at(self._unit) > -math.inf
 
     @property
     def following(self) -> bool:
@@ -152,27 +152,27 @@ class Drive:
 
     @property
     def blocked_by_fault(self) -> bool:
-        """A fault keeps the drive from taking a stop, and the motor still."""
+        """A fault keeps the motor still, and the drive refuses a stop until it is over."""
         return self._controller is not None and self._controller.blocked_by_fault
 
     @property
     def stop_overdue(self) -> bool:
-        """It has had time to confirm it, and no fault keeps it from turning the motor."""
+        """A stop was not confirmed in time, and no fault keeps the motor still."""
         return self._controller is not None and self._controller.stop_overdue
 
     @property
     def statistics(self) -> Statistics:
-        """The counters and times of what is said to this drive."""
+        """The counters and times of the requests to this drive."""
         return self._bus.statistics(self._unit)
 
     @property
     def line_check(self) -> str:
-        """What to look at, in this order, while the drive has never answered."""
+        """What to check, in this order, while the drive has never answered."""
         protocol = self._bus.protocol
         return self.state.model.profile.line_check.get(protocol.name, protocol.check)
 
     def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
-        """Run a coroutine on the bus; what goes wrong on the line is explained."""
+        """Run a coroutine on the bus; an error of the line becomes one that explains it."""
 
         async def explained() -> _T:
             try:
@@ -186,7 +186,7 @@ class Drive:
         return self._bus.run(explained())
 
     def on_stop(self, call: Callable[[Report], None]) -> None:
-        """Have something called on the bus whenever the motor is stopped, with the reason."""
+        """Call a function on the bus whenever the motor is stopped, with the reason."""
 
         def safely(why: Report) -> None:
             try:
@@ -208,7 +208,7 @@ class Drive:
 
     def set_setpoint(self, value: float) -> None:
         """
-        Ask for a set-point in the unit of the control mode; it counts only while armed.
+        Request a set-point in the unit of the control mode; it counts only while enabled.
 
         :raises ValueError: not finite.
         :raises DriveError: the drive follows a reference of its own, and no set-points.
@@ -222,13 +222,13 @@ class Drive:
     @on_bus
     async def connect(self, *, retry: bool = True, parameters: bool = False) -> Identity:
         """
-        Identify the drive, make sure that nothing runs unasked, and watch it from then on.
+        Identify the drive, stop a motor that was not enabled, and poll the drive from then on.
 
         :param parameters: read all its parameters before, and watch them too.
-        :param retry: repeat the first request when there is no response; who tries again anyway
-            saves the other drives on the line that time.
+        :param retry: repeat the first request when there is no response; a caller that tries again
+            anyway need not cost the other drives on the line that time.
         """
-        if not self._watch.begun:
+        if not self._poller.begun:
             await self._connect(retry)
             if parameters:
                 try:
@@ -238,7 +238,7 @@ class Drive:
                     self._set_disconnected(_LEFT)
                     raise
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
-            self._watch.begin()
+            self._poller.begin()
             self._error_log_monitor.begin()
             self._fault_namer.begin()
         assert self.state.nameplate.identity is not None
@@ -247,9 +247,9 @@ class Drive:
     @on_bus
     async def require_standing(self) -> None:
         """
-        Make sure that no motor runs by this control method any more, so that another may follow.
+        Make sure that no motor runs by this control method, before another one is used.
 
-        It is looked at anew, for after :meth:`disconnect` it may have been left to its ramp.
+        The status is read anew: after :meth:`disconnect` the motor may still be on its ramp.
         """
         if self._controller is None or self.state.nameplate.identity is None:
             return
@@ -260,8 +260,8 @@ class Drive:
 
     @on_bus
     async def disconnect(self, timeout: float, why: Report = _LEFT) -> Report:
-        """Stop the motor, wait so long, s, until it stands, and give control back."""
-        # no client may enable it until the motor stands
+        """Stop the motor, wait at most so long, s, for standstill, and release control."""
+        # no client may enable it until the motor stands still
         self._set_active(False)
         try:
             if self._controller is None:
@@ -271,7 +271,7 @@ class Drive:
             except (LinkError, DriveError) as error:
                 self._watchdog.left(error)
                 raise
-            # whoever has control at this moment: it may come back to the bus by itself
+            # whatever has control at this moment: it may come back to the bus by itself
             goes_on = bool(self._controller.method.control_retained)
             await self._watchdog.put_back(goes_on=goes_on)
             return answer
@@ -280,11 +280,11 @@ class Drive:
             self._set_disconnected(why)
             self._error_log_monitor.end()
             self._fault_namer.end()
-            self._watch.end()
+            self._poller.end()
 
     @on_bus
     async def deactivate(self, why: Report = _LEFT) -> Report | None:
-        """Stop the motor, if it may run, and only keep watch until it is active again."""
+        """Stop the motor, if it may run, and only watch the drive until it is active again."""
         return await self._deactivate(why)
 
     @on_bus
@@ -313,7 +313,7 @@ class Drive:
         controller = self._procedures.controller
         self._require_connected()
         answer = await controller.enable(self._watchdog.require_set, requested_at)
-        self._watch.wake()
+        self._poller.wake()
         return answer
 
     @on_bus
@@ -340,7 +340,7 @@ class Drive:
 
     @on_bus
     async def identify(self, *, thoroughly: bool = True) -> Identity:
-        """Find out who answers, thoroughly with model and serial number; what runs runs on."""
+        """Identify the drive, thoroughly with model and serial number; a motor runs on."""
         identity = await self.state.nameplate.identify()
         await self.state.nameplate.scales.read()
         return await self._read_nameplate() if thoroughly else identity
@@ -356,8 +356,8 @@ class Drive:
         return await self.params.read(key, Priority.SERVICE)
 
     @on_bus
-    async def method_in_charge(self) -> str:
-        """Return the control method by which the bus runs it, or would be able to stop it."""
+    async def active_control_method(self) -> str:
+        """Return the control method by which the bus runs the drive, or could stop it."""
         steps = self.model.profile.in_charge(self.state.status)
         return await carry_out(steps, self.params, Priority.SERVICE)
 
@@ -369,13 +369,13 @@ class Drive:
 
     @on_bus
     async def erase_error_log(self) -> Report:
-        """Erase the error log; the motor must stand."""
+        """Erase the error log; the motor must be at standstill."""
         self._require_open()
         return await self.log.erase_now()
 
     @on_bus
     async def reset_energy(self) -> Report:
-        """Reset the kWh counter; the motor must stand."""
+        """Reset the kWh counter; the motor must be at standstill."""
         self._require_open()
         return await self.log.reset_energy_now()
 
@@ -389,23 +389,23 @@ class Drive:
         """
         Have the drive measure or calculate its motor; minutes may pass until the result.
 
-        :param progress: told on the bus what the drive says, and how long it takes already, s:
-            whenever the inverter status changes, and twice a second.
+        :param progress: called on the bus with a snapshot and the time elapsed, s, whenever the
+            inverter status changes, and twice a second.
         :param requested_at: as for :meth:`enable`.
         """
         # as with enable, the motor may turn
         self._require_active()
         self._procedures.controller.require_newer(requested_at)
 
-        def tell(status: InverterStatus, elapsed: float) -> None:
+        def report(status: InverterStatus, elapsed: float) -> None:
             if progress is not None:
                 progress(take_snapshot(self.state, self.setpoint, status), elapsed)
 
-        return await self._tuning.tune_now(procedure, tell)
+        return await self._tuning.tune_now(procedure, report)
 
     @on_bus
     async def cancel_tuning(self) -> Report | None:
-        """Stop a tuning; does nothing else, and nothing if there is none."""
+        """Stop a tuning, if there is one; stop nothing else."""
         return await self._procedures.abort()
 
     @on_bus
@@ -420,8 +420,8 @@ class Drive:
             raise DriveError(Cause.NOT_CONNECTED, address=self._unit)
 
     def _require_active(self) -> None:
-        # looked at on the bus, where a deactivation cannot come between
-        if not self._watch.active:
+        # checked on the bus, where no deactivation can come between
+        if not self._poller.active:
             raise DriveError(Cause.NOT_ACTIVE)
 
     def _require_open(self) -> None:
@@ -442,7 +442,7 @@ class Drive:
             ) from error
         if self._controller is not None:
             self._controller.method.require_fitted()
-        # nothing is written to a drive of another family; one that was connected is stopped first
+        # nothing is written to a drive of another family; one that was recognised is stopped first
         if early := not self._recognised and state.model.profile.product is not None:
             await self._read_nameplate()
         await read_scales(state)
@@ -450,24 +450,24 @@ class Drive:
         await state.timeout.read()
         state.require_fresh(await state.read_status(Priority.SERVICE))
         if self._controller is not None:
-            await self._controller.secure_found()
+            await self._controller.stop_unexpected_run()
             self._watchdog.connected()
         if not early:
             await self._read_nameplate()
-        self._watch.connected()
+        self._poller.connected()
         self.setpoint.connected()
         self.log.connected()
         state.found()
         if self._controller is not None:
             self._controller.connected()
         self._report_identity()
-        held = state.model.profile.holds_control.get(self.params.protocol)
-        if self._controller is None and held:
-            state.tell(Severity.WARNING, Cause.HELD_BY_LINE, why=held)
+        why = state.model.profile.holds_control.get(self.params.protocol)
+        if self._controller is None and why:
+            state.notify(Severity.WARNING, Cause.HELD_BY_LINE, why=why)
         self._watchdog.warn_if_unfit()
 
     async def _read_nameplate(self) -> Identity:
-        """Read vendor, product and software (DriveError: it says that it is of another family)."""
+        """Read vendor, product and software (DriveError: it is of another family)."""
         nameplate, read = self.state.nameplate, self.model.profile.product
         self._recognised = False
         if read is None:
@@ -480,15 +480,15 @@ class Drive:
         state, profile, identity = self.state, self.model.profile, self.identity
         assert identity is not None
         if identity.model and not (profile.names_itself or profile.product):
-            state.tell(
+            state.notify(
                 Severity.WARNING,
                 Cause.UNEXPECTED_IDENTITY,
                 model=identity.model,
                 title=profile.title,
             )
         name = '' if identity.model else self.model.name
-        told = ', '.join(part for part in (name, str(identity)) if part)
-        state.tell(Severity.INFO, Cause.CONNECTED, drive=told)
+        shown = ', '.join(part for part in (name, str(identity)) if part)
+        state.notify(Severity.INFO, Cause.CONNECTED, drive=shown)
 
     def _set_disconnected(self, why: Report) -> None:
         self.state.lost()
@@ -502,17 +502,17 @@ class Drive:
         return await self._controller.stop(why, patience)
 
     def _take_parameters(self, keys: Collection[str]) -> None:
-        """Take note of parameters that have new values, whoever changed them."""
+        """Note new values of parameters, whatever changed them."""
         if self.state.timeout.take(keys, self.parameters.values):
-            # the drive may have to be kept alive more often from now on
-            self._watch.wake()
+            # the drive may have to be polled more often from now on
+            self._poller.wake()
         if any(self.state.model.key(role) in keys for role in _MODE_ROLES):
-            self._watch.read_mode_soon()
+            self._poller.read_mode_soon()
         self.state.listener.on_parameters(keys)
 
     def _set_active(self, active: bool) -> None:
         self._bus.cancel(self._telemetry_task)
         if active:
-            telemetry = watch_telemetry(self.state, lambda: self._watch.yields)
+            telemetry = watch_telemetry(self.state, lambda: self._poller.yields)
             self._telemetry_task = self._bus.spawn(telemetry)
-        self._watch.set_active(active)
+        self._poller.set_active(active)

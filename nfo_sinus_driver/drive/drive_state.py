@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is known of one drive: what its status says, whether it answers."""
+"""What is known of one drive: its status, and whether it responds."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ from nfo_sinus_driver.link import LinkError, PortError, Refused, Reply
 
 _log = logging.getLogger(__name__)
 
-#: How long a drive may take to do what it was told, its start delay not counted, s.
+#: How long a drive may take to carry out a command, its start delay not counted, s.
 TIMEOUT = 2.0
 #: How often the status is read while something is awaited, s.
 LOOK_PERIOD = 0.02
 #: No start delay of a drive is longer, s.
 _LONGEST_START_DELAY = 3600.0
-#: A fault that is seen so long after the status before it came just now, s.
+#: A fault whose status comes so soon after the one before has come just now, s.
 _SOON = 2.0
-#: How long it counts that the bus had control, s, where that has to be asked for by itself.
+#: How long bus control is assumed to last, s, where it has to be read separately.
 _BY_MODE_FOR = 1.0
-#: What makes another drive of it, or another way to command it.
+#: Settings that mean another drive, or another way to command it.
 _FIXED = (
     'address',
     'block_address',
@@ -61,10 +61,11 @@ _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 class Turning(NamedTuple):
     """
-    What tells how fast a motor turns.
+    How the speed of a motor is measured.
 
-    :ivar role: what is measured, in ``unit``; :ivar control_mode: that has set-points in it.
-    :ivar hertz: what one of it is, Hz: of a speed, turns a second.
+    :ivar role: the measured value, in ``unit``.
+    :ivar control_mode: the one with set-points in that unit.
+    :ivar hertz: what one of the unit is, Hz: of a speed, turns a second.
     """
 
     role: Role
@@ -74,14 +75,14 @@ class Turning(NamedTuple):
 
 
 def _turning(model: Family) -> Turning:
-    """Return what tells it: the frequency, but the speed where the telegram has that alone."""
+    """Return how: by the frequency, or by the speed where the telegram has only that."""
     if Role.ACTUAL_FREQUENCY not in model.roles and model.profile.speed_mode is not None:
         return Turning(Role.ACTUAL_SPEED, 'rpm', 'Speed', 1 / 60)
     return Turning(Role.ACTUAL_FREQUENCY, 'Hz', 'Freque', 1.0)
 
 
 class DriveState:
-    """The driver's knowledge of one drive; used on the bus alone, readable from anywhere."""
+    """What the driver knows of one drive; used on the bus alone, readable from anywhere."""
 
     def __init__(self, bus: Bus, settings: DriveSettings, listener: Listener) -> None:
         self.bus = bus
@@ -107,43 +108,43 @@ class DriveState:
             method.addressing,
             settings.block_address,
         )
-        #: Who is told about every poll and event.
+        #: What is called with every poll and event.
         self.listener = listener
-        #: Who it says it is.
-        self.nameplate = Nameplate(self.params, settings, self.tell)
+        #: Its identity, and what it has by that.
+        self.nameplate = Nameplate(self.params, settings, self.notify)
         self.connected = False
         #: The last poll was answered; while it was not, no other request should wait for it.
         self.responsive = False
-        #: Called when a request to it failed, whoever asked.
+        #: Called when any request to it failed.
         self._on_missed: Callable[[], None] = lambda: None
-        #: It did not answer just before it was last looked at.
+        #: It did not answer a request just before the last status.
         self.missed_reply = False
         #: How many requests had got no answer when the status was last read.
         self._unanswered = 0
         self.status: InverterStatus | None = None
-        #: Something was asked in vain since the newest status, and before it.
+        #: A request got no answer since the newest status, and before it.
         self._in_vain = self._asked_in_vain = False
         #: How far apart the last statuses were, s, the newest last.
         self._intervals: deque[float] = deque((0.0,), maxlen=4)
         #: The longest time without a valid frame before the newest one, s.
         self._alone = 0.0
-        #: Called when a fault comes that did not stand before.
+        #: Called when a fault comes that was not active before.
         self._on_fault: Callable[[], None] = lambda: None
-        #: The status that first showed the fault that stands, and whether that was soon.
+        #: The status that first showed the active fault, and whether that had just come.
         self.fault: InverterStatus | None = None
         self.fault_is_fresh = False
-        #: Measured values that were told to be impossible.
-        self._told_impossible: set[str] = set()
+        #: Measured values that were reported as impossible.
+        self._reported_impossible: set[str] = set()
         #: What was polled last.
         self._polled: dict[Role, Measured] = {}
         self._measured: Mapping[str, float] = {}
-        #: It changes its parameters itself just now.
+        #: It is changing its parameters itself.
         self.tuning = False
-        #: The codes of a fault or an alarm that the status word does not name, and of its name.
+        #: The code of a fault or alarm that the status word does not name, and the one that does.
         self._named: tuple[int, int] | None = None
         self.control_mode = ''
         self.unit = ''
-        #: What it does by itself when it hears nothing.
+        #: Its communication time-outs.
         self.timeout = CommunicationTimeout(self.params, self.model, self.nameplate.has)
 
     async def read_status(
@@ -152,44 +153,44 @@ class DriveState:
         *,
         retry: bool = True,
         alarming: Callable[[InverterStatus], bool] = lambda _: False,
-        told: Reply | None = None,
+        received: Reply | None = None,
         code_for: float = 0.0,
     ) -> InverterStatus:
         """
         Read the status, without acknowledging anything.
 
         :param retry: repeat a request when there is no response.
-        :param told: the status word, where the drive has just told it with something else.
-        :param code_for: how long an inverter status counts, s, that was read with the very status
-            word that stands, if nothing was on its way then (:attr:`InverterStatus.plain`).
-        :param alarming: tells of half a status whether it may have to stop the motor; if it does
-            and has not before, the rest is read at the head of the bus.
+        :param received: the status word, where it has just come with another answer.
+        :param code_for: how long an inverter status counts, s, while the status word stays the
+            same, if nothing was changing (:attr:`InverterStatus.plain`).
+        :param alarming: whether a status of which one half is known may have to stop the motor; the
+            rest is then read ahead of all else, unless that half is old.
         :raises LinkError: the drive does not answer.
         """
         if not self.nameplate.has(self.word_key):
-            return await self._look_at_code(priority, retry)
+            return await self._read_code(priority, retry)
         before = self.status
-        if told is None:
+        if received is None:
             word, at = await self._read_int(self.word_key, priority, retry)
         else:
-            word, at = self.status_word(told.data), told.arrived
+            word, at = self.status_word(received.data), received.arrived
         half = self.status_of_word(word, at)
         alarmed = before is not None and word != before.word and alarming(half)
         priority = Priority.LOOK if alarmed else priority
         if self.model.profile.status_word.code is not None:
             status = await self._with_control(half, priority, retry)
             return await self._with_frequency(status, priority, retry)
-        held = self.status
-        if held is not None and held.word == word and at - held.code_at < code_for and held.plain:
-            status = replace(held, at=at)
+        last = self.status
+        if last is not None and last.word == word and at - last.code_at < code_for and last.plain:
+            status = replace(last, at=at)
             if not alarming(status):
                 return await self._with_frequency(status, priority, retry)
         code, code_at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, retry)
         status = replace(half, code=code, code_at=code_at)
         is_new = before is not None and code != before.code
         news = is_new and not alarmed
-        # a fault or an alarm came or went between the two; one that stays so is treated as the
-        # other by the drive [C95]
+        # a fault or an alarm came or went between the two; where they go on to differ, the drive
+        # treats the one as the other [C95]
         kind = status.listed.kind
         differs = (
             is_new and status.kind is not kind
@@ -204,7 +205,7 @@ class DriveState:
         return await self._with_frequency(status, priority, retry)
 
     def status_of_word(self, word: int, at: float) -> InverterStatus:
-        """Return what a status word says alone; what only the rest tells is not known of it."""
+        """Return the status that a status word alone shows; the rest of it is unknown."""
         code_of = self.model.profile.status_word.code
         if code_of is None:
             return InverterStatus(at, word, NO_CODE, self.model)
@@ -224,23 +225,23 @@ class DriveState:
         return code if Meaning.UNNAMED in self.model.status_code(code).meanings else 0
 
     def name(self, unnamed: int, code: int) -> None:
-        """Take what a fault or an alarm is called that the status word does not name."""
+        """Take the name of a fault or an alarm that the status word does not name."""
         is_one = self.model.status_code(code).kind is not Kind.STATUS
         self._named = (unnamed, code) if is_one and code in self.model.status_codes else None
 
     @property
     def named(self) -> bool:
-        """What it is called is known."""
+        """The fault or alarm that the status word does not name has a name."""
         return self._named is not None
 
     def require_fresh(self, status: InverterStatus) -> None:
         """
-        See to it that a status is not older than a drive may be silent; a PLC may keep an old one.
+        Make sure that a status is not older than ``lost_after``: a PLC may keep an old one.
 
         :raises DriveError: it is.
         """
         longest = self.settings.lost_after
-        # who looks at low priority waits for its turn, while others see newer ones
+        # a read of low priority waits for its turn, while others get newer ones
         newest = status.at if self.status is None else max(status.at, self.status.at)
         if self.plc_time and self.bus.now() - newest >= longest:
             raise DriveError(Cause.OLD_DATA, seconds=longest)
@@ -266,7 +267,7 @@ class DriveState:
     async def _with_frequency(
         self, status: InverterStatus, priority: Priority, retry: bool
     ) -> InverterStatus:
-        """Complete a status by the frequency, where its word alone tells no stop, or it is free."""
+        """Add the frequency to a status, where its word shows no stop, or where it is free."""
         if not (status.by_frequency or self.model.profile.status_word.frequency_beside):
             return self._note_status(status)
         role, hertz = self.turning.role, self.turning.hertz
@@ -290,8 +291,8 @@ class DriveState:
         """Return the status word that bytes mean."""
         return int(self.params.number(self.word_key, data))
 
-    async def _look_at_code(self, priority: Priority, retry: bool) -> InverterStatus:
-        """Do with the inverter status alone: older firmware has no status word [C21]."""
+    async def _read_code(self, priority: Priority, retry: bool) -> InverterStatus:
+        """Read the inverter status alone: older firmware has no status word [C21]."""
         code, at = await self._read_int(self.model.key(Role.STATUS_CODE), priority, retry)
         status = InverterStatus(at, None, code, self.model, code_at=at)
         return self._note_status(await self._with_control(status, priority, retry))
@@ -306,12 +307,12 @@ class DriveState:
         self, status: InverterStatus, priority: Priority, retry: bool
     ) -> InverterStatus:
         """
-        Complete a status by who has control, where neither its word nor its code tells it.
+        Add to a status who has control, where neither its word nor its code shows it.
 
-        That the bus has it counts for a while, as long as the code stays what it was.
+        Bus control is assumed to last for a while, as long as the code stays the same.
         """
-        word_tells = status.word is not None and Fact.NETWORK_CONTROL in status.valid
-        if word_tells or not status.means(Meaning.ANONYMOUS):
+        in_word = status.word is not None and Fact.NETWORK_CONTROL in status.valid
+        if in_word or not status.means(Meaning.ANONYMOUS):
             return status
         before = self.status
         same = before is not None and before.code == status.code
@@ -324,14 +325,14 @@ class DriveState:
         return replace(status, by_mode=by_bus, by_mode_at=reply.arrived)
 
     async def _operated_locally(self, priority: Priority, retry: bool) -> bool:
-        """Tell whether keypad or terminals command, whatever the control source says."""
+        """Return whether keypad or terminals command, whatever the control source says."""
         key = self.model.key(Role.LOCAL_OPERATION)
         if not self.params.reaches(key):
             return False
         return bool(await self.params.read(key, priority, retry=retry))
 
     def _note_status(self, status: InverterStatus) -> InverterStatus:
-        # a look of low priority may be overtaken by one that began later
+        # a read of low priority may be overtaken by one that began later
         before = self.status
         if before is None or status.at >= before.at:
             self.status = status
@@ -344,14 +345,14 @@ class DriveState:
         return status
 
     async def keep_alive(self) -> None:
-        """Keep the drive from stopping by itself, with one request (LinkError: in vain)."""
+        """Keep the drive from stopping by itself, with one request (LinkError: it failed)."""
         has_word = self.nameplate.has(self.word_key)
         key = self.word_key if has_word else self.model.key(Role.STATUS_CODE)
         await self.params.read_data(key, Priority.SERVICE, retry=False)
 
     @property
     def left_alone(self) -> bool:
-        """Before the newest status the drive was not asked for longer than its own time-out."""
+        """Before the newest status the drive got no request for longer than its own time-out."""
         timeout = self.timeout
         alone = self._alone if not self._asked_in_vain else 0.0
         return timeout.stops_motor and 0 < timeout.shortest <= alone
@@ -372,51 +373,51 @@ class DriveState:
             self._on_fault()
 
     def missed(self) -> None:
-        """Take note that a request failed; until it is known why, no request should wait for it."""
+        """Note that a request failed; until it is known why, none should wait for it."""
         self.unanswered()
         self._on_missed()
 
     def answered(self) -> None:
-        """Take note that a poll was answered."""
+        """Note that a poll was answered."""
         self.responsive = True
 
     def unanswered(self) -> None:
-        """Take note that a poll was not."""
+        """Note that a poll was not."""
         self.responsive = False
         self._in_vain = True
 
     def found(self) -> None:
-        """Take note that it is connected."""
+        """Note that it is connected."""
         self.connected = self.responsive = True
 
     def lost(self) -> None:
-        """Take note that it is connected no more."""
+        """Note that it is connected no more."""
         self.connected = False
 
     @property
     def missed_since_status(self) -> bool:
-        """It has not answered something since it was last looked at."""
-        # one that is busy, or whose answer was damaged, was there
+        """It has not answered a request since the last status."""
+        # one that was busy, or whose answer was damaged, has responded
         return self.params.unanswered > self._unanswered
 
     def status_read(self) -> None:
-        """Take note of whether it did not answer just before it was looked at now."""
+        """Note whether it did not answer a request just before the status read now."""
         self.missed_reply = self.missed_since_status
         self._unanswered = self.params.unanswered
 
     def on_missed(self, call: Callable[[], None]) -> None:
-        """Have something called when a request to it failed, whoever asked."""
+        """Call a function when any request to it failed."""
         self._on_missed = call
 
     def on_fault(self, call: Callable[[], None] | None) -> None:
-        """Have something called when a fault comes that did not stand before; or nothing."""
+        """Call a function when a fault comes that was not active before; ``None``: call none."""
         self._on_fault = call or (lambda: None)
 
     def use(self, settings: DriveSettings) -> None:
         """
-        Treat the drive by other settings from now on.
+        Use other settings from now on.
 
-        :raises ValueError: they are those of another drive, or of another way to command it.
+        :raises ValueError: they mean another drive, or another way to command it.
         """
         for name in _FIXED:
             if getattr(settings, name) != getattr(self.settings, name):
@@ -427,7 +428,7 @@ class DriveState:
 
     @contextlib.contextmanager
     def changing_itself(self) -> Iterator[None]:
-        """Know that it changes its parameters itself meanwhile, as it does when it tunes."""
+        """Note that the drive changes its parameters itself meanwhile, as when it tunes."""
         self.tuning = True
         try:
             yield
@@ -436,7 +437,7 @@ class DriveState:
 
     async def measure(self, key: str, priority: Priority) -> float:
         """
-        Read a measured value once; NaN if there is none such, or if it cannot be, and that again.
+        Read a measured value, without retries; NaN if there is none, or if it stays impossible.
 
         :param key: of its parameter; ``''``: there is none.
         :raises LinkError: it does not answer, or refuses.
@@ -446,7 +447,7 @@ class DriveState:
     async def _measure(
         self, key: str, priority: Priority, retry: bool, status: InverterStatus | None
     ) -> float:
-        """Measure; a status tells the direction of what turns, where the value does not."""
+        """Measure; where a speed has no sign, the status gives its direction."""
         if not key:
             return math.nan
         data = await self.params.read_data(key, priority, retry=retry)
@@ -454,11 +455,11 @@ class DriveState:
         if not self.params.is_odd(key):
             turns = self.model.role_of.get(key) in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
             return status.signed(value) if turns and status is not None else value
-        if key not in self._told_impossible:
-            self._told_impossible.add(key)
+        if key not in self._reported_impossible:
+            self._reported_impossible.add(key)
             unit = self.model[key].unit
             shown = f'{value:g} {unit}'.rstrip()
-            self.tell(Severity.WARNING, Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
+            self.notify(Severity.WARNING, Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
         return math.nan
 
     @property
@@ -468,21 +469,21 @@ class DriveState:
         return named or tuple(filter(self.params.reaches, self.model.profile.measured))
 
     def polled(self, role: Role, value: float) -> None:
-        """Take note of what a poll has measured just now."""
+        """Note what a poll has just measured."""
         self._polled[role] = Measured(value, self.bus.now())
 
     def note_measured(self, values: Mapping[str, float]) -> None:
-        """Take note of what was measured beside the telemetry, by key."""
+        """Note what was measured beside the telemetry, by key."""
         self._measured = values
 
     def forget_polled(self) -> None:
-        """Take note that what was polled is not known of the drive that is there now."""
+        """Forget what was polled: another drive may be there now."""
         self._polled.clear()
         self._measured = {}
 
     @property
     def own_setpoint(self) -> float:
-        """The set-point that the drive tells, in the unit of its control mode; NaN if none."""
+        """The set-point that the drive reports, in the unit of its control mode; NaN if none."""
         target = self.model.profile.setpoints.get(self.control_mode)
         return math.nan if target is None else self._measured.get(target.key, math.nan)
 
@@ -502,7 +503,7 @@ class DriveState:
 
     @property
     def frequency(self) -> float:
-        """Hz, as last polled."""
+        """The frequency as last polled, Hz."""
         return self.last_polled(Role.ACTUAL_FREQUENCY).value
 
     @property
@@ -516,7 +517,7 @@ class DriveState:
         """
         Read which quantity is controlled: ``Freque``, ``Speed``, ``Torque`` or ``PI-Reg``.
 
-        Where no register tells it ([C58]), it is what the settings expect.
+        Where no parameter shows it ([C58]), it is the one that the settings expect.
         """
         key = self.model.key(Role.CONTROL_MODE)
         expected = self.settings.expected_control_mode or next(iter(self.model.profile.setpoints))
@@ -535,7 +536,7 @@ class DriveState:
         return mode
 
     async def _read_mode_by_mailbox(self, key: str, priority: Priority, known: str) -> str:
-        """Read it where a PLC takes its time: by no poll, and it is not insisted on."""
+        """Read it by the mailbox of a PLC, which is slow: not in a poll, and without retries."""
         if priority is not Priority.SERVICE:
             return known
         try:
@@ -546,23 +547,23 @@ class DriveState:
             return known
 
     async def coasts_to_stop(self) -> bool:
-        """Tell whether an ordinary stop releases the motor [C97], as far as the drive tells."""
+        """Return whether an ordinary stop releases the motor [C97], as far as is known."""
         key = self.model.key(Role.STOP_MODE)
         if self.params.reaches(key):
             return await self.params.read(key, Priority.STOP) == self.model.profile.releases
         status = self.status
-        told = status is not None and Fact.STOP_MODE_BRAKE in status.valid
-        return told and status is not None and Fact.STOP_MODE_BRAKE not in status.facts
+        shown = status is not None and Fact.STOP_MODE_BRAKE in status.valid
+        return shown and status is not None and Fact.STOP_MODE_BRAKE not in status.facts
 
     async def read_start_delay(self) -> float:
-        """Read how long the drive waits after a run command, s; an hour if it does not tell."""
+        """Read how long the drive waits after a run command, s; if unknown, an hour."""
         key = self.model.key(Role.START_DELAY)
         if self.params.reaches(key):
             return await self.params.read_number(key, Priority.SERVICE)
         return _LONGEST_START_DELAY
 
     async def read_start_braking(self) -> float:
-        """Read how long the drive brakes the motor before it starts, s; 0 if it does not tell."""
+        """Read how long the drive brakes the motor before it starts, s; if unknown, 0."""
         key = self.model.key(Role.START_BRAKING)
         if not self.nameplate.has(key):
             return 0.0
@@ -570,7 +571,7 @@ class DriveState:
 
     @property
     def kind(self) -> Kind:
-        """How grave the inverter status is."""
+        """Whether the inverter status is a fault, an alarm or neither."""
         return Kind.STATUS if self.status is None else self.status.kind
 
     @property
@@ -583,15 +584,15 @@ class DriveState:
         return '' if self.status is None else f'{self.status.code} {self.text}'
 
     def report(self, cause: Cause, **values: object) -> Report:
-        """Return a report that has the inverter status and the name of the enable input, too."""
+        """Return a report with the inverter status and the name of the enable input."""
         named = self.model.profile.enable_input
         return Report(cause, status=self.describe(), enable_input=named, **values)
 
-    def tell(self, severity: Severity, what: Report | Cause, /, **values: object) -> None:
-        """Tell the listener; what cannot be told keeps nothing from being done."""
+    def notify(self, severity: Severity, what: Report | Cause, /, **values: object) -> None:
+        """Report to the listener; an error of the listener is only logged."""
         report = what if isinstance(what, Report) else Report(what, **values)
         code = None if self.status is None else self.status.code
         try:
             self.listener.on_event(Event(severity, report, code))
         except Exception:
-            _log.exception('not told: %s', report)
+            _log.exception('not reported: %s', report)

@@ -28,14 +28,14 @@ _DRIFT = 1e-4
 _READINGS = 3
 #: A counter that was reset may have counted on since, kWh.
 _NEARLY_NOTHING = 0.1
-#: How often it is looked whether a fault between two polls has left an entry, s.
+#: How often the log is read for faults between two polls, s.
 _PERIOD = 30.0
-#: How often it is looked whether the drive is there again, s.
+#: How often to check whether the drive responds again, s.
 _WAIT = 1.0
-#: How often the entry of a fault that was seen is looked for, s, and how many times.
+#: How often the entry of a fault is looked for, s, and how many times.
 _RETRY_PERIOD = 0.2
 _TRIES = 10
-#: An entry that was told so shortly before a poll saw its fault is that fault's, s.
+#: An entry that was reported so shortly before a poll showed its fault is that fault's, s.
 _SOON = 2.0
 
 
@@ -54,12 +54,12 @@ class ErrorLog:
         self.powered_since = math.nan
         #: When it showed that hour, s of the clock of the bus.
         self._shown_at = math.nan
-        #: Where it stands, if not where it was looked for first.
+        #: Where it is, if not where it was read first.
         self._moved: ErrorLogArea | None = None
 
     @property
     def documented(self) -> bool:
-        """A manual says where it stands."""
+        """A manual says where it is in the drive."""
         return self._params.protocol in self._state.model.error_logs
 
     @property
@@ -69,7 +69,7 @@ class ErrorLog:
 
     @property
     def timed(self) -> bool:
-        """It is documented, and tells when an error happened."""
+        """It is documented, and its entries have a time."""
         return self.documented and self.area.timed
 
     async def read_now(self, most: int = 0) -> tuple[LogEntry, ...]:
@@ -82,20 +82,20 @@ class ErrorLog:
 
     async def _with_readings(self, number: int, entry: int) -> LogEntry:
         """Return what an entry without a time says, and what the drive has kept of it."""
-        told: list[str] = []
+        kept: list[str] = []
         for what, key in self.area.readings_of(number):
             try:
                 data = await self._params.read_data(key, Priority.POLL)
-                told.append(f'{what} {self._shown(key, data)}')
+                kept.append(f'{what} {self._shown(key, data)}')
             except (Refused, ValueError):
-                # what cannot be told is left out
+                # what cannot be read is left out
                 continue
         code = self.area.code(entry)
         text = self.area.unknown(entry) or self._state.nameplate.text_of(code)
-        return LogEntry(code, text, readings=tuple(told))
+        return LogEntry(code, text, readings=tuple(kept))
 
     def _shown(self, key: str, data: bytes) -> str:
-        """Return what the drive has kept with an entry; a bit field as it stands in the drive."""
+        """Return a value that the drive has kept with an entry; a bit field in hexadecimal."""
         parameter = self._params.model[key]
         if parameter.kind is int:
             return f'{data.hex().upper()}h'
@@ -103,7 +103,7 @@ class ErrorLog:
 
     async def newer_than(self, known: int | None, priority: Priority) -> list[int]:
         """
-        Read the entries that are newer than one, as they stand in the drive, newest first.
+        Read the entries that are newer than one, as the drive encodes them, newest first.
 
         :param known: the newest one so far; 0 if there was none, ``None`` for only the newest.
         """
@@ -122,20 +122,20 @@ class ErrorLog:
         return hours
 
     def connected(self) -> None:
-        """Take note that the drive may have been off until now."""
+        """Note that the drive may have been off until now."""
         self.powered_since = math.nan
 
     def understood(self, entries: Sequence[int], now: float) -> tuple[LogEntry, ...]:
         """
-        Return what entries say, newest first, when the operating time is ``now``, h.
+        Decode entries, newest first, at operating time ``now``, h.
 
-        An entry was made so many hours before now as the operating time says, to a tick of it, if
-        the drive has had power ever since.
+        The age of an entry is the difference of operating times, to a tick, if the drive has had
+        power ever since.
         """
         return tuple(self._understood(entry, now) for entry in entries)
 
     async def erase_now(self) -> Report:
-        """Erase the error log by SCMD [M0 table 18], and see that it is empty."""
+        """Erase the error log by SCMD [M0 table 18], and check that it is empty."""
         with self._procedures.begun(Reset.ERROR_LOG) as access:
             area = self.area
             async with self._procedures.in_standby(access):
@@ -145,16 +145,16 @@ class ErrorLog:
         return Report(Cause.LOG_ERASED)
 
     async def reset_energy_now(self) -> Report:
-        """Reset the kWh counter E-Out, from firmware 4.38 on [M0 table 18], and see it at 0."""
+        """Reset the kWh counter E-Out, from firmware 4.38 on [M0 table 18], and check it."""
         energy = self._state.model.key(Role.ENERGY)
         self._procedures.require(Reset.ENERGY)
         if not self._state.nameplate.has(energy):
-            since, told = self._state.model[energy].since, self._state.nameplate.identity
+            since, identity = self._state.model[energy].since, self._state.nameplate.identity
             raise DriveError(
                 Cause.ENERGY_RESET_UNKNOWN,
                 what=Reset.ENERGY.value,
                 since=float(since or 0),
-                firmware=told.versions if told else '',
+                firmware=identity.versions if identity else '',
             )
         with self._procedures.begun(Reset.ENERGY) as access:
             async with self._procedures.in_standby(access):
@@ -167,13 +167,13 @@ class ErrorLog:
 
     @property
     def area(self) -> ErrorLogArea:
-        """Where it stands."""
+        """Where it is in the drive."""
         if not self.documented:
             raise DriveError(Cause.LOG_UNDOCUMENTED, model=self._state.model.name)
         return self._moved or self._state.model.error_logs[self._params.protocol]
 
     async def _read(self, limit: int, known: int, priority: Priority) -> list[int]:
-        """Read the entries down to one that is known, while none comes in."""
+        """Read the entries down to a known one; again if one comes in meanwhile."""
         area = self.area
         for _ in range(_READINGS):
             entries = await self._read_down(area, limit, known, priority)
@@ -229,7 +229,7 @@ class ErrorLog:
     def _understood(self, entry: int, now: float) -> LogEntry:
         code, then = self.area.code(entry), self.area.hours(entry)
         clock, age, at, latest = self._state.bus.now, math.nan, math.nan, math.nan
-        # one tick of doubt, for the drive rounds
+        # one tick of tolerance, for the drive rounds
         if now > then - TICK:
             age = max(0.0, now - then)
             latest = clock() - max(0.0, age - TICK) * _HOUR
@@ -245,7 +245,7 @@ class ErrorLogMonitor:
     Watches the error log of one drive in the background; used on the bus alone.
 
     It is read when a fault comes, and now and then: a fault that was acknowledged between two
-    polls, or while the drive was not reached, has left an entry too. Nothing is acknowledged by it.
+    polls, or while the drive was not reached, has left an entry, too. Reading acknowledges nothing.
     """
 
     def __init__(self, state: DriveState, log: ErrorLog) -> None:
@@ -255,29 +255,29 @@ class ErrorLogMonitor:
         self._task: Task | None = None
         #: The newest entry, as it was read; ``None`` if there is none.
         self.newest: LogEntry | None = None
-        #: The same as it stands in the drive, 0 if there is none; ``None`` before the first look.
+        #: The same as the drive encodes it, 0 if there is none; ``None`` before the first reading.
         self._known: int | None = None
-        self._looked_at = self._told_at = -math.inf
-        #: The fault whose entry is looked for, and how often yet.
+        self._looked_at = self._reported_at = -math.inf
+        #: The fault whose entry is looked for, and how many tries are left.
         self._fault: InverterStatus | None = None
         self._tries = 0
 
     def begin(self) -> None:
         """
-        Watch from now on, where it is documented how to read the log.
+        Watch from now on, if the log is documented and its entries have a time.
 
-        Where entries have no time, nothing tells a new one from the same fault before.
+        Without a time, a new entry looks like the one before of the same fault.
         """
         if not self._error_log.timed or not self._error_log.reached:
             return
         self._known = None
-        self._looked_at = self._told_at = -math.inf
+        self._looked_at = self._reported_at = -math.inf
         self._state.on_fault(self._expect)
         self._expect()
         self._task = self._bus.spawn(self._watch_repeatedly())
 
     def end(self) -> None:
-        """Leave the log alone."""
+        """Stop watching."""
         self._state.on_fault(None)
         self._bus.cancel(self._task)
 
@@ -291,16 +291,16 @@ class ErrorLogMonitor:
             there = state.connected and state.responsive
             if there:
                 try:
-                    await self._read_status()
+                    await self._read_log()
                 except Refused as error:
                     if error.code != Refused.BUSY:
-                        # asked for what it does not have, a Classic drive may stop the motor
-                        state.tell(Severity.INFO, Cause.LOG_NOT_WATCHED, error=str(error))
+                        # a request for what it lacks may make a Classic drive stop the motor
+                        state.notify(Severity.INFO, Cause.LOG_NOT_WATCHED, error=str(error))
                         return
                 except DriveError as error:
                     _log.debug('%s', error)
                 except LinkError:
-                    # the poll says so if the drive is lost
+                    # the poll reports it if the drive is lost
                     state.missed()
             await self._bus.sleep(self._pause() if there else _WAIT)
 
@@ -311,7 +311,7 @@ class ErrorLogMonitor:
         self._fault = None
         return _PERIOD
 
-    async def _read_status(self) -> None:
+    async def _read_log(self) -> None:
         log, known, began = self._error_log, self._known, self._state.bus.now()
         news = await log.newer_than(known, Priority.TELEMETRY)
         now = await log.read_time(Priority.TELEMETRY)
@@ -319,7 +319,7 @@ class ErrorLogMonitor:
         fault = self._fault
         if known is None:
             self.newest = next(iter(log.understood(news, now)), None)
-            # what is older than this driver is no news, but for the fault that stands
+            # entries older than this driver are no news, but for that of the active fault
             code = fault and fault.code
             news = [entry for entry in news if log.area.code(entry) == code]
         elif not news and fault is not None and self._repeats(fault, newest, now):
@@ -327,23 +327,23 @@ class ErrorLogMonitor:
         entries = [self._sighted(entry, began) for entry in log.understood(news, now)]
         self._looked_at = began
         if entries:
-            self._told_at = self._state.bus.now()
-            self._tell(entries)
+            self._reported_at = self._state.bus.now()
+            self._report(entries)
 
     def _repeats(self, fault: InverterStatus, newest: int, now: float) -> bool:
-        """Tell whether a fault has left the same entry as the one before, within one tick."""
+        """Return whether a fault has left the same entry as the one before, within one tick."""
         area = self._error_log.area
         same = area.code(newest) == fault.code and now - area.hours(newest) < 2 * TICK
-        return same and self._told_at < fault.at - _SOON
+        return same and self._reported_at < fault.at - _SOON
 
     def _sighted(self, entry: LogEntry, began: float) -> LogEntry:
-        """Return a new entry with the moment when it came, where that was seen."""
+        """Return a new entry with the moment when it came, where that is known."""
         fault = self._fault
         if fault and fault.code == entry.code and self._state.fault_is_fresh:
             return replace(entry, at=fault.at)
         return replace(entry, at=began) if began - self._looked_at < 2 * _PERIOD else entry
 
-    def _tell(self, entries: Sequence[LogEntry]) -> None:
+    def _report(self, entries: Sequence[LogEntry]) -> None:
         self.newest = entries[0]
         codes = {entry.code for entry in entries}
         code = None
@@ -351,10 +351,10 @@ class ErrorLogMonitor:
             code, self._fault = self._fault.code, None
         for entry in reversed(entries):
             if entry.code == code:
-                self._state.tell(Severity.INFO, Cause.LOG_ENTRY, entry=entry)
+                self._state.notify(Severity.INFO, Cause.LOG_ENTRY, entry=entry)
             else:
-                self._state.tell(Severity.WARNING, Cause.LOG_ENTRY_UNSEEN, entry=entry)
+                self._state.notify(Severity.WARNING, Cause.LOG_ENTRY_UNSEEN, entry=entry)
             try:
                 self._state.listener.on_log_entry(entry)
             except Exception:
-                _log.exception('an entry of the error log could not be told')
+                _log.exception('an entry of the error log could not be reported')

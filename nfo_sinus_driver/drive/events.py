@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What there is to say of a drive: a report is values, and its cause the sentence for them."""
+"""The reports of a drive: a report has values, and its cause is the sentence for them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 
 class Severity(enum.Enum):
-    """How grave an event is; it becomes the level of a log line."""
+    """The severity of an event: the level of its log line."""
 
     INFO = 'info'
     WARNING = 'warning'
@@ -38,7 +38,7 @@ class Cause(enum.Enum):
     word first: what happened, why, and what to do.
     """
 
-    # --- the line and who answers
+    # --- the line, and what answers
     CONNECTED = 'connected: {drive}'
     DRIVER_ERROR = 'error in the driver: {error}'
     LINE_FAILED = '{error}'
@@ -66,19 +66,19 @@ class Cause(enum.Enum):
     )
     NO_MAILBOX = 'parameters, error log and the names of faults are not reached: {why}'
     UNEXPECTED_IDENTITY = (
-        'this drive says that it is a {model}; no {title} says anything: {call.set_model}'
+        'this drive identifies itself as a {model}, which no {title} does: {call.set_model}'
     )
     UNLISTED_MODEL = (
         'this drive says that it is a {model}, which the manual of the {title} does not list: '
         'check the model before the motor runs'
     )
     SEVERAL_MODELS = (
-        'the drive at address {address} does not tell what it is: set model to {models}'
+        'the drive at address {address} does not identify itself: set model to {models}'
     )
     FIRMWARE_NOT_ASKED = (
-        'its firmware is not asked for while the bus has control, which firmware before '
-        '{before:g} takes for a fault: it is treated like that one until it is connected to while '
-        'the bus has no control; set classic_dialect to v2.03 or {dialect} to know it at once'
+        'its firmware is not read while the bus has control, because firmware before {before:g} '
+        'takes that for a fault: it is treated as older until it is connected to while the bus '
+        'has no control; set classic_dialect to v2.03 or {dialect} to know it at once'
     )
     # --- why a command is not carried out
     MONITOR_ONLY = (
@@ -91,7 +91,7 @@ class Cause(enum.Enum):
     ENABLING_ALREADY = 'it is being enabled already'
     STOP_PENDING = 'a stop is on its way and not confirmed yet: wait for it, then enable'
     STOPPED_SINCE_ASKED = (
-        'a stop was confirmed after this was asked for: ask again if the motor shall run'
+        'a stop was confirmed after this was requested: request it again if the motor shall run'
     )
     PROCEDURE_GOES_ON = '{what} is going on: wait for its end, or stop it'
     FAULT_FORBIDS = f'fault {{status}} is active: {_REMEDY}; then {{call.acknowledge}}'
@@ -117,7 +117,7 @@ class Cause(enum.Enum):
     ENABLED_ALREADY = 'is enabled already'
     STOPPED = 'stopped ({status})'
     STOPPED_BY_FAULT = 'stopped by fault {status}'
-    STOP_BLOCKED = 'stopped by fault {status}; what the drive refuses now is done when it is over'
+    STOP_BLOCKED = 'stopped by fault {status}; the drive refuses the stop until the fault is over'
     STOPPING = 'stopping ({status})'
     COASTING = 'stopping: it coasts'
     RAMPING = 'stopping: it ramps down'
@@ -208,13 +208,14 @@ class Cause(enum.Enum):
         'switched off and on: check its mains'
     )
     SLOWER_AFTER_SILENCE = (
-        'the drive did not answer for a moment, and the motor turns slower than it was told to '
+        'the drive did not answer for a moment, and the motor turns slower than commanded '
         '({now:.4g} {unit}, before {before:.4g} {unit}; {status}). It may have been switched off '
         'and on: check its mains and the line'
     )
     DRIVER_PAUSED = (
         'this {call.program} did not run for longer than the time-out of the drive itself '
-        '({seconds:g} s), by which that stops the motor ({status}): check the load of the computer'
+        '({seconds:g} s), after which the drive stops the motor ({status}): check the load of the '
+        'computer'
     )
     TURNS_BACKWARDS = (
         'the motor turns in the other direction than its set-points say ({now:.4g} {unit}, '
@@ -227,7 +228,7 @@ class Cause(enum.Enum):
     )
     CONTROL_LOST = (
         'the bus has lost control ({status}). STOP was pressed at the keypad, or another '
-        'master took it away: find out who'
+        'master took it away: find out which'
     )
     CONTROL_LOST_WHILE_AWAY = (
         'the bus has lost control meanwhile ({status}). The drive was '
@@ -305,7 +306,7 @@ class Cause(enum.Enum):
     )
     OWN_TIMEOUT_UNKNOWN = (
         'the PLC stops the motor if this {call.program} dies; what the drive does if the PLC '
-        'does, cannot be read here: {what}'
+        'fails cannot be read here: {what}'
     )
     OWN_TIMEOUT_SHORT = (
         'the time-out of the drive itself ({name} {timeout:g} s) is less than lost_after + '
@@ -323,8 +324,8 @@ class Cause(enum.Enum):
     OWN_TIMEOUT_NOT_TAKEN = _NO_TIMEOUT.format(why='{why}', remedy='use the {enable_input}')
     OWN_TIMEOUT_LEFT = (
         'control stays with the bus, and the time-out of the drive itself ({name} {timeout:g} s) '
-        'goes on: {why}. So it will have a fault when nothing is said to it for so long; set '
-        '{key} to 0 if it shall not'
+        'goes on: {why}. So it will have a fault after so long without requests; set {key} to 0 '
+        'to prevent that'
     )
     OWN_TIMEOUT_NOT_PUT_BACK = (
         'the time-out of the drive itself ({name}) stays {timeout:g} s, which this {call.program} '
@@ -406,7 +407,7 @@ class Cause(enum.Enum):
     )
     CHANGED_AS_WANTED = '{change}, as the parameter file says'
     CHANGED_AT_DRIVE = 'changed at the drive: {change}'
-    NOT_AS_WANTED = '{key} is {has} in the drive, but {wanted} was asked for: it is left so'
+    NOT_AS_WANTED = '{key} is {has} in the drive, but {wanted} was given: it is left so'
     WANTED_BUT_MISSING = 'this drive has no {keys}: not applied'
     WANTED_BUT_REFUSED = 'not applied from the parameter file: {why}'
     NO_SETTING = '{key} is no parameter that can be changed here'
@@ -426,7 +427,7 @@ class Cause(enum.Enum):
     )
     STANDSTILL_NEEDED = 'only while the motor is stopped, but it is not ({status})'
     NOT_WHILE_ENABLED = (
-        'the motor is enabled, and might not do what it is told after that: stop it first'
+        'the motor is enabled, and might not follow its commands after that: stop it first'
     )
     VALUE_NOT_ACCEPTED = 'the drive does not accept {value}{behind}'
     RELEASE_NEEDED = '{why}; {call.quick_stop}, then change it before it is enabled again'
@@ -446,7 +447,7 @@ class Cause(enum.Enum):
 @dataclass(frozen=True, init=False)
 class Report:
     """
-    Something to be told, and what its sentence needs.
+    What is reported: a cause, and the values of its sentence.
 
     :ivar values: by name: numbers, names and texts from elsewhere, other reports, and tuples of
         these.
@@ -465,7 +466,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Event:
-    """An unrequested report, and the inverter status shown at last, if there was one."""
+    """A report that no command requested, and the last inverter status, if there was one."""
 
     severity: Severity
     report: Report
@@ -490,7 +491,7 @@ class DriveError(Exception):
         return self.report.cause
 
 
-#: What stands for a value that is empty, by its name.
+#: The text for an empty value, by its name.
 _IF_EMPTY = {
     'status': 'its status is not known',
     'mode': '?',
@@ -508,8 +509,8 @@ class Calls:
 
     :ivar acknowledge: such as ``call /infeed/fault_ack``.
     :ivar enable: likewise.
-    :ivar quick_stop: likewise; the motor stays released by it.
-    :ivar program: what this is that speaks.
+    :ivar quick_stop: likewise; it leaves the motor released.
+    :ivar program: what this program is called.
     :ivar drive_timeout: the name of that setting.
     :ivar set_drive_timeout: such as ``set drive_timeout``.
     :ivar set_setpoint_max: how to let set-points go beyond what is nominal.
@@ -548,6 +549,6 @@ class _Formatter(string.Formatter):
 
 
 def sentence(report: Report, calls: Calls) -> str:
-    """Return what an operator reads of a report."""
+    """Return the sentence of a report."""
     values = {**report.values, 'call': calls}
     return _Formatter(calls).vformat(report.cause.value, (), values)

@@ -12,18 +12,18 @@ from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.link import LinkError
 
-#: How often it is looked whether there is one to be named, s.
+#: How often to check whether there is one without a name, s.
 _WAIT = 0.1
-#: How often it is asked for in vain, and how often again, for another one may have come, s.
+#: How often its name is read until it is known, and then, for another may have come, s.
 _RETRY_PERIOD = 0.5
 _PERIOD = 2.0
 
 
 class FaultNamer:
     """
-    Reads what a fault or an alarm is called, beside the polls; used on the bus alone.
+    Reads the name of a fault or an alarm, beside the polls; used on the bus alone.
 
-    The status is judged before that: a fault without a name stops the motor, too.
+    A stop does not wait for it: a fault without a name stops the motor, too.
     """
 
     def __init__(self, state: DriveState) -> None:
@@ -36,7 +36,7 @@ class FaultNamer:
             self._task = self._state.bus.spawn(self._name_repeatedly())
 
     def end(self) -> None:
-        """Leave the drive alone."""
+        """Stop reading names."""
         self._state.bus.cancel(self._task)
 
     async def _name_repeatedly(self) -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who a drive says it is, and what its firmware therefore has."""
+"""The identity of a drive, and what its firmware has."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from nfo_sinus_driver.link import LinkError, PortError, Refused
 @dataclass(frozen=True)
 class Identity:
     """
-    Who answers; ``''`` is what it does not tell.
+    The identity of a drive; ``''``: unknown.
 
-    :ivar firmware: SWVer, such as 4.38 [M0 §8.1]; NaN if it does not tell.
+    :ivar firmware: SWVer, such as 4.38 [M0 §8.1]; NaN: unknown.
     :ivar motor_firmware: NFOVer, such as 4018.
-    :ivar vendor: who made it.
+    :ivar vendor: its maker.
     :ivar model: its product name and size, such as ``NFO Sinus 1.50/400`` [M0 §6.2.4].
     :ivar serial: its serial number.
     :ivar software: the part number of its software, of one that has no SWVer.
@@ -42,7 +42,7 @@ class Identity:
 
     @functools.cached_property
     def version(self) -> Fraction | None:
-        """The firmware as a number that can be compared exactly; ``None`` if it does not tell."""
+        """The firmware as a number that can be compared exactly; ``None``: unknown."""
         return None if math.isnan(self.firmware) else Fraction(self.firmware)
 
     @property
@@ -62,9 +62,9 @@ class Nameplate:
     The identity of one drive, and what it has by that: parameters, texts, scales; for the bus.
 
     :param report: reports what is found.
-    :ivar identity: who answers; ``None`` before the drive was asked.
-    :ivar is_older: its firmware is of those that do not know every parameter, or may be; these
-        take settings only while the bus has control [C100].
+    :ivar identity: that of the drive; ``None`` before the first answer.
+    :ivar is_older: its firmware lacks some parameters, or may do so; such firmware takes settings
+        only while the bus has control [C100].
     """
 
     def __init__(
@@ -87,9 +87,9 @@ class Nameplate:
         """
         Find out whether a drive answers, and with which firmware.
 
-        :param retry: ask again if none does; a silent drive costs its neighbours time-outs.
+        :param retry: repeat the request if none does; a silent drive costs the others time-outs.
         """
-        # anything will do that every drive answers, whichever dialect it knows
+        # any parameter will do that every drive has, in either dialect
         priority = Priority.SERVICE if retry else Priority.POLL
         await self._params.read(self._model.key_of_status, priority, retry=retry)
         await self._params.find_lacking()
@@ -103,7 +103,7 @@ class Nameplate:
             return self.identity
         if dialect is not None and not await self._may_ask_firmware(dialect):
             if before is None:
-                # what the older firmware knows the newer one knows, too
+                # the newer firmware has all that the older one has
                 self.identity, self.is_older = Identity(), True
                 report = Report(
                     Cause.FIRMWARE_NOT_ASKED, before=dialect.before, dialect=dialect.name
@@ -127,10 +127,10 @@ class Nameplate:
         return self.identity
 
     async def _find_mailbox(self) -> None:
-        """Find out whether parameters are reached behind a PLC; it goes on without them."""
+        """Find out whether parameters are reached behind a PLC; the driver can do without."""
         key = self._model.key(Role.TELEGRAM)
         if not key or self._settings.method == 'monitor':
-            # who only watches writes no request either
+            # monitor writes nothing, not even a request to the mailbox
             return
         trouble = ''
         try:
@@ -160,9 +160,9 @@ class Nameplate:
 
     async def _may_ask_firmware(self, dialect: OlderDialect) -> bool:
         """
-        Tell whether the firmware can be asked for without harm, which an older one does not know.
+        Return whether the firmware can be read without harm: an older one does not know it.
 
-        A control method that only newer firmware has says that the drive is not of the older.
+        A control method that only newer firmware has rules the older out.
         """
         method = self._model.profile.methods.get(self._settings.method)
         if self._settings.classic_dialect or (method is not None and not method.older):
@@ -172,7 +172,7 @@ class Nameplate:
         return self._model.profile.holders.get(source) in dialect.harmless
 
     async def read_more(self) -> Identity:
-        """Read vendor, product and serial number; nothing needs them, many have none [C57]."""
+        """Read vendor, product and serial number; nothing needs them, many lack them [C57]."""
         assert self.identity is not None
         if self._params.in_block:
             # a PLC would answer for itself [C118]
@@ -185,7 +185,7 @@ class Nameplate:
         return self.identity
 
     def take(self, product: Product) -> Identity:
-        """Take who the drive says it is; warn of what its manual does not list."""
+        """Take the identity that the drive gives; warn of a model that its manual does not list."""
         assert self.identity is not None
         self.identity = replace(
             self.identity, vendor=product.vendor, model=product.model, software=product.software
@@ -204,7 +204,7 @@ class Nameplate:
         return self._model.status_code(code).shown(firmware)
 
     def has(self, key: str) -> bool:
-        """Tell whether the drive has a parameter: its model, this line and its firmware do."""
+        """Return whether the drive has a parameter, by its model, this line and its firmware."""
         if not self._params.reaches(key) or (self.is_older and not self._model[key].older):
             return False
         since = self._model[key].since

@@ -22,17 +22,16 @@ from nfo_sinus_driver.link import (
     Reply,
 )
 
-#: How often a drive that is busy is asked again, s, and how many times.
+#: How often a request to a busy drive is repeated, s, and how many times.
 _BUSY_PERIOD = 0.05
 _BUSY_TRIES = 10
-#: What a drive answers that lacks the option card of a parameter, and how often until that is
+#: How a drive answers that lacks the option card of a parameter, and how often until that is
 #: believed.
 _NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
 _DENIALS = 2
-#: How often at most what cannot be is read, until it is believed that the drive has it.
+#: How often an impossible value is read at most, until it is believed.
 _READINGS = 3
-#: Parameters of different sizes that are safe to read at any time; the Optimal's status word has
-#: one word, its counters two.
+#: Parameters of different sizes that are safe to read at any time.
 _RESYNC_READS = (Role.STATUS_CODE, Role.STATUS_WORD, Role.OPERATING_TIME)
 
 
@@ -41,7 +40,7 @@ class ParameterAccess:
     The parameters of one drive, for coroutines on the bus.
 
     :param addressing: how they are addressed; ``''``: as the line does.
-    :param block_address: where the block of registers begins that they stand in, behind a PLC.
+    :param block_address: the first register of their block, behind a PLC.
     :param retries: how often a request without an answer is sent again, where ``retry`` is true.
     :raises LinkError: reading or writing fails, as the link does.
     :raises ValueError: a value that the drive cannot have, or bytes that mean none.
@@ -64,20 +63,20 @@ class ParameterAccess:
         self._retries = retries
         #: How many requests got no answer.
         self.unanswered = 0
-        #: What cannot be, and what the drive says all the same, read more than once.
+        #: Impossible values that were read more than once.
         self._odd: dict[str, bytes] = {}
         #: What steps of a profile have written last and no reading has shown yet.
         self._own: dict[str, bytes] = {}
         #: What this drive does not have.
         self._lacking: frozenset[str] = frozenset()
-        #: What it has refused because no option card for it is there, each time in a row.
+        #: The refusals in a row of parameters whose option card may be missing.
         self._denials: dict[str, list[Refused]] = {}
         self._addresses: dict[str, Address] = {}
         #: Those that have another factor in this drive than in the tables.
         self._rescaled: dict[str, Parameter] = {}
         #: How parameters are addressed on this line.
         self.protocol = addressing or bus.protocol.addressing
-        #: They stand in the registers of a PLC.
+        #: They are in the registers of a PLC.
         self.in_block = self.protocol != bus.protocol.addressing
         self._block = block_address if self.in_block else None
         #: The PLC has a mailbox by which parameters of the drive are reached.
@@ -86,18 +85,18 @@ class ParameterAccess:
         bus.use_resync_reads(unit, tuple(self.address(key) for key in reads))
 
     def address(self, key: str) -> Address:
-        """Return where a parameter stands."""
+        """Return the address of a parameter."""
         if key not in self._addresses:
             address = Address(*self.model[key].at(self.protocol).place)
             self._addresses[key] = address._replace(block=self._block)
         return self._addresses[key]
 
     def is_rescaled(self, key: str) -> bool:
-        """Tell whether a parameter has another factor in this drive than in the tables."""
+        """Return whether a parameter has another factor in this drive than in the tables."""
         return key in self._rescaled
 
     def rescale(self, factors: Mapping[str, Fraction]) -> None:
-        """Take what the factors of parameters are multiplied by in this drive, by key."""
+        """Multiply the factors of parameters by those of this drive, by key."""
         self._rescaled = {
             key: self.model[key].rescaled(self.protocol, factor)
             for key, factor in factors.items()
@@ -130,29 +129,29 @@ class ParameterAccess:
         return address, self.encode(step.key, step.value)
 
     def value(self, key: str, data: bytes) -> Value:
-        """Return what the drive means by bytes."""
+        """Return the value that bytes mean."""
         return self._parameter(key).decode(data, self.protocol)
 
     def is_addressable(self, key: str) -> bool:
-        """Tell whether the tables say where a parameter stands on this line."""
+        """Return whether the tables have the address of a parameter on this line."""
         return key in self.model and self.protocol in self.model[key].addresses
 
     def reaches(self, key: str) -> bool:
-        """Tell whether the drive has a parameter and it can be reached over this line."""
+        """Return whether the drive has a parameter and it can be reached over this line."""
         if not self.is_addressable(key) or key in self._lacking:
             return False
         return self.reaches_space(self.model[key].at(self.protocol).space)
 
     def reaches_space(self, space: str) -> bool:
-        """Tell whether what stands in a space of addresses can be reached over this line."""
+        """Return whether a space of addresses can be reached over this line."""
         return space not in BY_MAILBOX or not self.in_block or self._has_mailbox
 
     def by_mailbox(self, key: str) -> bool:
-        """Tell whether a parameter is reached by the mailbox of a PLC, which takes its time."""
+        """Return whether a parameter is reached by the mailbox of a PLC, which is slow."""
         return self.in_block and self.model[key].at(self.protocol).space in BY_MAILBOX
 
     def use_mailbox(self, has_mailbox: bool) -> None:
-        """Take note of whether parameters are reached by the mailbox of the PLC."""
+        """Note whether parameters are reached by the mailbox of the PLC."""
         self._has_mailbox = has_mailbox
 
     async def find_lacking(self) -> None:
@@ -176,7 +175,7 @@ class ParameterAccess:
         return float(low), float(high), float(parameter.step(self.protocol))
 
     def connected(self) -> None:
-        """Take note that the drive was found: it may have another option card than before."""
+        """Note that the drive is connected: it may have another option card than before."""
         self._denials.clear()
 
     def require_fitted(self, key: str) -> None:
@@ -186,14 +185,14 @@ class ParameterAccess:
             raise denials[-1]
 
     def _highest(self, key: str) -> Fraction | None:
-        """Return the end that the line sets: beyond it a drive could not be asked again [C10]."""
+        """Return the highest address of the line: beyond it the drive would be lost [C10]."""
         if self.model.role_of.get(key) is not Role.BUS_ADDRESS:
             return None
         highest = Fraction(self._bus.protocol.units[-1])
         return highest if highest < self.model[key].span(self.protocol)[1] else None
 
     def number(self, key: str, data: bytes) -> float:
-        """Return the value of bytes as the drive understands them."""
+        """Return the number that bytes mean."""
         value = self.value(key, data)
         assert not isinstance(value, str), key
         return float(value)
@@ -203,7 +202,7 @@ class ParameterAccess:
         return self.value(key, await self.read_data(key, priority, retry=retry))
 
     async def read_data(self, key: str, priority: Priority, *, retry: bool = True) -> bytes:
-        """Read a parameter as it stands in the drive."""
+        """Read the bytes of a parameter."""
         return (await self.read_reply(key, priority, retry=retry)).data
 
     async def read_number(self, key: str, priority: Priority, *, retry: bool = True) -> float:
@@ -211,7 +210,7 @@ class ParameterAccess:
         return self.number(key, await self.read_data(key, priority, retry=retry))
 
     async def identify(self, priority: Priority) -> Identification:
-        """Ask the drive who it is; what it does not tell stays empty."""
+        """Read the identity of the drive; what it does not give stays empty."""
         return await self._bus.identify(self._unit, priority)
 
     async def watch(self, seconds: float, priority: Priority) -> str:
@@ -219,7 +218,7 @@ class ParameterAccess:
         return await self._bus.watch(self._unit, seconds, priority, 1 + self._retries)
 
     async def acknowledge(self, key: str, priority: Priority) -> Value:
-        """Read a parameter whose reading acknowledges; once, because a person asked for it."""
+        """Read a parameter whose reading acknowledges, once: an operator has requested it."""
         assert self.model[key].access is Access.ACKNOWLEDGE, key
         reply = await self._ask(self.address(key), priority, None, retry=False)
         return self.value(key, reply.data)
@@ -228,7 +227,7 @@ class ParameterAccess:
         """
         Read a parameter whose reading acknowledges, and write another as the very next frame.
 
-        :raises LinkError: the write was not answered, or refused; whatever became of the reading.
+        :raises LinkError: the write was not answered, or refused, whether or not the reading was.
         """
         assert self.model[key].access is Access.ACKNOWLEDGE, key
         await self._bus.read_then_write(
@@ -249,33 +248,33 @@ class ParameterAccess:
             raise
 
     def is_own(self, key: str, data: bytes) -> bool:
-        """Tell whether a step of a profile has written what a parameter has at its next reading."""
+        """Return whether a step of a profile has written what was now read of a parameter."""
         return self._own.pop(key, None) == data
 
     async def write_data(
         self, key: str, data: bytes, priority: Priority, *, retry: bool = True
     ) -> None:
-        """Write a parameter as it shall stand in the drive, whatever its range."""
+        """Write the bytes of a parameter, whatever its range."""
         await self._ask(self.address(key), priority, data, retry)
 
     async def read_from(self, address: Address, priority: Priority, *, retry: bool = True) -> bytes:
-        """Read what stands at an address."""
+        """Read the bytes at an address."""
         address = address._replace(block=self._block)
         return (await self._ask(address, priority, None, retry)).data
 
     def is_odd(self, key: str) -> bool:
-        """Tell whether what was read last of a parameter cannot be, and was read more than once."""
+        """Return whether the last value of a parameter is impossible, read more than once."""
         return key in self._odd
 
     def can_be(self, key: str, data: bytes) -> bool:
-        """Tell whether bytes mean a value that the manual knows of this parameter."""
+        """Return whether bytes mean a value that the manual allows for a parameter."""
         try:
             return self.model.can_be(key, self.value(key, data))
         except ValueError:
             return False
 
     async def read_reply(self, key: str, priority: Priority, *, retry: bool = True) -> Reply:
-        """Read a parameter as it stands in the drive; what cannot be counts when it comes again."""
+        """Read the bytes of a parameter; an impossible value counts when it comes again."""
         address = self.address(key)
         try:
             reply = await self._ask(address, priority, None, retry)
@@ -316,7 +315,7 @@ class ParameterAccess:
         require_wanted: Callable[[], None] = lambda: None,
     ) -> Reply:
         tries = 1 + self._retries if retry else 1
-        # what is busy has done nothing; a stop that is sent once is repeated by who wants it
+        # a busy drive has done nothing; a stop that is sent once is repeated by its caller
         busy = 0 if not retry and priority <= Priority.LOOK else _BUSY_TRIES
         while True:
             try:

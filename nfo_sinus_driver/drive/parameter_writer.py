@@ -19,7 +19,7 @@ from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.link import LinkError, Refused
 
 _SERVICE = Priority.SERVICE
-#: How often it is tried to put a value back that the drive refuses.
+#: How often a value that the drive refuses to take back is written.
 _TRIES = 3
 #: How a drive refuses what it may accept after other settings have changed.
 _AS_THINGS_ARE = (Refused.ILLEGAL_VALUE, Refused.SETTINGS_CONFLICT)
@@ -39,7 +39,7 @@ class ParameterError(DriveError):
         self.left = tuple(left)
 
     def followed_by(self, *more: Report, left: Iterable[str] = ()) -> ParameterError:
-        """Return the same error with more to say of it."""
+        """Return the same error with more reports."""
         report = Report(Cause.SEVERAL, reports=(self.report, *more))
         return ParameterError(self.key, report, (*self.left, *left))
 
@@ -50,7 +50,7 @@ class _BadValue(ParameterError):
 
 @dataclass(frozen=True)
 class Change:
-    """A parameter that was written; bytes that mean nothing stand for a value as text."""
+    """A parameter that was written; bytes that mean nothing are shown as text."""
 
     key: str
     old: Value
@@ -63,7 +63,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Written:
-    """A parameter that was written and read back, as it stands in the drive."""
+    """A parameter that was written and read back, as bytes."""
 
     key: str
     before: bytes
@@ -71,7 +71,7 @@ class Written:
 
 
 def show(value: Value) -> str:
-    """Return a value as a person writes it in a parameter file."""
+    """Return a value as it is written in a parameter file."""
     if isinstance(value, bool):
         return 'true' if value else 'false'
     return f'{value:.10g}' if isinstance(value, float) else str(value)
@@ -118,14 +118,14 @@ class ParameterWriter:
             except Cancelled:
                 if done:
                     changes = tuple(self.describe(entry) for entry in done)
-                    self._state.tell(Severity.WARNING, Cause.ENDED_HALF_WAY, changes=changes)
+                    self._state.notify(Severity.WARNING, Cause.ENDED_HALF_WAY, changes=changes)
                 raise
         return tuple(self.describe(entry) for entry in done)
 
     async def write_each(
         self, wanted: Mapping[str, bytes], wrote: Callable[[Written], None]
     ) -> None:
-        """Write what differs, telling of each; what was written before a refusal stays."""
+        """Write what differs, one by one; what was written before a refusal stays."""
         async with self._access.granted() as allow:
             await self._write_all(wanted, wrote, allow, Priority.POLL)
 
@@ -150,7 +150,7 @@ class ParameterWriter:
             waiting = list(refused)
 
     async def require_standstill(self, keys: Iterable[str]) -> None:
-        """Refuse what only a standing motor allows; a drive lax about it is not trusted."""
+        """Refuse what needs a motor at standstill, even if the drive would take it."""
         keys = tuple(keys)
         for key in keys:
             self._require_not_enabled(key)
@@ -165,13 +165,13 @@ class ParameterWriter:
             raise not_changed(stopped, self._state.report(Cause.STANDSTILL_NEEDED))
 
     def _require_not_enabled(self, key: str) -> None:
-        """Refuse what a start depends on while the motor is enabled, be it at set-point 0."""
+        """Refuse what a start depends on while the motor is enabled, even at set-point 0."""
         depends = key in self._state.model.profile.start_settings
         if depends and self._procedures.commanded:
             raise not_changed(key, Report(Cause.NOT_WHILE_ENABLED))
 
     def describe(self, entry: Written) -> Change:
-        """Return what was written as a person reads it."""
+        """Return what was written, as values."""
         model = self._params.model[entry.key]
         before, after = self.value(entry.key, entry.before), self.value(entry.key, entry.after)
         return Change(entry.key, before, after, model.unit)
@@ -220,13 +220,13 @@ class ParameterWriter:
         raise refused.followed_by(*stuck, left=left) from failure
 
     async def _keep(self) -> None:
-        """Have what was written take effect, and be kept, where that takes writes of its own."""
+        """Have what was written take effect, and be kept, where that needs further writes."""
         for step in self._state.model.profile.after_write:
             with contextlib.suppress(LinkError):
                 await self._params.write(step, _SERVICE)
 
     async def _send(self, key: str, data: bytes) -> LinkError | None:
-        """Write; return why the drive may not have taken it: reading it back tells."""
+        """Write; return why the drive may not have taken it, which only reading back shows."""
         try:
             await self._params.write_data(key, data, _SERVICE)
         except LinkError as error:
@@ -234,7 +234,7 @@ class ParameterWriter:
         return None
 
     async def _restore(self, key: str, before: bytes, allow: Allow) -> Report | None:
-        """See to it that a parameter is as it was, for it was once; return why it is not."""
+        """Restore the value that a parameter had; return why it does not have it."""
         trouble: Report | None = None
         for _ in range(_TRIES):
             try:
@@ -256,7 +256,7 @@ class ParameterWriter:
     async def _put_back(
         self, done: Sequence[Written], allow: Allow
     ) -> tuple[list[Report], list[str]]:
-        """Undo what was written; return what to say of it, and what may not be as it was."""
+        """Undo what was written; return the reports, and the keys that may not be as before."""
         stuck: dict[str, Report] = {}
         silence: Report | None = None
         for entry in reversed(done):
@@ -302,7 +302,7 @@ class ParameterWriter:
         return Report(Cause.DRIVE_KEEPS_OTHER, value=value, written=written)
 
     async def _refusal(self, key: str, data: bytes, error: Refused) -> Report:
-        """Return what the drive said, and what else is known that may be the reason [C87]."""
+        """Return why the drive refused, with what else may be the reason [C87]."""
         state = self._state
         why = report_of(error)
         if error.code == Refused.ILLEGAL_VALUE:
@@ -329,11 +329,11 @@ _WHAT = 'changing settings'
 
 class WriteAccess:
     """
-    Has one drive take settings; used on the bus alone.
+    Makes one drive take settings; used on the bus alone.
 
-    Firmware of the v5.0 dialect takes them only while the bus has control. Where it is free, it
-    is taken while the motor stands, with no run command and set-point 0, and given back. Everything
-    else takes settings at any time.
+    Firmware of the v5.0 dialect takes them only while the bus has control. If control is free, it
+    is taken while the motor stands still, with no run command and set-point 0, and released again.
+    Other firmware takes settings at any time.
     """
 
     def __init__(self, state: DriveState, procedures: Procedures) -> None:
@@ -342,7 +342,7 @@ class WriteAccess:
 
     @contextlib.asynccontextmanager
     async def granted(self) -> AsyncIterator[Allow]:
-        """Give control back at the end, if what this yields had to take it."""
+        """Yield what takes control, if need be; release control at the end, if it was taken."""
         async with contextlib.AsyncExitStack() as stack:
             access = ExclusiveAccess(_WHAT)
 
@@ -352,7 +352,7 @@ class WriteAccess:
                     return
                 if await self._procedures.controller.method.in_control(Priority.SERVICE):
                     return
-                # what was had was lost: to a client that stopped it, or by a serial fault that a
+                # control was lost: to a client that stopped the drive, or by a serial fault that a
                 # refused write has caused
                 if access.aborted:
                     raise DriveError(Cause.PROCEDURE_STOPPED, what=_WHAT)
@@ -363,7 +363,7 @@ class WriteAccess:
             yield allow
 
 
-#: The driver's own setting that goes with each setting of the line.
+#: The driver's own setting for each setting of the line.
 _FOLLOWERS = {
     Role.BUS_PROTOCOL: 'protocol',
     Role.BUS_ADDRESS: 'address',
@@ -373,7 +373,7 @@ _FOLLOWERS = {
 
 
 def followers(model: Family) -> Mapping[str, str]:
-    """Return the driver's own setting that goes with each setting of the line."""
+    """Return the driver's own setting for each setting of the line."""
     named = {model.key(role): setting for role, setting in _FOLLOWERS.items()}
     return {key: setting for key, setting in named.items() if key}
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The settings of one drive: read once, watched, changed on request, as wanted or not."""
+"""The settings of one drive: read once, watched, changed on request."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ from nfo_sinus_driver.link import LinkError, Refused
 _log = logging.getLogger(__name__)
 
 #: How long one round of reading every parameter again takes at least, s: a change at the keypad
-#: is seen within 10 s, and a fast line is not kept busy for nothing.
+#: is noticed within 10 s, and a fast line is not kept busy for nothing.
 _ROUND = 9.8
 #: How often at most one is read by the mailbox of a PLC, s: it has other work.
 _MAILBOX_PACE = 0.5
-#: How often it is looked whether there is something to read, s.
+#: How often to check whether there is something to read, s.
 _WAIT = 0.5
 #: When progress is logged first while the parameters are read for the first time, s; then each time
 #: after a pause twice as long, for on a line with many drives it takes minutes.
 _PROGRESS = 5.0
-#: After how many rounds that brought nothing a parameter is not there.
+#: After how many rounds of refusals alone the drive does not have the parameters left.
 _REFUSALS = 2
 
 _T = TypeVar('_T')
@@ -59,10 +59,10 @@ _P = ParamSpec('_P')
 
 
 class OnBus(Protocol):
-    """Something of a drive that any thread may have to do with."""
+    """A part of a drive whose methods any thread may call."""
 
     def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
-        """Run a coroutine on the bus; what goes wrong on the line is explained."""
+        """Run a coroutine on the bus; an error of the line becomes one that explains it."""
 
 
 _Self = TypeVar('_Self', bound=OnBus)
@@ -71,7 +71,7 @@ _Self = TypeVar('_Self', bound=OnBus)
 def on_bus(
     method: Callable[Concatenate[_Self, _P], Coroutine[Any, Any, _T]],
 ) -> Callable[Concatenate[_Self, _P], Future[_T]]:
-    """Have a method run on the bus: who calls it, from any thread, is given a future."""
+    """Have a method run on the bus: it may be called from any thread, and returns a future."""
 
     @functools.wraps(method)
     def run(me: _Self, /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
@@ -87,8 +87,8 @@ class Parameters:
     Reading and watching never write. Public methods may be called from any thread, those that end
     in ``_now`` on the bus alone.
 
-    :param run: runs a coroutine on the bus; its errors are for people.
-    :param told: called on the bus with the keys of parameters whose value is new.
+    :param run: runs a coroutine on the bus; its errors explain themselves.
+    :param on_change: called on the bus with the keys of parameters whose value is new.
     :raises LinkError: the drive does not answer.
     :raises ParameterError: a value is not taken, and why.
     """
@@ -98,23 +98,23 @@ class Parameters:
         state: DriveState,
         procedures: Procedures,
         run: Callable[[Callable[[], Coroutine[Any, Any, Any]]], Future[Any]],
-        told: Callable[[Collection[str]], None],
+        on_change: Callable[[Collection[str]], None],
     ) -> None:
         self._bus = state.bus
         self._state = state
         self._params = state.params
         self.run = run
-        self._told = told
+        self._on_change = on_change
         self._writer = ParameterWriter(state, procedures)
         self._keys: tuple[str, ...] = ()
         self._data: dict[str, bytes] = {}
         self._values: dict[str, Value] = {}
         self._wanted = DesiredConfig(self, state)
         self._turn = Lock(state.bus)
-        #: What is being written, and may be put back yet.
+        #: What is being written, and may still be put back.
         self._changing: Collection[str] = ()
         self._rounds = 0
-        #: How many are still to be read, and of how many, before the drive is known.
+        #: How many are still to be read for the first time, and of how many.
         self._unread = self._total = 0
 
     # --- any thread ---------------------------------------------------------------------------
@@ -126,7 +126,7 @@ class Parameters:
 
     @property
     def data(self) -> Mapping[str, bytes]:
-        """The same as they stand in the drive, meaningful or not."""
+        """The same as bytes, meaningful or not."""
         return self._data
 
     @property
@@ -138,7 +138,7 @@ class Parameters:
 
     @property
     def drift(self) -> tuple[Change, ...]:
-        """What the drive has otherwise than it was wanted, as wanted -> what it has."""
+        """What differs from the wanted settings, as wanted -> what the drive has."""
         return self._wanted.drift
 
     def describe(self, key: str, before: Value, data: bytes) -> Change:
@@ -146,11 +146,11 @@ class Parameters:
         unit = self._state.model[key].unit
         return Change(key, before, self._writer.value(key, data), unit)
 
-    def exact(self, key: str, value: Value) -> Value:
+    def coerce(self, key: str, value: Value) -> Value:
         """Return a value as the drive would show it."""
         known = self._values.get(key)
         if known is not None and type(known) is type(value) and known == value:
-            # it has it, also where no manual says that it can [C19]
+            # the drive has it, even if no manual allows it [C19]
             return known
         model = self._state.model
         if key not in model or not model[key].is_setting or not self.reaches(key):
@@ -165,11 +165,11 @@ class Parameters:
         return self._params.limits(key)
 
     def reaches(self, key: str) -> bool:
-        """Tell whether a parameter can be reached over this line."""
+        """Return whether a parameter can be reached over this line."""
         return self._params.is_addressable(key)
 
     def available(self, only: Collection[str] | None = None) -> list[str]:
-        """Return what the drive should keep, all settings or some of it, in its order."""
+        """Return the keys of the settings that the drive has, or of ``only`` some, in order."""
         return [
             parameter.key
             for parameter in self._state.model.kept
@@ -178,12 +178,12 @@ class Parameters:
         ]
 
     def validate(self, key: str, value: Value) -> Value:
-        """Return the same of one that may be set; nothing is asked of the drive."""
-        exact = self.exact(key, value)
+        """Return the same, or raise why it may not be set; nothing is sent to the drive."""
+        coerced = self.coerce(key, value)
         reason = write_forbidden(key, self._state)
-        if reason is not None and self._values.get(key) != exact:
+        if reason is not None and self._values.get(key) != coerced:
             raise not_changed(key, reason)
-        return exact
+        return coerced
 
     # --- on the bus ---------------------------------------------------------------------------
 
@@ -206,12 +206,12 @@ class Parameters:
         self._keys = tuple(key for key in keys if key in self._data)
         if keys:
             took = self._bus.now() - started
-            state.tell(Severity.INFO, Cause.SETTINGS_READ, progress=self.progress, seconds=took)
+            state.notify(Severity.INFO, Cause.SETTINGS_READ, progress=self.progress, seconds=took)
 
     async def _read_first(self, keys: Sequence[str]) -> None:
-        """Read what is not known yet; what is refused again and again is not there."""
+        """Read each once; what the drive refuses again and again it does not have."""
         pause = _PROGRESS
-        tell_at = self._bus.now() + pause
+        report_at = self._bus.now() + pause
         refusals = 0
         while keys and refusals < _REFUSALS:
             refused: dict[str, Refused] = {}
@@ -220,30 +220,30 @@ class Parameters:
                     await self._read(key, retry=True)
                     self._unread -= 1
                 except Refused as error:
-                    # by a busy drive, perhaps: asked again when the others are read
+                    # by a busy drive, perhaps: read again after the others
                     refused[key] = error
-                if self._bus.now() > tell_at:
+                if self._bus.now() > report_at:
                     pause *= 2
-                    tell_at = self._bus.now() + pause
-                    self._state.tell(
+                    report_at = self._bus.now() + pause
+                    self._state.notify(
                         Severity.INFO, Cause.SETTINGS_BEING_READ, progress=self.progress
                     )
             refusals = refusals + 1 if len(refused) == len(keys) else 0
             keys = tuple(refused)
-        self._tell_unreadable({key: refused[key] for key in keys})
+        self._report_unreadable({key: refused[key] for key in keys})
 
-    def _tell_unreadable(self, refused: Mapping[str, Refused]) -> None:
+    def _report_unreadable(self, refused: Mapping[str, Refused]) -> None:
         cards: list[str] = []
         for key, error in refused.items():
             if option := self._state.model[key].option:
                 cards.append(option)
             else:
-                self._state.tell(
+                self._state.notify(
                     Severity.WARNING, Cause.SETTING_UNREADABLE, key=key, error=str(error)
                 )
         if cards:
             options = ', '.join(dict.fromkeys(cards))
-            self._state.tell(
+            self._state.notify(
                 Severity.INFO, Cause.OPTIONS_MISSING, count=len(cards), options=options
             )
 
@@ -256,7 +256,7 @@ class Parameters:
     async def _watch_round(self, sharers: Callable[[], int]) -> None:
         state = self._state
         keys = self._keys
-        # without these the drive could hardly be read any more, so one of them in a round will do
+        # if these had changed, the drive could hardly be read: one of them in a round will do
         settings = followers(state.model)
         rare = [key for key in keys if key in settings]
         self._rounds += 1
@@ -270,64 +270,64 @@ class Parameters:
                 except Refused:
                     pass
                 except LinkError:
-                    # the poll says so if the drive is lost
+                    # the poll reports it if the drive is lost
                     state.missed()
-            # many drives on a line take their time, so that other things go on, too
+            # with many drives on a line a round takes longer, to leave time for other requests
             pace = _ROUND * sharers() / len(due)
             if self._params.by_mailbox(key):
                 pace = max(pace, _MAILBOX_PACE)
             await self._bus.sleep(started + number * pace - self._bus.now())
             if keys is not self._keys:
-                # they are read anew
+                # they are being read anew
                 return
         if not due:
             await self._bus.sleep(_WAIT)
 
     def _cannot_change(self, key: str) -> bool:
-        """Tell whether a running motor keeps it from being changed, or this firmware has none."""
+        """Return whether a running motor forbids a change, or this firmware does not have it."""
         status = self._state.status
         barred = self._state.model[key].stopped and status is not None and status.driven
         return barred or not self._state.nameplate.has(key)
 
     async def change_now(
-        self, wanted: Mapping[str, Value], *, guarded: bool = True, told_as: Cause = Cause.CHANGED
+        self, wanted: Mapping[str, Value], *, guarded: bool = True, report_as: Cause = Cause.CHANGED
     ) -> tuple[Change, ...]:
         """
         Write what differs, all of it or nothing, and read it back; return what was changed.
 
         :param guarded: false for what the driver sets itself.
-        :param told_as: as what each change is reported.
+        :param report_as: the cause of the report of each change.
         """
-        take = self.validate if guarded else self.exact
-        exact = {key: take(key, value) for key, value in wanted.items()}
+        take = self.validate if guarded else self.coerce
+        coerced = {key: take(key, value) for key, value in wanted.items()}
         if guarded:
-            # what may not be changed was only admitted because the drive has it already
-            exact = {
+            # what may not be changed passes only because the drive has it already
+            coerced = {
                 key: value
-                for key, value in exact.items()
+                for key, value in coerced.items()
                 if not write_forbidden(key, self._state)
             }
-        data = {key: self._data_of(key, value) for key, value in exact.items()}
+        data = {key: self._data_of(key, value) for key, value in coerced.items()}
         async with self._alone(data):
             await self._require_standstill(data)
             try:
-                # between any two, everybody who polls has a turn, unless the motor waits for it
+                # between any two, polls have a turn, unless the motor waits for the change
                 pace = Priority.POLL if guarded else Priority.SERVICE
                 changes = await self._writer.write(data, pace)
             except ParameterError as error:
-                hint = after_change({key: exact[key] for key in error.left}, self._state.model)
+                hint = after_change({key: coerced[key] for key in error.left}, self._state.model)
                 if hint is None:
                     raise
                 raise error.followed_by(hint) from error
-            self._wanted.follow(exact)
+            self._wanted.follow(coerced)
             written = {change.key for change in changes}
             for key in data:
                 self._learn(key, data[key], quiet=key in written)
         for change in changes:
-            self._state.tell(Severity.INFO, Report(told_as, change=change))
+            self._state.notify(Severity.INFO, Report(report_as, change=change))
         hint = after_change({change.key: change.new for change in changes}, self._state.model)
         if hint is not None:
-            self._state.tell(Severity.WARNING, hint)
+            self._state.notify(Severity.WARNING, hint)
         return changes
 
     async def write_each_now(
@@ -336,7 +336,7 @@ class Parameters:
         """
         Write what differs, one after the other; what was written before a refusal stays.
 
-        :param wrote: told of each on the bus; what it raises ends the writing.
+        :param wrote: called with each on the bus; an exception of it ends the writing.
         """
         for key in wanted:
             reason = write_forbidden(key, self._state)
@@ -355,7 +355,7 @@ class Parameters:
     async def left_to_the_drive(
         self, keys: Collection[str]
     ) -> AsyncIterator[Callable[[], Awaitable[tuple[Change, ...]]]]:
-        """Let the drive change parameters alone; yields what reads which of them it changed."""
+        """Let the drive change parameters itself; yield what reads which of them it changed."""
         before = {key: await self._params.read_data(key, Priority.SERVICE) for key in keys}
 
         async def changes() -> tuple[Change, ...]:
@@ -380,7 +380,7 @@ class Parameters:
 
     @contextlib.asynccontextmanager
     async def _alone(self, keys: Collection[str]) -> AsyncIterator[None]:
-        """Change parameters exclusively; they are no news before it is done."""
+        """Change parameters exclusively; they are not reported as changed meanwhile."""
         async with self._turn:
             self._changing = keys
             try:
@@ -399,7 +399,7 @@ class Parameters:
 
     @on_bus
     async def apply(self, wanted: Mapping[str, Value], *, write: bool) -> None:
-        """Take a state as the wanted one, and report what drifts later; write it only if told."""
+        """Take settings as the wanted ones, and report later drift; ``write``: write them now."""
         await self._wanted.apply_now(wanted, write=write)
 
     @on_bus
@@ -409,7 +409,7 @@ class Parameters:
         keys = [key for key in self._keys if self._state.nameplate.has(key)]
         for key in keys:
             with contextlib.suppress(Refused):
-                # a person waits for it, so it goes by turns with the polls
+                # an operator waits for it, so it takes turns with the polls
                 await self._read(key, retry=True, priority=Priority.POLL)
         changed = [key for key in keys if before.get(key) != self._values.get(key)]
         return Report(Cause.SETTINGS_REFRESHED, count=len(keys), changed=tuple(changed))
@@ -420,34 +420,34 @@ class Parameters:
             self._learn(key, data)
 
     def _learn(self, key: str, data: bytes, *, quiet: bool = False) -> None:
-        """Take what the drive has for a parameter, and tell it if it is news."""
+        """Take the value that the drive has of a parameter, and report a change."""
         own = self._params.is_own(key, data)
         if self._data.get(key) == data:
             return
-        # others may be reading the old ones just now
+        # other threads may be reading the old ones
         self._data = {**self._data, key: data}
         values = dict(self._values)
         before = values.pop(key, None)
         try:
             values[key] = self._params.value(key, data)
         except ValueError as error:
-            # and the value before is not to be relied on
-            self._state.tell(Severity.WARNING, Cause.NOT_POSSIBLE, why=str(error))
+            # and the value before no longer counts
+            self._state.notify(Severity.WARNING, Cause.NOT_POSSIBLE, why=str(error))
         self._values = values
         if not quiet and before is not None and key in values:
-            self._tell_news(Change(key, before, values[key], self._state.model[key].unit), own)
+            self._report_change(Change(key, before, values[key], self._state.model[key].unit), own)
         try:
-            self._told((key,))
+            self._on_change((key,))
         except Exception:
-            _log.exception('a new value of %s could not be told', key)
+            _log.exception('a new value of %s could not be reported', key)
 
-    def _tell_news(self, change: Change, own: bool) -> None:
-        if not self._wanted.tell_drift(change.key) and not own:
-            self._state.tell(Severity.INFO, Cause.CHANGED_AT_DRIVE, change=change)
+    def _report_change(self, change: Change, own: bool) -> None:
+        if not self._wanted.report_drift(change.key) and not own:
+            self._state.notify(Severity.INFO, Cause.CHANGED_AT_DRIVE, change=change)
 
 
 class DesiredConfig:
-    """What the settings of one drive shall be; used on the bus, readable from anywhere."""
+    """The wanted settings of one drive; used on the bus, readable from anywhere."""
 
     def __init__(self, parameters: Parameters, state: DriveState) -> None:
         self._parameters = parameters
@@ -456,7 +456,7 @@ class DesiredConfig:
 
     @property
     def drift(self) -> tuple[Change, ...]:
-        """What the drive has otherwise than it was wanted, as wanted -> what it has."""
+        """What differs from the wanted settings, as wanted -> what the drive has."""
         data, values = self._parameters.data, self._parameters.values
         return tuple(
             self._parameters.describe(key, wanted, data[key])
@@ -465,47 +465,47 @@ class DesiredConfig:
         )
 
     def follow(self, changed: Mapping[str, Value]) -> None:
-        """Want what a person has set since, where a state is wanted at all."""
+        """Take later changes by clients into the wanted settings, where those have the key."""
         self._values.update((key, changed[key]) for key in changed if key in self._values)
 
-    def tell_drift(self, key: str) -> bool:
-        """Say that a parameter is not as wanted; false if it is."""
+    def report_drift(self, key: str) -> bool:
+        """Report that a parameter is not as wanted; false if it is."""
         for drift in self.drift:
             if drift.key == key:
-                self._state.tell(Severity.WARNING, _not_as_wanted(drift))
+                self._state.notify(Severity.WARNING, _not_as_wanted(drift))
                 return True
         return False
 
     async def apply_now(self, wanted: Mapping[str, Value], *, write: bool) -> None:
         """
-        Take a state as the wanted one and bring the drive into it, or only report how it differs.
+        Take settings as the wanted ones, and write them or only report how the drive differs.
 
         What cannot be written is logged, and stays reported as drift.
         """
         state = self._state
         here = {key: value for key, value in wanted.items() if key in self._parameters.data}
-        self._values = {key: self._parameters.exact(key, value) for key, value in here.items()}
+        self._values = {key: self._parameters.coerce(key, value) for key, value in here.items()}
         missing = [key for key in wanted if key not in here]
         if missing:
-            state.tell(Severity.WARNING, Cause.WANTED_BUT_MISSING, keys=tuple(missing))
+            state.notify(Severity.WARNING, Cause.WANTED_BUT_MISSING, keys=tuple(missing))
         drifts = self.drift
         while drifts:
             refused: list[ParameterError] = []
             for drift in drifts:
                 if not write:
-                    state.tell(Severity.WARNING, _not_as_wanted(drift))
+                    state.notify(Severity.WARNING, _not_as_wanted(drift))
                     continue
                 try:
                     await self._parameters.change_now(
-                        {drift.key: drift.old}, told_as=Cause.CHANGED_AS_WANTED
+                        {drift.key: drift.old}, report_as=Cause.CHANGED_AS_WANTED
                     )
                 except ParameterError as error:
                     refused.append(error)
             if len(refused) == len(drifts):
                 for refusal in refused:
                     why = refusal.report
-                    state.tell(Severity.ERROR, Cause.WANTED_BUT_REFUSED, why=why)
-            # values that bound each other may stand in any order
+                    state.notify(Severity.ERROR, Cause.WANTED_BUT_REFUSED, why=why)
+            # values that bound each other may come in any order
             drifts = self.drift if write and len(refused) < len(drifts) else ()
 
 
@@ -514,16 +514,16 @@ def _not_as_wanted(drift: Change) -> Report:
     return Report(Cause.NOT_AS_WANTED, key=drift.key, has=has, wanted=show(drift.old))
 
 
-#: There is no need to look: the one that leaves wakes the next one, s.
+#: No polling is needed: the one that leaves wakes the next one, s.
 _LONG = 60.0
 
 
 class Lock:
-    """Lets one coroutine on the bus at a time in, in the order in which they came."""
+    """A lock for coroutines on the bus, in the order in which they came."""
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
-        #: Who is in, and behind it who waits.
+        #: The holder, and behind it those that wait.
         self._tasks: deque[Task | None] = deque()
 
     async def __aenter__(self) -> None:

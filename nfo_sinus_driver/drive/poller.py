@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The watch over one drive: polls it, judges what it sees, notices when it is lost."""
+"""Polls one drive, checks its status, and notices when it is lost."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from nfo_sinus_driver.link import Interrupted, LinkError, NoData, PortError, Ref
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
 
-#: How often a drive is looked at while its node is not active, s.
+#: How often a drive is polled while its node is not active, s.
 _INACTIVE_PERIOD = 0.5
-#: How often one that stands is polled at most while another one is read for the first time, s.
+#: How often an idle one is polled at most while another one is read for the first time, s.
 _YIELDING_PERIOD = 2.0
-#: How often the control mode is read, while no motor that stands may start by a set-point, s.
+#: How often the control mode is read, while no motor at standstill may start by a set-point, s.
 _MODE_PERIOD = 1.0
 #: How often the status is read at least while the motor runs, s.
 _WATCH_PERIOD = 0.2
@@ -38,30 +38,30 @@ _RECONNECT_PERIOD = 1.0
 _SLOWEST_RECONNECT = 4.0
 #: The bus is silent for no more than this share of the drive's own time-out.
 _KEEP_ALIVE_SHARE = 1 / 3
-#: After this share of it the drive is asked ahead of everything but stops and set-points.
+#: After this share of it the drive gets a request ahead of all but stops and set-points.
 _LATEST_SHARE = 0.5
-#: So long before its own time-out stops it, a drive that is lost is tried again and again, s.
+#: How long before its own time-out stops it a lost drive is tried again and again, s.
 _LAST_CHANCE = 0.6
 #: How often at most, if the port is gone too, s.
 _SHORTEST_PAUSE = 0.02
-#: What the control mode is about, which is measured with every poll.
+#: The quantity that a control mode controls, which is measured with every poll.
 _ACTUAL = {
     'Freque': Role.ACTUAL_FREQUENCY,
     'Speed': Role.ACTUAL_SPEED,
     'Torque': Role.ACTUAL_TORQUE,
     'PI-Reg': Role.ACTUAL_PROCESS_VALUE,
 }
-#: What is measured whatever it is about.
+#: What is measured in every control mode.
 _BASIC = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
-#: How often what else a poll is made of is read, s: the other one of frequency and speed, and an
-#: inverter status that the status word gives no reason to read. All that makes the driver do
-#: something shows in that word: fault, control lost, a stop, the current limit.
+#: How often the rest of a poll is read, s: the other one of frequency and speed, and an inverter
+#: status that the status word gives no reason to read. All that the driver reacts to shows in
+#: that word: fault, control lost, a stop, the current limit.
 _SLOW_PERIOD = 0.1
 #: On a full line, where each read waits for its turn, once in so many turns of this drive: so two
 #: reads that every poll takes become 2.4 at most, with the control mode, which changes least.
 _SLOW_TURNS = 15
-#: A motor is at its speed while what the control mode is about changes by no more than this share
-#: from poll to poll; else frequency and speed are both measured each time.
+#: A motor is at its speed while the controlled quantity changes by no more than this share from
+#: poll to poll; else frequency and speed are both measured each time.
 _STEADY = 0.02
 _MODE_TURNS = 60
 
@@ -103,15 +103,15 @@ class Poller:
         #: When the control mode was last read.
         self._mode_read_at = 0.0
         self._complaint: Report | None = None
-        #: A status word that came with a set-point, and has not been judged yet.
-        self._told: Reply | None = None
-        self._told_fault = 0
+        #: A status word that came with a set-point, and has not been checked yet.
+        self._received: Reply | None = None
+        self._reported_fault = 0
         self._conditions = Conditions(state)
-        state.on_missed(self._look_soon)
+        state.on_missed(self._poll_soon)
 
     @property
     def begun(self) -> bool:
-        """It watches."""
+        """It is polling."""
         return self._task is not None
 
     def begin(self) -> None:
@@ -121,7 +121,7 @@ class Poller:
             self._keep_alive_task = self._bus.spawn(self._keep_alive())
 
     def end(self) -> None:
-        """Leave the drive alone."""
+        """Stop polling."""
         if self._task is not None:
             task, self._task = self._task, None
             self._bus.cancel(task)
@@ -130,11 +130,11 @@ class Poller:
         self._bus.recorder.cycle(self._unit, math.nan)
         self._publish(None)
 
-    def told(self, reply: Reply) -> None:
+    def take_status(self, reply: Reply) -> None:
         """
-        Take a status word that the drive has told with something else, if it told one.
+        Take a status word that came with another answer, if one came.
 
-        It is the answer to a look that waits for it; else, if it is news, the next poll comes at
+        It is the answer to a read that waits for it; else, if it is news, the next poll comes at
         once. A poll that may have to stop the motor replaces one that waits for its turn to read
         something else: on a full line that may take long.
         """
@@ -144,15 +144,15 @@ class Poller:
         place = params.address(state.word_key)
         if self._bus.answer(self._task, self._unit, place, reply):
             return
-        # what cannot be counts for nothing: the next poll reads it again
+        # impossible values are ignored: the next poll reads again
         if not params.can_be(state.word_key, reply.data):
             return
         word = state.status_word(reply.data)
         if state.status is None or word == state.status.word:
             return
-        if self._told is not None and word == state.status_word(self._told.data):
+        if self._received is not None and word == state.status_word(self._received.data):
             return
-        self._told = reply
+        self._received = reply
         if self._alarming(state.status_of_word(word, reply.arrived)):
             self._bus.cancel(self._task)
             self.begin()
@@ -160,13 +160,13 @@ class Poller:
             self.wake()
 
     def restarted(self) -> None:
-        """Take note that the drive has started anew: it is lost until it is connected to again."""
+        """Note that the drive has restarted: it is lost until it is connected to again."""
         if self._task is None or not self._state.connected:
             return
         self._begin_anew(DriveError(Cause.RESTARTED))
 
     def _begin_anew(self, error: LinkError | DriveError) -> None:
-        """Take the drive for lost until it is connected to again; the poll was begun before."""
+        """Treat the drive as lost until it is connected to again, and poll anew."""
         self._bus.cancel(self._task)
         self._lose(error)
         self._failures = 0
@@ -179,12 +179,12 @@ class Poller:
             self.wake()
 
     def wake(self) -> None:
-        """Look at the drive at once."""
+        """Poll at once."""
         if self._task is not None:
             self._bus.wake(self._task)
 
-    def _look_soon(self) -> None:
-        """Find out at once whether a drive is there that did not answer another request."""
+    def _poll_soon(self) -> None:
+        """Find out at once whether a drive responds that did not answer another request."""
         if self._state.connected:
             self.wake()
 
@@ -194,12 +194,12 @@ class Poller:
         self.wake()
 
     def connected(self) -> None:
-        """Begin anew to count what goes wrong: the drive has been found."""
+        """Reset the counts of failures: the drive is connected."""
         self._bus.recorder.connected(self._unit)
         self._failing_since = math.inf
         self._failures = 0
         self._complaint = None
-        self._told = None
+        self._received = None
         self._state.forget_polled()
 
     async def _poll_repeatedly(self) -> None:
@@ -228,40 +228,40 @@ class Poller:
 
     async def _keep_alive(self) -> None:
         """
-        Ask the drive something before its own time-out strikes, where polls wait for too long.
+        Send the drive a request before its own time-out strikes, where polls wait for too long.
 
-        They give way to commands, and to have many drives enabled at once takes seconds. In a
-        silence it is asked once, for then the polls have to find that it is lost.
+        They give way to commands, and enabling many drives at once takes seconds. A silent drive
+        gets one such request, for then the polls have to find out that it is lost.
         """
         state = self._state
         asked_after = -math.inf
         while True:
-            patience = state.timeout.seconds * _LATEST_SHARE
-            if not state.connected or not patience:
+            latest = state.timeout.seconds * _LATEST_SHARE
+            if not state.connected or not latest:
                 await self._bus.sleep(_WATCH_PERIOD)
                 continue
-            heard_at = self._bus.silences.heard_at(self._unit)
-            left = heard_at + patience - self._bus.now()
-            if left <= 0 and heard_at != asked_after:
-                asked_after = heard_at
+            frame_at = self._bus.silences.last_frame_at(self._unit)
+            left = frame_at + latest - self._bus.now()
+            if left <= 0 and frame_at != asked_after:
+                asked_after = frame_at
                 with contextlib.suppress(LinkError):
                     await state.keep_alive()
-            await self._bus.sleep(left if left > 0 else patience / 2)
+            await self._bus.sleep(left if left > 0 else latest / 2)
 
     def _pause(self, polled_at: float) -> float:
-        """Return how long to wait until the drive is asked again, s."""
+        """Return how long to wait until the next poll, s."""
         state = self._state
         if not state.connected:
             # a drive that stays silent costs its neighbours less and less
             pause = min(_RECONNECT_PERIOD * self._failures, _SLOWEST_RECONNECT)
-            heard_at = self._bus.silences.heard_at(self._unit)
-            strikes_in = heard_at + state.timeout.seconds - self._bus.now()
+            frame_at = self._bus.silences.last_frame_at(self._unit)
+            strikes_in = frame_at + state.timeout.seconds - self._bus.now()
             if strikes_in > 0:
                 pause = min(pause, max(strikes_in - _LAST_CHANCE, _SHORTEST_PAUSE))
             return pause
         pause = polled_at + self._period - self._bus.now()
-        # however seldom the status is to be published, a motor that runs is watched, and so is
-        # one whose run command may still stand, for a fault that ends would let it go on
+        # however low the poll rate, a motor that runs is watched, and so is one whose run
+        # command may still be active, for it would start when its fault ends
         controller = self._controller
         watched = controller is not None and (controller.stopping or self._setpoint.following)
         return min(pause, _WATCH_PERIOD) if watched else pause
@@ -278,19 +278,19 @@ class Poller:
         if self.yields:
             period = max(period, _YIELDING_PERIOD)
         state = self._state
-        for patience in (state.timeout.seconds, state.plc_time):
-            if patience:
-                period = min(period, patience * _KEEP_ALIVE_SHARE)
+        for timeout in (state.timeout.seconds, state.plc_time):
+            if timeout:
+                period = min(period, timeout * _KEEP_ALIVE_SHARE)
         return period
 
     @property
     def yields(self) -> bool:
-        """It leaves the line to one whose settings are read for the first time: many reads."""
+        """It leaves the line to a drive whose settings are read for the first time."""
         return self._bus.reads_another_first(self._unit) and self._is_idle
 
     @property
     def _is_idle(self) -> bool:
-        """The motor stands, and nothing was begun that may change that."""
+        """The motor is at standstill, and nothing was begun that may change that."""
         controller, status = self._controller, self._state.status
         commanded = controller is not None and (controller.commanded or controller.stopping)
         if commanded or status is None or status.driven:
@@ -306,7 +306,7 @@ class Poller:
 
     @property
     def _mode_is_due(self) -> bool:
-        """The control mode is to be read again; it can only change while the motor stands."""
+        """The control mode is to be read again; it can only change at standstill."""
         state = self._state
         stands = self._setpoint.following and 0 in (state.frequency, state.speed)
         period = max(_MODE_PERIOD, _MODE_TURNS * self._turn)
@@ -329,36 +329,36 @@ class Poller:
         return self._slow_period
 
     def _alarming(self, status: InverterStatus) -> bool:
-        """Tell whether a status may have to stop the motor."""
+        """Return whether a status may have to stop the motor."""
         return self._controller is not None and self._controller.alarmed_by(status)
 
     async def _read_status(self) -> InverterStatus:
         state = self._state
 
-        told = taken = self._told
-        if told is not None and state.status and told.arrived <= state.status.at:
-            # a command has looked since
-            told = None
+        received = taken = self._received
+        if received is not None and state.status and received.arrived <= state.status.at:
+            # a command has read a newer one since
+            received = None
 
-        async def look() -> InverterStatus:
+        async def read() -> InverterStatus:
             # once: both words of a status are of one moment, so they are repeated together
-            nonlocal told
-            word, told = told, None
+            nonlocal received
+            word, received = received, None
             return await state.read_status(
                 Priority.POLL,
                 retry=False,
                 alarming=self._alarming,
-                told=word,
+                received=word,
                 code_for=self._code_holds,
             )
 
-        status = await self._insist(look)
-        if self._told is taken:
-            self._told = None
+        status = await self._insist(read)
+        if self._received is taken:
+            self._received = None
         state.require_fresh(status)
         state.status_read()
-        reported = self._controller is not None and self._controller.judge(status)
-        self._tell_fault(status, reported)
+        reported = self._controller is not None and self._controller.on_status(status)
+        self._report_fault(status, reported)
         self._conditions.take(status)
         return status
 
@@ -371,8 +371,8 @@ class Poller:
             before = state.control_mode
             mode = await self._insist(lambda: state.read_control_mode(Priority.POLL, retry=False))
             if mode != before and self._controller:
-                # before it is told: a set-point never has the unit of another mode
-                self._controller.judge(status)
+                # before it is published: a set-point never has the unit of another mode
+                self._controller.on_status(status)
         actual = _ACTUAL.get(state.control_mode)
         steady = True
         if actual is not None:
@@ -384,16 +384,16 @@ class Poller:
                 await self._measure(role)
         self._publish(status)
 
-    def _tell_fault(self, status: InverterStatus, reported: bool) -> None:
+    def _report_fault(self, status: InverterStatus, reported: bool) -> None:
         """Report on change that a fault is active, unless a stop because of it was reported."""
         code = status.code if status.faulted else 0
-        if code and code != self._told_fault and not reported:
+        if code and code != self._reported_fault and not reported:
             fault = explain_fault(self._state, status)
-            self._state.tell(Severity.ERROR, Cause.FAULT_APPEARED, fault=fault)
-        self._told_fault = code
+            self._state.notify(Severity.ERROR, Cause.FAULT_APPEARED, fault=fault)
+        self._reported_fault = code
 
     async def _measure(self, role: Role) -> float:
-        """Measure a value anew; NaN if it is not to be had from a drive that answers."""
+        """Measure a value anew; NaN if a drive that responds does not give it."""
         state = self._state
         status = state.status
         if role is state.turning.role and status and not math.isnan(status.frequency):
@@ -421,7 +421,7 @@ class Poller:
 
     async def _insist(self, read: Callable[[], Awaitable[_T]]) -> _T:
         """
-        Repeat a read at once until the drive answers; what was read before it stays good.
+        Repeat a read at once until the drive answers; what was read before it stays valid.
 
         :raises LinkError: the drive has been silent for too long, or has answered everything but
             this; it refuses; the port is gone; or the PLC has no valid data of it.
@@ -452,38 +452,38 @@ class Poller:
         if not state.connected:
             self._failures += 1
             if isinstance(error, DriveError) and error.report != self._complaint:
-                # what keeps the drive from being used is said once
+                # what keeps the drive from being used is reported once
                 self._complaint = error.report
-                state.tell(Severity.ERROR, error.report)
+                state.notify(Severity.ERROR, error.report)
             return
         self._failing_since = min(self._failing_since, now)
-        # one that answers, but tells no status, cannot be watched either
+        # one that answers, but gives no status, cannot be watched either
         unwatched = now - self._failing_since >= state.settings.lost_after
-        # and these have been waited out, or cannot be
+        # these have been waited out, or cannot be
         at_once = isinstance(error, (PortError, NoData, Interrupted))
         at_once = at_once or _is(error, Cause.OLD_DATA)
         if at_once or self._silent_for_long or unwatched:
             self._lose(error)
 
     def _lose(self, error: LinkError | DriveError) -> None:
-        """Give the drive up until it can be connected to again, and say why."""
+        """Treat the drive as lost until it can be connected to again, and report why."""
         state = self._state
         state.lost()
         why = explain_failure(error, state)
         self._bus.recorder.cycle(self._unit, math.nan)
         in_use = self._controller is not None and self._controller.lost(why)
         cause = Cause.LOST_IN_USE if in_use else Cause.LOST
-        state.tell(Severity.ERROR, cause, why=why)
+        state.notify(Severity.ERROR, cause, why=why)
         try:
             self._publish(None)
         except Exception:
-            # a mistake of who listens must not end the watch
-            _log.exception('the loss of the drive could not be told')
+            # an error of the listener must not end the polling
+            _log.exception('the loss of the drive could not be reported')
 
     def _publish(self, status: InverterStatus | None) -> None:
         state = self._state
         if status is not None and state.status is not None and state.status.at > status.at:
-            # a command has looked since: with it the drive may be enabled, its fault acknowledged
+            # a command has read a newer one: the drive may be enabled since, its fault acknowledged
             status = state.status
         frequency, speed = (state.last_polled(role) for role in _BASIC)
         actual = state.last_polled(_ACTUAL.get(state.control_mode)).value

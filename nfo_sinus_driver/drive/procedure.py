@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a drive does on a command while its motor stands: tune, erase, reset [M0 table 18]."""
+"""What a drive does on a command at standstill: tune, erase, reset [M0 table 18]."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from nfo_sinus_driver.drive.events import Cause, DriveError, Report
 from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.link import LinkError, Refused
 
-#: How often a busy drive is told again, and for how long, s.
+#: How often a command is repeated to a busy drive, and for how long, s.
 _BUSY_PERIOD = 0.05
 _LONGEST_BUSY = 0.5
 
@@ -34,8 +34,8 @@ class Procedures:
     """
     Has one drive carry out procedures; used on the bus alone.
 
-    :param controller: who commands the drive else; ``None`` if this driver only reads.
-    :raises DriveError: the drive cannot be had, has no such procedure, or does not confirm.
+    :param controller: what commands the drive otherwise; ``None`` if this driver only reads.
+    :raises DriveError: the drive is not free, has no such procedure, or does not confirm it.
     """
 
     def __init__(self, state: DriveState, controller: Controller | None) -> None:
@@ -45,7 +45,7 @@ class Procedures:
 
     @property
     def controller(self) -> Controller:
-        """Who commands the drive else; a :class:`DriveError` if this driver only reads."""
+        """What commands the drive otherwise; a :class:`DriveError` if this driver only reads."""
         if self._controller is None:
             raise DriveError(Cause.MONITOR_ONLY)
         return self._controller
@@ -56,7 +56,7 @@ class Procedures:
         return self._controller is not None and self._controller.commanded
 
     def require(self, procedure: Procedure | Reset) -> None:
-        """See to it that a procedure may begin."""
+        """Make sure that a procedure may begin."""
         controller, state = self.controller, self._state
         if not state.connected:
             raise DriveError(Cause.NOT_CONNECTED, address=state.settings.address)
@@ -74,7 +74,7 @@ class Procedures:
 
     @contextlib.contextmanager
     def begun(self, procedure: Procedure | Reset) -> Iterator[ExclusiveAccess]:
-        """Have the drive for a procedure, from its first preparations on."""
+        """Give a procedure exclusive access, from its first preparations on."""
         self.require(procedure)
         with self.controller.exclusive(procedure.value) as access:
             yield access
@@ -84,24 +84,24 @@ class Procedures:
         self, access: ExclusiveAccess, ended: Report | None = None
     ) -> AsyncIterator[None]:
         """
-        Take control of a drive whose motor stands, and give it back as it was found.
+        Take control of a drive whose motor stands still, and release it as it was found.
 
-        Not from keypad or terminals: giving it back to them could start the motor [C43].
+        Not from keypad or terminals: releasing it to them could start the motor [C43].
 
-        :param ended: why the motor stops then, if it is energised meanwhile.
+        :param ended: why the motor stops at the end, if it was energised.
         """
         found = await self._take(access)
         try:
             yield
         except Exception:
-            # who asked is told what went wrong first; what comes of it is logged
+            # the caller gets the first error; what follows from it is logged
             with contextlib.suppress(DriveError, LinkError):
                 await self._give_back(found, ended)
             raise
         await self._give_back(found, ended)
 
     async def abort(self) -> Report | None:
-        """End the procedure that has the drive; anything else goes on."""
+        """End the procedure that has exclusive access; stop nothing else."""
         controller = self._controller
         if controller is None or not controller.procedure:
             return None
@@ -110,10 +110,10 @@ class Procedures:
 
     async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
         """
-        Have the drive begin; once, for the state before a second time would be unknown.
+        Have the drive begin, once: the state before a second try would be unknown.
 
-        It waits for its turn with the stops, so that none that comes later overtakes it. Only a
-        drive that is busy is told again for a while, for it has done nothing.
+        It queues with the stops, so that no later one overtakes it. Only to a busy drive, which
+        has done nothing, the command is repeated for a while.
         """
         deadline = self._bus.now() + _LONGEST_BUSY
         while True:
@@ -146,13 +146,13 @@ class Procedures:
                 with contextlib.suppress(DriveError, LinkError):
                     await self._give_back(found)
                 raise DriveError(state.report(Cause.NO_STANDBY, what=what))
-            # no manual says that a drive has forgotten what it was told before
+            # no manual says that a drive forgets an earlier command
             await controller.method.stop(control_mode)
             await self._bus.sleep(drive_state.LOOK_PERIOD)
         return found
 
     async def _give_back(self, found: Holder, ended: Report | None = None) -> None:
-        """Remove the command, and give control back where it was free; not while faulted."""
+        """Remove the command, and release control where it was free; not while faulted."""
         controller = self.controller
         await controller.withdraw_run_command(ended)
         if found is Holder.NOBODY and not controller.blocked_by_fault:

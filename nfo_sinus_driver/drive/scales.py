@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Factors that a drive has other than its family's tables: by its firmware, by its own scale."""
+"""Factors of a drive that differ from its family's tables, by firmware or by its own scale."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.link import Refused
 
 _ONE = Fraction(1)
-#: The factory's scales of frequency, torque and process values, which stand in the tables [C16].
+#: The factory's scales of frequency, torque and process values, which the tables have [C16].
 FACTORY = {
     Role.ACTUAL_FREQUENCY: Fraction(1, 10),
     Role.ACTUAL_TORQUE: _ONE,
@@ -26,9 +26,9 @@ class Scales:
     """
     The scales of one drive; for the bus.
 
-    :param has: tells whether the drive has a parameter.
-    :param chosen: the value of one count of those scales that no bus tells, by role.
-    :ivar speed: by what speeds are multiplied that come over the bus [M0 §8.3.2].
+    :param has: whether the drive has a parameter.
+    :param chosen: the value of one count, of the scales that cannot be read, by role.
+    :ivar speed: the factor of speeds on the bus [M0 §8.3.2].
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Scales:
 
     async def read(self) -> bool:
         """
-        Read the scale of speeds, 1 where the drive tells none; tell whether it is another now.
+        Read the scale of speeds, 1 where the drive has none; return whether it has changed.
 
         :raises LinkError: the drive does not answer.
         """
@@ -78,7 +78,7 @@ class Scales:
             ]
         except Refused:
             return _ONE
-        # what cannot be a scale is none [C114]
+        # an impossible scale is none [C114]
         return Fraction(above, below) if above > 0 and below > 0 else _ONE
 
     async def _read_own(self, key: str) -> Fraction:
@@ -91,7 +91,7 @@ class Scales:
             key = model.key(role)
             if key and model[key].scale:
                 scales[model[key].scale] = factor
-        # what the drive itself tells counts
+        # what the drive itself has comes first
         scales |= self._own
         found = {
             parameter.key: scales[parameter.scale] * self._dialect.get(parameter.key, _ONE)

@@ -23,14 +23,14 @@ from nfo_sinus_driver.link import Address, Interrupted, LinkError, NoAnswer, Ref
 #: may have changed it meanwhile.
 _REWRITE_PERIOD = 5.0
 #: And this share of the drive's own time-out. Any message keeps that from striking over Classic
-#: [M0 §6.1.5], so the polls do; what counts over Modbus no manual says [M0 §5.3.3], and it might be
-#: what commands the drive.
+#: [M0 §6.1.5], so the polls do; what counts over Modbus no manual says [M0 §5.3.3]: it might be
+#: only what commands the drive.
 _KEEP_ALIVE_SHARE = 1 / 3
-#: A drive may be too busy for a set-point so long, s.
+#: How long a drive may be too busy for a set-point, s.
 _LONGEST_BUSY = 1.0
-#: The watch looks at least this often, so that a changed time-out takes effect, s.
+#: The age is checked at least this often, so that a changed time-out takes effect, s.
 _WATCH_PERIOD = 0.25
-#: How long it is known which set-points the drive had, s.
+#: How long the set-points that the drive had are remembered, s.
 _REMEMBERED = 10.0
 
 
@@ -50,7 +50,7 @@ _NONE = Request(NAN, -math.inf)
 
 
 class _Combining(enum.Enum):
-    """Whether the drive takes a set-point and tells its status in one transaction."""
+    """Whether the drive takes a set-point and returns its status in one transaction."""
 
     #: Not known, for none has been answered yet.
     UNTRIED = enum.auto()
@@ -61,21 +61,24 @@ class _Combining(enum.Enum):
 
 class Setpoint:
     """
-    What the motor is to follow while the drive is armed.
+    The set-point that the motor follows while the drive is enabled.
 
     :param refused: called when the drive refuses a set-point, with the reason.
-    :param told: called with the status word that a drive told with a set-point.
+    :param on_status: called with the status word that came with a set-point.
     """
 
     def __init__(
-        self, state: DriveState, refused: Callable[[Report], None], told: Callable[[Reply], None]
+        self,
+        state: DriveState,
+        refused: Callable[[Report], None],
+        on_status: Callable[[Reply], None],
     ) -> None:
         self._bus = state.bus
         self._unit = state.settings.address
         self._params = state.params
         self._state = state
         self._refused = refused
-        self._slot = LatestValue(self._make, self._done, told)
+        self._slot = LatestValue(self._make, self._done, on_status)
         self._combining = _Combining.GIVEN_UP
         #: The newest request; written by any thread, at once.
         self._request = _NONE
@@ -88,24 +91,24 @@ class Setpoint:
         #: once: that takes longer than all else that is done for it.
         self._encode = functools.lru_cache(maxsize=1)(self._encoded)
         self._following_since = math.inf
-        #: What stands in the drive and since when, by where; nothing where that is not known, and
-        #: minus infinity where it may be what was written since.
+        #: What the drive has and since when, by address; nothing where that is not known, and minus
+        #: infinity where it may have taken a later write.
         self._written: dict[Address, tuple[bytes, float]] = {}
-        self._watch: Task | None = None
+        self._age_task: Task | None = None
         self._expired = False
-        #: What was reported when none came for so long that the motor had to be stopped.
+        #: The report of the time-out, until set-points arrive again.
         self._timed_out: Report | None = None
         self._waits_for_answer = False
         self._busy_since = math.inf
-        self._clamp_told = False
-        #: The set-points that the drive may have had lately, and until when; newest last.
+        self._clamp_reported = False
+        #: The set-points that the drive may have had recently, and until when; newest last.
         self._had: list[tuple[float, float]] = []
         #: What the drive was last given, in the unit of the control mode.
         self.commanded = NAN
         self.clamped = False
 
     def request(self, value: float) -> None:
-        """Ask for a set-point, from any thread; it must be finite, and counts only while armed."""
+        """Request a set-point, from any thread; it must be finite, and counts only if enabled."""
         if not math.isfinite(value):
             raise ValueError(f'a set-point of {value} is no number')
         self._request = Request(value, self._bus.now())
@@ -134,27 +137,27 @@ class Setpoint:
 
     @property
     def timed_out(self) -> Report | None:
-        """What was reported when the motor was stopped for want of set-points, while it is."""
+        """The report of the set-point time-out, until set-points arrive again."""
         return self._timed_out
 
     @property
     def age(self) -> float:
-        """How long ago the newest valid set-point came in, s; NaN if none did since arming."""
+        """How long ago the newest valid set-point came, s; NaN if none did since the enable."""
         at = self._request.at
         return self._bus.now() - at if at > self._following_since else NAN
 
     def connected(self) -> None:
-        """Find out anew whether the drive tells its status with a set-point that it takes."""
+        """Find out anew whether the drive returns its status with a set-point."""
         able = self._params.writes_and_reads
         self._combining = _Combining.UNTRIED if able else _Combining.GIVEN_UP
 
     def follow(self, control_mode: str, limits: Limits, target: SetpointTarget | None) -> None:
         """
-        Follow set-points that come in from now on; 0 stands in the drive.
+        Follow set-points that come in from now on; the drive has 0 now.
 
         With a reference of the drive's own, none is followed and none is missed.
 
-        :param limits: what a set-point may be, in the unit of the control mode.
+        :param limits: those of a set-point, in the unit of the control mode.
         :param target: where set-points go; ``None``: none is followed.
         """
         self.control_mode = control_mode
@@ -170,32 +173,32 @@ class Setpoint:
                 self._written[address] = data, self._following_since
         self.commanded = 0.0 if follows else NAN
         self._had = [(0.0, math.inf)]
-        self.clamped = self._clamp_told = False
+        self.clamped = self._clamp_reported = False
         self._expired = False
         self._timed_out = None
         self._waits_for_answer = False
         self._busy_since = math.inf
         if follows:
-            self._watch = self._bus.spawn(self._watch_age())
+            self._age_task = self._bus.spawn(self._watch_age())
 
     def stop_following(self) -> None:
         """Follow nothing any more."""
         self._following_since = math.inf
         self.commanded = NAN
         self.clamped = False
-        if self._watch is not None:
-            self._bus.cancel(self._watch)
-        self._watch = None
+        if self._age_task is not None:
+            self._bus.cancel(self._age_task)
+        self._age_task = None
 
     def answered(self) -> None:
-        """Take note that the drive answers; write what could not be written before."""
+        """Note that the drive responds; write what could not be written before."""
         if self._waits_for_answer:
             self._waits_for_answer = False
             self._bus.request(self._slot)
 
     def least_since(self, at: float, *, reverse: bool) -> float:
         """
-        Return the slowest that the drive can have been told to turn since then, in one direction.
+        Return the lowest set-point that the drive can have had since then, in one direction.
 
         :param at: s of the clock of the bus; longer ago than 10 s is not known.
         """
@@ -210,7 +213,7 @@ class Setpoint:
         return min(values, default=0.0), max(values, default=0.0)
 
     def write_again(self) -> None:
-        """Write the set-point again that stands in the drive, for another may stand there."""
+        """Write the set-point again, for the drive may have another one."""
         self._written = {
             where: (data, since if self._is_once(where) else -math.inf)
             for where, (data, since) in self._written.items()
@@ -218,7 +221,7 @@ class Setpoint:
         self._bus.request(self._slot)
 
     def _may_have(self, value: float) -> None:
-        """Take note that the drive may have a set-point from now on; NaN: it is not known which."""
+        """Note that the drive may have a set-point from now on; NaN: it is not known which."""
         value = 0.0 if math.isnan(value) else value
         oldest = self._bus.now() - _REMEMBERED
         self._had = [one for one in self._had if one[1] >= oldest]
@@ -226,7 +229,7 @@ class Setpoint:
             self._had.append((value, math.inf))
 
     def _has(self, value: float) -> None:
-        """Take note that the drive has a set-point, and none of the others any more."""
+        """Note that the drive has a set-point, and none of the others any more."""
         self.commanded = value
         self._may_have(value)
         now = self._bus.now()
@@ -241,7 +244,7 @@ class Setpoint:
         return min(_REWRITE_PERIOD, timeout * _KEEP_ALIVE_SHARE) if timeout else _REWRITE_PERIOD
 
     def _is_old(self, at: float) -> bool:
-        """Tell whether a request waited so long for the line that it has expired meanwhile."""
+        """Return whether a request waited so long for the line that it has expired meanwhile."""
         timeout = self._state.settings.setpoint_timeout
         return bool(timeout) and self._bus.now() - at > timeout
 
@@ -250,15 +253,15 @@ class Setpoint:
         """
         The greatest set-point that it may be given, in either direction.
 
-        More than nominal only where a setting says so: what was meant in another unit, rpm for Hz,
-        must not race the motor.
+        More than nominal only where a setting says so: a value in the wrong unit, rpm for Hz, must
+        not race the motor.
         """
         limits = self._limits
         own = max(limits.most, -limits.least)
         return min(own, self._state.settings.setpoint_max or limits.nominal)
 
     def _counts(self, request: Request) -> bool:
-        """Tell whether a request came after the drive was enabled, and is still fresh."""
+        """Return whether a request came after the drive was enabled, and is still fresh."""
         return request.at > self._following_since and not self._is_old(request.at)
 
     def _encoded(self, value: float, before: float) -> tuple[tuple[Address, bytes], ...]:
@@ -267,7 +270,7 @@ class Setpoint:
         return tuple(map(self._params.target, self._target.writes(value, before)))
 
     def _due(self, request: Request) -> list[tuple[Address, bytes]]:
-        """Return what has to be written for a request: else other stands in the drive, or long."""
+        """Return what has to be written for a request: what the drive lacks, or has for long."""
         assert self._target is not None
         found: list[tuple[Address, bytes]] = []
         before_all = self._meant(self._standing)
@@ -277,14 +280,14 @@ class Setpoint:
         return found
 
     def _stands(self, address: Address, data: bytes) -> bool:
-        """Tell whether the same stands there, and need not be written again."""
+        """Return whether the drive has the same there, and it need not be written again."""
         before, since = self._written.get(address, (b'', -math.inf))
         if data != before or since == -math.inf:
             return False
         return self._is_once(address) or self._bus.now() - since < self._rewrite_period
 
     def _is_once(self, address: Address) -> bool:
-        """Tell whether what stands there is never written again."""
+        """Return whether what is written there is never written again."""
         return self._target is not None and self._keys[address] in self._target.written_once
 
     def _limited(self, request: Request) -> float:
@@ -294,13 +297,13 @@ class Setpoint:
         return max(-most, min(most, taken))
 
     def _accept(self, request: Request) -> float:
-        """Take note that a request counts; return what it is limited to."""
+        """Note that a request counts; return what it is limited to."""
         limited = self._limited(request)
         self.clamped = limited != request.value
         self._expired = False
         if self._timed_out is not None:
             self._timed_out = None
-            self._state.tell(Severity.INFO, Cause.SETPOINTS_AGAIN)
+            self._state.notify(Severity.INFO, Cause.SETPOINTS_AGAIN)
         return limited
 
     def _make(self) -> Transfer | None:
@@ -311,13 +314,13 @@ class Setpoint:
             self._waits_for_answer = True
             return None
         limited = self._accept(request)
-        if self.clamped and not self._clamp_told:
-            self._tell_limited(request.value, limited)
-        self._clamp_told = self.clamped
+        if self.clamped and not self._clamp_reported:
+            self._report_limited(request.value, limited)
+        self._clamp_reported = self.clamped
         due = self._due(request)
         if not due:
             return None
-        # of several writes each has a turn of its own, and a newer set-point comes between
+        # each of several writes has its own turn, and a newer set-point may come between
         address, data = due[0]
         self._may_have(self._meant({**self._standing, address: data}))
         by_itself = len(due) > 1 or self._is_once(address)
@@ -326,10 +329,10 @@ class Setpoint:
         status = self._params.address(self._state.word_key)
         return self._bus.write_and_read(self._unit, address, data, status, Priority.SETPOINT)
 
-    def _tell_limited(self, value: float, limited: float) -> None:
+    def _report_limited(self, value: float, limited: float) -> None:
         chosen = self._state.settings.setpoint_max
         nominal = chosen == 0 and abs(limited) == self._limits.nominal
-        self._state.tell(
+        self._state.notify(
             Severity.WARNING,
             Cause.SETPOINT_BEYOND_NOMINAL if nominal else Cause.SETPOINT_LIMITED,
             value=value,
@@ -348,14 +351,14 @@ class Setpoint:
             if len(self._keys) > 1:
                 self._bus.request(self._slot)
         elif transfer.source is not None and self._gives_up_combining(error):
-            # what is wrong with the set-point itself, if anything is, the drive says now
+            # if the set-point itself is wrong, the drive says so now
             self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
             assert transfer.data is not None
             asked = self._meant({**self._standing, transfer.address: transfer.data})
             self._refused(Report(Cause.SETPOINT_REFUSED, value=asked, error=str(error)))
         elif isinstance(error, Interrupted):
-            # no status need tell it: who is between stops the drive, and lets it not go on
+            # no status is needed: the PLC has stopped the drive, and does not let it go on
             self._refused(Report(Cause.LINE_FAILED, error=str(error)))
         else:
             self._missed(error, transfer.address)
@@ -368,16 +371,16 @@ class Setpoint:
 
     def _missed(self, error: LinkError, address: Address) -> None:
         """
-        Take note that what stands in the drive is unknown; it is written when it answers.
+        Note that the set-point in the drive is unknown; it is written when the drive responds.
 
-        :param address: of several, where alone that is not known: the old or the new.
+        :param address: of several, the only one where that is so: it has the old or the new.
         """
-        # the poll asks at once whether it is there, and has the time that a silent drive may
+        # the poll finds out at once whether it responds, in the time that a silent drive may
         # take from its neighbours
         self._params.count(error)
         self._waits_for_answer = True
         if len(self._keys) > 1 and address in self._written:
-            # the motor goes on in its direction, and need not be told to stop first
+            # the motor goes on in its direction, and need not be stopped first
             self._written[address] = self._written[address][0], -math.inf
         else:
             self._written = {}
@@ -385,10 +388,10 @@ class Setpoint:
 
     def _gives_up_combining(self, error: LinkError) -> bool:
         """
-        Tell whether a drive may have refused the transaction, and not the set-point in it.
+        Return whether a drive may have refused the transaction, and not the set-point in it.
 
-        One that has never taken any may refuse it in whatever words, or say nothing to a function
-        that it does not know.
+        One that has never taken any may refuse it with any code, or not answer a function that it
+        does not know.
         """
         untried = self._combining is _Combining.UNTRIED
         if not isinstance(error, Refused):
@@ -402,7 +405,7 @@ class Setpoint:
         return False
 
     def _may_be_busy(self, error: Refused) -> bool:
-        """Tell whether a refusal only means that the drive is busy, and not for long yet."""
+        """Return whether a refusal only means that the drive is busy, and not for long yet."""
         if error.code != Refused.BUSY:
             return False
         now = self._bus.now()
@@ -411,7 +414,7 @@ class Setpoint:
 
     @property
     def _standing(self) -> dict[Address, bytes]:
-        """What stands in the drive, as far as that is known."""
+        """The bytes that the drive has, as far as they are known."""
         return {address: data for address, (data, _) in self._written.items()}
 
     def _meant(self, standing: Mapping[Address, bytes]) -> float:
@@ -443,7 +446,7 @@ class Setpoint:
         if self._standing != dict(map(self._params.target, zero)):
             if self._timed_out is None:
                 self._timed_out = Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
-                self._state.tell(Severity.WARNING, self._timed_out)
+                self._state.notify(Severity.WARNING, self._timed_out)
             before = self._request
             for step in zero:
                 if self._request is not before:

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How one drive is to be treated."""
+"""The settings of one drive."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from nfo_sinus_driver.catalog.finding import find
 from nfo_sinus_driver.link import ADDRESSES, PROTOCOLS, LineProtocol
 from nfo_sinus_driver.setting import UNCONFIGURED, setting, settings_of
 
-#: The model that is found out at the first configure.
+#: The model is detected at the first configure.
 AUTO = 'auto'
 CLASSIC_DIALECTS = ('v2.03', 'v5.0')
 MONITOR = 'monitor'
@@ -63,7 +63,7 @@ def _control_modes(model: str, method: str = '') -> tuple[str, ...]:
 
 
 def _has_speed_mode(model: str, method: str) -> bool:
-    """Tell whether nothing but the settings tells Speed mode of a model, by a control method."""
+    """Return whether Speed mode of a model is known from the settings alone."""
     return model != AUTO and load_profile(model, method).speed_mode is not None
 
 
@@ -102,7 +102,7 @@ LAST_BLOCK = 0x10000 - BLOCK_SIZE
 #: How much longer than ``lost_after`` the drive's own time-out is, s: else it would stop the motor
 #: in noise that the driver waits out.
 DRIVE_TIMEOUT_MARGIN = 0.5
-#: ``drive_timeout`` where nothing is said of it: the usual one, as far as the drive has one.
+#: ``drive_timeout`` where none is given: the usual one, if the drive has one.
 AS_THE_DRIVE_CAN = -1.0
 _USUAL_DRIVE_TIMEOUT = 2.0
 
@@ -110,7 +110,7 @@ _USUAL_DRIVE_TIMEOUT = 2.0
 @dataclass(frozen=True)
 class DriveSettings:
     """
-    How one drive is to be treated; the fields are parameters of its node.
+    The settings of one drive; the fields are parameters of its node.
 
     :raises ValueError: a field that makes no sense; the message says what would.
     """
@@ -195,7 +195,7 @@ class DriveSettings:
         0.0,
         'set-points beyond it are clamped, in both directions, in the unit of the control mode',
         0, 32767,
-        zero="what is nominal for the motor, or the drive's own limit where it does not tell that",
+        zero="what is nominal for the motor, or the drive's own limit where that is not known",
     )
     expected_control_mode: str = setting(
         '',
@@ -205,7 +205,7 @@ class DriveSettings:
     nominal_speed: float = setting(
         0.0,
         'with control_method telegram1 and expected_control_mode Speed: the nominal speed of the '
-        'motor, which the telegram does not tell',
+        'motor, which the telegram does not have',
         0, 30000, unit='rpm', zero='not given', change=UNCONFIGURED,
     )
     drive_timeout: float = setting(
@@ -229,7 +229,7 @@ class DriveSettings:
     )
     frequency_scale: float = setting(
         0.1,
-        'what one count of a frequency is, where the drive has a scale that no bus tells [C16]; '
+        'what one count of a frequency is, where the drive has a scale that cannot be read [C16]; '
         'one that is not that of the drive makes every frequency wrong',
         1e-6, 1e6, unit='Hz', change=UNCONFIGURED,
     )
@@ -259,7 +259,7 @@ class DriveSettings:
 
     @property
     def scales(self) -> Mapping[Role, float]:
-        """The scales that no bus tells, by the role of what is measured in them."""
+        """The scales that cannot be read, by the role of what is measured in them."""
         return {
             Role.ACTUAL_FREQUENCY: self.frequency_scale,
             Role.ACTUAL_TORQUE: self.torque_scale,
@@ -268,7 +268,7 @@ class DriveSettings:
 
     @functools.cached_property
     def telegram_speed(self) -> float:
-        """The nominal speed, rpm, where a telegram has speeds for frequencies; 0: it has not."""
+        """The nominal speed, rpm, where a telegram has speeds for frequencies; else 0."""
         in_speed = self.expected_control_mode == 'Speed'
         return self.nominal_speed if in_speed and _has_speed_mode(self.model, self.method) else 0.0
 
@@ -286,7 +286,7 @@ class DriveSettings:
 
     @property
     def method_class(self) -> type[ControlMethod]:
-        """How it is commanded; how it would be, where it is only watched."""
+        """Its control method; the one it would have, where it is only monitored."""
         methods = load_profile(self.model).methods
         return methods.get(self.method) or next(iter(methods.values()))
 
@@ -355,11 +355,11 @@ class DriveSettings:
             raise ValueError(
                 f'expected_control_mode Speed with control_method {self.method}: set '
                 'nominal_speed first, in rpm, such as 1500 of a four-pole motor; the telegram '
-                'does not tell it'
+                'does not have it'
             )
 
     def _model_of_family(self) -> str:
-        """Return the model that :attr:`family` means; it is loaded, so that it is right."""
+        """Return the model that :attr:`family` means; it is loaded to check it."""
         found = find(self.family)
         if self.model not in (usual_family(), found):
             raise ValueError(
@@ -382,7 +382,7 @@ class DriveSettings:
         return 0.0
 
     def _least_drive_timeout(self, step: Fraction, usual: float = 0.0) -> float:
-        """Return the least in steps of the drive that noise does not reach, or a usual one, s."""
+        """Return the least time-out that noise does not reach, at least ``usual``, s."""
         least = max(usual, self.lost_after + DRIVE_TIMEOUT_MARGIN)
         return float(math.ceil((least - 1e-7) / step) * step)
 

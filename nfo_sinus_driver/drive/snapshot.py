@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a drive tells the outside: immutable pictures of one moment."""
+"""What a drive publishes: immutable snapshots of one moment."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NAN = math.nan
 
 class Measured(NamedTuple):
     """
-    A measured value; NaN where the drive tells none.
+    A measured value; NaN where there is none.
 
     :ivar at: when it arrived, s of the clock of the bus; minus infinity before the first.
     """
@@ -47,7 +47,7 @@ class Snapshot:
     :ivar frequency: Hz, as last measured, which was at ``frequency_at``.
     :ivar speed: rpm, likewise.
     :ivar text: the inverter status as on the display.
-    :ivar kind: its kind; the fault bit has the last word [C95].
+    :ivar kind: its kind; the fault bit decides [C95].
     :ivar stop: why the motor was stopped last; ``None`` before the first time, and while it is
         enabled and set-points arrive.
     """
@@ -96,7 +96,7 @@ class Telemetry:
 
 
 class Listener(Protocol):
-    """Who wants to know; called by the bus worker, so it must not keep it waiting."""
+    """Receives what is published; called by the bus worker, which it must not keep waiting."""
 
     def on_snapshot(self, snapshot: Snapshot) -> None:
         """Take the result of a poll."""
@@ -105,7 +105,7 @@ class Listener(Protocol):
         """Take measured values."""
 
     def on_parameters(self, keys: Collection[str]) -> None:
-        """Take note that these settings of the drive have new values."""
+        """Note that these settings of the drive have new values."""
 
     def on_log_entry(self, entry: LogEntry) -> None:
         """Take a new entry of the drive's error log."""
@@ -121,10 +121,10 @@ class LogEntry:
 
     :ivar code: as the inverter status has it.
     :ivar text: as on the display.
-    :ivar operating_time: the drive's operating time when it happened, h; NaN if it does not tell.
-    :ivar age: operating hours ago; NaN if the drive does not tell.
-    :ivar at: when it happened, s of the clock of the bus, as exactly as that is known: it was seen
-        to come, or the drive is known to have had power ever since; else NaN.
+    :ivar operating_time: the drive's operating time when it happened, h; NaN if unknown.
+    :ivar age: operating hours ago; NaN if unknown.
+    :ivar at: when it happened, s of the clock of the bus, if it came while the log was watched, or
+        the drive has had power ever since; else NaN.
     :ivar readings: what the drive has kept of that moment, such as ``DC link 540 V``.
     :ivar latest: it cannot have been later, s of the clock of the bus; NaN if there is no age.
     :ivar now: the clock of the bus.
@@ -155,7 +155,7 @@ class LogEntry:
     def __str__(self) -> str:
         if math.isnan(self.operating_time):
             return f'{self.code} {self.full_text}'
-        # coarser than a wall time that is known
+        # a wall time that is known is more exact
         known = math.isnan(self.age) or not math.isnan(self.at)
         age = '' if known else f', {self.age:.1f} operating hours ago'
         wall_time = f' ({self.wall_time})' if self.wall_time else ''
@@ -166,6 +166,6 @@ class LogEntry:
             # as the computer has it now: its time may have been set since
             moment = datetime.fromtimestamp(datetime.now().timestamp() - self.now() + at)
         except (ValueError, OverflowError, OSError):
-            # no calendar goes back so far: the drive tells nonsense
+            # no calendar goes back so far: the operating time is nonsense
             return ''
         return moment.isoformat(' ', 'minutes')

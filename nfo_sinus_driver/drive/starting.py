@@ -18,18 +18,18 @@ from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError
 from nfo_sinus_driver.link import Refused
 
-#: How long all that a start waits for may take together, s, what the drive itself waits for aside.
+#: How long the steps of a start may take together, s, delays of the drive itself aside.
 _START_TIMEOUT = 4.0
 
-#: Does what has to be done first.
+#: Runs before the motor is energised.
 Prepare = Callable[[], Awaitable[None]]
 
 
 class _StepTime:
     """
-    How long a step of a start may take, with what the drive itself waits for.
+    The time for a step of a start, with the delays of the drive itself.
 
-    :param deadline: when it would have to be over without that, s of the clock of the bus.
+    :param deadline: when it has to be over without them, s of the clock of the bus.
     """
 
     def __init__(self, state: DriveState, deadline: float) -> None:
@@ -40,15 +40,15 @@ class _StepTime:
 
     @property
     def added(self) -> float:
-        """How long the drive waits itself, as far as that was asked for, s."""
+        """The delays of the drive itself, as far as they were read, s."""
         return (self._delay or 0.0) + (self._braking or 0.0)
 
     async def is_over(self, status: InverterStatus) -> bool:
-        """Tell whether a drive with this status has had its time."""
+        """Return whether the time of a drive with this status is over."""
         if self._delay is None and status.means(Meaning.START_DELAY):
             self._delay = await self._state.read_start_delay()
         if self._braking is None and self._is_late(status):
-            # what it shows while it brakes the motor before the start is not printed [C122]
+            # no manual says what it shows while it brakes the motor before the start [C122]
             self._braking = await self._state.read_start_braking()
         return self._is_late(status)
 
@@ -70,9 +70,9 @@ class StartSequence:
 
     async def check(self) -> tuple[str, Limits]:
         """
-        See to it that the motor may be started, writing nothing.
+        Make sure that the motor may be started, writing nothing.
 
-        :returns: the control mode, and what its set-points may be.
+        :returns: the control mode, and the limits of its set-points.
         """
         state = self._state
         status = await state.read_status(Priority.SERVICE)
@@ -87,15 +87,15 @@ class StartSequence:
                 Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
             )
         await self._method.require_startable()
-        # it may have been changed since the drive was connected, at its keypad
+        # the keypad may have changed it since the drive was connected
         await read_scales(state)
         return control_mode, await read_limits(state, control_mode)
 
     async def start(self, control_mode: str, prepare: Prepare) -> None:
         """
-        Take control and run at set-point 0; after an error a run command may stand all the same.
+        Take control and run at set-point 0; even after an error a run command may be active.
 
-        :param prepare: does what has to be done before a run command, once the bus has control.
+        :param prepare: runs before the run command, once the bus has control.
         """
         await self.take_control(control_mode)
         await self._await_status(lambda now: now.from_bus)
@@ -131,10 +131,10 @@ class StartSequence:
 
     async def take_control(self, control_mode: str) -> None:
         """
-        Put the drive under bus control, with no run command standing.
+        Put the drive under bus control, with no run command active.
 
-        The set-point of an earlier session is removed before, where the drive lets us: one that has
-        kept its run command, too, would turn the motor at once.
+        The set-point of an earlier session is removed first, if the drive allows it: with a run
+        command that is left, too, it would turn the motor at once.
         """
         self._deadline = self._state.bus.now() + _START_TIMEOUT
         if not self._state.nameplate.is_older:

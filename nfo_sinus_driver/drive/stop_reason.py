@@ -78,7 +78,7 @@ _CAUSES: Mapping[StopReason, tuple[Cause, ...]] = {
     StopReason.NOT_ENABLED: (Cause.RUNS_UNASKED, Cause.FOUND_RUNNING),
 }
 _REASON_OF = {cause: reason for reason, causes in _CAUSES.items() for cause in causes}
-#: Faults by which a drive says that it has heard nothing for its own time-out.
+#: The faults of a drive after its own communication time-out.
 _OF_THE_LINE = (Meaning.SERIAL_FAILURE, Meaning.FIELDBUS_FAILURE)
 
 

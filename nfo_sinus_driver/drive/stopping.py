@@ -20,17 +20,17 @@ from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
 
-#: How often a stop is written again that was heard and is not confirmed, s.
+#: How often a stop that was answered and is not confirmed is written again, s.
 _RETRY_PERIOD = 0.2
-#: How often one is that a lost drive does not hear, for its neighbours' sake, s.
+#: How often one to a lost drive is, to spare its neighbours, s.
 _LOST_RETRY_PERIOD = 1.0
-#: How often it is said that a stop is not confirmed, s.
+#: How often an unconfirmed stop is reported, s.
 _COMPLAINT_PERIOD = 5.0
-#: Each time it is said after a longer while, up to this, s.
+#: The interval grows each time, up to this, s.
 _LONGEST_COMPLAINT_PERIOD = 60.0
-#: After so many stops in a row that got no answer it is looked whether the drive answers others.
-_UNHEARD_BEFORE_FORCE = 4
-#: The slowest ramp, of 2000 s, shows in the frequency by then, s, in whatever steps that is told.
+#: After so many stops in a row without an answer the drive is tried with other requests.
+_UNANSWERED_BEFORE_FORCE = 4
+#: The slowest ramp, of 2000 s, shows in the frequency by then, s, however coarse that is.
 _RAMP_SHOWS_BY = 7.0
 _NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
 
@@ -38,18 +38,18 @@ _NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
 class _Outcome(enum.Enum):
     CONFIRMED = enum.auto()
     #: It is unknown whether the drive has received it: it is repeated at once, for a while.
-    UNHEARD = enum.auto()
+    UNANSWERED = enum.auto()
     #: The drive was too busy for it, and may take it the next moment.
     BUSY = enum.auto()
-    #: It was heard, or it is known that it was not sent.
+    #: It was answered, or it is known that it was not sent.
     UNCONFIRMED = enum.auto()
-    #: A fault keeps the motor still, and the drive from taking the stop until it is over.
+    #: A fault keeps the motor still, and the drive refuses the stop until it is over.
     BLOCKED_BY_FAULT = enum.auto()
 
 
 class StopSequence:
     """
-    Removes the run command of one drive; there is one for a drive, shared by all reasons.
+    Removes the run command of one drive; all reasons to stop share it.
 
     It begins with the event ``STOP``, and ends with ``STOPPED``. After each attempt before it
     dispatches ``FAULT_BLOCKS`` or ``FAULT_OVER``.
@@ -60,36 +60,36 @@ class StopSequence:
         self._state = state
         self._method = method
         self._control = control
-        #: What removes the run command, while there may be one that no client wants any more.
+        #: The task that removes the run command, until that is confirmed.
         self._task: Task | None = None
-        #: How many operations are on their way that stop the motor by other means.
+        #: How many operations are stopping the motor by other means.
         self._external = 0
         #: When the last attempt ended that counts; minus infinity before the first.
         self._tried_at = -math.inf
-        #: How often there was a new reason; what an earlier attempt shows says nothing of it.
+        #: How often there was a new reason; an earlier attempt does not confirm it.
         self._reasons = 0
         #: Why it has not been confirmed yet.
         self._unconfirmed = _NO_ANSWER_YET
-        #: When the drive had been told to stop for the reasons that there are.
-        self._told_at = math.inf
-        #: From when on a drive that has still not confirmed it is complained of.
+        #: When the stop for the present reasons had been sent.
+        self._sent_at = math.inf
+        #: From when on an unconfirmed stop is reported.
         self._due = 0.0
-        #: From when on one that has taken it and does not confirm it is stopped by force.
+        #: From when on a drive that has taken it and does not confirm it is stopped by force.
         self._force_at = math.inf
         #: How many attempts in a row the drive has refused, and how many got no answer.
-        self._refusals = self._unheard = 0
+        self._refusals = self._unanswered = 0
         #: The last stop that was confirmed was one by force.
         self.forced = False
 
     @property
     def overdue(self) -> bool:
-        """A stop is not confirmed although there was time; no fault keeps the motor still."""
+        """A stop was not confirmed in time, and no fault keeps the motor still."""
         waiting = self._task is not None and not self._control.blocked
         return waiting and self._bus.now() >= self._due
 
     @contextlib.contextmanager
     def external_stop(self, why: Report) -> Iterator[None]:
-        """Be stopping while an operation stops the motor by other means."""
+        """Keep the state of a stop while an operation stops the motor by other means."""
         self._external += 1
         self._control.dispatch(ControlEvent.STOP, why)
         try:
@@ -100,12 +100,12 @@ class StopSequence:
 
     def start(self, why: Report | None = None) -> None:
         """
-        Remove the run command, again and again until the drive says that it stops.
+        Remove the run command, again and again until the drive confirms that it stops.
 
-        Where that is going on already nothing has to be added: no client can start the motor
-        meanwhile. Only what a fault has blocked is tried once more, for it may be over by now.
+        If that is going on already, nothing has to be added: no client can start the motor
+        meanwhile. Only a stop that a fault has blocked is tried once more: the fault may be over.
 
-        :param why: needed where something may drive the motor.
+        :param why: needed where something may run the motor.
         """
         self._control.dispatch(ControlEvent.STOP, why)
         if self._control.blocked and self._bus.now() > self._tried_at + _RETRY_PERIOD:
@@ -113,27 +113,27 @@ class StopSequence:
         if self._task is None:
             self._tried_at = -math.inf
             self._unconfirmed = _NO_ANSWER_YET
-            self._told_at = self._force_at = math.inf
-            self._refusals = self._unheard = 0
+            self._sent_at = self._force_at = math.inf
+            self._refusals = self._unanswered = 0
             self.forced = False
             self._due = self._bus.now() + drive_state.TIMEOUT
             task = self._bus.spawn(self._keep_trying())
             self._task = None if task.future.done() else task
 
     def restart(self, why: Report | None = None) -> None:
-        """Start, or try again at once: what attempts show that have begun counts no more."""
+        """Start, or try again at once: an attempt that has begun no longer counts."""
         if self._task is None:
             self.start(why)
         else:
             self._tried_at = -math.inf
-            self._told_at = math.inf
+            self._sent_at = math.inf
             self._reasons += 1
             self._control.dispatch(ControlEvent.FAULT_OVER)
             self._bus.wake(self._task)
 
     async def wait_confirmed(self, patience: float | None = None) -> None:
         """
-        Wait until the drive has confirmed that it stops, or stands because of a fault.
+        Wait until the drive has confirmed that it stops, or a fault keeps the motor still.
 
         :param patience: how long to wait, s; by default not for a drive that is lost. Within it the
             motor is stopped by force, if need be.
@@ -146,7 +146,7 @@ class StopSequence:
         while task is not None and not await self._bus.join(task, drive_state.LOOK_PERIOD):
             if self._control.blocked:
                 return
-            # a drive that is not there keeps others waiting, and the answer would be the same
+            # waiting for a lost drive keeps the others waiting, with the same result
             tried = self._tried_at > -math.inf
             lost = patience is None and not self._state.connected and tried
             if lost or self._bus.now() > deadline:
@@ -171,10 +171,10 @@ class StopSequence:
                 why = self._unconfirmed
                 if stands:
                     standing = self._state.report(Cause.CANNOT_STOP_BUT_STANDS, why=why)
-                    self._state.tell(Severity.WARNING, standing)
+                    self._state.notify(Severity.WARNING, standing)
                 else:
                     by = self._state.model.profile.enable_input
-                    self._state.tell(
+                    self._state.notify(
                         Severity.ERROR, Cause.CANNOT_STOP, why=why, enable_input=by
                     )
                 stood = stands
@@ -182,11 +182,11 @@ class StopSequence:
         self._task = None
         self._report_end()
         if pause:
-            self._state.tell(Severity.INFO, self._state.report(Cause.STOP_CONFIRMED_LATE))
+            self._state.notify(Severity.INFO, self._state.report(Cause.STOP_CONFIRMED_LATE))
 
     @property
     def _stands(self) -> bool:
-        """The drive has just shown that the motor stands, and no run command."""
+        """The drive has just shown that the motor stands still, and no run command."""
         status = self._state.status
         if status is None or self._bus.now() - status.at > _RETRY_PERIOD:
             return False
@@ -195,7 +195,7 @@ class StopSequence:
         return shows and not (status.driven or status.runs)
 
     async def _fault_gone(self) -> None:
-        """Wait until the drive may take commands again; the polls tell, and cost nothing more."""
+        """Wait until the drive may take commands again; the polls show it."""
         while self._control.blocked:
             await self._bus.sleep(_RETRY_PERIOD)
             status = self._state.status
@@ -205,7 +205,7 @@ class StopSequence:
             if status is not None and not status.faulted:
                 if status.runs_by_bus:
                     started = self._state.report(Cause.STARTED_AFTER_FAULT)
-                    self._state.tell(Severity.WARNING, started)
+                    self._state.notify(Severity.WARNING, started)
                 return
 
     async def _rest(self, outcome: _Outcome) -> None:
@@ -213,11 +213,11 @@ class StopSequence:
         if not self._state.connected:
             await self._bus.sleep(_LOST_RETRY_PERIOD)
         elif self._is_lost or self._bus.now() >= self._due:
-            # what helps neither at once nor in a while must not keep the line from all others
+            # tries that have not helped so far must not keep the line from all others
             await self._bus.sleep(_RETRY_PERIOD)
         elif outcome is _Outcome.BUSY:
             await self._bus.sleep(drive_state.LOOK_PERIOD)
-        elif outcome is not _Outcome.UNHEARD:
+        elif outcome is not _Outcome.UNANSWERED:
             await self._bus.sleep(_RETRY_PERIOD)
 
     @property
@@ -232,13 +232,13 @@ class StopSequence:
         try:
             outcome = await self._try_once(before)
         except (NoAnswer, DamagedAnswer) as error:
-            outcome, self._unconfirmed = _Outcome.UNHEARD, report_of(error)
+            outcome, self._unconfirmed = _Outcome.UNANSWERED, report_of(error)
         except Exception as error:
-            # even a mistake of ours must not end the trying
+            # even an error in the driver must not end the tries
             outcome, self._unconfirmed = _Outcome.UNCONFIRMED, report_of(error)
         if self._reasons > reasons:
-            outcome, self._unconfirmed = _Outcome.UNHEARD, _NO_ANSWER_YET
-            self._told_at = math.inf
+            outcome, self._unconfirmed = _Outcome.UNANSWERED, _NO_ANSWER_YET
+            self._sent_at = math.inf
         self._tried_at = self._bus.now()
         blocked = outcome is _Outcome.BLOCKED_BY_FAULT
         self._control.dispatch(ControlEvent.FAULT_BLOCKS if blocked else ControlEvent.FAULT_OVER)
@@ -254,8 +254,8 @@ class StopSequence:
         failure: LinkError | None = None
         try:
             await self._method.stop(control_mode)
-            self._told_at = min(self._told_at, self._bus.now())
-            self._refusals = self._unheard = 0
+            self._sent_at = min(self._sent_at, self._bus.now())
+            self._refusals = self._unanswered = 0
         except Refused as error:
             if error.code == Refused.BUSY and self._bus.now() < self._due:
                 self._unconfirmed = report_of(error)
@@ -263,23 +263,23 @@ class StopSequence:
             failure = error
             self._refusals += 1
         except (NoAnswer, DamagedAnswer) as error:
-            self._unheard += 1
-            # among late answers a refusal is not believed, until something else was answered
-            if isinstance(error, DamagedAnswer) and before is _Outcome.UNHEARD:
+            self._unanswered += 1
+            # among late answers a refusal is not believed until another request was answered
+            if isinstance(error, DamagedAnswer) and before is _Outcome.UNANSWERED:
                 await self._state.read_status(Priority.LOOK, retry=False)
-            if self._unheard < _UNHEARD_BEFORE_FORCE:
+            if self._unanswered < _UNANSWERED_BEFORE_FORCE:
                 raise
             failure = error
-        # one that answers nothing at all ends it here
+        # a drive that does not respond at all ends it here
         status = await self._state.read_status(Priority.LOOK, retry=False)
         if failure is None:
-            status = await self._newer(status, reasons, self._told_at)
+            status = await self._newer(status, reasons, self._sent_at)
         if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
             if await self._method.remove(control_mode) is Removal.COMMAND:
                 return _Outcome.CONFIRMED
             self._unconfirmed = report_of(failure)
             return _Outcome.BLOCKED_BY_FAULT
-        unconfirmed = self._why_not(status, failure)
+        unconfirmed = self._why_unconfirmed(status, failure)
         if unconfirmed is not None and self._needs_force(status, failure):
             unconfirmed = await self._force(control_mode, reasons, unconfirmed)
         if unconfirmed is None:
@@ -288,56 +288,56 @@ class StopSequence:
         return _Outcome.UNCONFIRMED
 
     def _needs_force(self, status: InverterStatus, failure: LinkError | None) -> bool:
-        """Tell whether an ordinary stop will not do: refused again, ignored, or without effect."""
+        """Return whether an ordinary stop does not do: refused again, ignored or in vain."""
         if status.local:
             return False
         if isinstance(failure, Refused):
-            # once may have been a moment at which it could not
+            # the first refusal may have been one of the moment
             return self._refusals > 1 and (status.from_bus or status.driven)
         if failure is not None:
             return True
-        shows_at = min(self._told_at + _RAMP_SHOWS_BY, self._force_at)
-        # what a PLC has from before says nothing of a motor that may well be ramping down
-        return status.at > self._told_at and self._bus.now() >= shows_at
+        shows_at = min(self._sent_at + _RAMP_SHOWS_BY, self._force_at)
+        # a status from before, kept by a PLC, does not show whether the motor ramps down
+        return status.at > self._sent_at and self._bus.now() >= shows_at
 
     async def _force(self, control_mode: str, reasons: int, why: Report) -> Report | None:
-        """Stop by all that is left [C126]; return what keeps that from being confirmed."""
+        """Stop by every means left [C126]; return why that is not confirmed."""
         obeyed = await self._method.force_stop(control_mode)
-        told_at = self._bus.now()
+        sent_at = self._bus.now()
         status = await self._state.read_status(Priority.LOOK, retry=False)
         if not obeyed:
             return why
-        self._told_at = min(self._told_at, told_at)
-        unconfirmed = self._why_not(await self._newer(status, reasons, told_at), None)
+        self._sent_at = min(self._sent_at, sent_at)
+        unconfirmed = self._why_unconfirmed(await self._newer(status, reasons, sent_at), None)
         if unconfirmed is None:
             self.forced = True
-            self._state.tell(Severity.WARNING, self._state.report(Cause.STOP_FORCED, why=why))
+            self._state.notify(Severity.WARNING, self._state.report(Cause.STOP_FORCED, why=why))
         return unconfirmed
 
-    async def _newer(self, status: InverterStatus, reasons: int, told_at: float) -> InverterStatus:
+    async def _newer(self, status: InverterStatus, reasons: int, sent_at: float) -> InverterStatus:
         """
-        Look until a status is from after the stop: a PLC shows for a while what was before.
+        Read until a status is from after the stop: a PLC shows the one before for a while.
 
-        :param reasons: those that the stop was for; with a new one it has to be written again.
+        :param reasons: their number when it was written; with a new one it has to be written again.
         """
         until = self._bus.now() + _RETRY_PERIOD
-        while self._reasons == reasons and status.at <= told_at:
+        while self._reasons == reasons and status.at <= sent_at:
             if self._bus.now() > until:
                 break
             await self._bus.sleep(drive_state.LOOK_PERIOD)
             status = await self._state.read_status(Priority.LOOK, retry=False)
         return status
 
-    def _why_not(self, status: InverterStatus, refusal: LinkError | None) -> Report | None:
-        """Return what keeps a stop from being confirmed; ``None`` if nothing does."""
+    def _why_unconfirmed(self, status: InverterStatus, refusal: LinkError | None) -> Report | None:
+        """Return why a stop is not confirmed; ``None`` if it is."""
         if status.tuning and refusal:
             return self._state.report(Cause.TUNING_REFUSES, error=str(refusal))
         if status.tuning:
             return self._state.report(Cause.TUNING_ENERGISES)
         if refusal and not status.local:
             return report_of(refusal)
-        if refusal is None and status.at < self._told_at:
-            # a PLC whose data stand still goes on showing what was before
+        if refusal is None and status.at < self._sent_at:
+            # a PLC with old data goes on showing the status before
             return _NO_ANSWER_YET
-        keeps_running = status.keeps_running_since(self._told_at)
+        keeps_running = status.keeps_running_since(self._sent_at)
         return self._state.report(Cause.DRIVE_SAYS) if keeps_running else None

@@ -34,10 +34,10 @@ SLOW = (
     Role.TOTAL_ENERGY,
 )
 
-#: What a drive answers that does not have a parameter, and how often until it is believed.
+#: How a drive answers that does not have a parameter, and how often until that is believed.
 _NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
 _DENIALS = 3
-#: How often the settings are looked at while telemetry is turned off, s.
+#: How often the settings are checked while telemetry is turned off, s.
 _OFF_PERIOD = 0.5
 
 
@@ -45,12 +45,12 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
     """
     Measure at ``telemetry_rate`` until cancelled; a value the drive does not have stays NaN.
 
-    One that it refuses is NaN until it is asked again: it may only have been busy, or tuning.
+    One that it refuses is NaN until the next reading: it may only have been busy, or tuning.
 
-    :param yields: tells whether the line is left to others just now.
+    :param yields: whether the line is left to another drive now.
     """
     key_of = state.model.key
-    #: By key: what was measured, and how often in a row the drive said that it has none of it.
+    #: By key: what was measured, and how often in a row the drive has denied it.
     values: dict[str, float] = {}
     denied: Counter[str] = Counter()
     # the first time all are read, so that the first message is whole
@@ -67,7 +67,7 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
             denied[key] = 0
         except Refused as error:
             values[key] = NAN
-            # over Classic it says so of everything while it tunes
+            # over Classic it refuses everything so while it tunes
             denied[key] += error.code in _NONE_SUCH and not state.tuning
 
     while True:
@@ -89,7 +89,7 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
                 state.note_measured(by_key)
                 state.listener.on_telemetry(Telemetry(state.bus.now(), by_role, by_key))
             except LinkError:
-                # the poll says so if the drive is lost
+                # the poll reports it if the drive is lost
                 state.missed()
                 values.update(dict.fromkeys((*map(key_of, FAST), *state.measured_keys), NAN))
         period = 1 / rate if rate else _OFF_PERIOD

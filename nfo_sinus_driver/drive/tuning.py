@@ -19,10 +19,10 @@ from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.starting import Prepare
 
-#: How often the drive is asked how far it is; the polls go on beside it, s.
+#: How often the status is read; the polls go on beside it, s.
 _LOOK_PERIOD = 0.05
-#: How often it is told how far it is while nothing changes, s.
-_TELL_PERIOD = 0.5
+#: How often progress is reported while nothing changes, s.
+_REPORT_PERIOD = 0.5
 #: Longer than any tuning takes; a drive that is still at it then is stopped, s.
 _LONGEST = 900.0
 #: What the motor plate says; a drive cannot tune without.
@@ -35,11 +35,11 @@ _PLATE = (
     Role.NOMINAL_POWER_FACTOR,
 )
 
-#: Standby, where nothing else tells how it ended: a lost RUN input ends in it, too, and a short
-#: procedure may be over before the first look. What was measured decides.
+#: In standby the status does not show how it ended: a lost RUN input leads there, too, and a short
+#: procedure may be over before the first reading. What was measured decides.
 _UNDECIDED = (Cause.TUNING_WITHOUT_RESULT, Cause.TUNING_DOES_NOT_BEGIN)
 
-#: Told of the status and of how long the procedure takes already, s; on the bus.
+#: Called on the bus with the status and the time elapsed, s.
 Progress = Callable[[InverterStatus, float], None]
 
 
@@ -50,7 +50,7 @@ class Tuned:
 
     :ivar success: the drive says that it has finished.
     :ivar how: what the drive says, or what went wrong.
-    :ivar changes: the parameters that are others now, whether it has finished or not.
+    :ivar changes: the parameters that have changed, whether it has finished or not.
     """
 
     success: bool
@@ -59,7 +59,7 @@ class Tuned:
 
     @property
     def report(self) -> Report:
-        """All of it."""
+        """How it ended, with the changes."""
         if not self.success and not self.changes:
             return self.how
         return Report(Cause.TUNING_CHANGED, how=self.how, changes=self.changes)
@@ -67,9 +67,9 @@ class Tuned:
 
 class Tuning:
     """
-    Has one drive tune; used on the bus alone.
+    Tunes one drive; used on the bus alone.
 
-    :param prepare: does what has to be done before a motor is energised.
+    :param prepare: runs before the motor is energised.
     """
 
     def __init__(
@@ -88,31 +88,31 @@ class Tuning:
         """
         Have the drive tune, wait for the end, and read what it changed.
 
-        The motor gets current and may turn, whatever the set-point is.
+        The motor is energised and may turn, whatever the set-point is.
 
-        :param progress: told whenever the inverter status changes, and twice a second.
+        :param progress: called whenever the inverter status changes, and twice a second.
         :raises DriveError: it was not begun, and why; or its end is unknown.
         """
         what = procedure.value
-        # from here on a stop is one of the tuning, too
+        # from here on a stop ends the tuning, too
         with self._procedures.begun(procedure) as access:
             await self._require_motor_plate(what)
             if not self._state.nameplate.is_older:
-                # that takes settings under bus control alone, which only an enable has
+                # older firmware takes settings under bus control alone, which only an enable has
                 await self._prepare()
             motor = self._state.model.group_of(Role.NOMINAL_POWER)
             keys = [key for key in self._parameters.available() if key in motor]
             async with self._parameters.left_to_the_drive(keys) as changes:
                 ended = Report(Cause.PROCEDURE_ENDED, what=what)
                 async with self._procedures.in_standby(access, ended):
-                    self._state.tell(Severity.INFO, Cause.TUNING_BEGINS, what=what)
+                    self._state.notify(Severity.INFO, Cause.TUNING_BEGINS, what=what)
                     await self._procedures.command(access, procedure)
                     how = await self._outcome(procedure, access, progress)
                 changed = await changes()
                 if changed and how.cause in _UNDECIDED:
                     how = self._state.report(Cause.TUNED, what=what)
                 result = Tuned(how.cause is Cause.TUNED, how, changed)
-        self._state.tell(Severity.INFO if result.success else Severity.ERROR, result.report)
+        self._state.notify(Severity.INFO if result.success else Severity.ERROR, result.report)
         return result
 
     async def _require_motor_plate(self, what: str) -> None:
@@ -127,12 +127,12 @@ class Tuning:
         state, what = self._state, procedure.value
         started = state.bus.now()
         begun = False
-        told_code, told_at = -1, 0.0
+        reported_code, reported_at = -1, 0.0
         while True:
             status = await state.read_status(Priority.POLL)
             elapsed = state.bus.now() - started
-            if status.code != told_code or elapsed > told_at + _TELL_PERIOD:
-                told_code, told_at = status.code, elapsed
+            if status.code != reported_code or elapsed > reported_at + _REPORT_PERIOD:
+                reported_code, reported_at = status.code, elapsed
                 progress(status, elapsed)
             if status.faulted:
                 return state.report(Cause.TUNING_FAILED, what=what, fault=status.listed)

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Bytes on one line, one transaction at a time. No ROS, no knowledge of drives or parameters."""
+"""Transactions on one line, one at a time. No ROS, no knowledge of drives or parameters."""
 
 from nfo_sinus_driver.link.interface import (
     BY_MAILBOX,

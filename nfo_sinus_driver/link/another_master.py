@@ -20,7 +20,7 @@ from nfo_sinus_driver.link.modbus_link import (
 )
 from nfo_sinus_driver.link.modbus_pdu import REFUSAL_LENGTH
 
-#: How often a read is asked while another master asks at the same time.
+#: How often a read is sent while another master sends at the same time.
 TRIES = 3
 
 ANOTHER_MASTER = (
@@ -33,27 +33,27 @@ _ANOTHER_MODBUS_MASTER = (
 )
 DOUBTFUL = 'another master asked at the same time'
 
-#: How long another master is reckoned with after it was heard, s.
-_RECKONED = 60.0
+#: How long another master counts as present after a request of it, s.
+_PRESENT_FOR = 60.0
 #: So many of its frames within that time are no noise.
 _SURE = 3
-#: How many of our own requests may still come back, or be answered by the very same bytes.
+#: How many of our own requests may still come back, or be answered by the same bytes.
 _OWN = 8
-#: More than any frame has.
+#: More bytes than any frame has.
 _MOST = 600
-#: Functions whose answer tells how long it is; those that are answered by their own beginning.
+#: Functions whose answer has its length; functions whose answer is the beginning of the request.
 _READS = (1, 2, 3, 4)
 _SINGLE = (5, 6)
 _MULTIPLE = (15, 16)
 _READ_WRITE = 23
-#: How long the requests are that ask a unit what it is.
+#: The lengths of the requests for the identity of a unit.
 _REPORT_LENGTH = 2
 _DEVICE_LENGTH = 5
 _EXCEPTION = 0x80
 
 
 def message_lengths(beginning: bytes) -> set[int]:
-    """Return how long a message that begins like this is, as a request or as an answer."""
+    """Return the possible lengths of a message that begins like this, request or answer."""
     if len(beginning) < 2 or not beginning[0]:
         return set()
     if beginning[1] == REPORT_SLAVE_ID:
@@ -78,7 +78,7 @@ def message_lengths(beginning: bytes) -> set[int]:
 
 @dataclass(frozen=True)
 class _Question:
-    """What another master asked a unit, and until when that may be answered."""
+    """A request of another master to a unit, and until when it may be answered."""
 
     unit: int
     function: int
@@ -92,7 +92,7 @@ class _Question:
 
 
 def _answer_head(message: bytes) -> bytes:
-    """Return how the answer to a request begins; nothing where a message is no request."""
+    """Return the beginning of the answer to a request; empty if a message is no request."""
     function, length = message[1], len(message)
     count = int.from_bytes(message[4:6], 'big')
     if function in _READS and length == 6:
@@ -112,27 +112,27 @@ def _answer_head(message: bytes) -> bytes:
 
 
 def _has_head(message: bytes, answer_head: bytes) -> bool:
-    """Tell whether an answer begins like this; a request of function 17 does, too."""
+    """Return whether an answer begins like this; a request of function 17 does, too."""
     return message.startswith(answer_head) and len(message) > _REPORT_LENGTH
 
 
 class Sightings:
-    """When another master was heard; it is reported when it was no mere noise."""
+    """When another master sent requests; it is reported when it was no mere noise."""
 
     def __init__(self, remarks: Remarks) -> None:
         self._remarks = remarks
-        self._heard: deque[float] = deque((-math.inf,), maxlen=_SURE)
+        self._at: deque[float] = deque((-math.inf,), maxlen=_SURE)
 
     def add(self, now: float, remark: str) -> None:
         """Count a request of another master."""
         self._remarks.foreign_frames += 1
-        self._heard.append(now)
-        if len(self._heard) == _SURE and now < self._heard[0] + _RECKONED:
+        self._at.append(now)
+        if len(self._at) == _SURE and now < self._at[0] + _PRESENT_FOR:
             self._remarks.add(remark)
 
     def is_there(self, now: float) -> bool:
-        """Tell whether another master has been heard of late."""
-        return now < self._heard[-1] + _RECKONED
+        """Return whether another master has sent anything recently."""
+        return now < self._at[-1] + _PRESENT_FOR
 
 
 class Codec(NamedTuple):
@@ -140,9 +140,9 @@ class Codec(NamedTuple):
     The messages of a protocol where a request and an answer always differ.
 
     :ivar enquiry: a request that reads; ``select`` one that writes.
-    :ivar kind: returns what tells an answer from others.
-    :ivar kinds: returns the kinds of answers that a request may have, the one hoped for first.
-    :ivar answers: tells whether a message may be the answer to a request.
+    :ivar kind: returns what distinguishes an answer from others.
+    :ivar kinds: returns the kinds of answers that a request may have, the wanted one first.
+    :ivar answers: returns whether a message may be the answer to a request.
     :ivar encode: returns the frame of a message.
     :ivar reader: finds messages in the bytes that come in: ``feed`` returns those that became
         whole, ``rest`` is what has come of the next one.
@@ -166,7 +166,7 @@ class OtherRequests:
     Finds the requests of another master in all that comes, and the answers to them.
 
     A request of another master is open until its answer comes, or may be late. What could answer
-    one that was open during our exchange is no certain answer to us, unless it asks the same.
+    one that was open during our exchange is no certain answer to us, unless both are the same.
 
     :param patience: how long an answer may take, s.
     """
@@ -185,7 +185,7 @@ class OtherRequests:
         self._meanwhile: list[Any] = []
         #: How many bytes the requests have that came since then.
         self._length = 0
-        #: Another master has asked since our last request, and was answered.
+        #: Another master has sent a request since our last one, and was answered.
         self.was_answered = False
 
     def open_until(self, unit: int) -> float:
@@ -193,11 +193,11 @@ class OtherRequests:
         return 0.0 if self._open is None else self._open_until
 
     def is_there(self, now: float) -> bool:
-        """Tell whether another master has been heard of late."""
+        """Return whether another master has sent anything recently."""
         return self._sightings.is_there(now)
 
     def sent(self, request: Any) -> None:
-        """Take note of a request of ours."""
+        """Note a request of ours."""
         self._own = request
         self._meanwhile = [] if self._open is None else [self._open]
         self._length = 0
@@ -212,10 +212,10 @@ class OtherRequests:
 
     def doubts(self, answer: object, request: Any, now: float, stray: int) -> bool:
         """
-        Tell whether what may answer our request may be the answer to another one.
+        Return whether what may answer our request may be the answer to another one.
 
-        :param stray: how many other bytes came with it. If they are more than requests that were
-            heard, two answers may have met.
+        :param stray: how many other bytes came with it. If they are more than those of the requests
+            of another master, two answers may have met.
         """
         if stray > self._length and self.is_there(now):
             return True
@@ -227,7 +227,7 @@ class OtherRequests:
         self._own = self._open = None
 
     def hear(self, data: bytes, now: float) -> bool:
-        """Take all bytes that come; tell whether any message of another exchange is in them."""
+        """Take all bytes that come; return whether any message of another exchange is in them."""
         found = False
         for message in self._reader.feed(data):
             if not isinstance(message, self._requests):
@@ -250,8 +250,8 @@ class AnotherMaster:
     """
     Finds the requests of another master, and the answers to them, in what is no answer to us.
 
-    Its request stands until its answer has come, or may be late. While it stands, and in every
-    exchange in which anything of it was heard, no answer is certain: one to a read names no
+    Its request is open until its answer has come, or may be late. While it is open, and in every
+    exchange in which any of its bytes came, no answer is certain: one to a read names no
     register.
 
     :param messages: yields the whole frames in some bytes: where each begins and ends, and its
@@ -272,11 +272,11 @@ class AnotherMaster:
         self._standing: dict[int, _Question] = {}
 
     def sent(self, frame: bytes) -> None:
-        """Take note of a request of ours: it may come back, and is not of another master."""
+        """Note a request of ours: it may come back, and is not of another master."""
         self._own.append(frame)
 
     def is_there(self, now: float) -> bool:
-        """Tell whether another master has been heard of late."""
+        """Return whether another master has sent anything recently."""
         return self._sightings.is_there(now)
 
     def open_until(self, unit: int) -> float:
@@ -285,7 +285,7 @@ class AnotherMaster:
         return 0.0 if question is None else question.until
 
     def take_late(self, unit: int, now: float) -> bytes:
-        """Return how the answer to a request begins that stands no more, but may be late."""
+        """Return the beginning of the answer to a request that is overdue and may come late."""
         question = self._standing.get(unit)
         if question is None or now < question.until:
             return b''
@@ -293,7 +293,7 @@ class AnotherMaster:
         return question.answer_head
 
     def hear(self, data: bytes, now: float) -> bool:
-        """Take bytes that are no answer to us; what of them is of no frame is kept for a while."""
+        """Take bytes that are no answer to us; those of no frame are kept for a while."""
         if not data:
             return False
         self._buffer = (self._buffer + data)[-_MOST:]
@@ -302,7 +302,7 @@ class AnotherMaster:
         return False
 
     def was_answered_in(self, data: bytes) -> bool:
-        """Tell whether another master's request and the answer to it are in some bytes."""
+        """Return whether another master's request and the answer to it are in some bytes."""
         head = b''
         for start, end, message in self._messages(data):
             if head and _has_head(message, head):
@@ -312,7 +312,7 @@ class AnotherMaster:
         return False
 
     def take_rest(self, unit: int) -> bytes:
-        """Return what is of no frame of another master, for the line is silent now."""
+        """Return the bytes of no frame of another master, now that the line is silent."""
         if unit in self._standing:
             # the beginning of the answer, perhaps
             return b''
@@ -320,7 +320,7 @@ class AnotherMaster:
         return rest
 
     def clear(self) -> None:
-        """Forget what was heard: the port is closed."""
+        """Forget what came: the port is closed."""
         self._buffer = b''
         self._standing.clear()
 
@@ -333,7 +333,7 @@ class AnotherMaster:
         return False
 
     def _is_own(self, frame: bytes, message: bytes) -> bool:
-        """Tell whether a frame may be an echo of ours; a write's answer is the same."""
+        """Return whether a frame may be an echo of ours; a write's answer is the same."""
         return frame in (self._own if message[1] in _SINGLE else [*self._own][-1:])
 
     def _is_foreign(self, frame: bytes, message: bytes, now: float) -> bool:

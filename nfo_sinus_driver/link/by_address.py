@@ -31,9 +31,9 @@ from nfo_sinus_driver.link.mailbox import TIME, Mailbox
 _ADDRESS, _DATA, _COMMAND, _ACKNOWLEDGE = range(1000, 1004)
 _WRITE, _READ = 1, 2
 _NOT_YET, _OK, _NOT_OK = range(3)
-#: How often it is looked whether an access is over, and how long another one waits, s.
+#: How often an access is checked for its end, and how long another one waits, s.
 _PERIOD = 0.02
-#: So long an access that is not gone on with keeps others off, s.
+#: How long an abandoned access blocks others, s.
 _LONGEST = 5.0
 
 
@@ -68,12 +68,12 @@ class ByAddress:
         self._current: _Access | None = None
 
     def forget(self) -> None:
-        """Take note that the connection is another one."""
+        """Note that the connection is a new one."""
         self._current = None
 
     def access(self, address: Address, data: bytes | None = None) -> Reply:
         """
-        Do the next step to read what stands at an address, or to write to it.
+        Do the next step to read a value at an address, or to write it.
 
         :raises InProgress: there are more.
         :raises NotReady: another access is under way.
@@ -120,7 +120,7 @@ class ByAddress:
         return reply or Reply(b'', self._now(), requests=0)
 
     def _require_over(self, current: _Access) -> None:
-        """See to it that the drive has done it."""
+        """Make sure that the drive has done it."""
         reply = self._mailbox.access(_place(current, _ACKNOWLEDGE))
         state = int.from_bytes(reply.data, 'big')
         if state == _NOT_OK:

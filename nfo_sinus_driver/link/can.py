@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Frames of a CAN bus, what carries them, and a bus that Linux drives (SocketCAN)."""
+"""Frames of a CAN bus, what carries them, and a CAN interface of Linux (SocketCAN)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from nfo_sinus_driver.link.interface import PortError
 MOST_DATA = 8
 #: The identifiers of standard frames; CANopen has no others.
 IDENTIFIERS = range(0x800)
-#: What the bits of an identifier are compared by where only its function code counts.
+#: The bits of an identifier that are compared where only its function code counts.
 FUNCTION_CODE = 0x780
 
 
@@ -29,7 +29,7 @@ class Frame(NamedTuple):
     A standard frame.
 
     :ivar identifier: which of :data:`IDENTIFIERS`; the least has precedence.
-    :ivar remote: it has no data, but asks for that of the same length; only ever sent.
+    :ivar remote: it has no data, but requests some of the same length; only ever sent.
     """
 
     identifier: int
@@ -37,8 +37,8 @@ class Frame(NamedTuple):
     remote: bool = False
 
 
-#: What is wrong where frames do not leave.
-CANNOT_SEND = 'frames do not leave: is anybody else on the bus, with this bit rate?'
+#: The message when frames do not leave.
+CANNOT_SEND = 'frames do not leave: is any other node on the bus, with this bit rate?'
 
 
 class CanPort(Protocol):
@@ -78,7 +78,7 @@ class CanPort(Protocol):
 
 #: struct can_frame and struct can_filter (linux/can.h).
 _FRAME = struct.Struct('=IB3x8s')
-#: How many frames are taken at once: on a full bus more come all the while.
+#: How many frames are taken at once: on a full bus more keep coming.
 _MOST_AT_ONCE = 1000
 _FILTER = struct.Struct('=II')
 #: Extended, remote and error frames: in the identifier.
@@ -191,6 +191,6 @@ class SocketCan:
 
 
 def interfaces() -> Sequence[str]:
-    """Return the names of the CAN interfaces that there are."""
+    """Return the names of all CAN interfaces."""
     types = sorted(_INTERFACES.glob('*/type'))
     return [path.parent.name for path in types if path.read_text('ascii').strip() == _IS_CAN]

@@ -42,10 +42,10 @@ from nfo_sinus_driver.link.sdo import SECOND, Download, Kind, ObjectShapes, Tran
 
 #: Bit rate of the serial port of an adapter; those on USB do not care.
 _ADAPTER_RATE = 115_200
-#: What the default SDO server of a node may be asked at any time: device type, error register, how
-#: many entries the identity has, and the vendor. Each node has them (CiA 301); one that has not
-#: says so by an abort, which names the object, so that tells as much. With four of them one is
-#: always certain, see LateReplies.
+#: Objects that may be read at any time: device type, error register, the number of entries of the
+#: identity, and the vendor. Each node has them (CiA 301); one that does not says so by an abort,
+#: which names the object and serves as well. With four of them one is always certain, see
+#: LateReplies.
 _EVERYWHERE = ((0x1000, 0), (0x1001, 0), (0x1018, 0), (0x1018, 1))
 #: The name of a network interface, which no path of a device has.
 _INTERFACE = re.compile(r'[^/:\s]+')
@@ -53,7 +53,7 @@ _INTERFACE = re.compile(r'[^/:\s]+')
 _FRAME_BITS = 108
 #: The longest value that comes in one answer, bytes.
 _EXPEDITED = 4
-#: How many times is read what another client's requests have made uncertain.
+#: How often a read is tried that another client's requests make uncertain.
 _TRIES = 3
 
 
@@ -67,17 +67,17 @@ def _remark(unit: int) -> str:
 
 class AnotherClient:
     """
-    Finds what another client asks the nodes that are asked here.
+    Finds the requests of another client to the nodes of this one.
 
-    A node carries out what it is asked in order, whoever asks. So an answer that the other's
-    request may have too is uncertain until the node has answered something else, asked later. A
-    segment names no object, and whatever begins a transfer ends the one before: a transfer in
-    segments is uncertain when anything else was asked meanwhile.
+    A node carries out the requests of all clients in order. So an answer that the other's request
+    may have, too, is uncertain until the node has answered another, later request. A segment names
+    no object, and any request that begins a transfer ends the one before: a transfer in segments
+    is uncertain when any other request came meanwhile.
     """
 
     def __init__(self, remarks: Remarks) -> None:
         self._sightings = Sightings(remarks)
-        #: What each node was asked last, until it comes back: some adapters return what they sent.
+        #: The last request to each node, until it comes back: some adapters return what they sent.
         self._own: dict[int, bytes] = {}
         #: The nodes of which the beginning of the last transfer came back.
         self._returned: set[int] = set()
@@ -85,26 +85,26 @@ class AnotherClient:
         self._meanwhile: set[Kind] = set()
 
     def sent(self, frame: Frame) -> None:
-        """Take note of a request of ours; what was asked before it is answered before it."""
+        """Note a request of ours; earlier requests are answered before it."""
         self._own[frame.identifier - sdo.REQUESTS] = frame.data
         self._meanwhile.clear()
 
     def begins(self, unit: int) -> None:
-        """Take note that a transfer of ours is about to begin."""
+        """Note that a transfer of ours is about to begin."""
         self._returned.discard(unit)
         self._disturbed.discard(unit)
 
     def is_there(self, now: float) -> bool:
-        """Tell whether another client has been heard of late."""
+        """Return whether another client has sent anything recently."""
         return self._sightings.is_there(now)
 
     def disturbed(self, unit: int) -> bool:
-        """Tell whether a node was asked anything else since our transfer began."""
+        """Return whether a node got another request since our transfer began."""
         return unit in self._disturbed
 
     @property
     def meanwhile(self) -> frozenset[Kind]:
-        """The kinds of answers that it may still get, asked for since our last request."""
+        """The kinds of answers to its requests since our last one."""
         return frozenset(self._meanwhile)
 
     def hear(self, frame: Frame, now: float) -> frozenset[Kind]:
@@ -115,7 +115,7 @@ class AnotherClient:
         kinds = sdo.kinds_asked_for(frame.data)
         names_object = kinds.isdisjoint(sdo.SEGMENTS)
         if frame.data == self._own[unit] and (names_object or unit in self._returned):
-            # or the other asks the very same: its answer says what ours does
+            # or the other's is the same: its answer says what ours does
             self._own[unit] = b''
             self._returned.add(unit)
             return frozenset()
@@ -140,7 +140,7 @@ def _text(data: bytes) -> str:
     return ''.join(char for char in text if char.isascii() and char.isprintable()).strip()
 
 
-#: What is asked, index and sub-index, for which field, and what is made of the bytes.
+#: The objects of the identity: index, sub-index, size, field, and how its bytes are decoded.
 _QUESTIONS: tuple[tuple[int, int, int, str, Callable[[bytes], str]], ...] = (
     (0x1018, 1, 4, 'vendor', _number),
     (0x1018, 2, 4, 'product_code', _number),
@@ -172,7 +172,7 @@ class CanopenInquiry:
         """
         Ask the next question: one transaction.
 
-        A question that failed is not asked again; only after :class:`NotReady` it still is to be.
+        A question that failed is not asked again, unless by :class:`NotReady`.
 
         :raises LinkError: as its subclasses say.
         """
@@ -198,30 +198,30 @@ class CanopenLink:
     A client of the default SDO server of each node on one bus; one request at a time.
 
     An answer names node and object, and whether something was read or written; only segments do
-    not name the object. So what could be taken for another is a late answer about the very same
+    not name the object. So what could be taken for another is a late answer about the same
     object, or a segment: after a missing answer its kind is in quarantine (:class:`LateReplies`),
     and the object is only read when the node has answered about another one. A write is never kept
     waiting, for it may be a stop; but if an earlier one of the same object may still be answered,
     the answer is not believed: something is read, and :class:`DamagedAnswer` says that the outcome
     is unknown.
 
-    CAN itself sees to it that no frame is damaged, but one may be sent twice, the second time right
-    behind the first. So what is the same as the answer before, and comes before the request can
-    have been answered, is believed only if no other comes for as long as the node may take.
+    CAN itself detects damaged frames, but a frame may be sent twice, the second time right behind
+    the first. So what is the same as the answer before, and comes before the request can have been
+    answered, is believed only if no other comes for as long as the node may take.
 
     What is promised: no value of another object or node is taken, no answer up to three time-outs
-    late to a question asked before, no answer to another write. An answer that is sent twice just
-    when the next one is lost is not distinguished.
+    late to an earlier request, no answer to another write. An answer that is sent twice just when
+    the next one is lost is not distinguished.
 
-    Another client may ask the same nodes: an answer that may be to it is not believed, and what is
-    read is read again (:class:`AnotherClient`).
+    Another client may use the same nodes: an answer that may be to it is not believed, and a read
+    is repeated (:class:`AnotherClient`).
 
-    How long a number is, and where the sub-indices of an array begin, is for the node to say
-    [C102]; above this link a number has the length of the catalog (:class:`ObjectShapes`).
+    How long a number is, and where the sub-indices of an array begin, is up to the node [C102];
+    above this link a number has the length of the catalog (:class:`ObjectShapes`).
 
-    A node is made operational before the first write to it, and again when it has started anew or
-    was silent: reading changes nothing. From then on the client's heartbeat is sent, by the thread
-    that asks: a node that watches over it notices when that thread is gone
+    A node is made operational before the first write to it, and again when it has restarted or was
+    silent: reading changes nothing. From then on the client's heartbeat is sent, by the thread
+    that sends requests: a node that watches it notices when that thread is gone
     (:class:`CanopenSupervision`).
     """
 
@@ -273,10 +273,10 @@ class CanopenLink:
         self.supervision.closed()
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
-        """Take parameters that are safe to read; here those are asked that every node has."""
+        """Take parameters that are safe to read; here those are read that every node has."""
 
     def parts(self, address: Address) -> tuple[Address]:
-        """Return the whole: a transfer carries all of a value."""
+        """Return the address: a transfer carries the whole value."""
         return (address,)
 
     def read(self, unit: int, address: Address) -> Reply:
@@ -294,7 +294,7 @@ class CanopenLink:
         return reply._replace(data=self._shapes.fit_read(unit, address, sub_index, reply.data))
 
     def _read_second(self, unit: int, address: Address) -> Reply | None:
-        """Find out how a node numbers an array; return what was read for it, if anything was."""
+        """Find out how a node numbers an array; return the second value, if it was read."""
         reply, refusal = None, None
         try:
             reply = self._read_object(unit, address, SECOND)
@@ -322,7 +322,7 @@ class CanopenLink:
         try:
             arrived = self._transact(upload)
         except LinkError as error:
-            error.heard = certain is not upload
+            error.responded = certain is not upload
             raise
         return Reply(upload.value, arrived)
 
@@ -344,11 +344,11 @@ class CanopenLink:
         if unit not in self._started:
             self._port.send(start(unit))
             self._started.add(unit)
-        self.supervision.asks(unit, writes=True)
+        self.supervision.note_request(unit, writes=True)
         try:
             return self._transact(download)
         except _Ambiguous:
-            # not after mere silence: a stop that is given again would only have to wait for it
+            # not after mere silence: a repeated stop would only have to wait for it
             self._settle(unit)
             raise
 
@@ -380,7 +380,7 @@ class CanopenLink:
             raise
 
     def identify(self, unit: int) -> CanopenInquiry:
-        """Return the questions by which a node tells who it is; nothing is sent yet."""
+        """Return the questions by which a node identifies itself; nothing is sent yet."""
         return CanopenInquiry(unit, self.read)
 
     # --- belief -----------------------------------------------------------------------------------
@@ -391,18 +391,18 @@ class CanopenLink:
             yield upload, upload.kinds
 
     def _resync_read(self, upload: Upload) -> None:
-        """Have the node answer; whatever it says, what was late has come before it."""
+        """Have the node answer; whatever it says, late answers have come before it."""
         try:
             self._transact(upload)
         except Refused:
             return
         except LinkError as error:
-            # no node has received the request for which it was asked
+            # the request that it prepares has not been sent
             error.maybe_done = False
             raise
 
     def _settle(self, unit: int) -> None:
-        """Read something, so that the next answer is believed again; if not, then not."""
+        """Try to read something, so that the next answer is believed again."""
         try:
             questions = self._resync_reads(unit)
             self._resync_read(self._late.first_certain(unit, questions, self._now()))
@@ -417,7 +417,7 @@ class CanopenLink:
         """Carry out a transfer; return when its last answer came."""
         unit = transfer.unit
         self._drain()
-        self.supervision.asks(unit, writes=False)
+        self.supervision.note_request(unit, writes=False)
         self._another.begins(unit)
         arrived = 0.0
         while transfer.request is not None:
@@ -447,30 +447,30 @@ class CanopenLink:
         self._port.send(frame)
 
     def _release(self, unit: int) -> None:
-        """Expect nothing more of what a node was asked before the request that it has answered."""
+        """Expect no more answers of a node to requests before the one that it has answered."""
         self._late.release(unit)
         self._late.quarantine(unit, self._another.meanwhile, self._now())
 
     def _drain(self) -> None:
-        """Take what came unasked: an answer that is late, one to another client, a boot-up."""
+        """Take what came unrequested: a late answer, one to another client, a boot-up."""
         until = self._now() + LONGEST_DRAIN
         while self._take(0.0) and self._now() < until:
             continue
 
     def _take(self, until: float) -> Sequence[Frame]:
-        """Return what has come, as the port does; note which nodes have started anew."""
+        """Return what has come, as the port does; note which nodes have restarted."""
         frames = self._port.receive(until)
         self._note(frames)
         return frames
 
     def _note(self, frames: Sequence[Frame]) -> AbstractSet[int]:
-        """Take note of what others ask; return which nodes have started anew."""
+        """Note the requests of others; return which nodes have restarted."""
         now = self._now()
         for frame in frames:
             kinds = self._another.hear(frame, now)
             if kinds:
                 self._late.quarantine(frame.identifier - sdo.REQUESTS, kinds, now)
-        restarted = self.supervision.heard(frames)
+        restarted = self.supervision.take_frames(frames)
         self._started -= restarted
         return restarted
 
@@ -484,7 +484,7 @@ class CanopenLink:
             now = self._now()
             self.supervision.send_due(now)
             if unit in self._note(frames):
-                raise NoAnswer(f'unit {unit} has started anew')
+                raise NoAnswer(f'unit {unit} has restarted')
             for frame in frames:
                 if frame.identifier != sdo.ANSWERS + unit:
                     continue
@@ -506,7 +506,7 @@ class CanopenLink:
 
     def _require_certain(self, transfer: Transfer, found: Kind, now: float) -> None:
         """
-        Make sure that an answer is none to an earlier request, nor to another client.
+        Make sure that an answer is not to an earlier request, nor to another client.
 
         :raises DamagedAnswer: it may be.
         """

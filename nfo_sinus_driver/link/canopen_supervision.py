@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How nodes of CANopen notice that this client is gone, and this client that one has started anew.
+How nodes of CANopen notice that this client is gone, and this client that a node has restarted.
 
-Three things live on the line beside questions and answers (CiA 301 §7.2.8). The client's heartbeat,
-over which a node watches by its object 1016h; the client's asking for the state of a node that is
-guarded (100Ch, 100Dh); and the message with which a node says that it has started. The thread that
-asks serves all of them, so they end with it.
+Three messages are sent beside requests and answers (CiA 301 §7.2.8): the client's heartbeat, which
+a node watches by its object 1016h; the client's request for the state of a node that is guarded
+(100Ch, 100Dh); and the boot-up message of a node. The thread that sends requests serves all of
+them, so they end with it.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from nfo_sinus_driver.link.interface import Address, Clock, Refused, Reply
 
 #: Added to the address of a node, the identifier of its boot-up and of its heartbeat.
 HEARTBEATS = 0x700
-#: The node ids that there are.
+#: The node ids.
 NODES = range(1, 128)
 
 _COMMANDS = 0x000
 _START = 0x01
 _BOOTED, _OPERATIONAL = b'\x00', b'\x05'
 
-#: How often nodes hear the heartbeat, s, and how often at least in the time that one watches for.
+#: How often the heartbeat is sent, s, and how often at least within the time-out of a node.
 _HEARTBEAT = 0.1
 _BEATS = 4
-#: How often it is listened to a line without requests, s.
+#: How often a line without requests is read, s.
 _LISTENING = 0.1
-#: How long frames are taken that came unasked, s: on a full bus more come all the while.
+#: How long unrequested frames are taken, s: on a full bus more keep coming.
 LONGEST_DRAIN = 0.1
-#: How many times in a row a guarded node may miss that it is asked: its life time factor.
+#: How many requests in a row a guarded node may miss: its life time factor.
 _LIFE_FACTOR = 4
-#: Of how many clients a node may watch over the heartbeats, as far as it is looked.
+#: How many entries for heartbeats of a node are tried.
 _ENTRIES = 8
-#: The longest time that there is for it, ms.
+#: The longest time-out of an entry, ms.
 _LONGEST = 0xFFFF
 
 HEARTBEAT_MEANS = 'consumer heartbeat, object 1016h'
@@ -47,12 +47,12 @@ GUARDING_MEANS = 'node guarding, objects 100Ch and 100Dh'
 
 
 def heartbeat(client: int) -> Frame:
-    """Return what a client sends for as long as it is there; it is this node to those who watch."""
+    """Return the heartbeat of a client, which has this node id for the nodes that watch it."""
     return Frame(HEARTBEATS + client, _OPERATIONAL)
 
 
 def guarding_request(unit: int) -> Frame:
-    """Return what asks a node for its state; one that is asked no more notices."""
+    """Return the request for the state of a node; a guarded node notices when they cease."""
     return Frame(HEARTBEATS + unit, bytes(1), remote=True)
 
 
@@ -62,13 +62,13 @@ def start(unit: int) -> Frame:
 
 
 def booted(frame: Frame) -> int | None:
-    """Return which node has started anew; ``None``: the frame says nothing of the kind."""
+    """Return which node has restarted; ``None``: the frame is no boot-up."""
     unit = frame.identifier - HEARTBEATS
     return unit if unit in NODES and frame.data == _BOOTED else None
 
 
 class _Guarding(NamedTuple):
-    """How often a node is asked for its state, s, and when next."""
+    """How often the state of a node is requested, s, and when next."""
 
     period: float
     due: float
@@ -76,9 +76,9 @@ class _Guarding(NamedTuple):
 
 class CanopenSupervision:
     """
-    What this client shows on one line, and what it hears there unasked.
+    The heartbeat and guarding of this client on one line, and the boot-ups of nodes.
 
-    :param take: takes what has come until a moment, and hands it to :meth:`heard`.
+    :param take: takes what has come until a moment, and hands it to :meth:`take_frames`.
     :param read: reads an object of a node; ``write`` writes one.
     """
 
@@ -95,41 +95,41 @@ class CanopenSupervision:
         self._take = take
         self._read = read
         self._write = write
-        #: The nodes that were asked anything.
-        self._asked: set[int] = set()
+        #: The nodes that got a request.
+        self._addressed: set[int] = set()
         self._restarted: set[int] = set()
-        #: The nodes that watch over the heartbeat: for how long, s, and in which entry.
+        #: The nodes that watch the heartbeat: their time-out, s, and in which entry.
         self._watching: dict[int, tuple[float, int]] = {}
         self._guarded: dict[int, _Guarding] = {}
-        #: Which node this client is to those that watch over it; 0: it is not settled.
+        #: The node id of this client for those that watch it; 0: it is not settled.
         self._client = 0
-        #: It has written something, so that its presence may be of interest.
+        #: It has written something, so that a node may need its heartbeat.
         self._commands = False
         self._beat_due = self._listen_due = 0.0
 
     # --- for the link -----------------------------------------------------------------------------
 
-    def asks(self, unit: int, *, writes: bool) -> None:
-        """Take note that a node is asked something."""
-        self._asked.add(unit)
+    def note_request(self, unit: int, *, writes: bool) -> None:
+        """Note a request to a node."""
+        self._addressed.add(unit)
         self._commands |= writes
 
     def closed(self) -> None:
-        """Take note that the port is closed: what a node watches over is shown when it is open."""
-        self._asked.clear()
+        """Note that the port is closed: heartbeat and guarding go on when it is open."""
+        self._addressed.clear()
         self._restarted.clear()
         self._commands = False
         self._beat_due = self._listen_due = 0.0
 
-    def heard(self, frames: Sequence[Frame]) -> AbstractSet[int]:
-        """Take what has come; return which nodes have started anew."""
+    def take_frames(self, frames: Sequence[Frame]) -> AbstractSet[int]:
+        """Take what has come; return which nodes have restarted."""
         started = {unit for unit in map(booted, frames) if unit is not None}
         self._restarted |= started
         return started
 
     @property
     def sign_due(self) -> float:
-        """When the next sign of life has to be sent, s of ``time.monotonic``; or infinity."""
+        """When the next heartbeat or guarding is due, s of ``time.monotonic``; or infinity."""
         beats = self._commands or self._watching
         asking = (guarding.due for guarding in self._guarded.values())
         return min(self._beat_due if beats else math.inf, *asking, math.inf)
@@ -150,10 +150,10 @@ class CanopenSupervision:
     @property
     def due(self) -> float:
         """When :meth:`serve` has to be called again, s of ``time.monotonic``; or infinity."""
-        return min(self.sign_due, self._listen_due if self._asked else math.inf)
+        return min(self.sign_due, self._listen_due if self._addressed else math.inf)
 
     def serve(self) -> None:
-        """Send what is due, and take what came unasked (PortError: the port is lost)."""
+        """Send what is due, and take what came unrequested (PortError: the port is lost)."""
         now = self.now()
         self.send_due(now)
         while self._take(0.0) and self.now() < now + LONGEST_DRAIN:
@@ -161,34 +161,34 @@ class CanopenSupervision:
         self._listen_due = now + _LISTENING
 
     def take_restarted(self) -> AbstractSet[int]:
-        """Return the nodes that have started anew since this was asked last."""
+        """Return the nodes that have restarted since the last call."""
         if not self._restarted:
             return frozenset()
         restarted, self._restarted = self._restarted, set()
         return restarted
 
     def watch(self, unit: int, seconds: float) -> CanopenWatch:
-        """Return how a node is made to notice a silence of so long, s; 0: nothing any more."""
+        """Return how a node is made to watch this client, with a time-out, s; 0: no longer."""
         return CanopenWatch(self, unit, seconds, self._read, self._write)
 
     # --- for what sets it up ----------------------------------------------------------------------
 
     @property
     def client(self) -> int:
-        """The node that this client is to those that watch over it; none that is asked."""
+        """The node id of this client for those that watch it; one that no node has."""
         if self._client:
             return self._client
-        free = [unit for unit in reversed(NODES) if unit not in self._asked]
+        free = [unit for unit in reversed(NODES) if unit not in self._addressed]
         return free[0] if free else NODES[-1]
 
     def show_heartbeat(self, unit: int, seconds: float, entry: int) -> None:
-        """Show a heartbeat to a node that watches for so long, s, by an entry of object 1016h."""
+        """Send the heartbeat for a node with a time-out, s, in an entry of object 1016h."""
         self._client = self.client
         self._watching[unit] = seconds, entry
         self._beat_due = 0.0
 
     def guard(self, unit: int, period: float) -> None:
-        """Ask a node for its state so often, s."""
+        """Request the state of a node so often, s."""
         self._guarded[unit] = _Guarding(period, 0.0)
 
     def entry_of(self, unit: int) -> int:
@@ -196,23 +196,23 @@ class CanopenSupervision:
         return self._watching.get(unit, (0.0, 0))[1]
 
     def is_guarded(self, unit: int) -> bool:
-        """Tell whether a node is asked for its state."""
+        """Return whether the state of a node is requested."""
         return unit in self._guarded
 
     def end(self, unit: int) -> None:
-        """Show nothing more to a node."""
+        """End heartbeat and guarding for a node."""
         self._watching.pop(unit, None)
         self._guarded.pop(unit, None)
 
 
 class _Request(NamedTuple):
-    """What is read, or written if there are data."""
+    """A read, or a write if there are data."""
 
     address: Address
     data: bytes | None = None
 
 
-#: Yields requests; is given what was read, empty for a write, or ``None`` if that is refused.
+#: Yields requests; receives what was read, empty for a write, or ``None`` if that is refused.
 _Plan = Generator[_Request, bytes | None, None]
 
 
@@ -222,9 +222,9 @@ def _object(index: int, sub_index: int, size: int) -> Address:
 
 class CanopenWatch:
     """
-    Has a node watch over this client by the first means that reads back, or ends that.
+    Has a node watch this client by the first means that reads back, or ends that.
 
-    :ivar means: by what it watches; ``''``: it does not.
+    :ivar means: the means; ``''``: it does not watch.
     """
 
     def __init__(
@@ -294,7 +294,7 @@ class CanopenWatch:
                 continue
             supervision.show_heartbeat(unit, milliseconds / 1000, entry)
             if (yield _Request(place, wanted)) is not None and (yield _Request(place)) == wanted:
-                # it watches from the first heartbeat on that it hears: none may run before that
+                # it watches from the first heartbeat on: send one before any motor runs
                 supervision.show_heartbeat(unit, milliseconds / 1000, entry)
                 self.means = HEARTBEAT_MEANS
             else:
@@ -310,10 +310,10 @@ class CanopenWatch:
         }
         for place, value in values.items():
             if (yield _Request(place, value)) is None or (yield _Request(place)) != value:
-                # half of it is nothing
+                # one of both alone is of no use
                 yield _Request(time_place, bytes(2))
                 return
-        # it watches from the first time on that it is asked, which is now
+        # it watches from the first request on, which is now
         supervision.guard(unit, period / 1000)
         self.means = GUARDING_MEANS
 

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The Classic protocol of NFO: messages, without I/O, why one refuses, the link [M0 §6.1], [M2 §5].
+The Classic protocol of NFO: messages without I/O, reasons of a NAK, the link [M0 §6.1], [M2 §5].
 
-:func:`encode` makes a message; a :class:`Reader` finds messages in whatever bytes come in, in any
+:func:`encode` makes a message; a :class:`Reader` finds messages in the bytes that come in, in any
 pieces, among noise and the remains of others. Hexadecimal digits are sent in upper case and read
 in both [C86].
 """
@@ -33,7 +33,7 @@ from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.protocols import BROADCAST, CLASSIC, POINT_TO_POINT
 from nfo_sinus_driver.link.request_link import CodecLink
 
-#: Of how many messages what is sent is kept; the ENQUIRIES of a poll are sent again and again.
+#: How many encoded messages are cached: the ENQUIRIES of a poll are sent again and again.
 PREPARED = 1024
 
 _EOT = 0x04
@@ -87,12 +87,12 @@ class Nak:
 
 Request = Enquiry | Select
 Message = Enquiry | Select | Value | Ack | Nak
-#: What tells answers apart: the number that a REPLY names, else only what it is.
+#: What distinguishes answers: the number that a REPLY names, else only its type.
 Kind = int | type[Message]
 
 
 def kind(message: Message) -> Kind:
-    """Return what tells an answer from others."""
+    """Return what distinguishes an answer from others."""
     return message.number if isinstance(message, Value) else type(message)
 
 
@@ -102,7 +102,7 @@ def kinds(request: Request) -> tuple[Kind, Kind]:
 
 
 def answers(message: Message, request: Request) -> bool:
-    """Tell whether a message may be the answer to a request."""
+    """Return whether a message may be the answer to a request."""
     if request.unit not in (message.unit, POINT_TO_POINT) or isinstance(message, (Enquiry, Select)):
         return False
     return kind(message) in kinds(request)
@@ -143,7 +143,7 @@ _HEX: _Chars = frozenset(b'0123456789ABCDEFabcdef')
 _ANY: _Chars = frozenset(range(256))
 _PARAMETER = (frozenset(b'Ee'), *4 * (_HEX,))
 _TEXT = (frozenset((_STX,)), *_PARAMETER, frozenset(b'='), *4 * (_HEX,), frozenset((_ETX,)))
-#: What characters each kind of message may have, one set for each; an answer has no EOT.
+#: The characters that each message may have, one set for each position; an answer has no EOT.
 _VALUE = (_ADDRESS, *_TEXT, _ANY)
 _VERDICT = (_ADDRESS, frozenset((_ACK, _NAK)))
 _ENQUIRY = (frozenset((_EOT,)), _ADDRESS, *_PARAMETER, frozenset((_ENQ,)))
@@ -159,11 +159,11 @@ class Reader:
     """
     Finds the messages in the bytes that come in.
 
-    A message counts only when every character is one that may stand there and the check sum is
-    right. It is cut by its length, for a check sum may be any control character. What breaks off
-    is passed over up to the character that breaks it, so that its remains are taken for nothing
-    and the next whole message is found. A REPLY straight behind an EOT is no REPLY but a SELECT:
-    the echo of a request never looks like an answer.
+    A message counts only when every character is allowed at its place and the check sum is right.
+    It is cut by its length, for a check sum may be any control character. A broken message is
+    passed over up to the character that breaks it, so that its remains count for nothing and the
+    next whole message is found. A REPLY straight behind an EOT is no REPLY but a SELECT: the echo
+    of a request never looks like an answer.
     """
 
     def __init__(self) -> None:
@@ -171,11 +171,11 @@ class Reader:
 
     @property
     def rest(self) -> bytes:
-        """What has come of a message that is not whole yet."""
+        """The bytes of a message that is not complete yet."""
         return bytes(self._buffer)
 
     def feed(self, data: bytes) -> list[Message]:
-        """Take bytes that came in; return the messages that became whole, in their order."""
+        """Take bytes that came in; return the messages that they complete, in order."""
         self._buffer += data
         found: list[Message] = []
         while self._buffer:
@@ -198,13 +198,13 @@ class Reader:
         return found
 
     def _broken_at(self, fit: int) -> int:
-        """Return where to look on, when only the first ``fit`` characters belong together."""
+        """Return where to go on, when only the first ``fit`` characters belong together."""
         # an STX has its address before it, even where that could be a digit of what broke off
         return max(1, fit - (self._buffer[fit] == _STX))
 
 
 def _fit(data: bytearray, shape: tuple[_Chars, ...]) -> int:
-    """Return how many characters at the beginning are as the shape wants them."""
+    """Return how many characters at the beginning fit the shape."""
     fit = 0
     for char, allowed in zip(data, shape, strict=False):
         if char not in allowed:
@@ -235,7 +235,7 @@ MODE = 0x0029  #: who controls the drive
 
 #: The inverter status of a serial fault [M0 table 19].
 SIO_FAIL = 14
-#: The inverter status codes that are faults; the rest are what the drive does.
+#: The inverter status codes that are faults.
 _FAULTS = range(1, 24)
 
 _VALUE_BIT = 10
@@ -259,13 +259,13 @@ FLAGS = {
 
 
 def flag_names(word: int) -> list[str]:
-    """Return what the serial fault flags say, in words."""
+    """Return the serial fault flags in words."""
     bits = (bit for bit in range(16) if word >> bit & 1)
     return [FLAGS.get(bit, f'flag {bit}') for bit in bits]
 
 
 def refused_by_status(inv_st: int) -> Refused:
-    """Return what the inverter status says of a NAK, where the flags are not read."""
+    """Return the refusal for a NAK by the inverter status, where the flags are not read."""
     if inv_st == SIO_FAIL:
         text = 'a serial fault (Sio Fail) is active: until it is acknowledged nothing can be done'
         return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)')
@@ -277,7 +277,7 @@ def refused_by_status(inv_st: int) -> Refused:
 
 
 def refused_by_flags(word: int) -> Refused:
-    """Return what the serial fault flags say of the NAK that raised them; they are clear now."""
+    """Return the refusal for a NAK by the serial fault flags, which are clear now."""
     code = Refused.DEVICE_FAILURE
     if word >> _VALUE_BIT & 1:
         code = Refused.ILLEGAL_VALUE
@@ -289,11 +289,11 @@ def refused_by_flags(word: int) -> Refused:
 
 
 def refused_unknown(error: LinkError) -> Refused:
-    """Return what to say of a NAK whose reason could not be found out."""
+    """Return the refusal for a NAK whose reason could not be read."""
     return Refused(Refused.DEVICE_FAILURE, f'the drive refused (NAK); why is not known: {error}')
 
 
-#: What a message carries.
+#: The value in a message.
 _WORD = struct.Struct('>H')
 #: Pauses within an answer may last this long, s: no manual limits them [C86], and an adapter may
 #: hold bytes back.
@@ -304,12 +304,11 @@ _NO_DOUBLE_LEAST = 0.002
 #: How long a write waits at least while another master's request is answered, s.
 _WRITE_WAIT = 0.05
 #: How long drives may be busy with a broadcast, which none of them confirms, s: this at most, else
-#: so many times what the slowest of them took lately for a request of its own, which is forgotten
-#: by and by.
+#: so many times what the slowest of them took recently for a request of its own, which decays.
 _TURNAROUND = 0.1
 _TURNAROUND_MARGIN = 2.0
 _KEPT_OF_SLOWEST = 0.98
-#: What every firmware has and may be read at any time [M0 tables 2 and 3], [M2 tables 1 and 2]:
+#: Parameters that every firmware has and that are safe to read [M0 tables 2, 3], [M2 tables 1, 2]:
 #: InvSt without acknowledging, MODE, Control/Mode and f-Nom. With four of them one is always
 #: certain, see LateReplies.
 _EVERYWHERE = (INV_ST, MODE, 0x0030, 0x000F)
@@ -330,11 +329,11 @@ class ClassicLink(CodecLink):
     one line.
 
     What is promised: no value of another parameter or another drive is taken, no answer up to
-    three time-outs late to a question asked before, no ACK of another write. A REPLY that comes
-    twice is noticed when it comes before the same question, asked again at once, can have been
-    answered, ACK and NAK when they begin again within two characters; later ones may pass for the
-    answer, a REPLY one reading old. ACK, NAK and an ENQUIRY have no check sum: parity is all that
-    protects them, so choose a format that has it.
+    three time-outs late to an earlier request, no ACK of another write. A REPLY that comes twice
+    is noticed when it comes before the same request, sent again at once, can have been answered,
+    ACK and NAK when they begin again within two characters; later ones may pass for the answer, a
+    REPLY one reading old. ACK, NAK and an ENQUIRY have no check sum: parity is all that protects
+    them, so choose a format that has it.
     """
 
     #: Factory settings and formats of both firmwares [M0 §6.1.2], [M2 §4], [C5], [C6]; addresses
@@ -347,7 +346,7 @@ class ClassicLink(CodecLink):
         super().__init__(port, settings, now)
         #: The inverter status that each unit reported last, and when.
         self._inv_st: dict[int, tuple[int, float]] = {}
-        #: What the slowest unit took lately until its answer began, s.
+        #: What the slowest unit took recently until its answer began, s.
         self._slowest = _TURNAROUND
 
     def close(self) -> None:
@@ -374,7 +373,7 @@ class ClassicLink(CodecLink):
         """
         Write one parameter; unit 95 means all of them, and none confirms it.
 
-        It has one word: what has two is never written, and no manual says how.
+        It has one word: parameters of two are never written, and no manual says how.
 
         :raises LinkError: as its subclasses say.
         """
@@ -398,12 +397,12 @@ class ClassicLink(CodecLink):
         return answer.word, arrived
 
     def _broadcast(self, request: Select) -> float:
-        """Tell all units something, and leave them the time to do it; return when it was said."""
+        """Send a request to all units, and leave them the time for it; return when it was sent."""
         self._await_gap(request, is_write=True)
         self._another.sent(request)
         sent = self._send(request, encode(request))
         self._last = None
-        # an echo, or what is late: nothing answers this
+        # an echo, or late answers: nothing answers this
         until = sent + min(_TURNAROUND, _TURNAROUND_MARGIN * self._slowest)
         while self._now() < until:
             self._read_line(until)
@@ -411,12 +410,12 @@ class ClassicLink(CodecLink):
 
     def _refusal(self, unit: int, began: float) -> Refused:
         """
-        Ask why a SELECT was answered by NAK [M0 §6.1.5]; nothing but our own error is cleared.
+        Find out why a SELECT was answered by NAK [M0 §6.1.5]; clear nothing but our own error.
 
         :param began: when the SELECT was sent.
         """
         before, read_at = self._inv_st.get(unit, (SIO_FAIL, 0.0))
-        # a serial fault that was not there just before: this SELECT is its cause
+        # a serial fault that was not active just before: this SELECT is its cause
         ours = before != SIO_FAIL and began - read_at < _FRESH
         try:
             inv_st, _ = self._enquire(unit, INV_ST)
@@ -439,15 +438,15 @@ class ClassicLink(CodecLink):
         return max(_WRITE_WAIT, super()._write_wait)
 
     def _gap_before(self, request: Any) -> float:
-        # no pause but where an answer that comes twice could pass for that to the request
+        # a pause only where an answer that comes twice could pass for that to the request
         if self._last is None or self._last[0].unit != request.unit:
             return 0.0
         last = kind(self._last[1])
         doubled = isinstance(last, type) and last in kinds(request)
         return max(self._gap, _NO_DOUBLE_LEAST) if doubled else 0.0
 
-    def _hear_unasked(self, data: bytes, request: Any) -> None:
-        # what was not answered is expected anyway
+    def _note_unrequested(self, data: bytes, request: Any) -> None:
+        # answers to requests without one are expected anyway
         if self._last is not None:
             self._late.expect(self._last[0], self._now())
 
@@ -460,7 +459,7 @@ class ClassicLink(CodecLink):
 
     def _came_early(self, request: Any) -> bool:
         """
-        Tell whether the last REPLY came before the request can have been answered; expect another.
+        Return whether the last REPLY came too early for the request; then expect another.
 
         It may be the one before, sent twice. A line without speed, such as a pseudo-terminal, is
         always early.
@@ -490,6 +489,6 @@ class ClassicLink(CodecLink):
     def _deadline(self, deadline: float, now: float) -> float:
         if not self._another.is_there(now):
             return deadline
-        # its next request may be as far away as the time-out
+        # its next request may be as late as the time-out
         longest = LONGEST_ANSWER * self._settings.char_time
         return min(deadline, now + longest + 2 * self._slowest)

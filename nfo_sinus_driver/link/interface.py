@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The one interface of every link: how it is set, what it does, and what can go wrong on it."""
+"""The interface of every link: its settings, its transactions and its errors."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import functools
 import re
 from typing import NamedTuple, Protocol
 
-#: Of serial lines to drives, bit/s.
+#: The baud rates of serial lines to drives, bit/s.
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600)
 _FORMAT = re.compile(r'([78])([EON])([12])')
-#: Most protocols are for drives that leave the factory set to another one [C93].
+#: Most protocols are not the factory setting of their drives [C93].
 _CHECK = (
     'the protocol that the drive is set to (the factory setting may be another one), RS232 or '
     'RS485 (there may be a jumper for that), the address, baud rate and parity'
@@ -25,25 +25,25 @@ _CHECK = (
 Clock = Callable[[], float]
 
 
-#: The space of addresses that count in PNUs: of parameters that a PLC asks a drive for.
+#: The space of addresses that are PNUs: parameters that a PLC reads from a drive.
 MAILBOX = 'pnu'
-#: That of addresses of the drive itself, which go by such parameters.
+#: The space of addresses of the drive itself, which are reached by such parameters.
 DRIVE_ADDRESS = 'drive_address'
-#: Both: what is reached by the mailbox of a PLC.
+#: Both: all that is reached by the mailbox of a PLC.
 BY_MAILBOX = frozenset((MAILBOX, DRIVE_ADDRESS))
 
 
 class Address(NamedTuple):
     """
-    Where a parameter stands on a line; only the link looks inside.
+    The address of a parameter on a line; only the link uses its fields.
 
-    :ivar space: which numbering of the protocol ``index`` counts in, such as ``register``.
+    :ivar space: the numbering of the protocol that ``index`` belongs to, such as ``register``.
     :ivar index: its number there; of several registers the first.
     :ivar sub_index: which part of it; on Classic the id of the high word.
     :ivar size: how many bytes it takes.
-    :ivar signed: whether the number in them may be negative, for a line where the drive says how
-        many bytes it has for it; ``None``: it is no number, and they count as they come.
-    :ivar block: the first register of the block of a PLC that it is reached by; ``None``: it is
+    :ivar signed: whether the number in them may be negative, for a line where the drive decides how
+        many bytes it has; ``None``: it is no number, and the bytes count as they come.
+    :ivar block: the first register of the block of a PLC by which it is reached; ``None``: it is
         reached directly.
     """
 
@@ -59,7 +59,7 @@ class Reply(NamedTuple):
     """
     What a unit answered.
 
-    :ivar data: the bytes read, as they stand on the bus; empty for a write.
+    :ivar data: the bytes read, as on the bus; empty for a write.
     :ivar arrived: when the last byte came, in seconds of ``time.monotonic``.
     :ivar requests: how many were sent for it; 0: it came with an answer before.
     """
@@ -72,11 +72,11 @@ class Reply(NamedTuple):
 @dataclass(frozen=True)
 class Identification:
     """
-    Who a unit says it is; ``''`` where it does not tell.
+    The identity that a unit gives; ``''``: unknown.
 
     :ivar revision: its firmware, such as ``4.30 / 4018``.
     :ivar model: its size, such as ``1.50/400``.
-    :ivar application: what a user named it.
+    :ivar application: the name that a user gave it.
     :ivar serial: its serial number.
     """
 
@@ -91,7 +91,7 @@ class Identification:
 
 
 class Inquiry(Protocol):
-    """Questions to a unit about itself, asked one by one, so that others may talk between."""
+    """Questions to a unit about itself, asked one by one, so that other requests go between."""
 
     @property
     def done(self) -> bool:
@@ -99,13 +99,13 @@ class Inquiry(Protocol):
 
     @property
     def found(self) -> Identification:
-        """What it has said so far."""
+        """What it has answered so far."""
 
     def ask(self) -> Reply:
         """
         Ask the next question: one transaction.
 
-        A question that failed is not asked again; only after :class:`NotReady` it still is to be.
+        A question that failed is not asked again, unless by :class:`NotReady`.
 
         :raises LinkError: as its subclasses say.
         """
@@ -113,9 +113,9 @@ class Inquiry(Protocol):
 
 class Watch(Protocol):
     """
-    How a unit is made to notice silence on the line; step by step, as an inquiry.
+    How a unit is made to watch this end of the line; step by step, as an inquiry.
 
-    :ivar means: by what it notices; ``''``: it has nothing for it, or it is turned off.
+    :ivar means: by which means; ``''``: it has none, or it is turned off.
     """
 
     means: str
@@ -134,9 +134,9 @@ class Watch(Protocol):
 
 class Supervision(Protocol):
     """
-    What lives on a line beside questions and answers; for the thread that has the line.
+    Messages on a line beside requests and answers; for the thread that has the line.
 
-    Units notice by it that this end is gone, and this end that a unit has started anew.
+    By them units notice that this end is gone, and this end that a unit has restarted.
     """
 
     @property
@@ -144,20 +144,20 @@ class Supervision(Protocol):
         """When :meth:`serve` has to be called again, s of the clock of the link; or infinity."""
 
     def serve(self) -> None:
-        """Send what is due, and take what came unasked (PortError: the port is lost)."""
+        """Send what is due, and take what came unrequested (PortError: the port is lost)."""
 
     def take_restarted(self) -> AbstractSet[int]:
-        """Return the units that have started anew since this was asked last."""
+        """Return the units that have restarted since the last call."""
 
     def watch(self, unit: int, seconds: float) -> Watch:
-        """Return how a unit is made to notice a silence of so long, s; 0: nothing any more."""
+        """Return how a unit is made to watch this end, with a time-out, s; 0: no longer."""
 
 
 class Remarks:
     """
     What a link has noticed about its line although it works; any thread may read it.
 
-    :ivar foreign_frames: how many requests of another master have been heard.
+    :ivar foreign_frames: how many requests of another master have come.
     """
 
     def __init__(self) -> None:
@@ -165,17 +165,17 @@ class Remarks:
         self._texts: dict[str, None] = {}
 
     def add(self, text: str) -> None:
-        """Take note of a sentence, which says what to do, too; once only."""
+        """Add a sentence, which says what to do, too; once only."""
         self._texts = {**self._texts, text: None}
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """Every sentence, in the order in which they came."""
+        """All sentences, in the order in which they came."""
         return tuple(self._texts)
 
 
 class NothingToAsk:
-    """The inquiry of a protocol that knows nothing but parameters: it has no questions."""
+    """The inquiry of a protocol that has only parameters: it has no questions."""
 
     done = True
     found = Identification()
@@ -190,25 +190,24 @@ class LineProtocol:
     """
     What a protocol can do, and how its lines leave the factory.
 
-    :ivar name: as the driver's parameter ``protocol`` has it.
-    :ivar link: what speaks it, file and class of this folder, such as ``rtu.RtuLink``.
-    :ivar addressing: which addresses of the catalog it reaches parameters by.
+    :ivar name: as in the driver's parameter ``protocol``.
+    :ivar link: its module and class in this folder, such as ``rtu.RtuLink``.
+    :ivar addressing: the addresses of the catalog by which it reaches parameters.
     :ivar units: the addresses that a drive may have.
     :ivar baud_rate: of the factory, bit/s.
     :ivar char_format: of the factory, such as ``8E1``.
-    :ivar baud_rates: those that the protocol can have.
-    :ivar char_formats: those that the protocol can have, the likeliest first; none where the line
-        is a gateway's.
+    :ivar baud_rates: those of the protocol.
+    :ivar char_formats: those of the protocol, the likeliest first; none where the line is a
+        gateway's.
     :ivar broadcast: the address that every drive obeys and none answers; ``None``: there is none.
     :ivar point_to_point: the address at which a drive that is alone answers, whatever its own is.
-    :ivar identifies: a drive can be asked who it is.
+    :ivar identifies: a drive can be asked for its identity.
     :ivar writes_and_reads: it can write one parameter and read another in one transaction.
-    :ivar most_requests: how many a second what serves the line is sent at most by default, a PLC or
-        a gateway [C118]; 0: the line itself is the limit.
-    :ivar carries: what else it reaches parameters by, that stand at who is between: a PLC.
-    :ivar rates_disturb: whoever has a wrong bit rate disturbs all others on the line, so that none
-        is tried.
-    :ivar check: what to look at, in this order, where no drive answers.
+    :ivar most_requests: how many requests a second a PLC or gateway gets at most by default [C118];
+        0: the line itself is the limit.
+    :ivar carries: other addressings by which it reaches parameters, those of a PLC.
+    :ivar rates_disturb: a wrong bit rate disturbs all others on the line, so none is tried.
+    :ivar check: what to check, in this order, where no drive answers.
     """
 
     name: str
@@ -229,14 +228,14 @@ class LineProtocol:
     check: str = _CHECK
 
     def reaches_by(self, addressing: str) -> bool:
-        """Tell whether parameters are reached by these addresses; ``''``: as the line does."""
+        """Return whether parameters are reached by this addressing; ``''``: that of the line."""
         return addressing in ('', self.addressing, *self.carries)
 
     def require_unit(self, address: int) -> None:
         """
         Make sure that a drive may have an address.
 
-        :raises ValueError: it may not; the message says which there are.
+        :raises ValueError: it may not; the message says which it may.
         """
         if address not in self.units:
             name = self.addressing.title()
@@ -271,7 +270,7 @@ class Link(Protocol):
     """
     One line to several units, used by one thread.
 
-    :ivar protocol: what it speaks.
+    :ivar protocol: that of the line.
     :ivar remarks: what it has noticed.
     """
 
@@ -280,11 +279,11 @@ class Link(Protocol):
 
     @property
     def supervision(self) -> Supervision | None:
-        """What lives on it beside questions and answers; ``None``: nothing."""
+        """Its messages beside requests and answers; ``None``: it has none."""
 
     def open(self) -> None:
         """
-        Open the port; where it is open, and nothing comes from it, another way to its far end.
+        Open the port; where it is open, and nothing comes from it, another connection beside it.
 
         :raises Connecting: that takes longer.
         :raises PortError: it cannot be opened; the message says what to do.
@@ -294,14 +293,14 @@ class Link(Protocol):
         """Close the port; harmless when it is closed already."""
 
     def parts(self, address: Address) -> Sequence[Address]:
-        """Return what each takes a transaction of its own to read, the low part first."""
+        """Return the parts that each take a transaction to read, the low part first."""
 
     def read(self, unit: int, address: Address) -> Reply:
         """
         Read one parameter, or one part of it where it has several.
 
-        :raises InProgress: it takes more transactions, and the same has to be called for each; so
-            it is with a write.
+        :raises InProgress: it takes more transactions, and has to be called again for each; so does
+            a write.
         :raises LinkError: as its subclasses say.
         """
 
@@ -312,8 +311,8 @@ class Link(Protocol):
         """
         Write one parameter and read another, in one transaction.
 
-        :returns: the bytes read; none if it was only written, because what was read could not have
-            been believed. A write is not held back for that.
+        :returns: the bytes read; none if it was only written, because a reading could not have been
+            believed. A write is not held back for that.
         :raises LinkError: as its subclasses say.
         """
 
@@ -321,8 +320,8 @@ class Link(Protocol):
         """
         Read a parameter whose value is not needed, then write another; nothing is sent between.
 
-        For reading that does something, such as acknowledging a fault (02A4h, E00E8). Whatever
-        becomes of the read, the write is the next thing on the line.
+        For a read with an effect, such as acknowledging a fault (02A4h, E00E8). Even if the read
+        fails, the write is the next request on the line.
 
         :param source: what is read in one transaction.
         :returns: the answer to the write.
@@ -330,13 +329,13 @@ class Link(Protocol):
         """
 
     def identify(self, unit: int) -> Inquiry:
-        """Return the questions by which a unit tells who it is; nothing is sent yet."""
+        """Return the questions by which a unit identifies itself; nothing is sent yet."""
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """
         Name parameters of different sizes that are safe to read at any time.
 
-        After a doubtful answer one of them tells whether the line can be believed again.
+        After a doubtful answer, reading one of them shows whether the line can be believed again.
         """
 
 
@@ -348,9 +347,9 @@ class LinkError(Exception):
     """
 
     maybe_done = False
-    #: The unit answered a question before, for the sake of this one: it is there.
-    heard = False
-    #: What the port knows of why, as it may be shown; ``''`` if nothing.
+    #: The unit answered the resync read before this request: it responds.
+    responded = False
+    #: What the port knows of the reason, to be shown; ``''`` if nothing.
     hint = ''
 
 
@@ -359,7 +358,7 @@ class PortError(LinkError):
 
 
 class Connecting(PortError):
-    """It takes longer to open the port: it has to be opened again, which goes on with it."""
+    """Opening the port takes longer: call ``open`` again, which goes on with it."""
 
 
 class NoAnswer(LinkError):
@@ -369,7 +368,7 @@ class NoAnswer(LinkError):
 
 
 class GatewaySilent(NoAnswer):
-    """The gateway itself said nothing in time, not even that the drive is silent."""
+    """The gateway itself did not answer in time, not even that the drive is silent."""
 
 
 class GatewayLate(NoAnswer):
@@ -377,19 +376,19 @@ class GatewayLate(NoAnswer):
 
 
 class NoData(NoAnswer):
-    """A PLC between answered that it has no valid data from the drive; the message says more."""
+    """A PLC answered that it has no valid data from the drive; the message says more."""
 
 
 class Interrupted(LinkError):
-    """What is between has stopped the drive, for it was not reached for longer than its time."""
+    """A PLC has stopped the drive, for it was not reached for longer than its time-out."""
 
 
 class MailboxSilent(NoAnswer):
-    """A PLC did not answer what was asked by its mailbox; the message says what to do."""
+    """A PLC did not answer a read by its mailbox; the message says what to do."""
 
 
 class Unconfirmed(LinkError):
-    """The same of a write: whether the drive has taken it is not known, nor is it repeated."""
+    """The same of a write: whether the drive has taken it is unknown; it is not repeated."""
 
     maybe_done = True
 
@@ -405,7 +404,7 @@ class DamagedAnswer(LinkError):
 
 
 class GatewayFault(DamagedAnswer):
-    """The gateway answered in a way that no gateway may; the message says what to do."""
+    """The gateway answered against the standard; the message says what to do."""
 
 
 class NeverSilent(DamagedAnswer):
@@ -416,10 +415,10 @@ class NeverSilent(DamagedAnswer):
 
 class Refused(LinkError):
     """
-    The drive answered that it will not.
+    The drive refused a request.
 
     :ivar code: the Modbus exception code, or on other protocols the one that means the same; those
-        from ``SETTINGS_CONFLICT`` on are none of Modbus.
+        from ``SETTINGS_CONFLICT`` on are not of Modbus.
     """
 
     ILLEGAL_FUNCTION = 1
@@ -436,7 +435,7 @@ class Refused(LinkError):
 
     def __init__(self, code: int, reason: str = '') -> None:
         self.code = code
-        #: What a person may look up, to stand behind a sentence.
+        #: What an operator may look up, for the end of a sentence.
         self.behind = f': {reason}' if reason else f' (exception {code})'
         text = _REFUSALS.get(code, 'the drive refused')
         super().__init__(reason or f'{text} (exception {code})')
@@ -457,11 +456,11 @@ _REFUSALS = {
 
 class NotReady(LinkError):
     """
-    This unit must be left alone for a while, so that no late answer is taken for the right one.
+    Requests to this unit must pause, so that no late answer is taken for the right one.
 
     Nothing was sent.
 
-    :ivar until: when it may be asked again, in seconds of ``time.monotonic``.
+    :ivar until: when it may get a request again, in seconds of ``time.monotonic``.
     """
 
     def __init__(self, until: float) -> None:
@@ -470,20 +469,20 @@ class NotReady(LinkError):
 
 
 class InProgress(NotReady):
-    """One transaction of several was done: the same is to be asked again, for the next of them."""
+    """One transaction of several was done: repeat the call for the next of them."""
 
 
 @dataclass(frozen=True)
 class LineSettings:
     """
-    How a serial line is set.
+    The settings of a serial line.
 
-    :ivar baud_rate: bit/s; which there are is for the protocol to say. 19200 is the drive's default
-        for Modbus [M0 §6.2.2].
+    :ivar baud_rate: bit/s, one of the protocol's. 19200 is the drive's default for Modbus
+        [M0 §6.2.2].
     :ivar char_format: data bits, parity and stop bits, such as ``8E1``.
     :ivar response_timeout: from the last byte sent to the first byte of the answer, s.
     :ivar rs485: let the port itself switch the transmitter, where it can.
-    :raises ValueError: a setting that no drive has; the message says which there are.
+    :raises ValueError: a setting that no drive has; the message says which ones are possible.
     """
 
     baud_rate: int = 19200

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What to believe after a silence: replies that are late, come twice or may belong to another request.
+Which replies to believe after a silence: some are late, come twice or are to another request.
 
 Without I/O; time is in seconds of one steady clock.
 """
@@ -17,20 +17,20 @@ from nfo_sinus_driver.link.interface import NotReady
 
 #: How late a reply may come, in time-outs, before it counts as lost for good.
 LATEST_REPLY = 4
-#: How long a line is not trusted that has brought something unrequested, s.
+#: How long a line is not trusted after unrequested bytes, s.
 SUSPECT_FOR = 60.0
-#: How much later than its slowest reply of late a unit may reply.
+#: How much later than its slowest recent reply a unit may reply.
 _LATER = 1.25
-#: What is left of the memory of a slow reply with each of the next.
+#: By how much a slow reply is remembered with each of the next ones.
 _DECAY = 0.95
 
 
 class Request(Protocol):
-    """What is asked."""
+    """A request to a unit."""
 
     @property
     def unit(self) -> int:
-        """Who is asked."""
+        """The unit."""
 
 
 _Request = TypeVar('_Request', bound=Request)
@@ -39,10 +39,10 @@ _Question = TypeVar('_Question')
 
 
 class Doubt(enum.Enum):
-    """What has to be done before the last reply is believed."""
+    """What is needed before the last reply is believed."""
 
     NONE = enum.auto()
-    #: Nothing, for what it says is right, but it may come once more.
+    #: Nothing, for it is right, but it may come once more.
     ONCE_MORE = enum.auto()
     #: Listen as long as the right reply may take: it may have been the one before, sent twice.
     LISTEN = enum.auto()
@@ -52,24 +52,24 @@ class Doubt(enum.Enum):
 
 class LateReplies(Generic[_Request, _Kind]):
     """
-    What may still come from each unit, by *kinds*: what tells its replies from one another.
+    The replies that may still come from each unit, by *kind*: what distinguishes its replies.
 
     Units reply in order and :data:`LATEST_REPLY` time-outs late at most. What may still come is in
-    *quarantine*: a reply of such a kind may be that to an earlier request, so it proves nothing.
-    One of any other kind is that to the present request, and whatever was to come has come before
-    it. Where each reply names its very request, as over Modbus TCP, nothing is ever in quarantine.
+    *quarantine*: a reply of such a kind may be to an earlier request, so it proves nothing. One of
+    any other kind is to the present request, and all late ones have come before it. Where each
+    reply names its request, as over Modbus TCP, nothing is ever in quarantine.
 
-    No request has to wait until a quarantine is over: :meth:`first_certain` finds what to ask
+    No request has to wait until a quarantine is over: :meth:`first_certain` finds what to send
     meanwhile. A request that fails takes a time-out, and what could answer it stays in quarantine
-    for three more, so there are never more than three such kinds: of four questions with replies
-    of different kinds one is always certain, and of three after a time-out at most.
+    for three more, so there are never more than three such kinds: of four requests with replies of
+    different kinds one is always certain, and of three after a time-out at most.
 
-    A reply with the very bytes of the one before may be the one before, sent twice: see
+    A reply with the same bytes as the one before may be the one before, sent twice: see
     :meth:`doubt_about`.
 
     :param response_timeout: how long a reply is waited for, s.
     :param kinds: returns the kinds of replies that a request may have.
-    :ivar repeated: to which earlier request the unit replied the same as to the last one just now;
+    :ivar repeated: the earlier request to which the unit gave the same reply as to the last one;
         ``None`` if it did not.
     """
 
@@ -84,7 +84,7 @@ class LateReplies(Generic[_Request, _Kind]):
         self._noted: dict[int, tuple[_Request, bytes, float]] = {}
         self._last: _Request | None = None
         self.repeated: _Request | None = None
-        #: Until when a reply may well come twice.
+        #: Until when a reply is likely to come twice.
         self._suspect_until = 0.0
         #: How long a unit has taken at most to reply, s.
         self._slowest: dict[int, float] = {}
@@ -105,16 +105,16 @@ class LateReplies(Generic[_Request, _Kind]):
         return self._left(unit, now).keys()
 
     def may_be_of_another(self, unit: int, kind: _Kind, now: float) -> bool:
-        """Tell whether a reply that names no unit may be a late one of another than that asked."""
+        """Return whether a reply that names no unit may be a late one of another unit."""
         others = [other for other in self._until if other != unit]
         return any(kind in self._left(other, now) for other in others)
 
     def release(self, unit: int) -> None:
-        """Expect nothing more from a unit: it has answered what was asked last."""
+        """Expect nothing more from a unit: it has answered the last request."""
         self._until.pop(unit, None)
 
     def clear(self) -> None:
-        """Expect nothing more from any unit, and forget what came."""
+        """Expect nothing more from any unit, and forget the replies."""
         self._until.clear()
         self._noted.clear()
         self._last = self.repeated = None
@@ -126,7 +126,7 @@ class LateReplies(Generic[_Request, _Kind]):
         Return the first question whose reply cannot be confused with any that may still come.
 
         :param questions: each with the kinds of replies to be distinguished; one question at least.
-        :raises NotReady: there is none, and when there will be.
+        :raises NotReady: there is none; it says when there will be.
         """
         left = self._left(unit, now)
         free = []
@@ -138,29 +138,29 @@ class LateReplies(Generic[_Request, _Kind]):
         raise NotReady(min(free))
 
     def _left(self, unit: int, now: float) -> dict[_Kind, float]:
-        """Forget what is too late by now; return the rest, and until when each may come."""
+        """Forget what can no longer come; return the rest, and until when each may come."""
         if unit not in self._until:
             return {}
         left = {kind: until for kind, until in self._until[unit].items() if until > now}
         self._until[unit] = left
         return left
 
-    # --- unasked, or sent twice ---------------------------------------------------------------
+    # --- unrequested, or sent twice -----------------------------------------------------------
 
     def sent(self, request: _Request) -> None:
-        """Take note that a request goes out."""
+        """Note a request."""
         self._last = request
         self.repeated = None
 
-    def heard_unasked(self, now: float) -> None:
-        """Take note of unrequested bytes: the last request may be answered once more."""
+    def note_unrequested(self, now: float) -> None:
+        """Note unrequested bytes: the last request may be answered once more."""
         self._suspect_until = now + SUSPECT_FOR
         if self._last is not None:
             self.expect(self._last, now)
 
     def note(self, request: _Request, reply: bytes, now: float, length: float) -> None:
         """
-        Take note of what a unit replied, for it may come again.
+        Note a reply of a unit, for it may come again.
 
         :param length: how long it takes on the line, s.
         """
@@ -171,11 +171,11 @@ class LateReplies(Generic[_Request, _Kind]):
 
     def doubt_about(self, request: _Request, now: float, *, names_it: bool = False) -> Doubt:
         """
-        Return what has to be done before the reply to the last request is believed.
+        Return what is needed before the reply to the last request is believed.
 
-        A line that has brought something unrequested is not trusted for a while.
+        After unrequested bytes the line is not trusted for a while.
 
-        :param names_it: the reply says itself what it is about.
+        :param names_it: the reply itself names what it is about.
         """
         if self.repeated is None:
             return Doubt.NONE
@@ -185,9 +185,9 @@ class LateReplies(Generic[_Request, _Kind]):
         return Doubt.ONCE_MORE if right else Doubt.RESYNC
 
     def took(self, unit: int, seconds: float) -> None:
-        """Take note how long a unit took to reply; a slow reply is remembered for some dozens."""
+        """Note how long a unit took to reply; a slow reply is remembered for some dozens."""
         self._slowest[unit] = max(seconds, _DECAY * self._slowest.get(unit, 0.0))
 
     def longest(self, unit: int) -> float:
-        """Return how long a unit may take to reply, as it replied of late, s."""
+        """Return how long a unit may take to reply, by its recent replies, s."""
         return _LATER * self._slowest.get(unit, 0.0)

@@ -5,9 +5,9 @@
 A CAN bus behind an adapter that speaks LAWICEL's protocol, which Linux calls slcan.
 
 A line ends with CR: ``t`` identifier (three digits) length data; ``r`` and no data is a remote
-frame, which is only sent. A BEL stands for *no* in place of
-a line; an empty line, ``z`` and ``Z`` stand for *done*. Digits are sent in upper case and read in
-both. Lines of other kinds, such as those of extended and remote frames, are passed over.
+frame, which is only sent. A BEL in place of a line means *no*; an empty line, ``z`` and ``Z`` mean
+*done*. Digits are sent in upper case and read in both. Other lines, such as those of extended and
+remote frames, are passed over.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ BIT_RATES = {
 }
 #: Ends a line.
 CR = b'\r'
-#: In place of a line: the adapter did not do it.
+#: In place of a line: the adapter refused.
 BEL = b'\a'
-#: A command that takes the adapter off the bus; it refuses it when it is off it.
+#: The command that takes the adapter off the bus; refused when it is off already.
 CLOSE = b'C' + CR
-#: A command that takes the adapter onto the bus.
+#: The command that takes the adapter onto the bus.
 OPEN = b'O' + CR
-#: Ends whatever an earlier program left half said; an adapter refuses or ignores it.
+#: Ends an incomplete command of an earlier program; an adapter refuses or ignores it.
 FLUSH = 3 * CR
 
 #: The longest line that counts: a frame with eight bytes, a time stamp and a CR behind it.
@@ -52,13 +52,13 @@ _FRAME = re.compile(rb't([0-7][0-9A-Fa-f]{2})([0-8])((?:[0-9A-Fa-f]{2})*)')
 _STAMP = 4
 
 
-class Heard(NamedTuple):
+class Output(NamedTuple):
     """
-    What an adapter said.
+    What an adapter sent.
 
     :ivar frames: in their order.
-    :ivar done: how often it said that something was done.
-    :ivar refused: how often it said *no*.
+    :ivar done: how often it confirmed a command.
+    :ivar refused: how often it refused one.
     """
 
     frames: Sequence[Frame]
@@ -82,9 +82,9 @@ def encode(frame: Frame) -> bytes:
 
 def bit_rate(rate: int) -> bytes:
     """
-    Return the command that sets a bit rate; an adapter takes it off the bus alone.
+    Return the command that sets a bit rate; an adapter takes it only while off the bus.
 
-    :raises ValueError: the protocol has none for it; the message says which there are.
+    :raises ValueError: the protocol has none for it; the message says which rates it has.
     """
     if rate not in BIT_RATES:
         raise ValueError(f'bit rate {rate}: there are {", ".join(map(str, BIT_RATES))}')
@@ -92,24 +92,24 @@ def bit_rate(rate: int) -> bytes:
 
 
 class Reader:
-    """Finds what an adapter says in the bytes that come in, in whatever pieces."""
+    """Finds the lines of an adapter in the bytes that come in, in any pieces."""
 
     def __init__(self) -> None:
         self._line = b''
 
     @property
     def pending(self) -> int:
-        """How many bytes have come of a line that is not whole yet."""
+        """How many bytes have come of a line that is not complete yet."""
         return len(self._line)
 
-    def feed(self, data: bytes) -> Heard:
-        """Take bytes that came in; return what the lines that became whole say."""
+    def feed(self, data: bytes) -> Output:
+        """Take bytes that came in; return what the lines say that they complete."""
         *lines, rest = (self._line + data).replace(BEL, BEL + CR).split(CR)
         # what is longer than any line is no line, however it ends
         self._line = rest[-_LONGEST_LINE:]
         frames = [frame for line in lines if (frame := _decode(line)) is not None]
         done = sum(line in (b'', b'z', b'Z') for line in lines)
-        return Heard(frames, done, sum(line.endswith(BEL) for line in lines))
+        return Output(frames, done, sum(line.endswith(BEL) for line in lines))
 
 
 def _decode(line: bytes) -> Frame | None:
@@ -123,11 +123,11 @@ def _decode(line: bytes) -> Frame | None:
     return Frame(int(match[1], 16), bytes.fromhex(match[3][:length].decode()))
 
 
-#: How long an adapter may take to say that it has done something, s; some never say it.
+#: How long an adapter may take to confirm a command, s; some never do.
 _REPLY_TIME = 0.1
-#: For how long it has to be silent before it is set up, s: longer when it seemed to refuse.
+#: How long it has to be silent before it is set up, s: longer when it seemed to refuse.
 _SILENCES = (0.1, 0.2, 0.4)
-#: For how long at most it is waited that it has nothing more to say, s.
+#: How long at most to wait for that silence, s.
 _LONGEST_TALK = 1.0
 
 
@@ -136,7 +136,7 @@ class LawicelPort:
     One adapter; it is on the bus as long as the port is open.
 
     :param rate: bit rate of the bus, bit/s.
-    :raises ValueError: there is no such bit rate; the message says which there are.
+    :raises ValueError: there is no such bit rate; the message says which ones there are.
     """
 
     def __init__(self, port: Port, rate: int, now: Clock = time.monotonic) -> None:
@@ -178,15 +178,15 @@ class LawicelPort:
 
     def receive(self, until: float) -> Sequence[Frame]:
         """Return what has come; wait for the first bytes until a moment of ``time.monotonic``."""
-        heard = self._reader.feed(self._port.read(until))
-        if heard.refused:
+        output = self._reader.feed(self._port.read(until))
+        if output.refused:
             self.trouble = CANNOT_SEND
-        elif heard.frames:
+        elif output.frames:
             self.trouble = ''
-        return heard.frames
+        return output.frames
 
     def _set_up(self, silence: float) -> str:
-        """Take the adapter onto the bus after so long a silence, s; return what it refused."""
+        """Take the adapter onto the bus after so long a silence, s; return why it refused."""
         # an earlier program may have left it on the bus, in the middle of a line
         self._port.write(FLUSH)
         self._port.write(CLOSE)
@@ -198,18 +198,18 @@ class LawicelPort:
         return ''
 
     def _hear_out(self, silence: float) -> None:
-        """Wait until it says nothing more: a late answer would count for another command."""
+        """Wait until it is silent: a late answer would count for another command."""
         now = self._now()
         end = now + _LONGEST_TALK
         while now < end and self._port.read(min(now + silence, end)):
             now = self._now()
         self._reader = Reader()
 
-    def _ask(self, command: bytes) -> Heard:
-        """Return what the adapter says to a command that was given alone."""
+    def _ask(self, command: bytes) -> Output:
+        """Send a command alone, and return the answer of the adapter."""
         self._port.write(command)
         until = self._now() + _REPLY_TIME
-        heard = self._reader.feed(b'')
-        while not heard.done and not heard.refused and self._now() < until:
-            heard = self._reader.feed(self._port.read(until))
-        return heard
+        output = self._reader.feed(b'')
+        while not output.done and not output.refused and self._now() < until:
+            output = self._reader.feed(self._port.read(until))
+        return output

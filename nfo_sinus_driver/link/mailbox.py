@@ -4,13 +4,14 @@
 """
 The mailbox of a PLC: parameters of a drive on its fieldbus, one at a time, by PNU and sub-index.
 
-A request stands in registers +17 to +21 of the block before its number is written to +16, alone.
-The PLC asks the drive, which takes its time, and writes that number to +24 last. So a request is
-several transactions, and others go between: each ends with :class:`InProgress`, until the last one.
+A request is written to registers +17 to +21 of the block before its number is written to +16,
+alone. The PLC passes it to the drive, which is slow, and writes that number to +24 last. So a
+request is several transactions, and others go between: each ends with :class:`InProgress`, until
+the last one.
 
-An answer is believed if its number and the request in the mailbox are still ours. What is not
-answered in :data:`TIME` is given up. A number that may have been lost is looked at before it is
-written again: the PLC does nothing twice for one number, and a write never gets a second one.
+An answer is believed if its number and the request in the mailbox are still ours. A request without
+an answer in :data:`TIME` is given up. A number that may have been lost is read before it is written
+again: the PLC does nothing twice for one number, and a write never gets a second one.
 """
 
 from __future__ import annotations
@@ -42,20 +43,20 @@ _T = TypeVar('_T')
 FIRST = 16
 #: How long an answer is waited for, s.
 TIME = 1.0
-#: How often the mailbox is looked at meanwhile, s.
+#: How often the mailbox is read meanwhile, s.
 _PERIOD = 0.02
-#: Who waits for a turn asks again within this time, s.
+#: Within what time a request that waits for its turn is repeated by its caller, s.
 _WAITS_FOR = 0.2
-#: So long an order that was given up is not taken for another one that is the same, s.
+#: How long a request that was given up is distinguished from a new one that is the same, s.
 _REMEMBERED = 1.0
 
 _LAYOUT = struct.Struct('>12H')
 _REQUEST = struct.Struct('>3HL')
 _READ, _WRITE = 1, 2
-#: What +25 says.
+#: The values of +25.
 _DONE, _REFUSED, _NONE_SUCH, _BUSY, _NO_ACCESS = range(5)
-#: The error numbers of PROFIdrive that mean what an exception code of Modbus means: it can only be
-#: read, and this value cannot be.
+#: The error numbers of PROFIdrive that mean the same as an exception code of Modbus: read-only, and
+#: value not allowed.
 _CODES = {
     0x01: Refused.ILLEGAL_FUNCTION,
     0x02: Refused.ILLEGAL_VALUE,
@@ -66,7 +67,7 @@ Ask = Callable[[Request[_T]], tuple[_T, float]]
 
 
 class _Stage(enum.Enum):
-    """What is to be done next for a request."""
+    """The next step of a request."""
 
     PREPARE = enum.auto()
     ASK = enum.auto()
@@ -74,14 +75,14 @@ class _Stage(enum.Enum):
 
 
 class _Wanted(NamedTuple):
-    """What is to be read, or written."""
+    """The parameter to be read, or written."""
 
     address: Address
     data: bytes | None
 
     @property
     def writes(self) -> bool:
-        """It changes the parameter."""
+        """It writes."""
         return self.data is not None
 
     @property
@@ -134,7 +135,7 @@ class _Shown(NamedTuple):
 
     @property
     def request(self) -> bytes:
-        """What was asked with it."""
+        """The request of that number."""
         return self.data[2:12]
 
     @property
@@ -144,7 +145,7 @@ class _Shown(NamedTuple):
 
     @property
     def result(self) -> int:
-        """What became of it."""
+        """The result of that request."""
         return self.words[9]
 
     @property
@@ -171,13 +172,13 @@ class Mailbox:
         self._pending: _Pending | None = None
         #: A write that was given up while another request was wanted.
         self._unconfirmed: _Pending | None = None
-        #: What waits for its turn, in order, and when it was last asked for.
+        #: What waits for its turn, in order, and when its caller last repeated it.
         self._waiting: dict[_Wanted, float] = {}
         #: Function 23 was refused.
         self._apart = False
 
     def forget(self) -> None:
-        """Take note that the connection is another one."""
+        """Note that the connection is a new one."""
         self._pending = self._unconfirmed = None
         self._waiting.clear()
 
@@ -228,13 +229,13 @@ class Mailbox:
         raise NotReady(now + _PERIOD)
 
     def _first_waiting(self, now: float) -> _Wanted | None:
-        """Return what has waited longest, and still does."""
+        """Return what has waited longest, and still waits."""
         waiting = self._waiting.items()
         self._waiting = {one: at for one, at in waiting if now - at <= _WAITS_FOR}
         return next(iter(self._waiting), None)
 
     def _step(self, pending: _Pending) -> _Shown | None:
-        """Do the next step; return what the mailbox shows then, once the number was written."""
+        """Do the next step; return the content of the mailbox, once the number was written."""
         if pending.stage is _Stage.PREPARE:
             shown = self._exchange(1, pending.wanted.registers)
             pending.number = _unlike(shown.number, shown.answered)
@@ -242,13 +243,13 @@ class Mailbox:
             return None
         if pending.stage is _Stage.WAIT:
             return self._exchange()
-        # written it may be, whether the answer comes or not
+        # it may be written, whether the answer comes or not
         pending.stage = _Stage.WAIT
         pending.until = self._now() + TIME
         return self._exchange(0, pending.number.to_bytes(2, 'big'))
 
     def _answer(self, pending: _Pending, shown: _Shown) -> Reply:
-        """Return what the mailbox answers to a request, if it does."""
+        """Return the answer of the mailbox to a request, if it has one."""
         wanted = pending.wanted
         if shown.request != wanted.registers:
             self._pending = None
@@ -284,7 +285,7 @@ class Mailbox:
         except Refused as refusal:
             raise self._of_registers(refusal) from None
 
-    # --- what went wrong --------------------------------------------------------------------------
+    # --- errors -----------------------------------------------------------------------------------
 
     def _refused(self, wanted: _Wanted, shown: _Shown) -> LinkError:
         if shown.result == _BUSY:

@@ -6,7 +6,7 @@ Modbus ASCII of a master: frames, without I/O, and the link over one serial line
 
 A frame is ``:``, the message and its check sum in hexadecimal characters, carriage return and line
 feed (MODBUS over Serial Line V1.02 §2.5.2). Upper case is sent, both are read. A colon always
-begins a frame: whatever came before it is lost.
+begins a frame: what came before it is lost.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from nfo_sinus_driver.link.serial_link import SerialLink
 
 #: How long a pause between two characters of a frame may last, s.
 INTER_BYTE_TIMEOUT = 1.0
-#: How long one may last where no frame is begun: adapters hand characters over in lumps, s.
+#: How long one may last outside a frame: adapters deliver characters in lumps, s.
 _IDLE_TIMEOUT = 0.03
 
 _FRAME = re.compile(rb':((?:[0-9A-Fa-f]{2})+)\r\n')
@@ -34,7 +34,7 @@ _T = TypeVar('_T')
 
 
 def lrc(data: bytes) -> int:
-    """Return the check sum of a message: with it, all bytes add up to nothing, modulo 256."""
+    """Return the check sum of a message: with it, all bytes add up to 0, modulo 256."""
     return -sum(data) & 0xFF
 
 
@@ -46,7 +46,7 @@ def encode(request: Request[object]) -> bytes:
 
 
 def length(message_length: int) -> int:
-    """Return how many characters the frame of a message has: two for each byte, and the rest."""
+    """Return how many characters the frame of a message has."""
     return 2 * (message_length + 1) + len(':\r\n')
 
 
@@ -60,7 +60,7 @@ def _whole_frames(data: bytes) -> Iterator[tuple[int, int, bytes]]:
 
 
 class AsciiReader(AnswerReader[_T]):
-    """Finds an answer in ASCII frames; one that has begun may pause so long, s."""
+    """Finds an answer in ASCII frames, which may pause for ``inter_byte_timeout``, s."""
 
     def __init__(
         self, request: Request[_T], inter_byte_timeout: float = INTER_BYTE_TIMEOUT
@@ -75,7 +75,7 @@ class AsciiReader(AnswerReader[_T]):
 
     @property
     def bytes_needed(self) -> int:
-        """How many characters have to come yet, as far as those that came tell."""
+        """How many characters have to come yet, by those that came."""
         begun = self._begun()
         digits = begun[1] if begun else b''
         beginning = bytes.fromhex(digits[: len(digits) & ~1].decode())
@@ -101,7 +101,7 @@ class AsciiReader(AnswerReader[_T]):
         return begun if fits else None
 
 
-#: Frames need no silence between them, but transmitters take a moment to switch, characters.
+#: Frames need no silence between them, but transmitters need a moment to switch, characters.
 _SWITCHING = 2
 
 
@@ -110,7 +110,7 @@ class AsciiLink(SerialLink):
     A Modbus ASCII master.
 
     The standard allows a pause of a second between two characters. An answer whose end was lost
-    would leave the line unused for that, so no pause may be longer than it may take to begin one.
+    would leave the line unused for that, so no pause may be longer than ``response_timeout``.
     """
 
     protocol = MODBUS_ASCII

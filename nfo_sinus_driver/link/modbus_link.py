@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What every Modbus link does: ask for what is wanted, and who a unit says it is [M0 §6.2.4]."""
+"""What every Modbus link does: its requests, and the identity of a unit [M0 §6.2.4]."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ class ModbusLink(ABC):
     supervision = None
 
     def parts(self, address: Address) -> tuple[Address, ...]:
-        """Return the whole; where the first register stands apart, it and then the others."""
+        """Return the address; where the first register is apart, it and then the others."""
         if address.sub_index is None or address.block is not None:
             return (address,)
         first = address._replace(sub_index=None, size=2)
         return first, first._replace(index=address.sub_index, size=address.size - 2)
 
     def read(self, unit: int, address: Address) -> Reply:
-        """Read one parameter (function 03; 04 and 01 for what is no holding register)."""
+        """Read one parameter (function 03; 04 for input registers, 01 for coils)."""
         return Reply(*self._ask(read_of(unit, address)))
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
@@ -51,7 +51,7 @@ class ModbusLink(ABC):
         return Reply(*self._ask(write_and_read_of(unit, address, data, source)))
 
     def identify(self, unit: int) -> ModbusInquiry:
-        """Return the questions by which a unit tells who it is (functions 43/14 and 17)."""
+        """Return the questions by which a unit identifies itself (functions 43/14 and 17)."""
         return ModbusInquiry(unit, self._ask)
 
     @abstractmethod
@@ -69,19 +69,19 @@ BASIC, REGULAR, SPECIFIC = 1, 2, 4
 
 #: The longest message there is.
 _LONGEST = 254
-#: Where the objects begin in an answer: behind unit, function, MEI type, code, conformity level,
+#: The offset of the objects in an answer: behind unit, function, MEI type, code, conformity level,
 #: more follows, next object and number of objects.
 _OBJECTS_AT = 8
 _MORE_FOLLOWS = {0x00: False, 0xFF: True}
 
-#: What the objects with these numbers say.
+#: The fields of the objects, by number.
 _FIELDS = ('vendor', 'product_code', 'revision', 'url', 'product', 'model', 'application')
 _TEXT = re.compile(rb'[ -~]+')
 
 
 @dataclass(frozen=True)
 class DeviceObjects:
-    """An answer of function 43/14: contents by number, and where to go on, if there is more."""
+    """An answer of function 43/14: contents by number, and the next object, if there is more."""
 
     objects: tuple[tuple[int, bytes], ...]
     next_object: int | None = None
@@ -89,7 +89,7 @@ class DeviceObjects:
 
 @dataclass(frozen=True)
 class ReadDevice:
-    """Read what a unit says about itself, from an object on; the G2 has the three codes above."""
+    """Read the identification of a unit, from an object on, by one of the three codes above."""
 
     unit: int
     code: int = REGULAR
@@ -105,20 +105,20 @@ class ReadDevice:
 
     @property
     def answer_head(self) -> bytes:
-        """What of the answer is known beforehand."""
+        """The beginning of the answer, as far as it is known."""
         return bytes((self.unit, self.function, _DEVICE_IDENTIFICATION, self.code))
 
     def measure(self, beginning: bytes) -> int:
-        """Bytes of an answer that begins like this; the least there can be."""
+        """Return the least length of an answer that begins like this."""
         at = _OBJECTS_AT
         if len(beginning) >= at:
             for _ in range(beginning[at - 1]):
-                # number, length, content; of what has not come, number and length at least
+                # number, length, content; of one that has not come, number and length at least
                 at += 2 + (beginning[at + 1] if len(beginning) > at + 1 else 0)
         return at
 
     def decode(self, message: bytes) -> DeviceObjects | None:
-        """Return what a whole message says; ``None`` if it is no answer after all."""
+        """Return the content of a whole message; ``None`` if it is no answer after all."""
         more = _MORE_FOLLOWS.get(message[5])
         objects = []
         at = _OBJECTS_AT
@@ -135,7 +135,7 @@ class ReadDevice:
 
 @dataclass(frozen=True)
 class ReportSlaveId:
-    """Read what a unit reports of itself, whatever that is (function 17)."""
+    """Read what a unit reports of itself (function 17)."""
 
     unit: int
 
@@ -145,11 +145,11 @@ class ReportSlaveId:
 
     @property
     def answer_head(self) -> bytes:
-        """What of the answer is known beforehand."""
+        """The beginning of the answer, as far as it is known."""
         return bytes((self.unit, self.function))
 
     def measure(self, beginning: bytes) -> int:
-        """Bytes of an answer that begins like this; the least there can be."""
+        """Return the least length of an answer that begins like this."""
         return 3 + (beginning[2] if len(beginning) > 2 else 0)
 
     def decode(self, message: bytes) -> bytes:
@@ -158,7 +158,7 @@ class ReportSlaveId:
 
 
 def text(data: bytes) -> str:
-    """Return what is printable ASCII, for nothing else may come into a log."""
+    """Return the printable ASCII of a text: nothing else may come into a log."""
     return ' '.join(part.decode('ascii').strip() for part in _TEXT.findall(data)).strip()
 
 
@@ -173,17 +173,17 @@ def serial_number(report: bytes) -> str:
     Return the serial number in the answer of function 17.
 
     A G2 reports 16 characters and nothing else; the standard has an id, a run indicator (00 or
-    FF) and whatever the maker adds, so the longest text is taken [C94].
+    FF) and additions of the maker, so the longest text is taken [C94].
     """
     return max((part.strip() for part in _TEXT.findall(report)), key=len, default=b'').decode()
 
 
 class ModbusInquiry:
     """
-    The questions by which a unit tells who it is.
+    The questions by which a unit identifies itself.
 
-    All objects that fit into one answer are asked for at once, then the serial number. A question
-    that is refused or not answered is never asked again: many devices do not know it [C57].
+    All objects that fit into one answer are read at once, then the serial number. A question that
+    is refused or not answered is never repeated: many devices do not know it [C57].
 
     :param ask: sends a request; returns its answer and when that came.
     """
@@ -192,7 +192,7 @@ class ModbusInquiry:
         self._unit = unit
         self._ask = ask
         self._questions: list[Request[object]] = [ReadDevice(unit), ReportSlaveId(unit)]
-        self._told: dict[str, str] = {}
+        self._answers: dict[str, str] = {}
 
     @property
     def done(self) -> bool:
@@ -201,8 +201,8 @@ class ModbusInquiry:
 
     @property
     def found(self) -> Identification:
-        """What it has said so far."""
-        return Identification(**self._told)
+        """What it has answered so far."""
+        return Identification(**self._answers)
 
     def ask(self) -> Reply:
         """Ask the next question: one transaction (LinkError: as its subclasses say)."""
@@ -216,15 +216,15 @@ class ModbusInquiry:
             assert isinstance(question, ReadDevice)
             self._take(answer)
             following = answer.next_object
-            # only forward: a unit that always has more is not asked without end
+            # only forward: a unit that always has more must not keep this going
             if following is not None and question.first < following < len(_FIELDS):
                 self._questions.insert(0, ReadDevice(self._unit, REGULAR, following))
         elif isinstance(answer, bytes):
-            self._told['serial'] = serial_number(answer)
+            self._answers['serial'] = serial_number(answer)
         return Reply(b'', arrived)
 
     def _take(self, answer: DeviceObjects) -> None:
         for number, content in answer.objects:
             if number < len(_FIELDS):
                 name = _FIELDS[number]
-                self._told[name] = revision(content) if name == 'revision' else text(content)
+                self._answers[name] = revision(content) if name == 'revision' else text(content)

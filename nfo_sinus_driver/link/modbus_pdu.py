@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What a Modbus master asks and is answered, and how that is found among bytes [M0 §6.2.3].
+The requests of a Modbus master and their answers, and how these are found in bytes [M0 §6.2.3].
 
 A *message* is unit, function and data: what RTU, ASCII and TCP have in common. Each of them packs
 it into frames of its own.
@@ -38,7 +38,7 @@ _ON = 0xFF00
 #: Unit, function, code.
 REFUSAL_LENGTH = 3
 
-#: Of how many requests each line keeps what is sent; those of a poll are sent again and again.
+#: How many encoded requests each line caches: those of a poll are sent again and again.
 PREPARED = 1024
 
 _T = TypeVar('_T')
@@ -46,14 +46,14 @@ _Answer = TypeVar('_Answer', covariant=True)
 
 
 class Request(Protocol[_Answer]):
-    """What a request knows of itself and of its answer; all in messages."""
+    """What a request knows of itself and of its answer, in messages."""
 
     def __hash__(self) -> int:
-        """Requests that ask the same of the same unit are the same."""
+        """Equal requests to the same unit are the same."""
 
     @property
     def unit(self) -> int:
-        """Who is asked."""
+        """The unit."""
 
     @property
     def function(self) -> int:
@@ -65,21 +65,21 @@ class Request(Protocol[_Answer]):
 
     @property
     def answer_head(self) -> bytes:
-        """What of the answer is known beforehand: unit, function and what follows them."""
+        """The beginning of the answer, as far as it is known: unit, function and more."""
 
     @property
     def answer_length(self) -> int:
-        """Bytes of the answer; the most there can be."""
+        """The greatest length of the answer."""
 
     def measure(self, beginning: bytes) -> int:
-        """Bytes of an answer that begins like this; the least there can be."""
+        """Return the least length of an answer that begins like this."""
 
     def decode(self, message: bytes) -> _Answer | None:
-        """Return what a whole message says; ``None`` if it is no answer after all."""
+        """Return the content of a whole message; ``None`` if it is no answer after all."""
 
 
-class _TellsRegisters:
-    """What is answered by ``count`` registers, and by nothing that names them."""
+class _ReadsRegisters:
+    """A request whose answer has ``count`` registers, and does not name them."""
 
     unit: int
     function: int
@@ -100,12 +100,12 @@ class _TellsRegisters:
         return self.answer_length
 
     def decode(self, message: bytes) -> bytes:
-        """Return what the registers hold."""
+        """Return the registers."""
         return message[3:]
 
 
 @dataclass(frozen=True)
-class Read(_TellsRegisters):
+class Read(_ReadsRegisters):
     """Read ``count`` registers of ``unit``, from ``register`` on (function 03)."""
 
     unit: int
@@ -160,7 +160,7 @@ class ReadCoils:
         return self.answer_length
 
     def decode(self, message: bytes) -> bytes:
-        """Return the bits, eight in a byte; what is beyond the last is 0."""
+        """Return the bits, eight in a byte; unused ones are 0."""
         bits = int.from_bytes(message[3:], 'little') & ((1 << self.count) - 1)
         return bits.to_bytes(self._bytes, 'little')
 
@@ -233,7 +233,7 @@ class WriteCoil(Write):
 
 
 @dataclass(frozen=True)
-class WriteAndRead(_TellsRegisters):
+class WriteAndRead(_ReadsRegisters):
     """
     Write ``data`` from ``register`` on, then read ``count`` registers from ``source`` on.
 
@@ -259,7 +259,7 @@ class WriteAndRead(_TellsRegisters):
 
 @functools.lru_cache(PREPARED)
 def read_of(unit: int, address: Address) -> Request[bytes]:
-    """Return the request that reads; one that comes again is the same."""
+    """Return the request that reads; the same one for the same address."""
     if address.space == COIL:
         return ReadCoils(unit, address.index, 1 if address.size == 1 else 8 * address.size)
     kind = ReadInput if address.space == INPUT else Read
@@ -284,22 +284,22 @@ def encode(request: Request[object]) -> bytes:
 
 
 def refusal_head(request: Request[object]) -> bytes:
-    """Return how a message begins by which the unit refuses a request."""
+    """Return the beginning of a refusal of a request."""
     return bytes((request.unit, request.function | _EXCEPTION))
 
 
 def longest(request: Request[object], beginning: bytes) -> int:
-    """Return how many bytes an answer that begins like this may have: more than the least."""
+    """Return the greatest length of an answer that begins like this."""
     if request.measure(b'') == request.answer_length:
         return request.answer_length
-    # what does not follow from the beginning may be as much as there can be
+    # what does not follow from the beginning may be as long as possible
     unknown = b'\xff' * request.answer_length
     return min(request.answer_length, request.measure(beginning + unknown))
 
 
 def understand(request: Request[_T], message: bytes) -> _T | None:
     """
-    Return what a whole message says as the answer to a request; ``None``: to something else.
+    Return the content of a message as the answer to a request; ``None``: it is none.
 
     :raises Refused: the unit answered with an exception.
     """
@@ -317,12 +317,12 @@ class AnswerReader(ABC, Generic[_T]):
     Finds the answer to one request in the bytes that come in.
 
     An answer counts only when unit, function, length and check sum are right, and for a write
-    register and value too. Everything else is passed over: it can be noise, or the answer of
+    register and value too. Everything else is passed over: it can be noise, or the answer to
     another master. A read answer does not name its register, so the caller has to make sure that
     no answer to an earlier request of the same shape can still come.
 
-    :ivar frame: the bytes of the answer or refusal found last.
-    :ivar passed_over: what came before it.
+    :ivar frame: the bytes of the last answer or refusal found.
+    :ivar passed_over: the bytes before it.
     """
 
     def __init__(self, request: Request[_T]) -> None:
@@ -333,22 +333,22 @@ class AnswerReader(ABC, Generic[_T]):
 
     @property
     def received(self) -> int:
-        """How many bytes have come since, or at all."""
+        """How many bytes have come behind it, or at all."""
         return len(self._buffer)
 
     @property
     def other(self) -> bytes:
-        """All that came and is no answer."""
+        """All bytes that are no answer."""
         return self.passed_over + self._buffer
 
     @property
     @abstractmethod
     def bytes_needed(self) -> int:
         """
-        How many bytes have to come yet, as far as those that came tell.
+        How many bytes have to come yet, by those that came.
 
-        At least, while no answer has begun; then what may come: the port may hand over all of a
-        long answer at once, and one that is still coming is not late.
+        At least, while no answer has begun; then at most: the port may deliver all of a long answer
+        at once, and one that is still coming is not late.
         """
 
     @property
@@ -358,7 +358,7 @@ class AnswerReader(ABC, Generic[_T]):
 
     def feed(self, data: bytes) -> _T | None:
         """
-        Take bytes that came in; return what the request's ``decode`` makes of its answer, if any.
+        Take bytes that came in; return the decoded answer, if it is there.
 
         :raises Refused: the unit answered with an exception; feeding may go on after it.
         """

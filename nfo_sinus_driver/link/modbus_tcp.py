@@ -5,9 +5,8 @@
 Modbus TCP of a master: frames, without I/O, and the link to drives behind a gateway.
 
 A frame is a number that the answer repeats, two bytes of zero, the length of the message and the
-message (MODBUS Messaging on TCP/IP Implementation Guide V1.0b §3.1.3). TCP itself sees to it that
-bytes come whole and in order, so there is no check sum, and a header that makes no sense says that
-another device is there.
+message (MODBUS Messaging on TCP/IP Implementation Guide V1.0b §3.1.3). TCP delivers bytes complete
+and in order, so there is no check sum, and a header that makes no sense is of another device.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ from nfo_sinus_driver.link.protocols import MODBUS_TCP
 from nfo_sinus_driver.link.tcp_connection import Connection, TcpConnection
 
 _HEADER = struct.Struct('>HHH')
-#: Unit and function, and as much data as there can be.
+#: The lengths of a message, from unit and function alone to the most data.
 _MESSAGE_LENGTHS = range(2, 255)
 
 
@@ -55,7 +54,7 @@ def encode(request: Request[object], number: int) -> bytes:
 
 
 class FrameReader:
-    """Cuts a connection into frames; after what is none it is ``out_of_step`` for good."""
+    """Cuts a connection into frames; after an invalid header it is ``out_of_step`` for good."""
 
     def __init__(self) -> None:
         self.out_of_step = False
@@ -85,15 +84,15 @@ class FrameReader:
 
 _T = TypeVar('_T')
 
-#: Where gateways listen.
+#: The port of gateways.
 _PORT = 502
-#: How long the gateway may take to accept a connection, and how long that is waited for at a time,
-#: s: meanwhile others may want something of the thread.
+#: How long the gateway may take to accept a connection, and how long to wait for that at a time, s:
+#: the thread has other work.
 _CONNECT_TIMEOUT = 3.0
 _SLICE = 0.02
-#: So many connections in a row that the gateway closes after one answer are no accident.
+#: So many connections in a row that the gateway closes after one answer are no coincidence.
 _CLOSINGS = 2
-#: Of so many requests that were given up an answer is known as late.
+#: For so many requests that were given up an answer is recognised as late.
 _GIVEN_UP = 64
 _HINT = 'is the gateway switched on and its address right?'
 _CLOSED_HINT = (
@@ -107,13 +106,13 @@ class TcpLink(ModbusLink):
     A Modbus master on one connection to a gateway; a unit is a drive behind it.
 
     Every request has a number of its own, which its answer repeats: a late or doubled answer is
-    distinguished by that, so nothing is ever in quarantine. Drives that do not answer
-    leave the connection as it is.
+    distinguished by that, so nothing is ever in quarantine. A drive that does not answer does not
+    affect the connection.
 
-    A connection may stay open and mute, when the gateway has lost its other side, or something
-    between has forgotten it. Who calls :meth:`open` then has another one begun beside it; the first
-    that answers is kept. Before the other is used the mute one is closed so that nothing that was
-    handed over to it arrives later.
+    A connection may stay open and mute, when the gateway has lost its other side, or a router has
+    forgotten it. :meth:`open` then begins another one beside it; the first that answers is kept.
+    Before the other is used the mute one is closed so that nothing that was handed over to it
+    arrives later.
 
     A gateway that closes the connection after each answer gets another one for each request.
 
@@ -138,12 +137,12 @@ class TcpLink(ModbusLink):
         self._response_timeout = response_timeout
         self._make = connection
         self._connection: Connection | None = None
-        #: One that has been begun, and until when it is waited for.
+        #: One that has been begun, and until when to wait for it.
         self._begun: Connection | None = None
         self._begun_until = 0.0
         self._reader = FrameReader()
         self._number = 0
-        #: What was asked on this connection in vain, and how many answers came.
+        #: The requests on this connection without an answer, and how many answers came.
         self._given_up: deque[int] = deque(maxlen=_GIVEN_UP)
         self._answers = 0
         #: The last request on this connection has not been answered.
@@ -231,7 +230,7 @@ class TcpLink(ModbusLink):
             raise self._unreachable(error) from error
 
     def _go_on(self, until: float) -> bool:
-        """Wait for the connection that was begun; tell whether it is the one by now."""
+        """Wait for the connection that was begun; return whether it is in use now."""
         assert self._begun is not None
         try:
             if not self._begun.connected(until):
@@ -266,7 +265,7 @@ class TcpLink(ModbusLink):
             raise self._unreachable(TimeoutError('timed out'))
 
     def _usable(self) -> Connection:
-        """Return the connection that the next request goes by."""
+        """Return the connection for the next request."""
         if self._begun is not None:
             self._go_on(self._now())
         connection = self._connection
@@ -281,7 +280,7 @@ class TcpLink(ModbusLink):
         return self._connection
 
     def _was_closed(self, connection: Connection) -> bool:
-        """Tell whether the gateway has closed it since it answered."""
+        """Return whether the gateway has closed it since its answer."""
         try:
             self._reader.feed(connection.read(0.0))
         except OSError:
@@ -289,7 +288,7 @@ class TcpLink(ModbusLink):
         return False
 
     def _note_closing(self) -> None:
-        """Take note that the gateway has closed a connection after one answer."""
+        """Note that the gateway has closed a connection after one answer."""
         self._closings += 1
         if self._is_closed_each_time:
             self.remarks.add(
@@ -318,7 +317,7 @@ class TcpLink(ModbusLink):
             raise self._lost(error) from error
 
     def _closes_after_one(self, request: Request[object]) -> bool:
-        """Tell whether the gateway seems to close after each answer: it did after one, just now."""
+        """Return whether the gateway seems to close after each answer: it has just done so."""
         if self._answers != 1 or self._reader.received:
             return False
         self._note_closing()
@@ -345,7 +344,7 @@ class TcpLink(ModbusLink):
                     f'set protocol to modbus_rtu and port to socket://{self._name}'
                 )
             if data:
-                # it talks, so none is needed beside it
+                # it sends, so no other is needed
                 self._drop_begun()
             if now >= deadline:
                 break
@@ -361,7 +360,7 @@ class TcpLink(ModbusLink):
             self._closings = 0
 
     def _missing(self, request: Request[object], others: Sequence[int]) -> LinkError:
-        """Return what it means that no answer to a request came, but perhaps others."""
+        """Return the error when no answer to a request came, but perhaps others."""
         unit = request.unit
         strange = [number for number in others if number not in self._given_up]
         if strange:
@@ -423,7 +422,7 @@ def _host_and_port(port: str) -> tuple[str, int]:
 
 
 def _of_gateway(request: Request[Any], refusal: Refused) -> LinkError:
-    """Return what a refusal means: a gateway speaks with the voice of the unit that is asked."""
+    """Return what a refusal means: a gateway answers in the name of the unit."""
     if refusal.code == Refused.NO_PATH:
         return NoPath(
             f'the gateway has no path to unit {request.unit} (exception {refusal.code}): '

@@ -4,12 +4,12 @@
 """
 The serial protocol of SEW's MOVITRAC 31..: frames, without I/O, return codes, the link [M4 §2.1].
 
-:func:`encode` makes a frame; a :class:`Reader` finds messages in whatever bytes come in, in any
-pieces, among noise and the remains of others. A start delimiter says what a frame is and how long;
-its last byte is the sum of all others, without carry [C85].
+:func:`encode` makes a frame; a :class:`Reader` finds messages in the bytes that come in, in any
+pieces, among noise and the remains of others. A start delimiter gives the type and the length of a
+frame; its last byte is the sum of all others, without carry [C85].
 
-A drive that refuses answers by NACK with one of 34 return codes [M4 §2.1.2]. Two of them inform
-only, for the drive has done what was requested [C81].
+A drive refuses by NACK with one of 34 return codes [M4 §2.1.2]. Two of them only inform, for the
+drive has carried out the request [C81].
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from nfo_sinus_driver.link.interface import Address, DamagedAnswer, Refused, Rep
 from nfo_sinus_driver.link.protocols import MOVITRAC
 from nfo_sinus_driver.link.request_link import CodecLink
 
-#: How many bytes a value has: of a plain frame, and of a long one.
+#: How many bytes a value has, in a plain frame and in a long one.
 SIZES = (4, 8)
 #: Bytes of LONG_DATA, the longest answer.
 LONGEST_ANSWER = 12
 
-#: Of how many requests the frame is kept; those of a poll are sent again and again.
+#: How many encoded requests are cached: those of a poll are sent again and again.
 _PREPARED = 1024
 
 _ENQUIRY = 0xB5
@@ -39,7 +39,7 @@ _SELECT = 0xA9
 _LONG_SELECT = 0xAD
 _ACK = 0xD2
 _NACK = 0xF3
-#: How long a frame is, by its start delimiter.
+#: The length of a frame, by its start delimiter.
 _LENGTHS = {
     _ENQUIRY: 5,
     _DATA: 8,
@@ -65,7 +65,7 @@ class Enquiry:
 
 @dataclass(frozen=True)
 class Select:
-    """SELECT or LONG_SELECT, as its value is long: give a parameter a value."""
+    """SELECT or LONG_SELECT, by the length of its value: give a parameter a value."""
 
     unit: int
     index: int
@@ -87,7 +87,7 @@ class Ack:
 
 @dataclass(frozen=True)
 class Nack:
-    """It was not done, or is not quite what was asked for: the return code says why."""
+    """It was not done, or not quite as requested: the return code says why."""
 
     code: int
 
@@ -95,12 +95,12 @@ class Nack:
 Request = Enquiry | Select
 Answer = Data | Ack | Nack
 Message = Request | Answer
-#: What tells answers apart: the index that a DATA names, else only what it is.
+#: What distinguishes answers: the index that a DATA names, else only its type.
 Kind = int | type[Answer]
 
 
 def kind(answer: Answer) -> Kind:
-    """Return what tells an answer from others."""
+    """Return what distinguishes an answer from others."""
     return answer.index if isinstance(answer, Data) else type(answer)
 
 
@@ -110,7 +110,7 @@ def kinds(request: Request) -> tuple[Kind, Kind]:
 
 
 def answers(message: Message, request: Request) -> bool:
-    """Tell whether a message may be the answer to a request."""
+    """Return whether a message may be the answer to a request."""
     return not isinstance(message, Request) and kind(message) in kinds(request)
 
 
@@ -155,7 +155,7 @@ def _word(index: int) -> bytes:
 
 
 def decode(data: bytes) -> Message | None:
-    """Return the message whose frame the bytes begin with; ``None`` if they do not, or not yet."""
+    """Return the message whose frame begins the bytes; ``None`` if none does, or not yet."""
     length = _LENGTHS.get(data[0], 0) if data else 0
     if not 0 < length <= len(data) or check_sum(data[: length - 1]) != data[length - 1]:
         return None
@@ -173,7 +173,7 @@ def decode(data: bytes) -> Message | None:
 
 
 def is_glitch(data: bytes) -> bool:
-    """Tell whether bytes are too few to be the remains of an answer, and none begins a frame."""
+    """Return whether bytes are too few to be part of an answer, and none begins a frame."""
     return len(data) <= _GLITCH and _LENGTHS.keys().isdisjoint(data)
 
 
@@ -181,12 +181,12 @@ class Reader:
     """
     Finds all messages, of any master and drive, in the bytes that come in.
 
-    A message with a value counts when its sum is right, whatever came before it. ACK and NACK have
-    next to nothing that could be wrong in them, so they count only at the beginning, behind whole
-    frames, such as the echo of the request, or behind a glitch: a byte or two of which none begins
-    a frame. Whatever else comes is passed over.
+    A message with a value counts when its sum is right, whatever came before it. ACK and NACK are
+    too short to be checked, so they count only at the beginning, behind whole frames, such as the
+    echo of the request, or behind a glitch: a byte or two of which none begins a frame. All other
+    bytes are passed over.
 
-    :ivar rest: what came behind the last message, as far as it may become one.
+    :ivar rest: the bytes behind the last message that may become one.
     """
 
     def __init__(self) -> None:
@@ -195,7 +195,7 @@ class Reader:
         self._is_all = True
 
     def feed(self, data: bytes) -> list[Message]:
-        """Take bytes that came in; return the messages that became whole, in their order."""
+        """Take bytes that came in; return the messages that they complete, in order."""
         self.rest += data
         found: list[Message] = []
         behind = 0
@@ -230,10 +230,10 @@ def _messages(data: bytes, is_all: bool) -> Iterator[tuple[int, int, Message]]:
 
 class ReturnCode(NamedTuple):
     """
-    What a return code says.
+    The meaning of a return code.
 
     :ivar kind: the code of :class:`Refused` that means the same.
-    :ivar remedy: what a person does about it.
+    :ivar remedy: what an operator does about it.
     """
 
     kind: int
@@ -262,7 +262,7 @@ _INHIBIT = (
     'function /Controller inhibit'
 )
 
-#: What the drive has done all the same.
+#: NACKs of a drive that has carried out the request.
 DONE: Mapping[int, str] = {
     0x1E: 'factory setting was started',
     0x28: 'parameter stored to volatile memory, lost on power-down (P801 is Off)',
@@ -350,7 +350,7 @@ REFUSALS: Mapping[int, ReturnCode] = {
 
 
 def refusal(code: int) -> Refused:
-    """Return what a NACK with a return code says."""
+    """Return the refusal of a NACK with a return code."""
     hexadecimal = f'(return code {code:02X})'
     known = REFUSALS.get(code)
     if known is None:
@@ -359,17 +359,18 @@ def refusal(code: int) -> Refused:
     return Refused(known.kind, f'{known.meaning}: {known.remedy} {hexadecimal}')
 
 
-#: How much later than at once a drive may be set to answer (P843), s.
+#: The longest delay that a drive may be set to answer with (P843), s.
 LONGEST_RESPONSE_TIME = 0.2
 #: Pauses within an answer, s: 10 ms of the drive [M4 §2.4.2], and what a USB adapter holds back.
 _INTER_BYTE_TIMEOUT = 0.03
-#: Silence between two frames, in characters: the manual wants none, but the drive has to let go of
-#: the two wires before it can see a start delimiter.
+#: Silence between two frames, in characters: the manual wants none, but the drive has to release
+#: the two wires before it can receive a start delimiter.
 _GAP = 2
-#: The least that an answer takes, s; less is a line without speed.
+#: The least time of an answer, s; less is a line without speed.
 _AT_ONCE = 0.001
-#: What every drive has and may be read at any time: its address (P842), its response time (P843),
-#: frequency and heat sink temperature. With four of them one is always certain, see LateReplies.
+#: Parameters that every drive has and that are safe to read: its address (P842), its response time
+#: (P843), frequency and heat sink temperature. With four of them one is always certain, see
+#: LateReplies.
 _EVERYWHERE = (206, 207, 0, 4)
 CODEC = Codec(
     Enquiry, Select, kind, kinds, answers, encode, Reader, LONGEST_ANSWER, _INTER_BYTE_TIMEOUT
@@ -381,19 +382,19 @@ class MovitracLink(CodecLink):
     A master of the MOVITRAC's protocol on one line: no belief in a doubtful answer.
 
     A DATA names its index, ACK and NACK name nothing, and no answer names its drive. Where a late
-    answer may be *another* drive's, or be the one before sent twice, the line is listened to for as
-    long as the right answer may take; if anything more comes, nothing is believed. So a drive that
-    is dead costs its neighbours no transaction.
+    answer may be *another* drive's, or the one before sent twice, the line is read for as long as
+    the right answer may take; if anything more comes, nothing is believed. So an unresponsive drive
+    costs its neighbours no transaction.
 
-    Drives may be set to answer up to 0.2 s late (P843). Nothing has to say so: the first request,
-    and each after a failure, is waited for so much longer than ``response_timeout``, any other as
-    much longer as the drive has taken of late.
+    Drives may be set to answer up to 0.2 s late (P843). No setting is needed for that: the first
+    request, and each after a failure, may take so much longer than ``response_timeout``, any other
+    as much longer as the drive has taken recently.
 
     What is promised: no value of another index is taken, no answer of the drive up to three
-    time-outs late to a question asked before, no ACK of another write to it. Not distinguished is a
-    late answer of another drive just when the right one is lost, and one that is sent twice, the
-    second time when the right one may be on its way, but does not come. There is no parity, and
-    the check is a sum: choose short wires.
+    time-outs late to an earlier request, no ACK of another write to it. Not distinguished is a late
+    answer of another drive just when the right one is lost, and one that is sent twice, the second
+    time when the right one may be on its way, but does not come. There is no parity, and the check
+    is a sum: choose short wires.
     """
 
     #: [M4 §2.3.1], [M4 §2.3.3]; 31 drives on a line at most, with addresses of 64 [C75].
@@ -403,7 +404,7 @@ class MovitracLink(CodecLink):
     _longest_response = LONGEST_RESPONSE_TIME
 
     def parts(self, address: Address) -> tuple[Address]:
-        """Return the whole: a frame carries all of a value."""
+        """Return the address: a frame carries the whole value."""
         return (address,)
 
     def read(self, unit: int, address: Address) -> Reply:
@@ -420,8 +421,8 @@ class MovitracLink(CodecLink):
         """
         Write one parameter, of 4 or of 8 bytes.
 
-        A drive that says by NACK that it has started a factory setting, or keeps the value only
-        until it is switched off, has done it [C81].
+        A drive whose NACK says that it has started a factory setting, or keeps the value only until
+        it is switched off, has carried it out [C81].
         """
         answer, arrived = self._command(Select(unit, address.index, data))
         if isinstance(answer, Nack) and answer.code not in DONE:
@@ -432,10 +433,10 @@ class MovitracLink(CodecLink):
     def _gap(self) -> float:
         return _GAP * self._settings.char_time
 
-    def _hear_unasked(self, data: bytes, request: Any) -> None:
-        # switching a transmitter makes a byte or two
+    def _note_unrequested(self, data: bytes, request: Any) -> None:
+        # a transmitter that is switched makes a byte or two
         if not is_glitch(data):
-            super()._hear_unasked(data, request)
+            super()._note_unrequested(data, request)
 
     def _patience(self, unit: int) -> float:
         longest = self._late.longest(unit)

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What carries the bytes of a serial line, by its name."""
+"""The port of a serial line, by its name."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from typing import Protocol
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.serial_port import SerialPort
 
-#: An address on a network without the kind of URL that says what is there.
+#: A network address without the scheme of a URL.
 _HOST_AND_PORT = re.compile(r'[^/]+:\d+')
 
 
 class Port(Protocol):
-    """What carries the bytes."""
+    """A port that carries bytes."""
 
     def open(self) -> None:
         """
@@ -44,7 +44,7 @@ def port_of(name: str, settings: LineSettings) -> Port:
     if not name:
         raise ValueError('port is empty: name a device, such as /dev/ttyUSB0')
     if '://' in name:
-        # with it comes pyserial, 0.4 MB that a driver on a device does without
+        # it loads pyserial, 0.4 MB that a driver on a device does not need
         from nfo_sinus_driver.link.url_port import UrlPort
 
         return UrlPort(name, settings)

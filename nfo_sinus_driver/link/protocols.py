@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What each protocol can do, how its lines leave the factory, and the settings of a line.
+The protocols, their factory settings, and the settings of a line.
 
-The link that speaks a protocol is loaded when it is opened: a driver speaks only one.
+The link of a protocol is loaded when it is opened: a driver uses only one.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from nfo_sinus_driver.setting import FIXED, setting
 
 #: The addresses of drives on Modbus [M0 §6.2.2].
 _MODBUS_UNITS = range(1, 248)
-#: Classic: the address at which a drive answers whatever its own is, if it is alone on the line.
+#: Classic: the address at which a drive that is alone on its line answers, whatever its own is.
 POINT_TO_POINT = 0
 #: Classic: the address that all drives obey and none answers.
 BROADCAST = 95
@@ -31,7 +31,7 @@ MODBUS_RTU = LineProtocol(
     units=_MODBUS_UNITS,
     baud_rate=19200,
     char_format='8E1',
-    # beyond what the manuals of the shipped drives have, for those that files describe
+    # more than the manuals of the shipped drives have, for drives that files describe
     baud_rates=(*BAUD_RATES, 115_200),
     char_formats=('8E1', '8O1', '8N2', '8N1', '8E2', '8O2'),
     identifies=True,
@@ -100,14 +100,14 @@ CANOPEN = LineProtocol(
     'and nowhere else, and that the interface is up (ip -details link show)',
 )
 
-#: What the driver's ``protocol`` parameter takes, and what each is.
+#: The values of the driver's ``protocol`` parameter, and their protocols.
 PROTOCOLS: Mapping[str, LineProtocol] = {
     protocol.name: protocol
     for protocol in (MODBUS_RTU, MODBUS_ASCII, MODBUS_TCP, CLASSIC, MOVITRAC, CANOPEN)
 }
 #: The bit rates of all of them.
 BIT_RATES = tuple(sorted({rate for each in PROTOCOLS.values() for rate in each.baud_rates}))
-#: Which addresses a drive may have, for the reader.
+#: Which addresses a drive may have, as text.
 ADDRESSES = '; '.join(
     dict.fromkeys(
         f'{one.addressing} {one.units[0]} to {one.units[-1]}'
@@ -118,14 +118,14 @@ ADDRESSES = '; '.join(
 
 
 class _LinkClass(Protocol):
-    """What makes a link of a kind."""
+    """The class of a link."""
 
     def on_port(self, port: str, settings: LineSettings) -> Link:
         """Return the link on a port; it is not open yet."""
 
 
 def link_class(protocol: LineProtocol) -> _LinkClass:
-    """Return what makes links of a protocol."""
+    """Return the link class of a protocol."""
     module, name = protocol.link.split('.')
     return cast('_LinkClass', getattr(importlib.import_module(f'{__package__}.{module}'), name))
 
@@ -134,7 +134,7 @@ def protocol_of(name: str) -> LineProtocol:
     """
     Return a protocol.
 
-    :raises ValueError: there is none of that name; the message says which there are.
+    :raises ValueError: there is none of that name; the message says which ones there are.
     """
     if name not in PROTOCOLS:
         raise ValueError(f'unknown protocol {name!r}: choose one of {", ".join(PROTOCOLS)}')
@@ -143,7 +143,7 @@ def protocol_of(name: str) -> LineProtocol:
 
 @dataclass(frozen=True)
 class BusSettings:
-    """A line and how it is used; the fields are parameters of the bus node, fixed at the start."""
+    """The settings of a line; the fields are parameters of the bus node, fixed at the start."""
 
     port: str = setting(
         '/dev/ttyUSB0',
@@ -196,10 +196,10 @@ class BusSettings:
     @property
     def line(self) -> LineSettings:
         """
-        How the line is set, with the factory settings of the protocol where nothing else is said.
+        The settings of the serial line, by default the factory settings of the protocol.
 
         :raises ValueError: no such protocol, or a setting that no drive has; the message says
-            which there are.
+            which ones there are.
         """
         usual = protocol_of(self.protocol)
         return LineSettings(

@@ -14,10 +14,10 @@ _log = logging.getLogger(__name__)
 
 class Reconnect:
     """
-    Opens a link, and again when it was lost; nothing that the link raises gets out.
+    Opens a link, and again when it was lost; catches every error of the link.
 
     :ivar is_open: the link is open.
-    :ivar error: why it is not, or was not when it was closed last.
+    :ivar error: why it is not, or was closed last.
     :ivar reopen_at: when it may be tried again, s on the steady clock.
     """
 
@@ -28,11 +28,11 @@ class Reconnect:
         self.reopen_at = 0.0
 
     def open(self, reopen_at: float) -> bool:
-        """Try to open the link; if that fails, again at ``reopen_at``. Tells whether it is open."""
+        """Try to open the link, and if that fails again at ``reopen_at``; return whether it is."""
         try:
             self._link.open()
         except Connecting:
-            # it is gone on with at once, but whoever has the link may do something else between
+            # the next call goes on at once; the caller may do something else between
             return False
         except PortError as error:
             self.mark_lost(error, reopen_at)
@@ -55,5 +55,5 @@ class Reconnect:
         try:
             self._link.close()
         except BaseException:
-            # what waits for an answer gets the error all the same
+            # requests that wait for an answer get the error all the same
             _log.exception('error in the link')

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Requests on one serial line: ask, wait, believe.
+Requests on one serial line: send, wait, and decide whether to believe the answer.
 
-What every protocol does alike stands in :class:`RequestLink`; each adds its messages and what they
-do not say. :class:`CodecLink` serves those whose codec distinguishes answers from requests.
+:class:`RequestLink` has what all protocols do alike; each adds its messages. :class:`CodecLink`
+serves those whose codec distinguishes answers from requests.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ _IN_PIECES = (
     'answers come in pieces with long pauses: the adapter, or the device server, holds bytes back; '
     'set its latency timer or packing time to the least, or use another one'
 )
-#: A pause within an answer that is more than a good adapter makes, s; so many of them are reported,
-#: each of which is forgotten by and by: on a busy machine there is one now and then.
+#: A pause within an answer that is longer than a good adapter makes, s; so many of them are
+#: reported, and their count decays: on a busy machine there is one now and then.
 _LONG_PAUSE = 0.03
 _MANY_PAUSES = 3
 _KEPT_OF_PAUSES = 0.9
@@ -55,9 +55,9 @@ _Self = TypeVar('_Self', bound='RequestLink[Any]')
 
 class Echo:
     """
-    Tells an echo of a request from its answer.
+    Distinguishes the echo of a request from its answer.
 
-    Who finds the request itself among the bytes that come sets ``present``; from then on every
+    ``present`` is set when a request itself is found among the bytes that come; from then on every
     request has to come back before anything else counts. That matters most where the answer is
     the same as the request: function 06 of Modbus.
 
@@ -73,7 +73,7 @@ class Echo:
         self.held = b''
 
     def sent(self, frame: bytes) -> None:
-        """Expect a request to come back, if they do."""
+        """Expect a request to come back, if there is an echo."""
         self._awaited = frame if self.present else b''
         self.held = self.before = b''
 
@@ -83,7 +83,7 @@ class Echo:
         return max(0, len(self._awaited) - len(self.held))
 
     def strip(self, data: bytes) -> bytes:
-        """Return what of the bytes that came is no echo, nor came before it."""
+        """Return the bytes that came behind the echo."""
         if not self._awaited:
             return data
         self.held += data
@@ -100,28 +100,28 @@ class Echo:
 
 
 class AnyMaster(Protocol):
-    """What finds another master on the line."""
+    """Finds another master on the line."""
 
     def is_there(self, now: float) -> bool:
-        """Tell whether another master has been heard of late."""
+        """Return whether another master has sent anything recently."""
 
     def open_until(self, unit: int) -> float:
         """Return until when an answer of a unit may be to another master; 0: it is not."""
 
     def hear(self, data: bytes, now: float) -> bool:
-        """Take bytes; tell whether they are known to be of another exchange."""
+        """Take bytes; return whether they are known to be of another exchange."""
 
     def clear(self) -> None:
-        """Forget what was heard: the port is closed."""
+        """Forget what came: the port is closed."""
 
 
 class RequestLink(ABC, Generic[_Request]):
     """
     A master on one serial line; one request at a time.
 
-    Between frames the line is silent for a gap, counted from the last byte on it. Whenever an
-    answer is missing or damaged, or bytes come unasked, the kinds of answers that may still come
-    are in quarantine (:class:`LateReplies`). A read whose answer could be confused with them is
+    Between frames the line is silent for a gap, counted from the last byte on it. After a missing
+    or damaged answer, or unrequested bytes, the kinds of answers that may still come are in
+    quarantine (:class:`LateReplies`). A read whose answer could be confused with them is
     sent after the unit has answered something else, a *resync read*. A write is sent at once, for
     it may be a stop. An answer that may be to another master is not believed; a read is repeated.
 
@@ -140,7 +140,7 @@ class RequestLink(ABC, Generic[_Request]):
         self._settings = settings
         self.remarks = Remarks()
         self._echo = Echo()
-        #: When the last byte was on the line, as far as we know.
+        #: When the last known byte was on the line.
         self._line_end = 0.0
         #: How many of the last answers had long pauses.
         self._in_pieces = 0.0
@@ -183,7 +183,7 @@ class RequestLink(ABC, Generic[_Request]):
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
         """Write one parameter (LinkError: as its subclasses say)."""
 
-    # --- what the protocols differ in -------------------------------------------------------------
+    # --- what differs by protocol -----------------------------------------------------------------
 
     @property
     @abstractmethod
@@ -204,8 +204,8 @@ class RequestLink(ABC, Generic[_Request]):
         """Yield requests that do nothing, the best first."""
 
     @abstractmethod
-    def _telling_kinds(self, request: _Request) -> Sequence[Any]:
-        """Return the kinds of answers by which one to a read is distinguished from others."""
+    def _distinct_kinds(self, request: _Request) -> Sequence[Any]:
+        """Return the kinds of answers to a read that are distinct from others."""
 
     @abstractmethod
     def _transact(self, request: _Request) -> tuple[Any, float]:
@@ -213,18 +213,18 @@ class RequestLink(ABC, Generic[_Request]):
 
     @abstractmethod
     def _take_late(self, request: _Request, now: float) -> None:
-        """Put in quarantine what another master asked and may be answered late."""
+        """Quarantine the late answers to requests of another master."""
 
     def _gap_before(self, request: _Request) -> float:
-        """Return how long the line is silent before a request if nothing comes unasked, s."""
+        """Return how long the line is silent before a request if nothing unrequested comes, s."""
         return self._gap
 
-    def _hear_unasked(self, data: bytes, request: _Request) -> None:
-        """Take note of bytes that are of no exchange that is known."""
-        self._late.heard_unasked(self._now())
+    def _note_unrequested(self, data: bytes, request: _Request) -> None:
+        """Note bytes of no known exchange."""
+        self._late.note_unrequested(self._now())
 
     def _expect_again(self, request: _Request) -> None:
-        """Expect an answer once more where the last may have been the one before, sent twice."""
+        """Expect another answer where the last may have been the one before, sent twice."""
 
     # --- belief -----------------------------------------------------------------------------------
 
@@ -244,14 +244,14 @@ class RequestLink(ABC, Generic[_Request]):
         try:
             return self._transact(request)
         except LinkError as error:
-            error.heard = resynced
+            error.responded = resynced
             raise
 
     def _make_certain(self, request: Any) -> bool:
         """
-        Have the unit answer something else first, if needed; tell whether it did.
+        Have the unit answer another request first, if needed; return whether it did.
 
-        :raises NotReady: everything that could be asked first is in quarantine, too.
+        :raises NotReady: all that could be sent first is in quarantine, too.
         """
         if not self._late.quarantined(request.unit, self._now()):
             return False
@@ -272,14 +272,14 @@ class RequestLink(ABC, Generic[_Request]):
 
         def questions() -> Iterator[tuple[_Request, Sequence[Any]]]:
             for request in requests:
-                yield request, self._telling_kinds(request)
+                yield request, self._distinct_kinds(request)
             for request in self._resync_reads(unit):
-                yield request, self._telling_kinds(request)
+                yield request, self._distinct_kinds(request)
 
         return self._late.first_certain(unit, questions(), self._now())
 
     def _resync_read(self, request: _Request) -> None:
-        """Have a unit answer; whatever it says, what was late has come before it."""
+        """Have a unit answer; whatever it says, late answers have come before it."""
         with contextlib.suppress(Refused):
             self._transact(request)
 
@@ -287,10 +287,10 @@ class RequestLink(ABC, Generic[_Request]):
 
     def _await_gap(self, request: Any, *, is_write: bool = False) -> bool:
         """
-        Wait for a gap of silence; tell whether bytes came meanwhile that were not requested.
+        Wait for a gap of silence; return whether unrequested bytes came meanwhile.
 
         A write may be a stop, and the noise may be on our side of the line alone: rather than not
-        at all it is sent into it, as soon as no answer that began before can still be coming.
+        at all it is sent into the noise, once no earlier answer can still be coming.
 
         :raises NeverSilent: there is none.
         """
@@ -302,13 +302,13 @@ class RequestLink(ABC, Generic[_Request]):
             data, now, silent = self._await_silence(gap, wait)
             if data and not self._another.hear(data, now):
                 stray = True
-                self._hear_unasked(data, request)
+                self._note_unrequested(data, request)
             if not silent and not is_write:
                 raise NeverSilent(_NEVER_SILENT)
             until = min(self._another.open_until(request.unit), give_up)
             if now >= until:
                 break
-            # what another master asked is answered first
+            # requests of another master are answered first
             if data := self._read_line(until):
                 self._another.hear(data, self._now())
                 gap = self._gap
@@ -320,7 +320,7 @@ class RequestLink(ABC, Generic[_Request]):
         Wait for silence on the line.
 
         :param gap: how long it has to last, s.
-        :param wait: how much longer than that it is waited for, s.
+        :param wait: how much longer than that to wait for it, s.
         :returns: all bytes that came meanwhile, the moment, and whether silence came, too.
         """
         give_up = max(self._line_end + gap, self._now()) + wait
@@ -346,19 +346,19 @@ class RequestLink(ABC, Generic[_Request]):
         return self._line_end
 
     def _read_line(self, until: float) -> bytes:
-        """Return what comes on the line until a moment; nothing: it has passed."""
+        """Return the next bytes on the line until a moment; empty: it has passed."""
         while True:
             data = self._port.read(until)
             now = self._now()
             if data:
-                # what comes while the request still leaves is no answer to it
+                # bytes that come while the request is still being sent are no answer to it
                 self._line_end = max(self._line_end, now)
                 return data
             if now >= until:
                 return data
 
     def _note_pause(self, longest: float) -> bool:
-        """Take note of the longest pause, s, within a whole answer; tell whether it is too long."""
+        """Note the longest pause, s, within a whole answer; return whether it is too long."""
         too_long = longest > _LONG_PAUSE
         self._in_pieces = self._in_pieces + 1 if too_long else _KEPT_OF_PAUSES * self._in_pieces
         if self._in_pieces >= _MANY_PAUSES:
@@ -377,15 +377,15 @@ class CodecLink(RequestLink[Any]):
     If the answer to a write is in quarantine it is not believed: the line is cleared by reading
     something, and :class:`DamagedAnswer` says that the outcome is unknown.
 
-    The requests of another master are found (:class:`OtherRequests`). What may answer them, and
-    any answer that may have met another one, is not believed; a read is repeated.
+    The requests of another master are found (:class:`OtherRequests`). An answer that may be to one
+    of them, or may have collided with another, is not believed; a read is repeated.
     """
 
     _codec: Codec
-    #: Which parameters every drive has, and may be read at any time: with four of them one is
-    #: always certain, see :class:`LateReplies`.
+    #: Parameters that every drive has and that are safe to read: with four of them one is always
+    #: certain, see :class:`LateReplies`.
     _everywhere: tuple[int, ...]
-    #: How much later than at once a drive may answer, s.
+    #: How late a drive may answer, s.
     _longest_response = 0.0
 
     def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
@@ -407,9 +407,9 @@ class CodecLink(RequestLink[Any]):
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """
-        Take parameters that are safe to read; here those are asked that every drive has.
+        Take parameters that are safe to read; here those are read that every drive has.
 
-        To ask a drive for what it does not have may be a fault, for which it stops [M2 table 4].
+        A read of a parameter that a drive lacks may be a fault, for which it stops [M2 table 4].
         """
 
     def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
@@ -422,7 +422,7 @@ class CodecLink(RequestLink[Any]):
         """Read one parameter (LinkError: as its subclasses say)."""
 
     def identify(self, unit: int) -> NothingToAsk:
-        """Return no questions: the protocol has none but for parameters."""
+        """Return no questions: the protocol has only parameters."""
         return NothingToAsk()
 
     def _read_request(self, unit: int, address: Address) -> Any:
@@ -435,7 +435,7 @@ class CodecLink(RequestLink[Any]):
     def _resync_reads(self, unit: int) -> Iterable[Any]:
         return (self._codec.enquiry(unit, number) for number in self._everywhere)
 
-    def _telling_kinds(self, request: Any) -> Sequence[Any]:
+    def _distinct_kinds(self, request: Any) -> Sequence[Any]:
         return self._codec.kinds(request)[:1]
 
     def _take_late(self, request: Any, now: float) -> None:
@@ -443,7 +443,7 @@ class CodecLink(RequestLink[Any]):
             self._late.expect(late, now)
 
     def _patience(self, unit: int) -> float:
-        """Return how much later than at once an answer may begin, s."""
+        """Return how late an answer may begin, s."""
         return 0.0
 
     def _confirm(self, request: Any, answer: Any, arrived: float, until: float) -> None:
@@ -460,12 +460,12 @@ class CodecLink(RequestLink[Any]):
         try:
             return self._transact(request)
         except _Ambiguous:
-            # not after mere noise: a stop that is given again would only have to wait for it
+            # not after mere noise: a repeated stop would only have to wait for it
             self._settle(request.unit)
             raise
 
     def _settle(self, unit: int) -> None:
-        """Read something, so that the next answer is believed again; if not, then not."""
+        """Try to read something, so that the next answer is believed again."""
         try:
             self._await_gap(self._codec.enquiry(unit, self._everywhere[0]))
             self._resync_read(self._first_certain(unit))
@@ -492,30 +492,30 @@ class CodecLink(RequestLink[Any]):
         except (NoAnswer, DamagedAnswer):
             self._late.expect(request, self._now())
             if self._echo.give_up():
-                # an adapter that echoes no more; if it does, the next echo will tell
+                # the adapter does not echo any more; if it does, the next echo will show it
                 self._echo.present = False
             raise
-        # units answer in order: whatever was still to come from it has come before this
+        # units answer in order: late answers of it have come before this
         self._late.release(request.unit)
         self._took(request.unit, arrived - sent - length)
         self._last = request, answer, arrived
         # and the request has left, even where the port is faster than its settings say
         self._line_end = arrived
         if behind:
-            self._hear_unasked(behind, request)
+            self._note_unrequested(behind, request)
         return answer, arrived
 
     def _receive(self, request: Any, due: float) -> tuple[Any, float, bytes]:
         """
         Return the answer, when it came, and what came behind it.
 
-        :param due: when it begins at last, if the drive is as fast as it can be.
+        :param due: when it begins, if the drive is as fast as it can be.
         """
         codec, unit = self._codec, request.unit
         quarantined = self._late.quarantined(unit, self._now())
         longest = codec.longest_answer * self._settings.char_time + codec.inter_byte_timeout
         deadline = due + self._settings.response_timeout
-        # one answer, and as much rubbish again, however long the line is not silent
+        # one answer, and as much noise again, however long the line is not silent
         last_chance = deadline + 2 * longest
         reader = codec.reader()
         came = 0
@@ -525,7 +525,7 @@ class CodecLink(RequestLink[Any]):
             self._another.hear(data, now)
             data = self._echo.strip(data)
             if came:
-                # less what these bytes took themselves
+                # less the time of these bytes themselves
                 pause = max(pause, now - last - len(data) * self._settings.char_time)
             last = now
             came += len(data)
@@ -534,7 +534,7 @@ class CodecLink(RequestLink[Any]):
                 if not codec.answers(message, request):
                     if message == request:
                         came -= len(codec.encode(request))
-                        # or another master asks the same
+                        # or another master sends the same
                         self._echo.present |= not self._another.is_there(now)
                     continue
                 stray = len(self._echo.before) + came - len(codec.encode(message))
@@ -560,15 +560,15 @@ class CodecLink(RequestLink[Any]):
         raise NoAnswer(f'unit {unit} did not answer')
 
     def _took(self, unit: int, seconds: float) -> None:
-        """Take note how long a unit took to answer."""
+        """Note how long a unit took to answer."""
         self._late.took(unit, seconds)
 
     def _was_passed_over(
         self, messages: Sequence[Any], request: Any, quarantined: Any, now: float
     ) -> bool:
-        """Tell whether an answer to another master shows that the request was lost."""
+        """Return whether an answer to another master shows that the request was lost."""
         return False
 
     def _deadline(self, deadline: float, now: float) -> float:
-        """Return until when more of an answer is waited for."""
+        """Return until when to wait for more of an answer."""
         return deadline

@@ -4,8 +4,8 @@
 """
 Modbus RTU of a master: frames, without I/O [M0 §6.2.3], and the link over one serial line.
 
-:func:`encode` makes a request; an :class:`RtuReader` finds its answer in whatever bytes come in,
-in any pieces, among noise and the answers to other requests.
+:func:`encode` makes a request; an :class:`RtuReader` finds its answer in the bytes that come in, in
+any pieces, among noise and the answers to other requests.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from nfo_sinus_driver.link.serial_link import SerialLink
 
 #: How many bytes the check sum has.
 CRC_LENGTH = 2
-#: USB adapters hand bytes over in lumps, so a pause within an answer may last this long, s.
+#: USB adapters deliver bytes in lumps, so a pause within an answer may last this long, s.
 _INTER_BYTE_TIMEOUT = 0.03
 
 _T = TypeVar('_T')
@@ -44,7 +44,7 @@ def encode(request: Request[object]) -> bytes:
 
 
 class RtuReader(AnswerReader[_T]):
-    """Finds an answer in RTU frames: nothing but its length and check sum tells where one is."""
+    """Finds an answer in RTU frames: only its length and check sum show where one is."""
 
     inter_byte_timeout = _INTER_BYTE_TIMEOUT
 
@@ -55,7 +55,7 @@ class RtuReader(AnswerReader[_T]):
 
     @property
     def bytes_needed(self) -> int:
-        """How many bytes have to come yet, as far as those that came tell."""
+        """How many bytes have to come yet, by those that came."""
         begun = self._begun()
         if begun is None:
             length = self._request.measure(self._buffer)

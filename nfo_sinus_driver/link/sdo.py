@@ -4,11 +4,11 @@
 """
 Service data objects of CANopen, the side of the client, without I/O (CiA 301 §7.2.4).
 
-A :class:`Transfer` says what to send, and takes what came, until it is over. Up to four bytes go
+A :class:`Transfer` gives what to send, and takes what came, until it is over. Up to four bytes go
 in one exchange, *expedited*; longer values in segments of seven bytes, each confirmed, whose
-toggle bit tells each from the one before. An answer is recognised by its *kind*: what it does and
-to which object; only segments do not say to which. A server ends a transfer by an abort code.
-:class:`ObjectShapes` is what only a node can say of its objects: how long values are, where arrays
+toggle bit distinguishes each from the one before. An answer is recognised by its *kind*: its
+command and its object; only segments name no object. A server ends a transfer by an abort code.
+:class:`ObjectShapes` is what only a node knows of its objects: how long values are, where arrays
 begin [C102].
 """
 
@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from nfo_sinus_driver.link.interface import Address, DamagedAnswer, Refused
 
-#: What a client says that has waited in vain.
+#: The abort of a client after a time-out.
 TIMED_OUT = 0x0504_0000
 #: The object has no such sub-index.
 NO_SUB_INDEX = 0x0609_0011
@@ -33,7 +33,7 @@ class Aborted(Refused):
     """
     The node has ended the transfer.
 
-    :ivar abort: with which of :data:`ABORT_CODES`.
+    :ivar abort: the code, one of :data:`ABORT_CODES`.
     """
 
     def __init__(self, abort: int, kind: int, reason: str) -> None:
@@ -46,7 +46,7 @@ _NO_SUCH = Refused.ILLEGAL_ADDRESS
 _VALUE = Refused.ILLEGAL_VALUE
 _STATE = Refused.DEVICE_FAILURE
 
-#: What an abort code says: the code of :class:`Refused` that means the same, and its words.
+#: The meaning of an abort code: the code of :class:`Refused` that means the same, and a text.
 ABORT_CODES: Mapping[int, tuple[int, str]] = {
     0x0503_0000: (_STATE, 'the toggle bit did not alternate'),
     TIMED_OUT: (_STATE, 'the drive waited in vain for the next segment'),
@@ -84,12 +84,12 @@ _UNKNOWN = (_STATE, 'the drive refused')
 
 
 def refusal(code: int) -> Aborted:
-    """Return what an abort says."""
+    """Return the refusal of an abort code."""
     kind, meaning = ABORT_CODES.get(code, _UNKNOWN)
     return Aborted(code, kind, f'{meaning} (SDO abort {code:08X}h)')
 
 
-#: Added to the address of a node, the identifiers of what it is asked, and of its answers.
+#: Added to the address of a node, the identifiers of its requests, and of its answers.
 REQUESTS = 0x600
 ANSWERS = 0x580
 #: The longest value that is taken or sent, bytes.
@@ -122,10 +122,10 @@ _NAMING = (_UPLOADED, _DOWNLOADED, _ABORT)
 
 class Kind(NamedTuple):
     """
-    What tells an answer from others.
+    What distinguishes an answer from others.
 
-    :ivar command: what the server did.
-    :ivar index: to which object; -1: a segment does not say.
+    :ivar command: that of the server.
+    :ivar index: the object; -1: a segment does not name it.
     """
 
     command: int
@@ -135,12 +135,12 @@ class Kind(NamedTuple):
 
 #: The kinds of segments.
 SEGMENTS = (Kind(_UPLOADED_SEGMENT), Kind(_DOWNLOADED_SEGMENT))
-#: An abort of whatever the node did last.
+#: An abort of the last transfer.
 _ANY_ABORT = Kind(_ABORT)
 
 
 def kind(message: bytes) -> Kind | None:
-    """Return what tells an answer from others; ``None`` if it is no answer."""
+    """Return the kind of an answer; ``None`` if it is no answer."""
     if len(message) != _LENGTH:
         return None
     command = message[0] & _COMMAND
@@ -151,7 +151,7 @@ def kind(message: bytes) -> Kind | None:
 
 
 def kinds_asked_for(request: bytes) -> frozenset[Kind]:
-    """Return the kinds of answers to what a client sends; none where it ends a transfer."""
+    """Return the kinds of answers to a request of a client; none where it ends a transfer."""
     if len(request) != _LENGTH:
         return frozenset()
     command = request[0] & _COMMAND
@@ -165,7 +165,7 @@ def kinds_asked_for(request: bytes) -> frozenset[Kind]:
 
 
 def is_among(found: Kind, kinds: AbstractSet[Kind]) -> bool:
-    """Tell whether an answer may be one of some kinds."""
+    """Return whether an answer may be one of some kinds."""
     return found in kinds or (found.command == _ABORT and _ANY_ABORT in kinds)
 
 
@@ -174,10 +174,10 @@ class Transfer(ABC):
     One value, read or written.
 
     :ivar unit: the node.
-    :ivar request: the message that has to be sent now; ``None``: it is over.
+    :ivar request: the message to be sent now; ``None``: it is over.
     """
 
-    #: What a server does that is asked to begin.
+    #: The command of the server's first answer.
     _begun: int
 
     def __init__(self, unit: int, index: int, sub_index: int) -> None:
@@ -185,7 +185,7 @@ class Transfer(ABC):
         self.index = index
         self.sub_index = sub_index
         self.request: bytes | None = None
-        #: The kind of the answer to it, if it is done.
+        #: The kind of its answer, if it is not refused.
         self._expected = Kind(self._begun, index, sub_index)
         self._toggle = 0
 
@@ -196,7 +196,7 @@ class Transfer(ABC):
 
     @property
     def has_begun(self) -> bool:
-        """The server has begun with segments; it waits for the next one."""
+        """The server has begun with segments, and waits for the next one."""
         return self._expected in SEGMENTS and self.request is not None
 
     def take(self, message: bytes) -> bool:
@@ -221,7 +221,7 @@ class Transfer(ABC):
         return True
 
     def abort(self) -> bytes:
-        """Return what makes the server forget the transfer; there is no answer to it."""
+        """Return the message that ends the transfer in the server; it has no answer."""
         return self._message(_ABORT, _SIZE.pack(TIMED_OUT))
 
     @abstractmethod
@@ -238,7 +238,7 @@ class Upload(Transfer):
     """
     A value that is read.
 
-    :ivar value: what has come of it.
+    :ivar value: the bytes that have come.
     """
 
     _begun = _UPLOADED
@@ -327,15 +327,15 @@ def _segments(value: bytes) -> Iterator[bytes]:
 
 #: How many bytes a number may have on CANopen.
 _LENGTHS = (1, 2, 4, 8)
-#: The sub-index of the second value of an array that is numbered from 1. Asking for it first tells
-#: how an array is numbered: where there is none, that value has the sub-index before. To ask for
-#: the first value would do, in the other case, what was not requested: it acknowledges a fault.
+#: The sub-index of the second value of an array that is numbered from 1. Reading it first shows how
+#: an array is numbered: where it does not exist, that value has the sub-index before. Reading the
+#: first value could have an effect that was not requested: it acknowledges a fault.
 SECOND = 2
 
 
 class ObjectShapes:
     """
-    What is known of the objects of all nodes of a line; without I/O.
+    The shapes of the objects of all nodes of a line; without I/O.
 
     Arrays are numbered from 1 in the addresses of the catalog. A node may number them from 0.
     """
@@ -343,7 +343,7 @@ class ObjectShapes:
     def __init__(self) -> None:
         #: How many bytes each number has, by node, index and sub-index of the node.
         self._lengths: dict[tuple[int, int, int], int] = {}
-        #: What has to be taken off the sub-indices of an array.
+        #: What is subtracted from the sub-indices of an array.
         self._offsets: dict[tuple[int, int], int] = {}
 
     def clear(self) -> None:
@@ -352,7 +352,7 @@ class ObjectShapes:
         self._offsets.clear()
 
     def sub_index(self, unit: int, address: Address) -> int | None:
-        """Return the sub-index of the node; ``None``: how it numbers the array is not known yet."""
+        """Return the sub-index in the node; ``None``: how it numbers the array is not known."""
         if not address.sub_index or address.signed is None:
             return address.sub_index or 0
         offset = self._offsets.get((unit, address.index))
@@ -360,9 +360,9 @@ class ObjectShapes:
 
     def note_array(self, unit: int, index: int, refusal: Refused | None) -> None:
         """
-        Take note of what a node answers to a question for the :data:`SECOND` value of an array.
+        Note the answer of a node to a read of the :data:`SECOND` value of an array.
 
-        :raises Refused: that does not tell how the array is numbered.
+        :raises Refused: it does not show how the array is numbered.
         """
         if refusal is None:
             self._offsets[unit, index] = 0
@@ -373,7 +373,7 @@ class ObjectShapes:
 
     def fit_read(self, unit: int, address: Address, sub_index: int, data: bytes) -> bytes:
         """
-        Return a value in as many bytes as the catalog has for it; note how many the node has.
+        Return a value in the length of the catalog; note its length in the node.
 
         :raises DamagedAnswer: it is no such number.
         """
@@ -398,10 +398,10 @@ class ObjectShapes:
         send: Callable[[bytes], float],
     ) -> float:
         """
-        Write a value in as many bytes as the node has for it.
+        Write a value in the length that it has in the node.
 
-        Where no reading has shown how many, and the node says that they are too many or too few, it
-        has done nothing, and others are tried.
+        Where no reading has shown that, and the node answers that the length is wrong, it has done
+        nothing, and others are tried.
 
         :param send: writes bytes; returns when it was confirmed.
         :raises LinkError: as ``send`` does.
@@ -427,7 +427,7 @@ class ObjectShapes:
 
 
 def _others(abort: int, length: int) -> Sequence[int]:
-    """Return which other lengths may be right, the likeliest first."""
+    """Return the other lengths that may be right, the likeliest first."""
     if abort == TOO_LONG:
         return [other for other in reversed(_LENGTHS) if other < length]
     if abort == TOO_SHORT:

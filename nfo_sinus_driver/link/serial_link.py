@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Modbus over one serial line: exact time, and no belief in a doubtful answer."""
+"""Modbus over one serial line: exact timing, and no belief in a doubtful answer."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ _FIRST_BYTE_LOST = (
     'receiving too late; use one that switches by itself, or try rs485 true where the port switches'
 )
 
-#: No pause is waited for longer, s.
+#: The longest pause that is waited for, s.
 _MOST_PAUSE = 0.2
 
-#: How many of the longest pauses within an answer there may be.
+#: How many of the longest pauses an answer may have.
 _PAUSES = 3
 #: Bytes in the answer to a read of two registers.
 _TWO_REGISTERS = 7
@@ -60,12 +60,11 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
     A read answer does not name its register, so its kind is its shape; the answer to a write names
     what was written.
 
-    For the same reason an answer with the very bytes of the one before is not believed at once: it
-    may be the one before, sent twice. The right one would come when a unit answers, so until then
-    the line is listened to. A line that has brought something unrequested is not trusted so far
-    for a while: there it is believed only after a request of another shape. If it answers the same
-    question too, what it says is right, but one more may come: the next request of its shape waits
-    for that.
+    For the same reason an answer with the same bytes as the one before is not believed at once: it
+    may be the one before, sent twice. The line is read for as long as the right one may take. After
+    unrequested bytes the line is trusted less for a while: then it is believed only after a request
+    of another shape. If it answers the same request too, it is right, but one more may come: the
+    next request of its shape waits for that.
     """
 
     _another: AnotherMaster
@@ -77,11 +76,11 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         )
         self._another = AnotherMaster(self.remarks, settings.response_timeout, self._messages)
         self._resync_addresses: dict[int, tuple[Address, ...]] = {}
-        #: How long a pause within an answer may be on this line, s, as far as answers have shown.
+        #: How long a pause within an answer may be on this line, s, by the answers so far.
         self._pause = 0.0
-        #: When the last request had left.
+        #: When the last request had been sent.
         self._sent_at = 0.0
-        #: The resync read on its way is only about that.
+        #: A resync read is under way that only confirms an answer.
         self._confirming = False
         #: Other bytes came with the last answer.
         self._stray = False
@@ -104,8 +103,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         """
         Write one parameter and read another (function 23), or only write it.
 
-        It is only written where the answer could be confused with another, for no write waits until
-        the line can be believed.
+        It is only written where the answer could be confused with another: no write waits until the
+        line can be believed.
 
         :raises LinkError: as its subclasses say.
         """
@@ -120,7 +119,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             raise DamagedAnswer(f'unit {unit}: {DOUBTFUL}')
         return Reply(*reply)
 
-    # --- what the protocols differ in -------------------------------------------------------------
+    # --- what differs by protocol -----------------------------------------------------------------
 
     @abstractmethod
     def _encode(self, request: Request[Any]) -> bytes:
@@ -149,7 +148,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         except Refused as error:
             refusal = error
         except LinkError as error:
-            error.heard = resynced
+            error.responded = resynced
             raise
         if self._doubtful:
             raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
@@ -158,7 +157,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         return answer
 
     def _believed(self, request: Request[_T]) -> tuple[_T, float]:
-        """Return the answer to a request; it may be to another master, but is none sent twice."""
+        """Return the answer to a request, perhaps to another master, but not one sent twice."""
         try:
             answer = self._transact(request)
         except Refused:
@@ -176,23 +175,23 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
     def _resync_reads(self, unit: int) -> Iterator[Request[Any]]:
         """
-        Yield requests that do nothing, the quickest first.
+        Yield requests without effect, the quickest first.
 
         First the parameters that the drive is known to have. Then functions 17 and 43/14, which
-        only identify a drive [M0 §6.2.4]: one that does not have them [C57] refuses, and a refusal
-        names the function, so that tells as much.
+        only identify a drive [M0 §6.2.4]: a drive without them [C57] refuses, and a refusal names
+        the function, so it serves as well.
         """
         for address in self._resync_addresses.get(unit, ()):
             yield read_of(unit, address)
         yield ReportSlaveId(unit)
         yield ReadDevice(unit, SPECIFIC, _PRODUCT_CODE)
 
-    def _telling_kinds(self, request: Request[Any]) -> Sequence[bytes]:
+    def _distinct_kinds(self, request: Request[Any]) -> Sequence[bytes]:
         identifies = isinstance(request, (ReportSlaveId, ReadDevice))
         return answer_kinds(request) if identifies else (request.answer_head,)
 
     def _confirm(self, request: Request[Any], *, names_it: bool = False) -> None:
-        """Make sure that the answer, if it ``names_it`` not itself, is not the one before again."""
+        """Make sure that the answer, unless it ``names_it``, is not the one before again."""
         if self._late.repeated is None:
             return
         now = self._now()
@@ -206,7 +205,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             self._resync(request)
 
     def _resync(self, request: Request[Any]) -> None:
-        """Have a unit answer something else: had another answer come, it would show."""
+        """Have a unit answer another request: a second answer would come before."""
         stray = self._stray
         self._confirming = True
         try:
@@ -217,7 +216,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         except (NotReady, NeverSilent):
             pass
         except (NoAnswer, DamagedAnswer):
-            # the right answer may be as late as that to the other
+            # the right answer may be as late as that to the resync read
             self._late.expect(request, self._now())
             raise
         finally:
@@ -225,31 +224,31 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
     def _listen(self, request: Request[Any]) -> None:
-        """Wait as long as the right answer may take, if this was the one before, sent twice."""
+        """Wait as long as the right answer may take, in case this was the one before again."""
         length = self._frame_length(request.answer_length) * self._settings.char_time
         until = self._sent_at + self._late.longest(request.unit) + length
         while (now := self._now()) < until:
             if self._port.read(until):
                 self._line_end = max(self._line_end, now)
-                self._late.heard_unasked(self._now())
+                self._late.note_unrequested(self._now())
                 raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
     def _await_gap(self, request: Request[Any], *, is_write: bool = False) -> bool:
         try:
             came = super()._await_gap(request, is_write=is_write)
         except NeverSilent:
-            self._late.heard_unasked(self._now())
+            self._late.note_unrequested(self._now())
             raise
         now = self._now()
         stray = bool(self._another.take_rest(request.unit)) and (
             came or self._another.is_there(now)
         )
         if stray:
-            self._late.heard_unasked(now)
+            self._late.note_unrequested(now)
         return stray
 
-    def _hear_unasked(self, data: bytes, request: Request[Any]) -> None:
-        # what of it is of no frame of another master shows when the line is silent
+    def _note_unrequested(self, data: bytes, request: Request[Any]) -> None:
+        # whether it is a frame of another master is known when the line is silent
         return
 
     def _take_late(self, request: Request[Any], now: float) -> None:
@@ -281,7 +280,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             other = reader.other
             now = self._now()
             # what comes back before the answer to a write may be its answer, and another master may
-            # ask the same as we do
+            # send the same request
             there = self._another.is_there(now)
             came_back = frame in other and not isinstance(request, Write)
             alone = not there
@@ -299,18 +298,18 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self._late.note(request, reader.frame, arrived, length)
         late = request.answer_head in self._late.quarantined(request.unit, arrived)
         if not late:
-            # units answer in order: whatever was still to come has come before this
+            # units answer in order: late answers have come before this
             self._late.release(request.unit)
         if not late and self._late.repeated is None:
             # and the request has left, even where the port is faster than its settings say
             self._line_end = arrived
         self._late.took(request.unit, arrived - self._sent_at - length)
         if came_back and not alone:
-            # another master has asked the same, which is answered, too
+            # another master has sent the same request, which is answered, too
             self._late.quarantine(request.unit, (request.answer_head,), arrived)
         if late or (reader.received and not self._doubtful):
             # it may answer an earlier write of the same, or answer twice: one more may come
-            self._late.heard_unasked(self._now())
+            self._late.note_unrequested(self._now())
         return answer, arrived
 
     def _receive(
@@ -321,7 +320,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         quarantined = self._late.quarantined(request.unit, self._now())
         believe_refusal = refusal_head(request) not in quarantined
         first = deadline = self._line_end + self._settings.response_timeout
-        # one answer, and as much rubbish again, however long bytes keep coming
+        # one answer, and as much noise again, however long bytes keep coming
         length = self._frame_length(request.answer_length)
         last_chance = first + 2 * length * char_time
         came = 0
@@ -334,11 +333,11 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
                 if now < deadline:
                     continue
                 break
-            # what comes while the request still leaves is no answer to it
+            # bytes that come while the request is still being sent are no answer to it
             self._line_end = max(self._line_end, now)
             data = self._echo.strip(data)
             if came:
-                # less what these bytes took themselves
+                # less the time of these bytes themselves
                 longest = max(longest, now - last - len(data) * char_time)
             last = now
             came += len(data)
@@ -359,11 +358,11 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         if held and not isinstance(request, Write):
             answer = _feed(reader, held, refusals)
             if answer is not None and not reader.other:
-                # an answer and nothing else: the adapter echoes no more
+                # an answer and nothing else: the adapter does not echo any more
                 self._echo.present = False
                 return answer, now
         if self._confirming and len(refusals) == 1 and not held and came == len(reader.frame):
-            # had there been another answer to come, it would be here, too
+            # a second answer would have come by now
             raise refusals[0]
         if held or (came and reader.other != frame):
             another = self._another.is_there(now)
@@ -376,17 +375,17 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
 
     def _learn_pause(self, longest: float) -> None:
-        """Take note of the longest pause, s, within an answer that came whole, and of no other."""
+        """Note the longest pause, s, within a complete answer, and of no other."""
         if self._note_pause(longest):
             self._pause = max(self._pause, min(2 * longest, _MOST_PAUSE))
 
     def _lacks_first_byte(self, request: Request[_T], frame: bytes, came: bytes) -> bool:
-        """Tell whether what came is the answer without its first byte, which is the request's."""
+        """Return whether what came is the answer without its first byte, that of the request."""
         return _feed(self._reader(request), frame[:1] + came, []) is not None
 
 
 def _feed(reader: AnswerReader[_T], data: bytes, refusals: list[Refused] | None) -> _T | None:
-    """Return the answer in what came so far; add the refusals before it, or raise the first."""
+    """Return the answer so far; add the refusals before it, or raise the first."""
     while True:
         try:
             return reader.feed(data)
@@ -402,5 +401,5 @@ _PRODUCT_CODE = 1
 
 
 def answer_kinds(request: Request[Any]) -> tuple[bytes, bytes]:
-    """Return what tells the answer to a request from others, and what its refusal."""
+    """Return the kind of the answer to a request, and that of its refusal."""
     return request.answer_head, refusal_head(request)

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A serial port as a raw descriptor: opened for us alone, set as asked, read without delay."""
+"""A serial port as a raw descriptor: exclusive, configured, read without delay."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import time
 
 from nfo_sinus_driver.link.interface import LineSettings, PortError
 
-# Linux ioctls that Python's termios module does not name
+# Linux ioctls that Python's termios module lacks
 _TIOCGSERIAL = 0x541E
 _TIOCSSERIAL = 0x541F
 _TIOCGRS485 = 0x542E
@@ -25,13 +25,13 @@ _TIOCSRS485 = 0x542F
 _ASYNC_LOW_LATENCY = 1 << 13
 _SER_RS485_ENABLED = 1 << 0
 _SER_RS485_RTS_ON_SEND = 1 << 1
-#: Of struct serial_struct: the flags are its fifth int.
+#: The flags are the fifth int of struct serial_struct.
 _SERIAL_STRUCT_INTS = 20
 _SERIAL_FLAGS = 4
 _RS485_STRUCT_INTS = 8
 #: Device numbers of pseudo-terminals, which have no parity and no baud rate to set.
 _PTY_MAJORS = range(136, 144)
-#: What a process has open that has the other end of one.
+#: The device that a process with the other end of one has open.
 _PTMX = os.makedev(5, 2)
 
 _READ_SIZE = 512
@@ -47,7 +47,7 @@ class SerialPort:
 
     def open(self) -> None:
         """
-        Open the port, lock it and set it.
+        Open the port, lock it and configure it.
 
         :raises PortError: absent, not permitted, in use, or unable to do the settings.
         """
@@ -118,12 +118,12 @@ class SerialPort:
 
     def _lock(self, fd: int) -> None:
         try:
-            # flock is what pyserial and other masters look at; TIOCEXCL stops those that do not
+            # pyserial and other masters check flock; TIOCEXCL stops those that do not
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise _busy(self._path) from None
         if not _is_pty(fd):
-            # a pseudo-terminal would stay so when it is closed, and then open for root alone
+            # a pseudo-terminal would keep it when closed, and then open for root alone
             fcntl.ioctl(fd, termios.TIOCEXCL)
 
     def _configure(self, fd: int) -> None:
@@ -137,7 +137,7 @@ class SerialPort:
             cflag |= termios.PARODD
         if settings.stop_bits == 2:
             cflag |= termios.CSTOPB
-        # a byte with wrong parity is dropped, so that the frame is too short to be believed
+        # a byte with wrong parity is dropped, so that the frame is too short to count
         iflag = termios.INPCK | termios.IGNPAR if settings.parity != 'N' else 0
         cc = termios.tcgetattr(fd)[6]
         cc[termios.VMIN] = 0
@@ -145,8 +145,8 @@ class SerialPort:
         try:
             termios.tcsetattr(fd, termios.TCSANOW, [iflag, 0, cflag, 0, rate, rate, cc])
         except termios.error as error:
-            # the C library compares what it set with what it got, and a pseudo-terminal has
-            # neither parity nor seven bits
+            # the C library compares what it set with the result, and a pseudo-terminal has neither
+            # parity nor seven bits
             if not _is_pty(fd):
                 raise PortError(
                     f'{self._path} cannot do {settings.baud_rate} bit/s {settings.char_format} '
@@ -196,14 +196,14 @@ def _is_pty(fd: int) -> bool:
 
 
 def _prefer_low_latency(fd: int) -> None:
-    """Ask for answers without delay; without it an FTDI adapter holds them back for 16 ms."""
+    """Request low latency; without it an FTDI adapter holds answers back for 16 ms."""
     settings = array.array('i', [0] * _SERIAL_STRUCT_INTS)
     try:
         fcntl.ioctl(fd, _TIOCGSERIAL, settings)
         settings[_SERIAL_FLAGS] |= _ASYNC_LOW_LATENCY
         fcntl.ioctl(fd, _TIOCSSERIAL, settings)
     except OSError:
-        # best effort: pseudo-terminals and some adapters do not know it
+        # best effort: pseudo-terminals and some adapters do not support it
         return
 
 
@@ -215,7 +215,7 @@ def _switch_transmitter_by_port(fd: int) -> None:
         settings[0] |= _SER_RS485_ENABLED | _SER_RS485_RTS_ON_SEND
         fcntl.ioctl(fd, _TIOCSRS485, settings)
     except OSError:
-        # best effort: most adapters switch by themselves and do not know it
+        # best effort: most adapters switch by themselves and do not support it
         return
 
 
@@ -241,7 +241,7 @@ def _has_open(process: Path, device: int) -> bool:
     try:
         descriptors = list((process / 'fd').iterdir())
     except OSError:
-        # ended meanwhile, or not ours to look into
+        # ended meanwhile, or not permitted
         return False
     return any(_device(descriptor) == device for descriptor in descriptors)
 

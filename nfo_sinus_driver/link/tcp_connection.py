@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One connection to a gateway: begun, waited for in small steps, and watched over by TCP itself."""
+"""One connection to a gateway: begun, awaited in small steps, and checked by TCP itself."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from typing import Protocol
 
 #: How long bytes may stay unacknowledged before the connection counts as lost, s.
 _ACKNOWLEDGE_TIMEOUT = 5
-#: An idle connection is asked after so long, so often, and so many times, s: a gateway that has
-#: lost it says so, and one that is gone says nothing.
+#: An idle connection is probed after so long, so often, and so many times, s: a gateway that has
+#: lost it says so, and one that is gone does not answer.
 _KEEPALIVE = {socket.TCP_KEEPIDLE: 2, socket.TCP_KEEPINTVL: 1, socket.TCP_KEEPCNT: 3}
 _READ_SIZE = 4096
-#: What a name leads to, while it leads somewhere: to look it up may take long.
+#: The addresses of a name, while they can be reached: a lookup may take long.
 _known: dict[tuple[str, int], list[tuple[socket.AddressFamily, object]]] = {}
 
 
 class Connection(Protocol):
-    """A connection to a gateway; whatever fails raises an ``OSError``, which says why."""
+    """A connection to a gateway; an ``OSError`` says what failed."""
 
     def open(self) -> None:
-        """Begin to connect; do not wait for it."""
+        """Begin to connect, without waiting."""
 
     def connected(self, until: float) -> bool:
-        """Wait for the connection until a moment of ``time.monotonic``, s; tell whether it is."""
+        """Wait for the connection until a moment of ``time.monotonic``, s; return whether it is."""
 
     def write(self, data: bytes) -> None:
         """Hand all bytes over."""
@@ -42,11 +42,11 @@ class Connection(Protocol):
         """
 
     def close(self, *, discard: bool = False) -> None:
-        """Close it; ``discard``: what was handed over and has not arrived never shall."""
+        """Close it; ``discard``: bytes that have not arrived yet never will."""
 
 
 class TcpConnection:
-    """A connection by a socket; of several addresses of a host, each attempt tries the next."""
+    """A connection by a socket; with several addresses of a host, each attempt tries the next."""
 
     def __init__(self, host: str, port: int) -> None:
         self._where = host, port
@@ -54,7 +54,7 @@ class TcpConnection:
         self._is_connected = False
 
     def open(self) -> None:
-        """Begin to connect; only a name that leads nowhere yet is looked up, and waited for."""
+        """Begin to connect; only the lookup of a name that is not known yet is waited for."""
         if self._where not in _known:
             found = socket.getaddrinfo(*self._where, type=socket.SOCK_STREAM)
             _known[self._where] = [(family, address) for family, _, _, _, address in found]
@@ -69,7 +69,7 @@ class TcpConnection:
             return
 
     def connected(self, until: float) -> bool:
-        """Wait for the connection until a moment; tell whether it is there."""
+        """Wait for the connection until a moment; return whether it is there."""
         one = self._open_socket()
         wait = max(0.0, until - time.monotonic())
         if not self._is_connected and select.select((), (one,), (), wait)[1]:
@@ -80,7 +80,7 @@ class TcpConnection:
         return self._is_connected
 
     def write(self, data: bytes) -> None:
-        """Hand all bytes over: requests are small, and there is always room for one."""
+        """Hand all bytes over: requests are small, and the buffer always has room for one."""
         self._open_socket().sendall(data)
 
     def read(self, until: float) -> bytes:
@@ -102,7 +102,7 @@ class TcpConnection:
         if not self._is_connected and (known := _known.pop(self._where, None)) and known[1:]:
             _known[self._where] = known[1:]
         if discard:
-            # else the kernel would go on trying to deliver it
+            # else the kernel would keep trying to deliver them
             one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack('ii', 1, 0))
         one.close()
 
@@ -113,7 +113,7 @@ class TcpConnection:
 
 
 def watch_over(one: socket.socket) -> None:
-    """Let TCP find out by itself that a connection leads nowhere any more, and send at once."""
+    """Have TCP find out by itself that a connection is broken, and send at once."""
     one.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for option, value in _KEEPALIVE.items():
         one.setsockopt(socket.IPPROTO_TCP, option, value)

@@ -4,16 +4,16 @@
 """
 Telegram 1 behind a PLC or gateway: a block of registers, one telegram each way.
 
-The PLC is the controller of the drive on its fieldbus and shows the driver a block of its own
+The PLC is the controller of the drive on its fieldbus and offers the driver a block of its own
 holding registers, five to be read and three to be written. Every transaction carries all of them
 (function 23, or 16 and 03 where that is refused), so that the status and the command are of one
-moment, and a life counter each way says who is alive.
+moment, and a life counter each way shows that the other end is alive.
 
-What is written goes out with every transaction from then on: our counter moves while the driver
-lives, and so the PLC knows that the command words are meant still. After so long without it as
-:data:`PLC_TIME` the PLC stops the drive, and would let it go on at the next word that moves the
-counter [C108]. So all words are forgotten after such a gap, or with the connection: nothing is
-written then until a command begins anew. Before that, the block is only read.
+The command words are written with every transaction: our counter moves while the driver lives, and
+so the PLC knows that they are still valid. After :data:`PLC_TIME` without a new count the PLC stops
+the drive, and would let it go on at the next write that moves the counter [C108]. So all words are
+forgotten after such a gap, or with the connection: nothing is written then until a command begins
+anew. Before that, the block is only read.
 
 A word reaches the drive when the PLC exchanges the next telegram with it, and the answer to that
 one is in the block when the PLC's life counter has moved twice [C117]. A status from before has the
@@ -45,36 +45,35 @@ from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write, WriteAndRead
 
 _T = TypeVar('_T')
 
-#: How parameters are addressed that stand in a block, and their space; the sub-index is which part
-#: of it is meant, as follows.
+#: The addressing of parameters in a block, and their space; the sub-index is the part of the block,
+#: as follows.
 ADDRESSING = 'telegram1'
-#: To be read: ZSW1, and in the higher word what the PLC says of it, bit 0: valid, 1: released.
+#: To be read: ZSW1, and in the higher word the flags of the PLC, bit 0: valid, 1: released.
 STATUS = 0
 #: The actual value.
 ACTUAL = 1
-#: To be written: STW1 and the set-point, by which no motor is let run. It is written whatever was
-#: before.
+#: To be written: STW1 and the set-point, with which no motor may run. It is always written.
 BEGIN = 2
-#: The same, by which one may run: it goes on from the words before, and is refused after a gap.
+#: The same, with which one may run: it follows on the words before, and is refused after a gap.
 NEXT = 3
-#: Which bits of the STW1 that stands are to be cleared, so that no motor is let run, and the
-#: set-point with them; refused where none stands.
+#: The bits of the present STW1 to be cleared, so that no motor may run, with the set-point;
+#: refused where there is none.
 CLEAR = 4
-#: The set-point alone; refused where no STW1 stands.
+#: The set-point alone; refused where there is no STW1.
 SETPOINT = 5
-#: To be read: what a longer telegram tells, three words from here on; refused where none is shown.
+#: To be read: three words of a longer telegram, from here on; refused where there are none.
 MORE = 6
 
-#: Without a new count from us for so long the PLC stops the drive, s.
+#: After so long without a new count from us the PLC stops the drive, s.
 PLC_TIME = 1.0
-#: The life counter of the PLC moves so often until a word has reached the drive, and the drive's
+#: How often the life counter of the PLC moves until a word has reached the drive, and the drive's
 #: answer the block [C117].
 _MOVES = 2
-#: So long the actual value is that of the status read before it, s; the block has both.
+#: How long the actual value is that of the status read before it, s; the block has both.
 _SHARED_FOR = 0.1
-#: Layouts of the block that are known; the second one has a mailbox for parameters.
+#: The known layouts of the block; the second one has a mailbox for parameters.
 LAYOUTS = (1, 2)
-#: From where on the driver writes.
+#: The first register that the driver writes.
 WRITTEN_FROM = 8
 
 #: How many registers are read, by the layout.
@@ -93,19 +92,19 @@ _NOTHING_STANDS = (
 )
 
 Ask = Callable[[Request[_T]], tuple[_T, float]]
-#: What is written, and where.
+#: A write.
 _Written = tuple[Address, bytes]
-#: The registers that are read, and a moment.
+#: The registers that were read, and a moment.
 _Shown = tuple[tuple[int, ...], float]
 
 
 class Block:
     """
-    One block: what stands in it, and how old that is.
+    One block: its content, and how old that is.
 
     :param ask: sends a request of Modbus; returns its answer and when that came.
     :param now: the clock of these moments, s.
-    :param unit: who has it.
+    :param unit: the unit of the PLC.
     :param start: its first register.
     """
 
@@ -116,31 +115,31 @@ class Block:
         self._start = start
         #: STW1 and set-point as they are written with every transaction; ``None``: nothing is.
         self._command: tuple[int, int] | None = None
-        #: They may let a motor run.
+        #: A motor may run by them.
         self._live = False
-        #: When the last transaction with them began that was answered.
+        #: When the last answered transaction with them began.
         self._sent_at = 0.0
         self._count = 0
-        #: STW1 that the PLC has last acknowledged.
+        #: The STW1 that the PLC has acknowledged last.
         self._acknowledged: int | None = None
-        #: The PLC's life counter, and how often it has to move until a status is dated anew.
+        #: The PLC's life counter, and how often it has to move until a status is new.
         self._life: int | None = None
         self._moves = 0
         #: When the present content of the block first came.
         self._life_at = 0.0
-        #: What came with the last status, and when; ``None`` once its actual value was taken.
+        #: The content with the last status, and when; ``None`` once its actual value was taken.
         self._beside: tuple[_Shown, float] | None = None
-        #: The layout that was looked at; 0: none yet.
+        #: The layout that was read; 0: none yet.
         self._layout = 0
         #: Function 23 was refused.
         self._apart = False
-        #: What was read last, and when.
+        #: The last reading, and when.
         self._last: tuple[_Shown, float] | None = None
         self._mailbox = Mailbox(ask, now, unit, start)
         self._by_address = ByAddress(self._mailbox, now)
 
     def forget(self) -> None:
-        """Write nothing any more, only read: the connection is another one."""
+        """Write nothing any more, only read: the connection is a new one."""
         self._layout = 0
         self._mailbox.forget()
         self._by_address.forget()
@@ -152,7 +151,7 @@ class Block:
         Read a part of it; ``arrived`` is when the PLC first had it from the drive.
 
         The actual value is that of the status that was read just before: the two are of one
-        telegram, and the PLC is not asked twice.
+        telegram, and one request is enough.
         """
         if address.space in BY_MAILBOX:
             return self._access(address)
@@ -166,7 +165,7 @@ class Block:
         return reply
 
     def _shared_with(self, address: Address) -> _Shown | None:
-        """Return what was read just before, and has this part of the same telegram."""
+        """Return the last reading, if it has this part of the same telegram."""
         beside, self._beside = self._beside, None
         part = address.sub_index
         shared = self._last if part is not None and part >= MORE else beside
@@ -182,7 +181,7 @@ class Block:
         return Reply(b'', arrived)
 
     def write_and_read(self, address: Address, data: bytes, source: Address) -> Reply:
-        """Write a part of it and read another; nothing where the PLC has no valid data."""
+        """Write a part of it and read another; empty where the PLC has no valid data."""
         shown, arrived = self._exchange((address, data))
         try:
             reply = Reply(self._part(shown, source), arrived)
@@ -218,7 +217,7 @@ class Block:
         return struct.pack('>HH', word, flags) if part == STATUS else _word(actual)
 
     def _exchange(self, write: _Written | None = None) -> _Shown:
-        """Carry out a transaction; return what is shown, and when it first came."""
+        """Carry out a transaction; return what was read, and when it first came."""
         began = self._now()
         self._beside = None
         if self._command is not None and began - self._sent_at > PLC_TIME:
@@ -229,7 +228,7 @@ class Block:
         if write is None and self._command is None:
             return self._look()
         if not self._layout:
-            # nothing is written to registers that may be something else
+            # nothing is written to registers that may have another meaning
             self._look()
             began = self._now()
         command, live = self._command_after(write)
@@ -244,7 +243,7 @@ class Block:
             shown, arrived = self._send(_COMMANDED.pack(*command, self._count))
         except (Refused, NoPath):
             if live:
-                # what was refused is not written again with the next transaction
+                # a refused word is not written again with the next transaction
                 self._sent_at, self._live, self._command = before
             raise
         self._sent_at = began
@@ -258,7 +257,7 @@ class Block:
         return taken
 
     def _command_after(self, write: _Written | None) -> tuple[tuple[int, int], bool]:
-        """Return STW1 and set-point as they shall be, and whether a motor may run by them."""
+        """Return the new STW1 and set-point, and whether a motor may run by them."""
         if write is None:
             assert self._command is not None
             return self._command, self._live
@@ -321,7 +320,7 @@ class Block:
             self._moves = max(self._moves - 1, 0)
             if not self._moves:
                 self._life_at = arrived
-        # the first look does not know yet how much there is to be read
+        # the first reading does not know yet how many registers there are
         self._last = ((shown, self._life_at), self._now()) if len(shown) > 5 else None
         return shown, self._life_at
 
@@ -350,7 +349,7 @@ class Blocks:
         self._blocks: dict[tuple[int, int], Block] = {}
 
     def __call__(self, unit: int, address: Address) -> Block:
-        """Return the block that a parameter stands in."""
+        """Return the block of a parameter."""
         assert address.block is not None
         place = unit, address.block
         if place not in self._blocks:
@@ -358,7 +357,7 @@ class Blocks:
         return self._blocks[place]
 
     def forget(self) -> None:
-        """Take note that the connection is another one."""
+        """Note that the connection is a new one."""
         for block in self._blocks.values():
             block.forget()
 

@@ -87,14 +87,14 @@ class UrlPort:
 
 
 def _check(url: str) -> None:
-    """Look at a URL without connecting; a ValueError says what is wrong with it."""
+    """Check a URL without connecting; a ValueError says what is wrong with it."""
     kind = url.split('://')[0].lower()
     try:
         port: Any = serial.serial_for_url(url, do_not_open=True)
     except ValueError:
         raise ValueError(f'port {url!r}: there is no {kind}:// here; {_REMEDY}') from None
     except OSError:
-        # known, but what it names is not there yet
+        # known, but its device does not exist yet
         return
     if kind not in _SERVERS:
         return

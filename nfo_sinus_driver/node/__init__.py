@@ -6,5 +6,5 @@
 import os
 
 # A field of a wrong type would end the whole process by an assertion in C, with the motors
-# running; checked in Python it is an exception. It is looked at when the messages are imported.
+# running; checked in Python it is an exception. It is read when the messages are imported.
 os.environ.setdefault('ROS_PYTHON_CHECK_FIELDS', '1')

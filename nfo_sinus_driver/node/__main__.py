@@ -21,7 +21,7 @@ def main(args: list[str] | None = None) -> int:
     """Run the driver until a signal ends it; returns 1 if a stop was not confirmed."""
     open_closed_streams()
     signals = HeldSignals()
-    # to the last, so that none cuts the end of the process short
+    # to the end, so that none cuts the end of the process short
     signals.hold()
     # as early as possible: a parent that has ended before it was looked for is not noticed
     parent = ros2_parent(os.getppid())

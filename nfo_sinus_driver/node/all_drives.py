@@ -32,7 +32,7 @@ _Callback = Callable[[Call], tuple[list[str], list[str]]]
 
 
 class AllDrives:
-    """Offers ``~/stop_all`` and its like on the bus node, for all drives but monitored ones."""
+    """Offers ``~/stop_all`` and the like on the bus node, for all drives but monitored ones."""
 
     def __init__(self, node: Node, context: BusContext) -> None:
         self._node = node
@@ -69,7 +69,7 @@ class AllDrives:
         return answer
 
     def _stop(self, call: Call) -> tuple[list[str], list[str]]:
-        """Stop each drive by its address; call to those that cannot be reached, where allowed."""
+        """Stop each drive by its address; broadcast to those out of reach, where allowed."""
         why = Report(Cause.STOP_ALL_REQUESTED, by=call)
         failed, done = self._command(lambda one: _stop_one(one, why), _LONGEST_STOP, call)
         if failed and self._context.bus.protocol.broadcast is not None:
@@ -97,7 +97,7 @@ class AllDrives:
     def _command(
         self, command: _Command, timeout: float, call: Call
     ) -> tuple[list[str], list[str]]:
-        """Give a command to every controlled drive; return what failed, and what was done."""
+        """Send a command to every controlled drive; return what failed, and what was done."""
         failed: list[str] = []
         done: list[str] = []
         futures: list[tuple[ManagedDrive, Future[Report]]] = []

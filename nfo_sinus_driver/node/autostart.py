@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Configures and activates a drive node by itself, and tries until it works."""
+"""Configures and activates a drive node by itself, and retries until it works."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import threading
 
 _log = logging.getLogger(__name__)
 
-#: How long it rests after a try that failed, at first and at last, s: meanwhile an operator may
-#: have the lifecycle, and the drives that do answer have the bus.
+#: How long it rests after a failed try, at first and at last, s: meanwhile an operator may change
+#: the lifecycle, and the drives that do respond have the bus.
 _REST = 1.0
 _LONGEST_REST = 4.0
 
@@ -21,7 +21,7 @@ class Autostart:
     """
     Tries, by ``attempt``, to start one drive, on a thread that ends when the drive has started.
 
-    A try waits for the bus; so every drive has a thread, and all of them are looked for at once.
+    A try waits for the bus; so every drive has a thread, and all are tried at once.
     """
 
     def __init__(self, name: str, attempt: Callable[[], bool]) -> None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the nodes of one process share: the bus, the queue of what is published, and who is who."""
+"""What the nodes of one process share: the bus, the publish queue, and the drives."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
 
-#: How long the bus waits for what is to begin at once, s; no drive times out by then.
+#: How long the bus waits for commands that are to begin at once, s; no drive times out by then.
 _LONGEST_GATHERING = 0.1
 
 
@@ -37,11 +37,11 @@ class BusContext:
     #: The names of all drives of the line, those to come too.
     names: list[str] = field(default_factory=list)
     drives: list[ManagedDrive] = field(default_factory=list)
-    #: What takes a set-point for all drives of the line, one for each drive.
+    #: The functions that take a set-point for all drives of the line, one for each drive.
     on_setpoint_all: list[Callable[[Float32], None]] = field(default_factory=list)
 
     def expect(self, names: Sequence[str]) -> None:
-        """Take note of the names of the drives that will be taken in."""
+        """Note the names of the drives that will be added."""
         self.names += names
 
     def stop_beside(self, names: Collection[str], why: Report) -> None:
@@ -53,23 +53,23 @@ class BusContext:
     def subscribe(
         self, node: Node, topics: Mapping[str, tuple[type, Callable[[Any], None]]]
     ) -> None:
-        """Take the set-points of topics, each of a type and for a function; warn of other types."""
+        """Subscribe to topics, each of a type and for a function; warn of other types."""
         for topic, (type_, callback) in topics.items():
             self.setpoint_subscriber.subscribe(node, type_, topic, callback)
         types = {topic: type_ for topic, (type_, _) in topics.items()}
         self.publish_queue.put_every(PERIOD, GraphWatch(node, types).look)
 
     def add(self, drive: ManagedDrive) -> None:
-        """Take in another drive."""
+        """Add a drive."""
         self.drives.append(drive)
 
     def log(self, log: Callable[[str], object], text: str) -> None:
-        """Log a line from the thread that publishes, for the bus must not wait for a log."""
+        """Log a line from the publishing thread, for the bus must not wait for a log."""
         self.publish_queue.put(lambda: log(text))
 
     @contextlib.contextmanager
     def at_once(self) -> Iterator[None]:
-        """Have all that is asked of the bus meanwhile begin together, between two transactions."""
+        """Have all requests to the bus meanwhile begin together, between two transactions."""
         complete = threading.Event()
         self.bus.call(lambda: complete.wait(_LONGEST_GATHERING))
         try:
@@ -81,8 +81,7 @@ class BusContext:
         """
         Return the name of another drive that would answer to the address of this one, too.
 
-        :param block: where its block of registers begins, where a PLC shows some; they may not
-            overlap.
+        :param block: the first register of its block, behind a PLC; blocks may not overlap.
         """
         alone = self.bus.protocol.point_to_point
         for drive in self.drives:

@@ -31,7 +31,7 @@ from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.setting import Setting
 
 _PERIOD = 1.0
-#: How long it is waited for at the start that the port opens, and how often it is looked, s.
+#: How long the start waits for the port to open, and how often that is checked, s.
 _LONGEST_OPENING = 0.5
 _LOOK_PERIOD = 0.005
 
@@ -84,7 +84,7 @@ class BusNode(Node):
         bus = self.bus_context.bus
         self.bus_context.publish_queue.start()
         bus.start()
-        # what the port does is said before what the drives do
+        # the state of the port is logged before that of the drives
         deadline = time.monotonic() + _LONGEST_OPENING
         while bus.port_error is not None and time.monotonic() < deadline:
             time.sleep(_LOOK_PERIOD)
@@ -94,7 +94,7 @@ class BusNode(Node):
         )
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Set parameters; of a name that is none the reason has what is most like it."""
+        """Set parameters; for an unknown name the reason suggests the closest one."""
         try:
             for parameter in parameter_list:
                 require_parameter(self, parameter.name)
@@ -134,12 +134,12 @@ class BusNode(Node):
 
     @property
     def _check(self) -> str:
-        """What to look at while no drive answers: what all have alike, or what is of the line."""
+        """What to check while no drive answers: of all drives if they agree, else of the line."""
         found = {drive.line_check for drive in self.bus_context.drives}
         return found.pop() if len(found) == 1 else self.bus_context.bus.protocol.check
 
     def _log_port(self, error: str | None) -> None:
-        """Say what the port does, on change."""
+        """Log whether the port is open, on change."""
         if error == self._logged_port:
             return
         self._logged_port = error

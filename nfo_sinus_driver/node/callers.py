@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which client has called a service, and what came of it: one line in the log for each command."""
+"""Which client has called a service, and the outcome: one line in the log for each command."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from rclpy.service_introspection import ServiceIntrospectionState
 
 from nfo_sinus_driver.node.qos import RELIABLE
 
-#: Within what time the middleware knows of a new client, s, and how often it is looked for.
+#: Within what time the middleware knows of a new client, s, and how often that is checked.
 _KNOWN_WITHIN = 0.5
 _LOOK_PERIOD = 0.02
 
 
 class Call:
     """
-    A command that was called; as text, by whom, as far as that is known by now.
+    A call of a command; as text, with its caller, as far as that is known by now.
 
     rclpy does not give a request the name of its client. So these are the nodes that have a client
-    of the service: more than one if several have. Nothing is looked for before :meth:`find`: a stop
+    of the service: more than one if several have. No search begins before :meth:`find`: a stop
     never waits for it.
 
     :param service: its name as it was created, such as ``~/stop``; an action is named with the
         service of it that was called.
-    :param detail: what was called for, where the name does not say it.
+    :param detail: what was requested, where the name does not say it.
     """
 
     def __init__(self, node: Node, service: str, detail: str = '') -> None:
@@ -49,12 +49,12 @@ class Call:
         return f'{called}{detail} called by {by}'
 
     def find(self) -> None:
-        """Find who called, once the command is given; one who has just come may take a moment."""
+        """Find the caller, once the command is given; a new client may take a moment."""
         if not self._look():
             threading.Thread(target=self._keep_looking, daemon=True).start()
 
     def log(self, outcome: str = '', *, success: bool = True) -> None:
-        """Log the call and what came of it, as soon as it is known who called."""
+        """Log the call and its outcome, as soon as the caller is known."""
         answered = outcome and f': {outcome}'
         log = self._node.get_logger()
         # one call site for each level: rclpy forbids another level at the same place
@@ -87,7 +87,7 @@ def publish_calls(node: Node, service: Service) -> None:
 
 def _clients(node: Node, service: str) -> list[str]:
     found = []
-    # the node may be destroyed meanwhile; and its command is given, so nothing spoils the answer
+    # the node may be destroyed meanwhile; the command is given already, whatever happens here
     with contextlib.suppress(InvalidHandle, rclpy_implementation.RCLError):
         for name, namespace in sorted(set(node.get_node_names_and_namespaces())):
             # one may have ended meanwhile

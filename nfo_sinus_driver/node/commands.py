@@ -47,8 +47,8 @@ from nfo_sinus_driver.node.messages import inv_st
 from nfo_sinus_driver.node.qos import COMMANDS
 from nfo_sinus_driver.node.wording import NodeError
 
-#: How long a service waits for the bus before it says that it does not know, s. A start delay of
-#: the drive may last an hour.
+#: How long a service waits for the bus before it reports that, s. A start delay of the drive may
+#: last an hour.
 _LONGEST_COMMAND = 3700.0
 _LONGEST_STOP = 10.0
 _LONGEST_REFRESH = 300.0
@@ -66,7 +66,7 @@ class Commands:
     def __init__(self, node: Node, managed: ManagedDrive) -> None:
         self._node = node
         self._managed = managed
-        # several, for to disable must not wait for an enable that waits for a start delay; but not
+        # several, for a disable must not wait for an enable that waits for a start delay; but not
         # any number, for each keeps a thread that other drives may need
         group = BoundedCallbackGroup(CALLS_OF_ENABLE)
         enable = node.create_service(
@@ -99,7 +99,7 @@ class Commands:
     def _answer(
         self, response: Any, call: Call, command: Callable[[], Future[Report]], timeout: float
     ) -> Any:
-        """Give a command, and log who called it and what came of it."""
+        """Send a command to the drive, and log its caller and its outcome."""
         self.answer(response, _and_find(call, command), timeout, self._managed.wording.say)
         call.log(response.message, success=response.success)
         return response
@@ -111,7 +111,7 @@ class Commands:
         timeout: float,
         describe: Callable[[_T], str],
     ) -> Any:
-        """Give a command that may take so long, s, and describe its result to who asked for it."""
+        """Send a command that may take so long, s, and answer with a description of its result."""
         try:
             response.message = describe(command().result(timeout))
             response.success = True
@@ -156,7 +156,7 @@ def _acknowledge(drive: Drive, call: Call) -> Future[Report]:
 
 
 def _and_find(call: Call, command: Callable[[], _T]) -> Callable[[], _T]:
-    """Return a command after which is found who called it: a stop never waits."""
+    """Return a command after which its caller is looked for: a stop never waits."""
 
     def given() -> _T:
         try:
@@ -168,7 +168,7 @@ def _and_find(call: Call, command: Callable[[], _T]) -> Callable[[], _T]:
 
 
 class BoundedCallbackGroup(CallbackGroup):
-    """Lets a number of callbacks run at once; what comes then waits in its queue."""
+    """Lets a number of callbacks run at once; further calls wait in their queue."""
 
     def __init__(self, most: int) -> None:
         super().__init__()
@@ -177,7 +177,7 @@ class BoundedCallbackGroup(CallbackGroup):
         self._lock = threading.Lock()
 
     def can_execute(self, entity: object) -> bool:
-        """Tell whether one more may run."""
+        """Return whether one more may run."""
         return self._running < self._most
 
     def beginning_execution(self, entity: object) -> bool:
@@ -188,12 +188,12 @@ class BoundedCallbackGroup(CallbackGroup):
             return begins
 
     def ending_execution(self, entity: object) -> None:
-        """Take note that one has ended."""
+        """Note that one has ended."""
         with self._lock:
             self._running -= 1
 
 
-#: A busy line has many other things to do, s.
+#: How long a busy line may take, s.
 _LONGEST = 60.0
 
 
@@ -234,11 +234,11 @@ class ErrorLogServices:
         if not undated:
             return count
         if all(math.isnan(entry.operating_time) for entry in entries):
-            return f'{count}; the drive does not tell when they came'
+            return f'{count}; the drive does not say when they came'
         since = self._managed.drive.powered_since
         return (
-            f'{count}, {undated} of them without the wall time: it is only known '
-            f'since the driver has seen the drive with power, from operating hour {since:.1f} on'
+            f'{count}, {undated} of them without the wall time: that is known only as long as the '
+            f'drive is known to have had power, from operating hour {since:.1f} on'
         )
 
 
@@ -255,12 +255,12 @@ _PROCEDURES = {
     Tune.Goal.STATOR_RESISTANCE: Procedure.STATOR_RESISTANCE,
     Tune.Goal.CALCULATE: Procedure.CALCULATE,
 }
-#: How often it is looked whether there is something new, s.
+#: How often progress and cancellation are checked, s.
 _LOOK_PERIOD = 0.05
 
 
 class TuningServices:
-    """Offers ``~/tune_full`` and its like, and the action ``~/tune``."""
+    """Offers ``~/tune_full`` and the like, and the action ``~/tune``."""
 
     def __init__(self, node: Node, managed: ManagedDrive, stamp: Callable[[float], Time]) -> None:
         self._node = node
@@ -289,7 +289,7 @@ class TuningServices:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             requested_at = received_at()
             call = Call(self._node, name)
-            # it may take minutes, and how it ends is reported anyway
+            # it may take minutes, and its outcome is reported anyway
             call.log()
             tune = _and_find(
                 call,
@@ -347,7 +347,7 @@ class TuningServices:
         call.log()
         call.find()
         drive = self._managed.require_active()
-        # the bus reports how far it is, and nothing may keep it waiting
+        # the bus reports progress, and must not be kept waiting
         reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()
         future = drive.tune(procedure, lambda *report: reports.put(report), requested_at)
         cancelling = False

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Settings as ROS parameters: declared with all that is known of them, and taken as meant."""
+"""Settings as ROS parameters: declared with full descriptors, and coerced to their types."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def declare(node: Node, settings: Mapping[str, Setting]) -> dict[str, SettingVal
     """Declare settings on a node and return their values; a ValueError says which is wrong."""
     overrides = overrides_of(node)
     for name, one in settings.items():
-        # the complaints of rclpy name no remedy
+        # the messages of rclpy name no remedy
         given = overrides.get(name)
         value = one.default if given is None else _coerced(one, given.value)
         node.declare_parameter(name, value, _descriptor(one), ignore_override=True)
@@ -42,7 +42,7 @@ def declare(node: Node, settings: Mapping[str, Setting]) -> dict[str, SettingVal
 
 
 def coerce(parameter: Parameter, settings: Mapping[str, Setting]) -> Parameter:
-    """Take what is set for what is meant, if it is one of the settings."""
+    """Return a parameter in the type of its setting, if it is one of the settings."""
     one = settings.get(parameter.name)
     if one is None or parameter.type_ is Parameter.Type.NOT_SET:
         return parameter
@@ -70,7 +70,7 @@ def _descriptor(one: Setting) -> ParameterDescriptor:
 
 
 def _coerced(one: Setting, given: object) -> SettingValue:
-    """Take what was given for what was meant: 5 for 5.0, and 8E1, eighty in YAML, for text."""
+    """Return a value in the type of its setting: 5 as 5.0, and 8E1, eighty in YAML, as text."""
     value = given
     wanted = type(one.default)
     if type(given) is int and wanted is float:
@@ -93,7 +93,7 @@ def _type_of(value: object) -> str:
 
 
 def _as(wanted: type, given: object) -> str:
-    """Return how to write what was given in the type that is wanted, or any of that type."""
+    """Return how to write a value in the wanted type, or any value of that type."""
     if isinstance(given, str):
         if wanted is list:
             return f'[{given}]'

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Diagnostics as REP-107 has them: once a second and on change, never used to stop anything."""
+"""Diagnostics by REP-107: once a second and on change, never used to stop anything."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def array(status: DiagnosticStatus, stamp: Time) -> DiagnosticArray:
 
 
 def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str]:
-    """Return how grave it is what one drive says, and what an operator should know of it."""
+    """Return the level of one drive's diagnosis, and its message for the operator."""
     if managed.drive.stop_overdue:
         message = 'the stop is NOT confirmed: use the enable input or the emergency stop'
         return DiagnosticStatus.ERROR, message
@@ -53,7 +53,7 @@ def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str
 def drive_status(
     name: str, managed: ManagedDrive, snapshot: Snapshot, verdict: tuple[bytes, str]
 ) -> DiagnosticStatus:
-    """Return how one drive is doing (verdict: as :func:`drive_verdict` has it)."""
+    """Return the diagnosis of one drive (verdict: from :func:`drive_verdict`)."""
     drive = managed.drive
     identity, parameters = drive.identity, drive.parameters
     code = '' if snapshot.status is None else str(snapshot.status.code)
@@ -100,9 +100,9 @@ def bus_status(
     remarks: Sequence[str],
 ) -> DiagnosticStatus:
     """
-    Return how the line is doing.
+    Return the diagnosis of the line.
 
-    :param check: what to look at where no drive answers; ``''`` where one has.
+    :param check: what to check where no drive has answered; ``''`` where one has.
     :param remarks: what the link has noticed about the line.
     """
     if port_error is not None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What ``ros2 doctor`` says of lines and drives; only ros2doctor imports this.
+What ``ros2 doctor`` reports of lines and drives; only ros2doctor imports this.
 
 It listens to ``/diagnostics`` for a while, and calls nothing.
 """
@@ -48,7 +48,7 @@ class DriveReport(DoctorReport):
         report.add_to_report('version', VERSION)
         statuses = _statuses()
         if not statuses:
-            report.add_to_report('drives', 'none is heard in this ROS_DOMAIN_ID')
+            report.add_to_report('drives', 'none found in this ROS_DOMAIN_ID')
         for name, status in sorted(statuses.items()):
             report.add_to_report(name, f'{_LEVELS[status.level]}: {status.message}')
         return report
@@ -62,7 +62,7 @@ class DriveCheck(DoctorCheck):
         return _CATEGORY
 
     def check(self) -> Result:
-        """Return the result; a driver that does not run is nothing to complain about."""
+        """Return the result; it is no error if no driver runs."""
         result = Result()
         for name, status in sorted(_statuses().items()):
             if status.level == DiagnosticStatus.ERROR:
@@ -76,10 +76,10 @@ class DriveCheck(DoctorCheck):
 
 @functools.lru_cache(maxsize=1)
 def _statuses() -> dict[str, DiagnosticStatus]:
-    """Return the newest status of each line and drive; heard once for check and report."""
+    """Return the newest status of each line and drive, collected once for check and report."""
     found: dict[str, DiagnosticStatus] = {}
 
-    def hear(array: DiagnosticArray) -> None:
+    def take(array: DiagnosticArray) -> None:
         found.update({one.name: one for one in array.status if one.name.endswith(_ENDS)})
 
     context = Context()
@@ -88,7 +88,7 @@ def _statuses() -> dict[str, DiagnosticStatus]:
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     try:
-        node.create_subscription(DiagnosticArray, '/diagnostics', hear, 100)
+        node.create_subscription(DiagnosticArray, '/diagnostics', take, 100)
         until = time.monotonic() + _LISTENS
         while (left := until - time.monotonic()) > 0:
             executor.spin_once(left)

@@ -36,7 +36,7 @@ from nfo_sinus_driver.node.setpoints import Setpoints
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.wording import NodeError, Wording
 
-#: How long a stop may wait for the bus before it is said that it is not known, s.
+#: How long a stop may wait for the bus, s.
 _LONGEST_STOP = 10.0
 
 _Transition = Callable[['DriveNode', LifecycleState], TransitionCallbackReturn]
@@ -66,12 +66,12 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def __init__(self, name: str, context: BusContext) -> None:
         # parameters have the default group, so lifecycle gets one of its own: neither may wait
-        # for the other, and commands for none of them
+        # for the other, and commands for neither
         Node.__init__(self, name)
         LifecycleNodeMixin.__init__(self, callback_group=MutuallyExclusiveCallbackGroup())
         self._bus_context = context
         self._ending = False
-        #: Who moves the node through its states.
+        #: What moves the node through its states.
         self.lifecycle = Lifecycle(self)
         family = overrides_of(self).get('family')
         known = with_factory_address(DRIVE_SETTINGS, None if family is None else family.value)
@@ -86,7 +86,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         queue, follow = context.publish_queue, self._drive_parameters.note
         wording = Wording(self)
         reporter = Reporter(self, queue, wording, joint, lambda: self.managed, follow)
-        #: The drive, for those who command it.
+        #: The drive of the node.
         self.managed = ManagedDrive(
             self.get_name(),
             wording,
@@ -118,7 +118,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         context.add(self.managed)
 
     def stop_for_good(self, patience: float, why: str) -> Future[Report | None]:
-        """Stop the motor within so many s, and see to it that no client can start it again."""
+        """Stop the motor within so many s; no client can start it again."""
         self._ending = True
         self.lifecycle.end()
         self._setpoints.be_quiet(True)
@@ -143,13 +143,13 @@ class DriveNode(LifecycleNodeMixin, Node):
         if self._ending:
             return TransitionCallbackReturn.FAILURE
         try:
-            asked_for = self.managed.connect(retry=self.lifecycle.by_operator)
+            is_wanted = self.managed.connect(retry=self.lifecycle.by_operator)
         except (DriveError, NodeError, ValueError) as error:
-            # of a port that is lost the bus node says so, for all its drives
+            # the bus node reports a lost port, for all its drives
             port_lost = self._bus_context.bus.port_error is not None
             self.lifecycle.complain(self.managed.wording.say(error), known=port_lost)
             return TransitionCallbackReturn.FAILURE
-        if not asked_for:
+        if not is_wanted:
             self.get_logger().info('the settings were changed meanwhile: beginning anew')
             self._stop_for('let go', self.managed.disconnect)
             return TransitionCallbackReturn.FAILURE
@@ -170,7 +170,7 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     @_guarded
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop the motor and only keep watch; fails if the drive answers and does not stop."""
+        """Stop the motor and only watch the drive; fails if it responds and does not stop."""
         self.lifecycle.note_transition()
         if not self._let_go('deactivated'):
             self.managed.drive.activate()
@@ -179,7 +179,7 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     @_guarded
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give control back and leave the drive alone; fails if it answers and does not stop."""
+        """Release control and disconnect; fails if the drive responds and does not stop."""
         self.lifecycle.note_transition()
         if not self._let_go('cleaned up'):
             return TransitionCallbackReturn.FAILURE
@@ -189,7 +189,7 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     @_guarded
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop the motor and give control back."""
+        """Stop the motor and release control."""
         self.lifecycle.note_transition()
         if self.managed.drive.identity is not None:
             self._stop_for('shut down', self.managed.drive.stop)
@@ -198,14 +198,14 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     @_guarded
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop the motor, whatever went wrong, and begin anew."""
+        """Stop the motor after any error, and begin anew."""
         self._stop_for('an error happened', self.managed.drive.stop)
         self._stop_for('an error happened', self.managed.disconnect)
         self._drive_parameters.undeclare()
         return TransitionCallbackReturn.SUCCESS
 
     def _apply_wanted_state(self) -> None:
-        """Bring the drive into the state of the parameter file, once in the life of a process."""
+        """Write the parameters of the parameter file to the drive, once in a process."""
         wanted, self._wanted = self._wanted, {}
         write = self.get_parameter('apply_parameters').value
         if wanted:
@@ -213,16 +213,16 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _let_go(self, what: str) -> bool:
         """
-        Stop the motor; false if the drive answers and its motor is energised all the same.
+        Stop the motor; false if the drive responds and its motor is energised all the same.
 
-        One that does not answer is let go: it is told to stop as soon as it answers again.
+        A drive that does not respond is let go: it is stopped as soon as it responds again.
         """
         drive = self.managed.drive
         confirmed = self._stop_for(what, drive.deactivate)
         return confirmed or not (drive.stop_unconfirmed and drive.snapshot.connected)
 
     def _stop_for(self, what: str, command: Callable[[Report], Future[Any]]) -> bool:
-        """Give a command that stops the motor; return whether the drive has confirmed it."""
+        """Send a command that stops the motor; return whether the drive has confirmed it."""
         say, call = self.managed.wording.say, Call(self, '~/change_state', what)
         try:
             stopping = command(Report(Cause.TRANSITION_REQUESTED, by=call))
@@ -266,15 +266,15 @@ class DriveNode(LifecycleNodeMixin, Node):
                 )
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Set parameters for a client, all or none: only so the drive is written to."""
+        """Set parameters for a client, all or none; nothing else writes to the drive."""
         try:
             coerced = [coerce(parameter, DRIVE_SETTINGS) for parameter in parameter_list]
-            admitted = self._drive_parameters.validate(coerced)
+            validated = self._drive_parameters.validate(coerced)
         except (ValueError, DriveError) as error:
             reason = self.managed.wording.say(error)
             return SetParametersResult(successful=False, reason=reason)
         with self._drive_parameters.from_outside():
-            return super().set_parameters_atomically(admitted)
+            return super().set_parameters_atomically(validated)
 
     def _check_settings(self, parameters: list[Parameter]) -> SetParametersResult:
         try:
@@ -299,7 +299,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         _require_gear_ratio(changed)
         require_scale(changed)
         self._require_same_scale(changed)
-        # not read_only for rclpy, so that what was dumped can be loaded
+        # not read_only for rclpy, so that a dump can be loaded
         autostart = self.get_parameter('autostart').value
         if changed.get('autostart', autostart) != autostart:
             raise ValueError('autostart is read when the driver starts: give it then')
@@ -318,14 +318,14 @@ class DriveNode(LifecycleNodeMixin, Node):
             )
 
     def _require_same_scale(self, changed: Mapping[str, object]) -> None:
-        # a set-point that goes on arriving would mean another speed
+        # the set-points that go on arriving would mean another speed
         for name in ('scale', 'unit'):
             now = self.get_parameter(name).value
             if changed.get(name, now) != now and self.managed.drive.following:
                 raise ValueError(f'{name} can only be changed while the drive is not enabled')
 
     def _try_drive_timeout(self, seconds: float, changes: Sequence[Change]) -> None:
-        """Set the drive's own time-out if it is there, or undo changes; else configure does it."""
+        """Set the drive's own time-out, or undo changes; without a drive configure does it."""
         managed = self.managed
         if managed.state in ('inactive', 'active') and seconds != managed.settings.drive_timeout:
             try:

@@ -20,7 +20,7 @@ from nfo_sinus_driver.node.overrides import require_parameter
 from nfo_sinus_driver.node.rclpy_internals import overrides_of, writable
 from nfo_sinus_driver.node.wording import NodeError
 
-#: How long a change may wait for the bus before it is said that it is not known, s.
+#: How long a change may wait for the bus, s.
 _LONGEST_CHANGE = 30.0
 
 _LATER = '; those of the drive are there once the node is configured'
@@ -31,9 +31,9 @@ class DriveParameters:
     """
     Keeps the parameters of a node and the settings of its drive the same.
 
-    Both can begin: who sets a parameter writes to the drive, and what changes at the drive shows
-    as a parameter event. Declaring and following never write, so the origin of every change has to
-    be known: it is this thread, between :meth:`from_outside` and its end, or it is the drive.
+    Both may change: a client that sets a parameter writes to the drive, and a change at the drive
+    shows as a parameter event. Declaring and following never write, so the origin of every change
+    has to be known: it is this thread, within :meth:`from_outside`, or it is the drive.
     """
 
     def __init__(self, node: Node) -> None:
@@ -43,13 +43,13 @@ class DriveParameters:
         self._changed: set[str] = set()
         self._lock = threading.Lock()
         self._outside: int | None = None
-        # in the group of the parameter services, so that a value is never changed by both at once
+        # in the group of the parameter services, so that a value is never changed from both sides
         self._guard = node.create_guard_condition(self._follow, node.default_callback_group)
 
     # --- from the drive -----------------------------------------------------------------------
 
     def declare(self, drive: Drive) -> None:
-        """Declare what the drive keeps, with the value that it has."""
+        """Declare the settings of the drive, with the values that it has."""
         self.undeclare()
         self._drive = drive
         for key, value in drive.parameters.values.items():
@@ -57,11 +57,11 @@ class DriveParameters:
                 key, value, descriptor(drive, key, value), ignore_override=True
             )
             self._declared.add(key)
-        # what came in between
+        # changes in between
         self.note(self._declared)
 
     def undeclare(self) -> None:
-        """Take back what was declared: what the drive has is not known any more."""
+        """Undeclare them: what the drive has is not known any more."""
         self._drive = None
         while self._declared:
             key = self._declared.pop()
@@ -84,7 +84,7 @@ class DriveParameters:
             value = drive.parameters.values.get(key)
             if value is None or value == self._node.get_parameter(key).value:
                 continue
-            # the drive is right, also where the manual does not allow what it has
+            # the drive is right, even where the manual does not allow its value
             parameter = Parameter(key, value=value)
             shown = descriptor(drive, key, value)
             with writable(self._node, key):
@@ -96,18 +96,18 @@ class DriveParameters:
 
     def validate(self, parameters: Iterable[Parameter]) -> list[Parameter]:
         """
-        Return parameters as the drive will have them, or raise why not; nothing is asked.
+        Return parameters as the drive will have them, or raise why not; nothing is sent.
 
-        What is only read is left out where it is as the drive has it: so a dump can be loaded.
+        Read-only ones with the value of the drive are left out: so a dump can be loaded.
         """
-        admitted = [self._admit(parameter) for parameter in parameters]
-        return [one for one in admitted if not self._is_read_only(one.name)]
+        coerced = [self._coerced(parameter) for parameter in parameters]
+        return [one for one in coerced if not self._is_read_only(one.name)]
 
     def _is_read_only(self, name: str) -> bool:
         drive = self._drive
         return drive is not None and name in self._declared and not drive.model[name].is_setting
 
-    def _admit(self, parameter: Parameter) -> Parameter:
+    def _coerced(self, parameter: Parameter) -> Parameter:
         require_parameter(self._node, parameter.name, _LATER)
         drive = self._drive
         unset = parameter.type_ is Parameter.Type.NOT_SET
@@ -121,7 +121,7 @@ class DriveParameters:
 
     @contextlib.contextmanager
     def from_outside(self) -> Iterator[None]:
-        """What is set by this thread meanwhile is meant for the drive."""
+        """What this thread sets meanwhile is for the drive."""
         self._outside = threading.get_ident()
         try:
             yield
@@ -158,7 +158,7 @@ class DriveParameters:
 
 
 def coerce(parameter: CatalogParameter, given: object) -> Value:
-    """Return what was given for what was meant: 5 for 5.0, and what YAML makes of OFF for OFF."""
+    """Return a value in the type of its parameter: 5 as 5.0, and the OFF of YAML as OFF."""
     kind = parameter.kind
     if kind is str and isinstance(given, bool):
         switched = ('off', 'no') if not given else ('on', 'yes')
@@ -183,10 +183,10 @@ def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
     for parameter in drive.model.settings:
         if parameter.key in given:
             value = coerce(parameter, given[parameter.key].value)
-            # what cannot be reached over this line is told when the drive is there
+            # what cannot be reached over this line is reported when the drive is connected
             reached = drive.parameters.reaches(parameter.key)
             wanted[parameter.key] = (
-                drive.parameters.exact(parameter.key, value) if reached else value
+                drive.parameters.coerce(parameter.key, value) if reached else value
             )
     return wanted
 

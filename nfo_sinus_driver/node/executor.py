@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Who serves one node: its thread sleeps until something is asked of the node, and of no other.
+The executor of one node: its thread sleeps until a request comes for this node.
 
-Services have no order among them: of two requests the later may be taken first. So this tells when
-each was received, too.
+Services have no order among them: of two requests the later may be taken first. So each request
+has the time at which it was received.
 
-Who has just come may ask before the middleware knows where his answer goes, which it then drops.
-So this sends it again.
+A new client may call before the middleware knows where its answer goes, which it then drops. So
+this sends the answer again.
 """
 
 from __future__ import annotations
@@ -45,19 +45,19 @@ _NOTHING = (
 
 #: No request waits for its turn for longer, s: a start delay before it may last an hour.
 _LONGEST_WAIT = 4000.0
-#: When an answer that was dropped is sent again, s after the last time. Each time that is in vain
-#: holds up all threads for 0.1 s, for rclpy lets none of them run while the middleware waits.
+#: When an answer that was dropped is sent again, s after the last time. Each vain try holds up all
+#: threads for 0.1 s, for rclpy lets none of them run while the middleware waits.
 _SENT_AGAIN_AFTER = (0.2, 0.5, 2.0)
-#: How rclpy tells that an answer was dropped: as a warning, which is not shown a second time.
+#: How rclpy reports that an answer was dropped: as a warning, which is not shown a second time.
 _DROPPED = 'failed to send response'
 _received: ContextVar[float] = ContextVar('received')
 
 
 def received_at() -> float:
     """
-    Return when the request was received that the service called now answers, s, monotonic.
+    Return when the request was received that this thread is serving, s, monotonic.
 
-    That is the present where the middleware does not tell.
+    It is the present where the middleware does not say.
     """
     return _received.get(time.monotonic())
 
@@ -65,7 +65,7 @@ def received_at() -> float:
 def _received_at(received: int) -> float:
     """Return the moment of a wall time in ns, s, monotonic; the present if it cannot be one."""
     ago = (time.time_ns() - received) / 1e9
-    # a middleware may tell 0 or count from elsewhere, and the clock may be set just now
+    # a middleware may give 0 or another epoch, and the clock may be set just now
     return time.monotonic() - (ago if 0.0 <= ago <= _LONGEST_WAIT else 0.0)
 
 
@@ -75,7 +75,7 @@ class NodeExecutor(Executor):
 
     An executor of rclpy looks through everything of all its nodes before it waits again. This has
     one node, so that a call to one drive costs the same however many there are, and no time-out,
-    so that nothing is looked through while no request comes.
+    so that it sleeps while no request comes.
 
     :param threads: how many callbacks may be waiting for something at once.
     """
@@ -99,7 +99,7 @@ class NodeExecutor(Executor):
         return self._thread.is_alive()
 
     def end(self) -> None:
-        """Begin nothing any more."""
+        """Begin no more callbacks."""
         self._ending = True
         self.wake()
 
@@ -210,7 +210,7 @@ def _run(task: Task, begun: threading.Event) -> None:
 
 
 def end_all(executors: Iterable[NodeExecutor], timeout: float) -> None:
-    """Let callbacks end before what they use is destroyed, for a limited time (s)."""
+    """Let callbacks end before what they use is destroyed, within a limited time (s)."""
     executors = list(executors)
     for executor in executors:
         executor.end()
@@ -224,7 +224,7 @@ def end_all(executors: Iterable[NodeExecutor], timeout: float) -> None:
 
 @contextlib.contextmanager
 def spinning(executor: Executor) -> Iterator[None]:
-    """Have an executor of rclpy spun on a thread, which ends before what it waits for is gone."""
+    """Spin an executor of rclpy on a thread that ends before what it waits for is gone."""
     ended = threading.Event()
 
     def spin() -> None:

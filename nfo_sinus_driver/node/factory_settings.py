@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The settings of line and drive that a family says, as it leaves the factory."""
+"""The factory settings of line and drive that a family describes."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _LINE = ('protocol', 'baud_rate', 'char_format')
 
 def line_of(families: Mapping[str, object], given: Mapping[str, object]) -> dict[str, Any]:
     """
-    Return protocol, speed and format of a line: as given, else as its drives leave the factory.
+    Return protocol, speed and format of a line: as given, else the factory settings of its drives.
 
-    Empty where no drive has a ``family``: the protocol says them then.
+    Empty where no drive has a ``family``: then the protocol decides.
 
-    :param families: what was given as ``family`` of each drive, by its name.
-    :param given: what was given of the line itself.
+    :param families: the ``family`` of each drive as given, by its name.
+    :param given: the settings of the line as given.
     :raises ValueError: there is no such family, or the drives differ in what is not given.
     """
     if not any(families.values()):

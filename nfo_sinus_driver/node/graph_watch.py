@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the graph shows to be wrong: messages that never arrive, and another node of the name."""
+"""Errors that the graph shows: messages that never arrive, and another node of the name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
-#: How often the graph should be looked at, s.
+#: How often the graph should be checked, s.
 PERIOD = 2.0
 #: How a message of each type is written; the value is harmless to whatever follows it.
 _WRITTEN = {
@@ -20,7 +20,7 @@ _WRITTEN = {
     Setpoint: '{value: 0.0, unit: 0}',
     JointState: '{name: [joint], velocity: [0.0]}',
 }
-#: What a node is called of which nothing but its publisher is known yet.
+#: The name of a node of which only a publisher is known yet.
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'
 
 
@@ -35,12 +35,12 @@ class GraphWatch:
         self._node = node
         self._log = node.get_logger()
         self._types = types
-        #: The publishers that there are and that were warned of.
+        #: The present publishers that were warned of.
         self._known: set[tuple[int, ...]] = set()
         self._has_namesake = False
 
     def look(self) -> None:
-        """Warn of what was not there before."""
+        """Warn of what is new."""
         self._look_at_names()
         self._look_at_types()
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who moves a managed node through its states, and what rclpy leaves out of that."""
+"""What moves a managed node through its states, and what rclpy lacks for that."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from nfo_sinus_driver.node.rclpy_internals import change_state_service, state_la
 
 class Lifecycle:
     """
-    The state of a managed node; autostart changes it until an operator takes a hand in it.
+    The state of a managed node; autostart changes it until an operator does.
 
     :param node: one that is not served yet.
     """
@@ -25,7 +25,7 @@ class Lifecycle:
     def __init__(self, node: LifecycleNodeMixin) -> None:
         self._node = node
         self._autostart = Autostart(node.get_name(), self._try_to_start)
-        #: Why the newest try of autostart failed.
+        #: Why the last try of autostart failed.
         self._complaint = ''
         # autostart changes the state from a thread of its own
         self._in_transition = threading.Lock()
@@ -47,7 +47,7 @@ class Lifecycle:
 
     @property
     def wanted(self) -> bool:
-        """A client has configured the node, or autostart goes on trying to."""
+        """A client has configured the node, or autostart is trying to."""
         return self.state != 'unconfigured' or self._autostart.going_on
 
     @property
@@ -57,11 +57,11 @@ class Lifecycle:
 
     @property
     def by_operator(self) -> bool:
-        """The transition that runs on this thread was not asked for by autostart."""
+        """The transition that runs on this thread was not requested by autostart."""
         return not self._autostart.trying
 
     def start(self) -> None:
-        """Have the node configured and activated as soon as the drive answers, if that is set."""
+        """With ``autostart``, configure and activate the node as soon as the drive responds."""
         if self._node.get_parameter('autostart').value:
             self._autostart.start()
 
@@ -74,13 +74,13 @@ class Lifecycle:
         self._autostart.join(timeout)
 
     def note_transition(self) -> None:
-        """Take note of one that works; an operator who took a hand in it has the lifecycle."""
+        """Note a transition that works; one by an operator ends autostart."""
         self._complaint = ''
         if self.by_operator:
             self._autostart.give_up()
 
     def complain(self, why: str, *, known: bool) -> None:
-        """Log why the drive cannot be configured, if not ``known``; in autostart each once."""
+        """Log why the drive cannot be configured, unless ``known``; in autostart each once."""
         log = self._node.get_logger()
         if self.by_operator:
             log.error(why)
@@ -92,7 +92,7 @@ class Lifecycle:
     def _try_to_start(self) -> bool:
         """Configure and activate; return whether the node is active."""
         with self._in_transition:
-            # meanwhile another client may have taken the lifecycle over
+            # meanwhile a client may have taken the lifecycle over
             if not self._autostart.over and self.state == 'unconfigured':
                 self._node.trigger_configure()
             if not self._autostart.over and self.state == 'inactive':
@@ -102,12 +102,12 @@ class Lifecycle:
 
 def _reject_invalid_transitions(node: LifecycleNodeMixin, in_transition: threading.Lock) -> None:
     """
-    Have ``~/change_state`` wait for others, and answer also what the node's state does not have.
+    Have ``~/change_state`` wait for other transitions, and reject those that are not possible.
 
     rclpy raises an error then and never answers, and nav2's lifecycle manager would wait
     without end.
 
-    :param in_transition: held by whoever changes the state of the node.
+    :param in_transition: held while the state of the node changes.
     """
     service = change_state_service(node)
     change = service.callback
@@ -119,7 +119,7 @@ def _reject_invalid_transitions(node: LifecycleNodeMixin, in_transition: threadi
             with in_transition:
                 return change(request, response)
         except rclpy_implementation.RCLError:
-            # what is wrong has been logged by rcl
+            # rcl has logged the reason
             response.success = False
             return response
 

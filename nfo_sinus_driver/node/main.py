@@ -47,8 +47,8 @@ _GROUPS_OF_A_DRIVE = 16 + CALLS_OF_ENABLE
 _GROUPS_OF_THE_BUS = 6
 #: With many threads and a busy one among them, this keeps the bus on time, s.
 _SWITCH_INTERVAL = 0.0002
-#: glibc gives threads up to eight arenas a core, and each keeps the most that it ever had: with so
-#: many threads, memory would grow by steps for hours.
+#: glibc has up to eight arenas a core, and each keeps the most that it ever had: with so many
+#: threads, memory would grow in steps for hours.
 _M_ARENA_MAX = -8
 _ARENAS = 2
 _POLL_SIGNALS = 0.5
@@ -57,13 +57,13 @@ _LAST_ANSWER = 0.5
 #: How long callbacks may take to end once the bus is closed, s.
 _LAST_CALLBACK = 2.0
 
-#: What an end says that comes before the port is opened.
+#: What is logged by an end before the port is opened.
 _NOT_STARTED = (
     'ended before the bus was opened, nothing was written; a motor that was left running before '
     'runs on: use the enable input or the emergency stop'
 )
 
-#: What rclpy raises when its own arguments make no sense.
+#: What rclpy raises for ROS arguments that make no sense.
 _ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
 
 class DriverProcess:
@@ -103,7 +103,7 @@ class DriverProcess:
 
     def start(self) -> None:
         """Open the port and let the nodes work."""
-        # nearly all of it stays: a search for garbage that looks at it again keeps every thread
+        # nearly all objects stay: a garbage collection that visits them again keeps every thread
         # waiting, the worker of the bus too, for 25 ms here and for longer on a small computer
         gc.collect()
         gc.freeze()
@@ -122,9 +122,9 @@ class DriverProcess:
         return all(part.alive for part in (*threads, *self._executors))
 
     def stop(self, why: str) -> bool:
-        """Stop the motors, give control back and end; false if a drive does not confirm it."""
+        """Stop the motors, release control and end; false if a drive does not confirm it."""
         confirmed = self._stop_motors(why)
-        # whoever still waits for the bus is told, so that no callback keeps the executor
+        # callbacks that wait for the bus get an error, so that none keeps the executor
         self._context.bus.close()
         self._context.publish_queue.close()
         self._context.setpoint_subscriber.close(_LAST_CALLBACK)
@@ -149,7 +149,7 @@ class DriverProcess:
             if self._may_be_there(node) and not _confirmed(node, stop):
                 unconfirmed.append(node)
             elif node.managed.drive.ever_responded:
-                # one that is silent must not take the others' time to be released
+                # a silent one must not take the time in which others are released
                 releases[node.managed.drive.disconnect(_time_left(node, begun))] = node
         unconfirmed += [
             node for node, release in _as_they_end(releases) if not _confirmed(node, release)
@@ -162,17 +162,17 @@ class DriverProcess:
         return not unconfirmed
 
     def _may_be_there(self, node: DriveNode) -> bool:
-        """Tell whether there may be a motor: one that never answered was never started by us."""
+        """Return whether it may run: a drive that never answered was never started by us."""
         return node.managed.drive.ever_responded or self._context.bus.port_error is None
 
 
 def _time_left(node: DriveNode, begun: float) -> float:
-    """Return how much of the time that the node's exit may take is left, s."""
+    """Return how much of the node's ``shutdown_timeout`` is left, s."""
     return max(0.0, begun + node.managed.settings.shutdown_timeout - time.monotonic())
 
 
 def _as_they_end(futures: dict[Future[Any], DriveNode]) -> Iterator[tuple[DriveNode, Future[Any]]]:
-    """Yield nodes with their futures as these end; in the end those that have not in time."""
+    """Yield nodes with their futures as these end; at last those that have not ended in time."""
     waiting = set(futures)
     longest = max((one.managed.settings.shutdown_timeout for one in futures.values()), default=0.0)
     with contextlib.suppress(FutureTimeoutError):
@@ -184,7 +184,7 @@ def _as_they_end(futures: dict[Future[Any], DriveNode]) -> Iterator[tuple[DriveN
 
 
 def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
-    """Log how a stop ended; false if not well, but for a drive that may well not be there."""
+    """Log the outcome of a stop; false if it failed, unless the drive has never answered."""
     log = node.get_logger()
     try:
         answer = future.result(timeout=0)
@@ -195,7 +195,7 @@ def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
         if not node.managed.drive.ever_responded:
             log.warning('the drive has not answered yet: if its motor was left running, it runs on')
             return True
-        # whatever it is, the other drives have to be waited for, too
+        # after any error, the other drives have to be waited for, too
         known = isinstance(error, DriveError)
         why = node.managed.wording.say(error) if known else f'error in the driver: {error!r}'
         log.error(why)
@@ -259,7 +259,7 @@ def _limit_arenas() -> None:
     try:
         ctypes.CDLL(None).mallopt(_M_ARENA_MAX, _ARENAS)
     except (OSError, AttributeError):
-        # another C library has other habits
+        # another C library has no such option
         return
 
 
@@ -312,7 +312,7 @@ def _starter(pid: int) -> OtherProcess:
 def _await_end(
     process: DriverProcess, signals: HeldSignals, starters: list[OtherProcess]
 ) -> str:
-    """Wait until something ends the driver; return what."""
+    """Wait until the driver has to end; return why."""
     while process.alive:
         why = _reason_to_end(signals, starters, _POLL_SIGNALS)
         if why is not None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The drive of one managed node: its settings, and the :class:`Drive` that goes by them."""
+"""The drive of one managed node: its settings, and the :class:`Drive` that has them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from nfo_sinus_driver.node.scale import Scale
 from nfo_sinus_driver.node.wording import NodeError, Wording
 from nfo_sinus_driver.setting import UNCONFIGURED, settings_of
 
-#: What identifies a drive or how it is commanded cannot change under way.
+#: What identifies a drive, or decides how it is commanded, cannot change while it is configured.
 ONLY_UNCONFIGURED = tuple(
     name for name, one in settings_of(DriveSettings).items() if one.change == UNCONFIGURED
 )
@@ -32,10 +32,10 @@ class ManagedDrive:
     another one.
 
     :param name: the node's.
-    :param listener: told about every poll and event, on the worker of the bus.
-    :param on_stop: told on it when the motor is stopped, and why.
-    :ivar wording: what it reports, as its node says it.
-    :ivar scale: what set-points for it are counted in.
+    :param listener: called with every poll and event, on the worker of the bus.
+    :param on_stop: called on it when the motor is stopped, with the reason.
+    :ivar wording: the sentences of its reports, as its node logs them.
+    :ivar scale: the unit of its set-points.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class ManagedDrive:
 
     @property
     def line_check(self) -> str:
-        """What to look at while the drive has never answered."""
+        """What to check while the drive has never answered."""
         known = self._settings.model != AUTO
         return self._drive.line_check if known else self._bus.protocol.check
 
@@ -74,11 +74,11 @@ class ManagedDrive:
 
     @property
     def settings(self) -> DriveSettings:
-        """What is asked for; the drive goes by it once it is connected."""
+        """The wanted settings; the drive has them once it is connected."""
         return self._settings
 
     def change_settings(self, settings: DriveSettings) -> None:
-        """Ask for something else; a drive that is connected goes by it at once."""
+        """Change the wanted settings; a drive that is connected takes them at once."""
         self._settings = settings
         if not self.may_be_another:
             self._drive.settings = self._concrete
@@ -95,7 +95,7 @@ class ManagedDrive:
 
     @property
     def may_be_another(self) -> bool:
-        """No drive belongs to the node yet; one that is being looked for does not count."""
+        """No drive belongs to the node yet; one that is still looked for does not count."""
         return self.state in ('unconfigured', 'configuring')
 
     @property
@@ -105,7 +105,7 @@ class ManagedDrive:
 
     @property
     def why_silent(self) -> str:
-        """Why it has not been connected to since its node began, and what to check."""
+        """Why it was not connected to so far, and what to check."""
         return self._lifecycle.complaint
 
     def require_active(self) -> Drive:
@@ -116,16 +116,16 @@ class ManagedDrive:
 
     def connect(self, *, retry: bool) -> bool:
         """
-        Find the drive that the settings ask for, and watch it from then on.
+        Connect to the drive of the settings, and poll it from then on.
 
         :param retry: repeat the first request when there is no response.
-        :returns: false if the settings ask for another one meanwhile.
+        :returns: false if the settings mean another one by now.
         :raises DriveError: it does not respond, or may not be taken over.
         :raises NodeError: the one before has not stopped yet.
-        :raises ValueError: the model that was found has not all that is set.
+        :raises ValueError: the model that was found does not have all that is set.
         """
         before = self._drive.settings
-        if self._drive.stop_unconfirmed and not self._is_asked_for:
+        if self._drive.stop_unconfirmed and not self._is_wanted:
             raise NodeError(f'the stop of the drive at {before.address} is not confirmed yet')
         if self._settings.model == AUTO:
             detection = detect_model(self._bus, self._settings.address)
@@ -137,13 +137,13 @@ class ManagedDrive:
                 self._drive.require_standing().result()
             self._drive = self._make_drive()
         self._drive.connect(retry=retry, parameters=True).result()
-        asked_for = self._is_asked_for
-        if asked_for:
+        wanted = self._is_wanted
+        if wanted:
             self._drive.settings = self._concrete
-        return asked_for
+        return wanted
 
     def disconnect(self, why: Report) -> Future[Report]:
-        """Stop the motor, give control back and leave the drive alone."""
+        """Stop the motor, release control and disconnect."""
         return self._drive.disconnect(self._settings.shutdown_timeout, why)
 
     def _make_drive(self) -> Drive:
@@ -153,14 +153,14 @@ class ManagedDrive:
 
     @property
     def _concrete(self) -> DriveSettings:
-        """The settings with a model that is one; a ValueError if it has not all that is set."""
+        """The settings with a concrete model; a ValueError if it does not have all that is set."""
         if self._settings.model != AUTO:
             return self._settings
         return dataclasses.replace(self._settings, model=self._found_model)
 
     @property
-    def _is_asked_for(self) -> bool:
-        """The present drive is still the one that the settings ask for."""
+    def _is_wanted(self) -> bool:
+        """The present drive is still the one of the settings."""
         return all(
             getattr(self._drive.settings, name) == getattr(self._concrete, name)
             for name in ONLY_UNCONFIGURED

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Turns what a drive and a line tell into messages, and the joint that a motor turns."""
+"""Turns what a drive and a line report into messages; the joint that a motor turns."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _CONTROL_MODES = {
     'Torque': DriveStatus.TORQUE,
     'Speed': DriveStatus.SPEED,
 }
-#: What has no constant is one of a family's own: CUSTOM.
+#: A method without a constant is a family's own: CUSTOM.
 _METHODS = {
     'mode_scmd': DriveStatus.MODE_SCMD,
     'drive_control': DriveStatus.DRIVE_CONTROL,
@@ -42,8 +42,8 @@ _METHODS = {
     'remote_setpoint': DriveStatus.REMOTE_SETPOINT,
 }
 _STATES = {state: getattr(DriveStatus, state.name) for state in State}
-#: The facts have the names and the bits that the message has; plain numbers, for this is done with
-#: every poll, and flags take their time.
+#: The facts have the names and the bits of the message; plain numbers, for this is done with every
+#: poll, and flags are slow.
 _FACTS = tuple((str(fact.name).lower(), int(fact)) for fact in Fact)
 _KINDS = {Kind.STATUS: InvSt.STATUS, Kind.ALARM: InvSt.ALARM, Kind.FAULT: InvSt.FAULT}
 
@@ -70,7 +70,7 @@ _TELEMETRY = {
 def drive_status(
     snapshot: Snapshot, stamp: Time, frame_id: str, scale: Scale, stop_text: str
 ) -> DriveStatus:
-    """Return the DriveStatus of a poll, in the unit of a scale; with why it stopped last."""
+    """Return the DriveStatus of a poll, in the unit of a scale, with why it stopped last."""
     return DriveStatus(
         header=Header(stamp=stamp, frame_id=frame_id),
         connected=snapshot.connected,
@@ -84,19 +84,19 @@ def drive_status(
         actual=scale.shown(snapshot.actual),
         stop_reason=snapshot.stop_reason,
         stop_text=stop_text,
-        **_told_by(snapshot.status),
+        **_status_fields(snapshot.status),
     )
 
 
-def _told_by(seen: InverterStatus | None) -> Mapping[str, int | bool]:
-    """Return the fields that say what the drive says of itself."""
-    if seen is None:
+def _status_fields(status: InverterStatus | None) -> Mapping[str, int | bool]:
+    """Return the fields for the status of the drive itself."""
+    if status is None:
         return {'state': DriveStatus.UNKNOWN}
-    facts = int(seen.facts)
+    facts = int(status.facts)
     return {
-        'state': _STATES[seen.state],
-        'status_word': seen.shown_word,
-        'valid': seen.valid.value,
+        'state': _STATES[status.state],
+        'status_word': status.shown_word,
+        'valid': status.valid.value,
         **{name: bool(facts & bit) for name, bit in _FACTS},
     }
 
@@ -107,7 +107,7 @@ def inv_st(snapshot: Snapshot, stamp: Time, frame_id: str) -> InvSt:
         raise ValueError('no inverter status without a connection')
     return InvSt(
         header=Header(stamp=stamp, frame_id=frame_id),
-        # a code that no table has may be greater than one byte: it is told by the text
+        # a code that no table has may be greater than one byte: then the text has it
         code=min(snapshot.status.code, 0xFF),
         text=snapshot.text,
         description=snapshot.description,
@@ -196,7 +196,7 @@ class Joint:
         return self._name()
 
     def state(self, snapshot: Snapshot, stamp: Time, frame_id: str) -> JointState:
-        """Return its state of a poll; the position, since it began, is what the speed comes to."""
+        """Return its state of a poll; the position is the integral of the speed since the start."""
         velocity = snapshot.speed * _RPM / self._ratio()
         step = snapshot.at - self._at
         if 0 < step < _LONGEST_STEP and not math.isnan(velocity):
@@ -222,16 +222,16 @@ class Joint:
 
 
 def _pole_pairs(drive: Drive) -> float:
-    """Return how many the motor has, told or from its nominal speed, or a ValueError."""
+    """Return how many the motor has, given or from its nominal speed, or a ValueError."""
     values, key = drive.parameters.values, drive.model.key
-    told = float(values.get(key(Role.POLE_PAIRS), drive.model.profile.pole_pairs))
-    if told:
-        return told
+    given = float(values.get(key(Role.POLE_PAIRS), drive.model.profile.pole_pairs))
+    if given:
+        return given
     frequency = float(values.get(key(Role.NOMINAL_FREQUENCY), 0))
     speed = float(values.get(key(Role.NOMINAL_SPEED), 0))
     if not frequency or not speed:
         raise ValueError(
-            'the drive tells neither pole pairs of the motor nor f-Nom and N-nom, so Hz are no '
+            'the drive has neither pole pairs of the motor nor f-Nom and N-nom, so Hz are no '
             'speed'
         )
     return max(1, round(60 * frequency / speed))

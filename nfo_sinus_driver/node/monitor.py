@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The view beside the running driver: ``ros2 run nfo_sinus_driver monitor``.
+The view of all drives on the graph: ``ros2 run nfo_sinus_driver monitor``.
 
-It listens to every drive on the graph and can stop them; nothing here starts a motor.
+It subscribes to every drive and can stop them; nothing here starts a motor.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE
 from nfo_sinus_driver.version import VERSION
-from nfo_sinus_driver.view import show, why_not
+from nfo_sinus_driver.view import show, why_unavailable
 from nfo_sinus_driver.view.picture import (
     Condition,
     DriveView,
@@ -48,15 +48,15 @@ from nfo_sinus_driver.view.picture import (
     line_view,
 )
 
-#: How often it is looked who is on the graph, s.
+#: How often the graph is searched for nodes, s.
 _DISCOVERY_PERIOD = 1.0
-#: A driver tells of every drive at least once a second: after so long without it has ended, s.
+#: A driver publishes every drive at least once a second: after so long without it has ended, s.
 _GONE_AFTER = 3.5
-#: The slowest `telemetry_rate` that is taken for one, s.
+#: The longest period of telemetry that is assumed, s.
 _LONGEST_TELEMETRY = 30.0
-#: After so long without an answer a stop is said not to be confirmed, s.
+#: After so long without an answer a stop is reported as not confirmed, s.
 _ANSWER_TIME = 5.0
-#: Before that none is missing, s.
+#: Before that no answer is missing, s.
 _SOON = 1.0
 
 _LEVELS = {
@@ -75,7 +75,7 @@ _QOS = {
 }
 _TYPES = {f'nfo_sinus_msgs/msg/{one.__name__}': one for one in _QOS}
 _TRIGGER = 'std_srvs/srv/Trigger'
-#: Of a publisher it can be known before, or after, which node it belongs to.
+#: The name while it is not known yet which node a publisher belongs to.
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'
 _NOT_KNOWN_YET = rclpy_implementation.RCLError
 #: The end of what was logged before the view was open.
@@ -94,17 +94,17 @@ class _Topics:
         self._subscriptions: dict[tuple[type, str], Subscription] = {}
 
     def add(self, type_: type, topic: str, qos: QoSProfile) -> None:
-        """Listen to a topic from now on, whatever it has been remapped to."""
+        """Subscribe to a topic from now on, even if it is remapped."""
         if (type_, topic) not in self._subscriptions:
             subscription = self._node.create_subscription(type_, topic, _nothing, qos)
             self._subscriptions[type_, topic] = subscription
 
     def has(self, type_: type) -> bool:
-        """Tell whether there is a topic of a type."""
+        """Return whether there is a topic of a type."""
         return any(known is type_ for known, _ in self._subscriptions)
 
     def take(self) -> Iterator[Any]:
-        """Return what has come since, oldest of each topic first."""
+        """Return the messages since the last call, oldest of each topic first."""
         for subscription in self._subscriptions.values():
             while True:
                 with subscription.handle:
@@ -119,19 +119,19 @@ def _nothing(_: object) -> None:
 
 
 @dataclass
-class _Teller:
-    """A node that tells of a drive, or of a line: what it said last."""
+class _DriverNode:
+    """A node of a drive, or of a line: what it published last."""
 
     name: str
     topics: _Topics
-    heard_at: float
-    #: The service by which it, or all that it has, is stopped; None: it offers none yet.
+    updated_at: float
+    #: The service that stops its drive, or all drives of its line; None: it offers none yet.
     stop: Client | None = None
     status: DriveStatus = field(default_factory=DriveStatus)
     inv_st: InvSt = field(default_factory=InvSt)
     telemetry: Telemetry | None = None
     telemetry_at: float = -math.inf
-    #: How long the one before it was ago then, s.
+    #: The time from the one before to it, s.
     telemetry_gap: float = 0.0
     statistics: BusStatistics | None = None
 
@@ -148,20 +148,20 @@ class _Teller:
 
 @dataclass
 class _Call:
-    """A stop that was asked for."""
+    """A call of a stop."""
 
     who: str
     service: str
     future: Future
     requested_at: float
-    told_late: bool = False
+    reported_late: bool = False
 
 
 class GraphSource:
     """
     Every drive on the graph, by what their nodes publish.
 
-    :param spaces: only what is in these namespaces; none: all.
+    :param spaces: only drives in these namespaces; none: all.
     """
 
     only_looks = ''
@@ -179,10 +179,10 @@ class GraphSource:
         self._executor.add_node(self._caller)
         self._thread = threading.Thread(target=self._spin, name='answers', daemon=True)
         self._thread.start()
-        self._tellers: dict[str, _Teller] = {}
+        self._driver_nodes: dict[str, _DriverNode] = {}
         self._rosout = _Topics(self._node)
         self._rosout.add(Log, '/rosout', _ROSOUT)
-        self._said: list[tuple[float, Log]] = []
+        self._log_lines: list[tuple[float, Log]] = []
         self._calls: list[_Call] = []
         #: Why the last stop of a node is not confirmed, by its name.
         self._failed: dict[str, str] = {}
@@ -197,7 +197,7 @@ class GraphSource:
         )
 
     def close(self) -> None:
-        """Listen no longer."""
+        """End the subscriptions."""
         self._executor.shutdown(timeout_sec=1.0)
         self._thread.join(1.0)
         self._caller.destroy_node()
@@ -210,24 +210,24 @@ class GraphSource:
     # --- as a source of pictures --------------------------------------------------------------
 
     def look(self) -> Picture:
-        """Return what the nodes have told."""
+        """Return what the nodes have published."""
         now = time.monotonic()
         if now - self._looked_around_at >= _DISCOVERY_PERIOD:
             self._looked_around_at = now
             self._look_around(now)
-        for teller in self._tellers.values():
-            for message in teller.topics.take():
-                self._hear(teller, message, now)
+        for node in self._driver_nodes.values():
+            for message in node.topics.take():
+                self._take(node, message, now)
         self._read_log(now)
         self._look_after_calls(now)
         notes, self._notes = self._notes, []
-        tellers = self._tellers.values()
+        nodes = self._driver_nodes.values()
         return Picture(
-            [_drive_view(teller, now) for teller in tellers if teller.is_drive],
+            [_drive_view(node, now) for node in nodes if node.is_drive],
             [
-                line_view(teller.name, teller.statistics)
-                for teller in tellers
-                if teller.is_line and teller.statistics and not _is_gone(teller, now)
+                line_view(node.name, node.statistics)
+                for node in nodes
+                if node.is_line and node.statistics and not _is_gone(node, now)
             ],
             sorted(notes, key=lambda note: -math.inf if math.isnan(note.at) else note.at),
             self.stops(now),
@@ -235,19 +235,19 @@ class GraphSource:
 
     def stop(self, name: str) -> None:
         """Call ``~/stop`` of a drive."""
-        self._call(self._tellers[name])
+        self._call(self._driver_nodes[name])
 
     def stop_all(self) -> None:
-        """Call ``~/stop_all`` of every line, and ``~/stop`` of every drive, whoever tells of it."""
-        # the lines first: they know in which order
-        known = [teller for teller in self._tellers.values() if teller.is_drive or teller.is_line]
-        for teller in sorted(known, key=lambda teller: teller.is_drive):
-            self._call(teller)
+        """Call ``~/stop_all`` of every line, and ``~/stop`` of every drive."""
+        # the lines first: they have the best order
+        known = [node for node in self._driver_nodes.values() if node.is_drive or node.is_line]
+        for node in sorted(known, key=lambda node: node.is_drive):
+            self._call(node)
         if not known:
             self._note(Level.ERROR, '', 'there is no drive to be stopped')
 
     def stops(self, now: float) -> list[str]:
-        """Return what is to be known of stops that are not confirmed, failures first."""
+        """Return the stops that are not confirmed, as sentences, failures first."""
         waiting = [
             f'{call.service} called {now - call.requested_at:.0f} s ago, not answered yet'
             for call in self._calls
@@ -266,75 +266,75 @@ class GraphSource:
                 name = f'{publisher.node_namespace.rstrip("/")}/{publisher.node_name}'
                 if publisher.node_name == _UNKNOWN or not self._wanted(name):
                     continue
-                # a node that is just being made shows one topic after the other
-                teller = self._tellers.get(name) or self._tellers.setdefault(
-                    name, _Teller(name, _Topics(self._node), now)
+                # a node that is just being created shows one topic after the other
+                node = self._driver_nodes.get(name) or self._driver_nodes.setdefault(
+                    name, _DriverNode(name, _Topics(self._node), now)
                 )
-                teller.topics.add(type_, topic, _QOS[type_])
-        for teller in self._tellers.values():
-            if teller.stop is None:
+                node.topics.add(type_, topic, _QOS[type_])
+        for node in self._driver_nodes.values():
+            if node.stop is None:
                 with contextlib.suppress(_NOT_KNOWN_YET):
-                    self._find_stop(teller)
+                    self._find_stop(node)
 
     def _wanted(self, name: str) -> bool:
         return not self._spaces or any(
             name == space or name.startswith(f'{space.rstrip("/")}/') for space in self._spaces
         )
 
-    def _find_stop(self, teller: _Teller) -> None:
-        space, _, name = teller.name.rpartition('/')
-        verb = 'stop' if teller.is_drive else 'stop_all'
+    def _find_stop(self, node: _DriverNode) -> None:
+        space, _, name = node.name.rpartition('/')
+        verb = 'stop' if node.is_drive else 'stop_all'
         for service, types in self._node.get_service_names_and_types_by_node(name, space or '/'):
             if _TRIGGER in types and service.rpartition('/')[2] == verb:
                 # now, so that both ends have discovered each other before the first stop
-                teller.stop = self._caller.create_client(Trigger, service)
+                node.stop = self._caller.create_client(Trigger, service)
                 return
 
-    def _hear(self, teller: _Teller, message: object, now: float) -> None:
-        if _is_gone(teller, now):
-            # it is another driver that has come: what the one before said is over
-            teller.status, teller.telemetry, teller.statistics = DriveStatus(), None, None
+    def _take(self, node: _DriverNode, message: object, now: float) -> None:
+        if _is_gone(node, now):
+            # another driver has started: what the one before published is over
+            node.status, node.telemetry, node.statistics = DriveStatus(), None, None
         if isinstance(message, DriveStatus):
-            teller.status, teller.heard_at = message, now
+            node.status, node.updated_at = message, now
         elif isinstance(message, InvSt):
-            teller.inv_st = message
+            node.inv_st = message
         elif isinstance(message, Telemetry):
-            teller.telemetry_gap = min(now - teller.telemetry_at, _LONGEST_TELEMETRY)
-            teller.telemetry, teller.telemetry_at = message, now
+            node.telemetry_gap = min(now - node.telemetry_at, _LONGEST_TELEMETRY)
+            node.telemetry, node.telemetry_at = message, now
         elif isinstance(message, BusStatistics):
-            teller.statistics, teller.heard_at = message, now
+            node.statistics, node.updated_at = message, now
         elif isinstance(message, ErrorLogEntry):
             stamp = message.stamp.sec + message.stamp.nanosec / 1e9
             text = f'{_ERROR_LOG}{message.code} {message.text}'
             if not math.isnan(message.operating_time):
                 text += f', at {message.operating_time:.1f} h of operation'
-            self._note(Level.WARNING, teller.name, text, stamp or math.nan)
+            self._note(Level.WARNING, node.name, text, stamp or math.nan)
 
     def _read_log(self, now: float) -> None:
-        self._said += [(now, line) for line in self._rosout.take() if line.level in _LEVELS]
-        names = {name.lstrip('/').replace('/', '.'): name for name in self._tellers}
+        self._log_lines += [(now, line) for line in self._rosout.take() if line.level in _LEVELS]
+        names = {name.lstrip('/').replace('/', '.'): name for name in self._driver_nodes}
         waiting = []
-        for came_at, line in self._said:
+        for came_at, line in self._log_lines:
             name = names.get(line.name)
             if name is not None and line.msg.startswith(_ERROR_LOG):
-                # its topic has told it
+                # it came by its topic
                 continue
             if name is not None:
                 at = line.stamp.sec + line.stamp.nanosec / 1e9
                 self._note(_LEVELS[line.level], name, line.msg, at)
             elif now - came_at < _WAITS_FOR_NODE:
                 waiting.append((came_at, line))
-        self._said = waiting
+        self._log_lines = waiting
 
     # --- what goes out ------------------------------------------------------------------------
 
-    def _call(self, teller: _Teller) -> None:
-        client = teller.stop
+    def _call(self, node: _DriverNode) -> None:
+        client = node.stop
         if client is None or not client.service_is_ready():
-            self._fail(teller.name, 'NOT stopped: it offers no such service. Has its driver ended?')
+            self._fail(node.name, 'NOT stopped: it offers no such service. Has its driver ended?')
             return
         future = client.call_async(Trigger.Request())
-        self._calls.append(_Call(teller.name, client.srv_name, future, time.monotonic()))
+        self._calls.append(_Call(node.name, client.srv_name, future, time.monotonic()))
 
     def _look_after_calls(self, now: float) -> None:
         waiting: list[_Call] = []
@@ -342,15 +342,15 @@ class GraphSource:
             if call.future.done():
                 answer = call.future.result()
                 if answer.success:
-                    # what was asked before, and will perhaps never be answered, is settled by it
+                    # earlier calls, which will perhaps never be answered, are settled by it
                     self._failed.pop(call.who, None)
                     waiting = [one for one in waiting if one.who != call.who]
                     self._note(Level.INFO, call.who, f'{call.service}: {answer.message}')
                 else:
                     self._fail(call.who, f'{call.service}: {answer.message}')
                 continue
-            if not call.told_late and now - call.requested_at > _ANSWER_TIME:
-                call.told_late = True
+            if not call.reported_late and now - call.requested_at > _ANSWER_TIME:
+                call.reported_late = True
                 text = (
                     f'{call.service} has not answered for {_ANSWER_TIME:.0f} s: the stop is NOT '
                     'confirmed. Stop the motor by other means'
@@ -367,28 +367,28 @@ class GraphSource:
         self._notes.append(Note(time.time() if at is None else at, level, who, text))
 
 
-def _is_gone(teller: _Teller, now: float) -> bool:
-    return now - teller.heard_at > _GONE_AFTER
+def _is_gone(node: _DriverNode, now: float) -> bool:
+    return now - node.updated_at > _GONE_AFTER
 
 
-def _drive_view(teller: _Teller, now: float) -> DriveView:
-    status, inv_st = teller.status, teller.inv_st
-    condition = _condition(teller, now)
+def _drive_view(node: _DriverNode, now: float) -> DriveView:
+    status, inv_st = node.status, node.inv_st
+    condition = _condition(node, now)
     if condition is Condition.GONE:
-        return DriveView(teller.name, condition, 'its driver is gone', age=now - teller.heard_at)
-    statistics = teller.statistics and line_view(teller.name, teller.statistics)
+        return DriveView(node.name, condition, 'its driver is gone', age=now - node.updated_at)
+    statistics = node.statistics and line_view(node.name, node.statistics)
     if condition is Condition.SILENT:
-        return DriveView(teller.name, condition, 'not connected', line=statistics)
+        return DriveView(node.name, condition, 'not connected', line=statistics)
     measured = Measured()
-    fresh = max(_GONE_AFTER, 2 * teller.telemetry_gap)
-    if teller.telemetry is not None and now - teller.telemetry_at <= fresh:
-        values = {one.name: getattr(teller.telemetry, one.name) for one in fields(Measured)}
+    fresh = max(_GONE_AFTER, 2 * node.telemetry_gap)
+    if node.telemetry is not None and now - node.telemetry_at <= fresh:
+        values = {one.name: getattr(node.telemetry, one.name) for one in fields(Measured)}
         measured = Measured(**values)
     return DriveView(
-        teller.name,
+        node.name,
         condition,
         f'{inv_st.code} {inv_st.text}' if inv_st.text else 'connected',
-        # what is well needs no explanation
+        # a normal status needs no explanation
         inv_st.description if inv_st.kind != InvSt.STATUS else '',
         inv_st.remedy,
         inv_st.requires_ack,
@@ -396,15 +396,15 @@ def _drive_view(teller: _Teller, now: float) -> DriveView:
         status.setpoint,
         status.actual,
         status.unit,
-        now - teller.heard_at,
+        now - node.updated_at,
         measured,
         statistics,
     )
 
 
-def _condition(teller: _Teller, now: float) -> Condition:
-    status, inv_st = teller.status, teller.inv_st
-    if _is_gone(teller, now):
+def _condition(node: _DriverNode, now: float) -> Condition:
+    status, inv_st = node.status, node.inv_st
+    if _is_gone(node, now):
         return Condition.GONE
     if not status.connected:
         return Condition.SILENT
@@ -412,8 +412,8 @@ def _condition(teller: _Teller, now: float) -> Condition:
         return Condition.FAULT
     if status.alarm or inv_st.kind == InvSt.ALARM:
         return Condition.ALARM
-    # without a status word there is no state, but what it comes to
-    measured = teller.telemetry
+    # without a status word there is no state: whether the motor turns decides
+    measured = node.telemetry
     turns = measured is not None and any(
         abs(value) > 0 for value in (measured.frequency, measured.speed)
     )
@@ -428,11 +428,11 @@ def main(args: list[str] | None = None) -> int:
     """Show the view until the operator ends it; return the exit status."""
     given = sys.argv[1:] if args is None else args
     options = _parser().parse_args(rclpy.utilities.remove_ros_args(['', *given])[1:])
-    missing = why_not()
+    missing = why_unavailable()
     if missing:
         print(f'monitor: {missing}', file=sys.stderr)
         return 2
-    # what ROS prints would be printed across the view
+    # ROS would print across the view
     logging = ['--ros-args', '--disable-stdout-logs', '--']
     rclpy.init(args=[*given, *logging], signal_handler_options=SignalHandlerOptions.NO)
     source = GraphSource(get_default_context(), options.namespaces)

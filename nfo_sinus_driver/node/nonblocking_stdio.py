@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Keeps a terminal that stands still, or a full pipe, from stopping the process."""
+"""Keeps a stopped terminal, or a full pipe, from stopping the process."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _LAST_WORDS = 1.0
 
 
 def open_closed_streams() -> None:
-    """Let what whoever started us has closed go nowhere, before another file gets its number."""
+    """Open standard streams that are closed to nowhere, before another file gets their number."""
     standard = (_INPUT, *_STREAMS)
     with open(os.devnull, 'r+b', buffering=0) as nowhere:
-        # each gets the lowest number that is free, and the last is none of the standard ones
+        # each gets the lowest free number, and the last is none of the standard ones
         first = nowhere.fileno()
         others = [os.dup(first) for _ in standard]
     if first in standard:
@@ -35,14 +35,14 @@ class NonblockingStdio:
 
     ROS writes its log with the interpreter locked. After Ctrl-S in the terminal, or with a reader
     that does not read, one such line would stop every thread, and with them the stop of a motor.
-    Now only what is written is lost, once the pipe is full.
+    Now only output is lost, once the pipe is full.
     """
 
     def __init__(self) -> None:
         self._threads = [_begin_to_pump(descriptor) for descriptor in _STREAMS]
 
     def close(self) -> None:
-        """Write what is waiting, for a while; what is said from now on goes nowhere."""
+        """Write what is waiting, for a limited time; later output goes nowhere."""
         with open(os.devnull, 'wb', buffering=0) as nowhere:
             for descriptor in _STREAMS:
                 os.dup2(nowhere.fileno(), descriptor)
@@ -67,5 +67,5 @@ def _pump(reading: int, original: int) -> None:
             while data:
                 data = data[os.write(original, data) :]
         except OSError:
-            # the reader is gone; what is still said goes nowhere
+            # the reader is gone; later output goes nowhere
             continue

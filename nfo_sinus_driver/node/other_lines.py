@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The drives of other lines that stop with the one of a node."""
+"""The drives of other lines that stop with the drive of a node."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from std_srvs.srv import Trigger
 from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.qos import COMMANDS
 
-#: How often it is looked whether they are there, s.
+#: How often their services are checked, s.
 PERIOD = 1.0
 #: How long the answer to a stop may take, s.
 _LONGEST_ANSWER = 3.0
 
 
 def is_elsewhere(name: str) -> bool:
-    """Tell whether a name in ``stop_with`` is of another line: with its namespace."""
+    """Return whether a name in ``stop_with`` is of another line: it has a namespace."""
     return '/' in name
 
 
@@ -45,13 +45,13 @@ def stop_of(node: Node, name: str) -> str:
 
 class OtherLines:
     """
-    Stops the drives of other lines that stop with the one of a node.
+    Stops the drives of other lines that stop with the drive of a node.
 
     A line is a process of its own, so each of them is stopped by its ``~/stop``. All of it is done
     on the thread of the queue: no bus and no stop waits for it.
 
-    :param names: what ``stop_with`` has now.
-    :param enabled: the drive of the node is enabled.
+    :param names: the present ``stop_with``.
+    :param enabled: whether the drive of the node is enabled.
     """
 
     def __init__(
@@ -69,23 +69,23 @@ class OtherLines:
         self._group = MutuallyExclusiveCallbackGroup()
         #: By the name of the service.
         self._clients: dict[str, Client] = {}
-        #: What was called and is not answered yet, and when that is complained of.
+        #: The calls that are not answered yet, and when that is reported.
         self._calls: dict[Future, tuple[str, float]] = {}
-        #: Those that cannot be stopped, of which that was said.
+        #: Those that cannot be stopped, as reported.
         self._missing: set[str] = set()
         self.follow()
         queue.put_every(PERIOD, self._look)
 
     def follow(self) -> None:
-        """Take over what is named now; may be called from any thread."""
+        """Follow a change of ``stop_with``; may be called from any thread."""
         self._queue.put_first(self._follow)
 
     def stop(self) -> None:
-        """Have all of them stopped; may be called from any thread."""
+        """Stop all of them; may be called from any thread."""
         self._queue.put_first(self._stop)
 
     def _follow(self) -> None:
-        """Have a client for each that is named, and no other."""
+        """Have a client for each that is named, and for no other."""
         wanted = {stop_of(self._node, name) for name in self._names() if is_elsewhere(name)}
         for service in self._clients.keys() - wanted:
             self._node.destroy_client(self._clients.pop(service))
@@ -118,7 +118,7 @@ class OtherLines:
             self._complain(service, f'no answer of {service}: {error!r}')
             return
         if answer is None:
-            # its client is gone, for it is no longer named
+            # its client is destroyed, for it is no longer named
             return
         if answer.success:
             self._log.info(f'{_drive(service)} stops with it: {answer.message}')
@@ -132,10 +132,10 @@ class OtherLines:
                 # it may come yet
                 self._calls[future] = service, math.inf
                 self._complain(service, f'no answer of {service} in {_LONGEST_ANSWER:g} s')
-        self._tell_missing()
+        self._report_missing()
 
-    def _tell_missing(self) -> None:
-        """Say of each, once for each time that this drive is enabled, that it is not there."""
+    def _report_missing(self) -> None:
+        """Report each that is missing, once for each time that this drive is enabled."""
         if not self._enabled():
             self._missing = set()
             return

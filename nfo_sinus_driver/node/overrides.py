@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which node gets which ROS arguments, and what none takes: a misspelt parameter or node."""
+"""Which node gets which ROS arguments, and those that none takes: misspelt names."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def bus_overrides(name: str) -> list[Parameter]:
     Return the settings of the bus that were given to a name for the whole process.
 
     A launch file's ``name=`` and ``namespace=`` put all parameters of the process under that name,
-    which becomes the drive's: the bus node, too, is to see what was meant for it. What is given to
+    which becomes the drive's: the bus node has to get those that are for it. What is given to
     every node reaches it anyway.
     """
     for_all = _given_to(_NO_NODE)
@@ -46,10 +46,10 @@ def bus_overrides(name: str) -> list[Parameter]:
 
 
 def families_of(names: Iterable[str]) -> Mapping[str, object]:
-    """Return what was given as ``family`` to the drives of these names, before there are any."""
+    """Return the ``family`` that was given to the drives of these names, before they exist."""
     found: dict[str, object] = {}
     for name in names:
-        # a name that is none is refused when its node is made
+        # an invalid name is refused when its node is created
         with contextlib.suppress(InvalidNodeNameException):
             given = _given_to(name).get('family')
             found[name] = None if given is None else given.value
@@ -57,7 +57,7 @@ def families_of(names: Iterable[str]) -> Mapping[str, object]:
 
 
 def _given_to(name: str) -> Mapping[str, Parameter]:
-    """Let ROS itself say what a node of a name gets: it knows files, wildcards and their order."""
+    """Have ROS itself find what a node of a name gets: it knows files, wildcards and order."""
     node = Node(name, enable_rosout=False, start_parameter_services=False)
     try:
         return overrides_of(node)
@@ -93,7 +93,7 @@ def _owners(name: str, known: Mapping[str, set[str]]) -> list[str]:
 
 def declared_names(node: Node) -> set[str]:
     """Return the parameters that a node has, or will have once its drive is there."""
-    # those of a drive are declared when it is there
+    # those of a drive are declared when it is connected
     later: Iterable[str] = getattr(node, 'later_parameters', ())
     return set(node.get_parameters_by_prefix('')) | set(later)
 
@@ -102,8 +102,8 @@ def require_parameter(node: Node, name: str, hint: str = '') -> None:
     """
     Make sure that a node has a parameter.
 
-    :param hint: what else to say of one that is not there.
-    :raises ValueError: it has not; rclpy refuses it too, but has no other name to offer.
+    :param hint: added to the message about one that is missing.
+    :raises ValueError: it does not; rclpy refuses it too, but suggests no other name.
     """
     if not node.has_parameter(name):
         near = did_you_mean(name, declared_names(node))
@@ -111,7 +111,7 @@ def require_parameter(node: Node, name: str, hint: str = '') -> None:
 
 
 def unknown_nodes(arguments: list[str], names: Iterable[str]) -> Iterator[str]:
-    """Return a warning for each section of a parameter file that no node is named by."""
+    """Return a warning for each section of a parameter file that is of no node here."""
     names = set(names)
     for flag, path in itertools.pairwise(arguments):
         if flag == _PARAMS_FILE:
@@ -128,12 +128,12 @@ def _load(path: str) -> Any:
     try:
         return yaml.safe_load(Path(path).read_text(encoding='utf-8'))
     except (OSError, yaml.YAMLError):
-        # ROS has said so itself by now
+        # ROS has reported it by now
         return None
 
 
 def _sections(tree: Any, prefix: str = '') -> Iterator[str]:
-    """Return the names of the nodes that a parameter file speaks of."""
+    """Return the names of the nodes in a parameter file."""
     if not isinstance(tree, dict):
         return
     for key, value in tree.items():
@@ -145,8 +145,8 @@ def _sections(tree: Any, prefix: str = '') -> Iterator[str]:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return the end of a sentence on an unknown name: those known that are most like it."""
-    # loaded for a mistake alone: it takes 0.1 MB
+    """Return the end of a sentence about an unknown name: the closest known ones."""
+    # loaded only when needed: it takes 0.1 MB
     import difflib
 
     close = difflib.get_close_matches(name, list(known), n=2)
@@ -172,7 +172,7 @@ Drives NFO Sinus inverters on one serial line. For example:
 
 
 def refuse_other_arguments(arguments: list[str]) -> None:
-    """Refuse what is meant for no node, saying how to give it; ``--help`` prints the usage."""
+    """Refuse arguments that are for no node, and say how to write them; ``--help``: usage."""
     others = remove_ros_args(arguments)[1:]
     if '-h' in others or '--help' in others:
         print(_HELP)
@@ -188,10 +188,10 @@ def refuse_other_arguments(arguments: list[str]) -> None:
 
 def take_out_end_with(arguments: list[str]) -> tuple[list[str], int | None]:
     """
-    Split off the number of the process that this one is to end with.
+    Split off the id of the process that this one is to end with.
 
-    :returns: the other arguments, and the number if there was one.
-    :raises ValueError: it is no number of a process.
+    :returns: the other arguments, and the id if there was one.
+    :raises ValueError: it is no id of a process.
     """
     if _END_WITH not in arguments:
         return arguments, None
@@ -206,8 +206,8 @@ def take_out_node_name(arguments: list[str]) -> tuple[list[str], str | None]:
     """
     Split off a name that would be given to every node of the process.
 
-    A launch file's ``name=`` does that, and with several nodes in one process all of them would
-    get the same name. ``node:__node:=x`` renames one node and is left alone.
+    A launch file's ``name=`` does that, and with several nodes in one process all would get the
+    same name. ``node:__node:=x`` renames one node and is left alone.
 
     :returns: the other arguments, and the name if there was one.
     """

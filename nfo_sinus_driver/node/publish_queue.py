@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is to be published, soon or by the clock: a thread does it, so that no bus waits for ROS."""
+"""Publishes on a thread, soon or by the clock, so that no bus waits for ROS."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _log = logging.getLogger(__name__)
 
 #: How often the same failure is logged, s: it may come with every poll.
 _SAME_AGAIN = 60.0
-#: More than this many waiting messages are too old to be of use; the oldest are dropped.
+#: With more waiting messages than this the oldest are too old to be of use, and are dropped.
 _MOST_WAITING = 1000
 
 
@@ -27,12 +27,12 @@ class PublishQueue:
     """
     Runs functions on a thread of its own: in the order in which they were put in, or by the clock.
 
-    The clock is the steady one of this machine, whatever time the nodes go by.
+    The clock is the steady one of this machine, whatever clock the nodes use.
     """
 
     def __init__(self) -> None:
         self._waiting: deque[Callable[[], None]] = deque(maxlen=_MOST_WAITING)
-        #: What is never dropped, and goes first.
+        #: These are never dropped, and go first.
         self._urgent: deque[Callable[[], None]] = deque()
         self._schedule = Schedule()
         self._failures = Failures()
@@ -50,21 +50,21 @@ class PublishQueue:
         return self._thread.is_alive()
 
     def put(self, function: Callable[[], None]) -> None:
-        """Have a function run soon, from any thread."""
+        """Run a function soon, from any thread."""
         self._waiting.append(function)
         self._something.set()
 
     def put_first(self, function: Callable[[], None]) -> None:
-        """Have a function run before all that waits, however much that is; from any thread."""
+        """Run a function before all that wait, however many; from any thread."""
         self._urgent.append(function)
         self._something.set()
 
     def put_every(self, period: float, function: Callable[[], None]) -> None:
-        """Have a function run once in every period, s; from any thread."""
+        """Run a function once in every period, s; from any thread."""
         self.put_first(lambda: self._schedule.add(time.monotonic(), period, function))
 
     def close(self, timeout: float = 2.0) -> None:
-        """Send what is waiting, then end."""
+        """Run what is waiting, then end."""
         self._closing = True
         self._something.set()
         if self._thread.is_alive():
@@ -96,13 +96,13 @@ class PublishQueue:
 
 
 class Failures:
-    """Which failures are to be logged: each kind once a minute, be it ever so frequent."""
+    """Which failures are to be logged: each kind once a minute, however frequent."""
 
     def __init__(self) -> None:
         self._logged: dict[tuple[object, ...], float] = {}
 
     def is_due(self, error: Exception, now: float) -> bool:
-        """Whether to log an error that is being handled; of its kind are those of its place."""
+        """Return whether to log the error being handled; its kind is its type and place."""
         place = traceback.extract_tb(error.__traceback__)[-1:]
         kind = (type(error), *((one.filename, one.lineno) for one in place))
         if now - self._logged.get(kind, -math.inf) < _SAME_AGAIN:
@@ -111,7 +111,7 @@ class Failures:
         return True
 
 
-#: The golden ratio: beginnings that are this part of a period apart never crowd.
+#: The golden ratio: starts that are this part of a period apart never crowd.
 _SPREAD = (math.sqrt(5) - 1) / 2
 
 
@@ -119,8 +119,8 @@ class Schedule:
     """
     Functions, each with its period, the next one in front.
 
-    No thread and no clock: who has both asks what is due. Functions with the same period begin at
-    different moments of it, so that those of many drives do not come all at once.
+    No thread and no clock: the caller has both, and takes what is due. Functions with the same
+    period start at different moments of it, so that those of many drives do not run all at once.
     """
 
     def __init__(self) -> None:
@@ -128,7 +128,7 @@ class Schedule:
         self._entries: list[tuple[float, int, float, Callable[[], None]]] = []
 
     def add(self, now: float, period: float, function: Callable[[], None]) -> None:
-        """Have a function become due within a period (s) from now, and then once in each."""
+        """Make a function due within a period (s) from now, and then once in each."""
         number = next(self._count)
         first = now + period * (1 - number * _SPREAD % 1)
         heapq.heappush(self._entries, (first, number, period, function))
@@ -139,7 +139,7 @@ class Schedule:
         return self._entries[0][0] if self._entries else math.inf
 
     def take_due(self, now: float) -> Callable[[], None] | None:
-        """Return a function that is due, once however late it is, or ``None``."""
+        """Return a function that is due, once however late, or ``None``."""
         if self.next_moment > now:
             return None
         moment, number, period, function = self._entries[0]

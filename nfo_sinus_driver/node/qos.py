@@ -1,25 +1,25 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The qualities of service that the topics and services of the driver have."""
+"""The quality of service of the driver's topics and services."""
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-#: For what flows: status, actual values, telemetry, statistics.
+#: For streams: status, actual values, telemetry, statistics.
 RELIABLE = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=10,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.VOLATILE,
 )
-#: For what changes rarely and late comers want to know.
+#: For what changes rarely, where late joiners need the last value.
 LATCHED = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
-#: For what happens rarely, where late comers want to know the last few.
+#: For what happens rarely, where late joiners need the last few.
 KEPT = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=10,

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What the driver needs of rclpy and rclpy does not promise: its private names are here alone.
+What the driver needs of rclpy beyond its public interface: the private names are here alone.
 
-A version of rclpy that has them no longer fails ``test/ros/test_rclpy_internals.py`` first.
+A version of rclpy without them fails ``test/ros/test_rclpy_internals.py`` first.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from rclpy.service import Service
 
 
 def overrides_of(node: Node) -> Mapping[str, Parameter]:
-    """Return the parameters that were given to a node, declared or not; rclpy shows only those."""
+    """Return the parameters that were given to a node, declared or not."""
     return dict(node._parameter_overrides)
 
 
@@ -30,8 +30,8 @@ def change_state_service(node: LifecycleNodeMixin) -> Service:
 
 @contextlib.contextmanager
 def writable(node: Node, name: str) -> Iterator[None]:
-    """Let a parameter that is read-only for clients follow what it shows."""
-    # rclpy keeps the very object
+    """Make a parameter that is read-only for clients writable meanwhile."""
+    # rclpy keeps the object itself
     descriptor = node.describe_parameter(name)
     read_only, descriptor.read_only = descriptor.read_only, False
     try:

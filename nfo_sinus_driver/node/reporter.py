@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a drive reports goes to ROS: topics, diagnostics and log lines."""
+"""Publishes what a drive reports: topics, diagnostics and log lines."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class Reporter:
     Its ``on_…`` methods are called by the bus and only put something into the queue; everything
     else runs on the queue's thread.
 
-    :param managed: gives the drive; not before the queue works.
-    :param follow: told which parameters have new values, by the bus.
+    :param managed: returns the drive; not called before the queue works.
+    :param follow: called by the bus with the parameters that have new values.
     """
 
     def __init__(
@@ -65,16 +65,16 @@ class Reporter:
         self._follow = follow
         self._log = node.get_logger()
         self._stamps = Stamps(lambda: node.get_clock().now().nanoseconds)
-        # a drive that is not connected tells by the clock, a poll when it was answered
+        # the stamp of a poll is when it was answered, that of a drive not connected is the clock
         self._status_stamps = Sequence(self._stamps)
         self._telemetry_stamps = Sequence(self._stamps)
-        #: Why it stopped last, and what is said of it; by whom may be known a moment later.
+        #: Why it stopped last, and the sentence for it; the caller may be known a moment later.
         self._stop: Report | None = None
         self._stop_text = ''
         self._last_inv_st: tuple[int, Kind] | None = None
         self._last_diagnosis: tuple[bytes, str] | None = None
         create = node.create_lifecycle_publisher
-        # these flow from the start, whatever the lifecycle says
+        # these are published from the start, in any lifecycle state
         self._status = node.create_publisher(DriveStatus, '~/status', RELIABLE)
         self._inv_st = node.create_publisher(InvSt, '~/inv_st', LATCHED)
         self._log_entries = node.create_publisher(ErrorLogEntry, '~/error_log_entry', KEPT)

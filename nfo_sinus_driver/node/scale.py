@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What set-points and actual values are counted in: the drive's unit, or that of a belt."""
+"""The unit of set-points and actual values: the drive's, or one of the user, as of a belt."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import math
 
 class Scale:
     """
-    A unit of the user's, such as m/s, for what the drive has in Hz or rpm.
+    A unit of the user, such as m/s, for what the drive has in Hz or rpm.
 
-    :param factor: how much of it one unit of the drive is, not 0; negative turns the direction.
+    :param factor: how much of it one unit of the drive is, not 0; negative inverts the direction.
     :param unit: its name; empty: that of the drive.
     """
 
@@ -27,11 +27,11 @@ class Scale:
         return self._factor()
 
     def of_drive(self, value: float) -> float:
-        """Return a set-point of the user's in the unit of the drive."""
+        """Return a set-point of the user in the unit of the drive."""
         return value / self._factor()
 
     def shown(self, value: float) -> float:
-        """Return a value of the drive's in the unit of the user."""
+        """Return a value of the drive in the unit of the user."""
         return value * self._factor()
 
     def unit(self, unit_of_drive: str) -> str:
@@ -40,7 +40,7 @@ class Scale:
 
 
 def require_scale(values: Mapping[str, object]) -> None:
-    """See to it that these settings, as far as they are there, have a scale that is one."""
+    """Make sure that these settings have a valid scale, if they have one."""
     factor = values.get('scale')
     if isinstance(factor, float) and (factor == 0 or not math.isfinite(factor)):
         raise ValueError(

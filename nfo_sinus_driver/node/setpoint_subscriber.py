@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Messages that cannot wait for the executor: one thread takes them as they come."""
+"""Set-points, which cannot wait for an executor: one thread takes them as they come."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from nfo_sinus_driver.node.qos import NEWEST
 
 _log = logging.getLogger(__name__)
 
-_FOR_EVER = -1
+_NO_TIMEOUT = -1
 
 
 class _Apart(ReentrantCallbackGroup):
-    """Keeps subscriptions from the executor of their node."""
+    """Keeps subscriptions out of the executor of their node."""
 
     def can_execute(self, entity: object) -> bool:
         return not isinstance(entity, Subscription)
@@ -34,17 +34,17 @@ class _Apart(ReentrantCallbackGroup):
 
 class SetpointSubscriber:
     """
-    Listens to a few topics for which an executor would be too slow.
+    Subscribes to a few topics for which an executor would be too slow.
 
     An executor of rclpy looks through everything of every node before it waits again, and hands a
     message from thread to thread. This waits for its subscriptions alone, as
-    ``rclpy.wait_for_message`` does. They are the node's like any other, under its name and with
-    its remappings.
+    ``rclpy.wait_for_message`` does. They belong to the node like any other, under its name and
+    with its remappings.
     """
 
     def __init__(self) -> None:
         self._context = get_default_context()
-        self._ways: list[tuple[Subscription, Callable[[Any], None]]] = []
+        self._subscriptions: list[tuple[Subscription, Callable[[Any], None]]] = []
         self._guard = GuardCondition(None, None, self._context)
         self._closing = False
         self._thread = threading.Thread(target=self._work, name='setpoint subscriber', daemon=True)
@@ -52,20 +52,20 @@ class SetpointSubscriber:
     def subscribe(
         self, node: Node, message_type: type, topic: str, callback: Callable[[Any], None]
     ) -> None:
-        """Have a function called with each message, once :meth:`start` was called."""
+        """Call a function with each message, once :meth:`start` was called."""
         subscription = node.create_subscription(
             message_type,
             topic,
             callback,
             NEWEST,
             callback_group=_Apart(),
-            # rclpy's own would stay with the executor, and each message would wake it several times
+            # rclpy's own would stay with the executor, and each message would wake it repeatedly
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
-        self._ways.append((subscription, callback))
+        self._subscriptions.append((subscription, callback))
 
     def start(self) -> None:
-        """Start the thread; all that it listens to has to be known by then."""
+        """Start the thread; all topics have to be subscribed to by then."""
         self._thread.start()
 
     @property
@@ -91,16 +91,16 @@ class SetpointSubscriber:
 
     def _take_all(self) -> None:
         wait_set = rclpy_implementation.WaitSet(
-            len(self._ways), 1, 0, 0, 0, 0, self._context.handle
+            len(self._subscriptions), 1, 0, 0, 0, 0, self._context.handle
         )
         while not self._closing:
             wait_set.clear_entities()
             wait_set.add_guard_condition(self._guard.handle)
-            for subscription, _ in self._ways:
+            for subscription, _ in self._subscriptions:
                 wait_set.add_subscription(subscription.handle)
-            wait_set.wait(_FOR_EVER)
+            wait_set.wait(_NO_TIMEOUT)
             ready = wait_set.get_ready_entities('subscription')
-            for subscription, callback in self._ways:
+            for subscription, callback in self._subscriptions:
                 if subscription.handle.pointer in ready:
                     self._take(subscription, callback)
 
@@ -110,5 +110,5 @@ class SetpointSubscriber:
             if taken is not None:
                 callback(taken[0])
         except Exception:
-            # a message that makes trouble must not keep the next one out
+            # an error with one message must not keep out the next
             _log.exception('error in a callback; the driver goes on')

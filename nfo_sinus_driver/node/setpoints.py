@@ -3,7 +3,7 @@
 
 """
 The set-points of one drive, from three topics of its own and one for all drives of its line: the
-newest valid one counts, wherever it came.
+newest valid one counts, from whichever topic.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ _NAMES = {
     Setpoint.PERCENT_TORQUE: '% of nominal torque',
     Setpoint.PROCESS: 'the process unit',
 }
-#: How often the same is logged, s.
+#: How often the same message is logged, s.
 _LOG_PERIOD = 10.0
 
 
 class Setpoints:
-    """Hands set-points to the drive of a node; those that make no sense are logged."""
+    """Passes set-points to the drive of a node; logs those that make no sense."""
 
     def __init__(
         self, node: Node, context: BusContext, managed: ManagedDrive, joint: Joint
@@ -49,7 +49,7 @@ class Setpoints:
         self._managed = managed
         self._joint = joint
         self._logged_idle = False
-        self._told_other_joint = False
+        self._warned_of_joint = False
         self._joint_command = node.resolve_topic_name('~/joint_command')
         context.subscribe(
             node,
@@ -62,14 +62,14 @@ class Setpoints:
         context.on_setpoint_all.append(self._on_setpoint_all)
 
     def be_quiet(self, quiet: bool) -> None:
-        """Say, or do not say, that set-points arrive while the drive is not enabled."""
+        """Log, or do not log, that set-points arrive while the drive is not enabled."""
         self._logged_idle = quiet
 
     def _on_setpoint(self, message: Float32) -> None:
         self._take(self._managed.scale.of_drive(message.data))
 
     def _on_setpoint_all(self, message: Float32) -> None:
-        # a drive that is only watched has no part in what is for all
+        # a monitored drive takes no part in commands for all
         if self._managed.settings.method != MONITOR:
             self._on_setpoint(message)
 
@@ -98,8 +98,8 @@ class Setpoints:
         if not self._managed.active:
             return
         if self._joint.name not in message.name:
-            if not self._told_other_joint:
-                self._told_other_joint = True
+            if not self._warned_of_joint:
+                self._warned_of_joint = True
                 self._log.warning(
                     f'{self._joint_command} has no joint {self._joint.name}, only '
                     f'{", ".join(message.name) or "none"}: ignored; joint_name says what ours is'

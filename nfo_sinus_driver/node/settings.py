@@ -9,7 +9,7 @@ from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.link import BusSettings
 from nfo_sinus_driver.setting import DISABLED, FIXED, START_ONLY, Setting, settings_of
 
-#: What is for the nodes alone.
+#: Settings of the nodes alone.
 _DRIVES = Setting(['nfo_sinus'], 'the names of the drive nodes', change=FIXED, name='drives')
 _OF_NODE = (
     Setting(

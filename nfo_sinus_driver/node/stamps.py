@@ -1,10 +1,11 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Moments of the steady clock as times of a node's clock, in the order in which they are told.
+"""
+Moments of the steady clock as stamps of a node's clock, in the order of publication.
 
-The bus measures by the steady clock, messages tell the node's time. A thread that is kept
-waiting between reading the one and the other would tell a time that is wrong by that wait.
+The bus measures by the steady clock, messages have the node's time. A thread that is kept waiting
+between reading the one and the other would make a stamp that is wrong by that wait.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ from collections.abc import Callable
 import math
 import time
 
-#: Two readings of the steady clock with one of the node's between them are good enough, ns.
+#: Readings of the steady clock so close before and after one of the node's are good enough, ns.
 _NEAR = 200_000
 _READINGS = 5
 
 
 class Stamps:
-    """What the node's clock showed at a moment of ``time.monotonic``.
+    """
+    What the node's clock showed at a moment of ``time.monotonic``.
 
     :param now: the node's clock, in ns: the wall clock or simulated time.
     :param steady: ``time.monotonic_ns``, or a test's.

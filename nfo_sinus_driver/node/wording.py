@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a node says: sentences with the full names of its services."""
+"""The sentences of a node, with the full names of its services."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class NodeError(Exception):
 
 
 class Wording:
-    """Makes sentences for the node of one drive, which says how it is enabled."""
+    """Makes sentences for the node of one drive; ``enable`` is how to enable it."""
 
     def __init__(self, node: Node) -> None:
         name = node.get_fully_qualified_name()
@@ -35,7 +35,7 @@ class Wording:
         )
 
     def say(self, what: Report | Exception | None) -> str:
-        """Return what there is to say; an error that is no drive's speaks for itself."""
+        """Return the sentence of a report or an error; ``''`` for none."""
         if isinstance(what, DriveError):
             what = what.report
         if isinstance(what, Report):

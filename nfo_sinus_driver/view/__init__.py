@@ -19,7 +19,7 @@ def is_terminal() -> bool:
     return all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr))
 
 
-def why_not() -> str:
+def why_unavailable() -> str:
     """Return why the view cannot be shown here, and what to do; empty: it can."""
     if not is_terminal():
         return 'the view needs a terminal for its input, its output and its errors'
@@ -36,7 +36,7 @@ def why_not() -> str:
 
 
 def show(source: Source) -> None:
-    """Show the view until the operator ends it; ask :func:`why_not` before."""
+    """Show the view until the operator ends it; call :func:`why_unavailable` first."""
     # only here: without the view textual is not needed
     from nfo_sinus_driver.view.app import MonitorApp
 

@@ -102,18 +102,18 @@ HISTORIES = (
         2,
         'in any order: a refused enable leaves its run command standing',
         CONTROLLER,
-        'a run command may stand by now\n'
+        'a run command may be active by now\n'
         '            self._sequence.start(Report(Cause.ENABLE_FAILED, why=report_of(error)))',
-        'a run command may stand by now',
+        'a run command may be active by now',
         G2_SCMD,
     ),
     Mutant(
         2,
         'in any order: what ends a ride leaves the run command standing',
         CONTROLLER,
-        '            self._sequence.start(reason)\n            self._tell_stopped(reason)',
+        '            self._sequence.start(reason)\n            self._report_stop(reason)',
         '            self._control.dispatch(ControlEvent.STOP)\n'
-        '            self._tell_stopped(reason)',
+        '            self._report_stop(reason)',
         G2_SCMD,
     ),
     Mutant(
@@ -249,7 +249,7 @@ HISTORIES = (
         3,
         'a stop that was lost is not repeated at once',
         SEQUENCE,
-        '        elif outcome is not _Outcome.UNHEARD:\n',
+        '        elif outcome is not _Outcome.UNANSWERED:\n',
         '        else:\n',
         STOP_CONFIRMED,
     ),
@@ -301,7 +301,7 @@ HISTORIES = (
         '        if False:\n',
         STOP_CONFIRMED,
         # a status from before the stop is waited out, too
-        ((SEQUENCE, '            self._told_at = math.inf\n            self._reasons += 1\n', ''),),
+        ((SEQUENCE, '            self._sent_at = math.inf\n            self._reasons += 1\n', ''),),
     ),
     Mutant(
         2,

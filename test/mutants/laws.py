@@ -180,9 +180,9 @@ LAWS = (
         2,
         'a refused enable leaves its run command standing',
         CONTROLLER,
-        'a run command may stand by now\n'
+        'a run command may be active by now\n'
         '            self._sequence.start(Report(Cause.ENABLE_FAILED, why=report_of(error)))',
-        'a run command may stand by now',
+        'a run command may be active by now',
         (NO_RESTART, '-k', 'without_run_input'),
     ),
     Mutant(
@@ -528,7 +528,7 @@ LAWS = (
         9,
         'an idle bus is silent longer than the time-out of the drive',
         WATCH,
-        '                period = min(period, patience * _KEEP_ALIVE_SHARE)',
+        '                period = min(period, timeout * _KEEP_ALIVE_SHARE)',
         '                pass',
         ('test/unit/drive/test_poll_schedule.py', '-k', 'striking'),
     ),

@@ -290,7 +290,7 @@ class Code:
 
 def informs(node: ast.AST) -> bool:
     """Tell whether a node tells something as information."""
-    if isinstance(node, ast.Call) and name_of(node.func) == 'tell':
+    if isinstance(node, ast.Call) and name_of(node.func) == 'notify':
         return ast.unparse(node.args[0]) == 'Severity.INFO'
     value = node.value if isinstance(node, ast.Yield) else None
     return isinstance(value, ast.Tuple) and ast.unparse(value.elts[0]) == 'Severity.INFO'
@@ -299,7 +299,7 @@ def informs(node: ast.AST) -> bool:
 def refuses(node: ast.AST) -> bool:
     """Tell whether a node tells something graver, or raises it."""
     name = name_of(node.func) if isinstance(node, ast.Call) else ''
-    return name == 'DriveError' or (name == 'tell' and not informs(node))
+    return name == 'DriveError' or (name == 'notify' and not informs(node))
 
 
 def causes_in(node: ast.AST) -> Iterator[ast.Attribute]:
@@ -465,8 +465,8 @@ def test_what_has_no_entry_is_found_and_what_only_informs_is_told_apart() -> Non
     assert missing(asked, page) == ['b: it', 'c: the motor … broke']
     assert of_template('x', 'no {{ {a:g} s').parts == ('no { ', ' s')
     source = (
-        'tell(Severity.INFO, Cause.CONNECTED)\n'
-        'tell(Severity.INFO, Cause.LOST)\ntell(Severity.ERROR, Cause.LOST)\n'
+        'notify(Severity.INFO, Cause.CONNECTED)\n'
+        'notify(Severity.INFO, Cause.LOST)\nnotify(Severity.ERROR, Cause.LOST)\n'
         'def f():\n    yield Severity.INFO, report(Cause.ASLEEP)\n    return Report(Cause.FAULT)\n'
     )
     assert only_informing(Code({'x.py': source})) == {Cause.CONNECTED, Cause.ASLEEP}

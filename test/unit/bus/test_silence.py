@@ -18,8 +18,8 @@ def test_who_is_not_asked_is_not_silent() -> None:
     silences.note(1, 5.0, None)
     assert silences.lasts(1, 1000.0) == silences.lasts(2, 1000.0) == 0.0
     assert not silences.is_silent(1)
-    assert silences.heard_at(1) == 5.0
-    assert silences.heard_at(2) == -math.inf
+    assert silences.last_frame_at(1) == 5.0
+    assert silences.last_frame_at(2) == -math.inf
 
 
 @pytest.mark.parametrize('error', [NoAnswer(), DamagedAnswer(), LinkError()])
@@ -31,7 +31,7 @@ def test_silence_lasts_from_the_first_answer_that_is_missing(error: LinkError) -
         silences.note(1, now, error)
     assert silences.is_silent(1)
     assert silences.lasts(1, 11.0) == 1.0
-    assert silences.heard_at(1) == 5.0
+    assert silences.last_frame_at(1) == 5.0
     assert not silences.is_silent(2)
 
 
@@ -42,7 +42,7 @@ def test_any_valid_frame_ends_it_a_refusal_too(answer: LinkError | None) -> None
     silences.note(1, 10.9, answer)
     assert not silences.is_silent(1)
     assert silences.lasts(1, 11.0) == 0.0
-    assert silences.heard_at(1) == 10.9
+    assert silences.last_frame_at(1) == 10.9
     silences.note(1, 12.0, NoAnswer())
     assert silences.lasts(1, 12.5) == 0.5
 

@@ -152,7 +152,7 @@ def test_values_that_no_drive_can_have_are_refused(rig: Rig, parameters: Paramet
         ('pi_reg.reg_amp', [1], '[1] is none of '),
     ):
         for take in (
-            lambda: parameters.exact(key, value),  # noqa: B023
+            lambda: parameters.coerce(key, value),  # noqa: B023
             lambda: parameters.validate(key, value),  # noqa: B023
             lambda: rig.result(parameters.change({RETARD: 9, key: value})),  # noqa: B023
         ):

@@ -26,7 +26,7 @@ INV_ST = 'fieldbus.inv_st'
 
 def waits_for(rig: Rig, key: str) -> bool:
     """The poll waits for its turn to read this."""
-    task = rig.drive._watch._task
+    task = rig.drive._poller._task
     assert task is not None
     awaited = task.awaited
     return isinstance(awaited, Transfer) and awaited.reads(1, rig.drive.params.address(key))
@@ -107,7 +107,7 @@ def test_a_poll_that_pauses_because_the_drive_was_busy_is_not_waited_for() -> No
     with full_line('rtu', 'status.u_rms') as rig:
         until(rig, lambda: waits_for(rig, 'status.frq_act'))
         rig.spoil('busy', 'status.frq_act', written=False)
-        task = rig.drive._watch._task
+        task = rig.drive._poller._task
         assert task is not None
         until(rig, lambda: task.asleep)
         rig.far.trip(OVERLOAD)

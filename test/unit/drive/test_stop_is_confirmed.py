@@ -94,7 +94,7 @@ def test_what_was_asked_for_before_a_stop_was_confirmed_is_refused_after_it() ->
             rig.drive.enable(requested_at),
             rig.drive.tune(Procedure.FULL, requested_at=requested_at),
         ):
-            assert 'a stop was confirmed after this was asked for' in rig.answer(command)
+            assert 'a stop was confirmed after this was requested' in rig.answer(command)
             assert rig.far.control_unit.scmd == Scmd.STOP
         assert 'enabled' in rig.answer(rig.drive.enable(rig.clock.now))
 

@@ -67,7 +67,7 @@ EVENTS = {
     'STOP at the keypad': Event(
         lambda rig: rig.far.control_unit.press('stop'),
         'the bus has lost control (24 Stop). STOP was pressed at the keypad, or another',
-        'find out who',
+        'find out which',
         lambda shown: lost_control(shown) and shown.text == 'Stop',
     ),
     'START at the keypad': Event(

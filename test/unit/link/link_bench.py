@@ -52,7 +52,7 @@ class Bench:
         self.link.open()
         if not trusted:
             # as behind a line that has told something twice before
-            self.link._late.heard_unasked(self.wire.now)
+            self.link._late.note_unrequested(self.wire.now)
         self.link.use_resync_reads(UNIT, resync)
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:

@@ -335,7 +335,7 @@ def test_a_node_that_started_anew_is_made_operational_again(reads: int) -> None:
     bench.bus.arrive(bench.bus.now + (0.0005 if reads else 0.0), Frame(0x705, b'\0'))
     for _ in range(reads):
         # what was asked of it is lost: nothing has to wait for that
-        with pytest.raises(NoAnswer, match='unit 5 has started anew'):
+        with pytest.raises(NoAnswer, match='unit 5 has restarted'):
             bench.read(A)
     bench.write(A)
     assert starts(bench) == [START, START]

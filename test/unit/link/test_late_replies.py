@@ -140,7 +140,7 @@ def test_doubt_about_the_same_bytes(
     for told_unasked, doubt in ((False, trusted), (True, untrusted)):
         late = make()
         if told_unasked:
-            late.heard_unasked(NOW)
+            late.note_unrequested(NOW)
         told(late, Ask('a'), b'1', NOW)
         told(late, second, reply, NOW + later)
         assert late.doubt_about(second, NOW + later) is doubt
@@ -150,7 +150,7 @@ def test_doubt_about_the_same_bytes(
 
 def test_a_line_is_trusted_again_after_a_while() -> None:
     late = make()
-    late.heard_unasked(NOW)
+    late.note_unrequested(NOW)
     over = NOW + SUSPECT_FOR
     for now, doubt in ((over - 1, Doubt.RESYNC), (over + 1, Doubt.LISTEN)):
         told(late, Ask('a'), b'1', now)
@@ -162,13 +162,13 @@ def test_a_line_is_trusted_again_after_a_while() -> None:
 
 def test_what_comes_unasked_may_come_once_more() -> None:
     late = make()
-    late.heard_unasked(NOW)
+    late.note_unrequested(NOW)
     assert late.quarantined(UNIT, NOW) == set(), 'nothing was asked yet'
     late.sent(Ask('a'))
-    late.heard_unasked(NOW)
+    late.note_unrequested(NOW)
     assert late.quarantined(UNIT, NOW) == {'a', 'no a'}
     late.clear()
-    late.heard_unasked(NOW)
+    late.note_unrequested(NOW)
     assert late.quarantined(UNIT, NOW) == set(), 'that was on another connection'
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 import pytest
 
 from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.lawicel import BIT_RATES, Heard, Reader, bit_rate, encode
+from nfo_sinus_driver.link.lawicel import BIT_RATES, Output, Reader, bit_rate, encode
 from nfo_sinus_driver.link.protocols import CANOPEN
 
 FRAMES = st.builds(Frame, st.integers(0, 0x7FF), st.binary(max_size=8), st.just(False))
@@ -19,12 +19,12 @@ OTHERS = st.sampled_from(
 )
 
 
-def heard(*pieces: bytes) -> Heard:
+def heard(*pieces: bytes) -> Output:
     """Return all that a reader hears."""
     reader = Reader()
     each = [reader.feed(piece) for piece in pieces]
     frames = [frame for one in each for frame in one.frames]
-    return Heard(frames, sum(one.done for one in each), sum(one.refused for one in each))
+    return Output(frames, sum(one.done for one in each), sum(one.refused for one in each))
 
 
 def pieces_of(data: st.DataObject, stream: bytes) -> list[bytes]:
@@ -43,8 +43,8 @@ def pieces_of(data: st.DataObject, stream: bytes) -> list[bytes]:
 )
 def test_frames_as_lines(frame: Frame, line: bytes) -> None:
     assert encode(frame) == line
-    assert heard(line) == Heard([frame], 0, 0)
-    assert heard(line.lower()) == Heard([frame], 0, 0)
+    assert heard(line) == Output([frame], 0, 0)
+    assert heard(line.lower()) == Output([frame], 0, 0)
 
 
 @given(st.data(), st.lists(st.one_of(FRAMES, OTHERS), max_size=8), st.booleans())

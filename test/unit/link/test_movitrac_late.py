@@ -105,7 +105,7 @@ def test_a_resync_read_that_fails_has_done_nothing() -> None:
     bench.drive.heal(Fate(), DROP)
     with pytest.raises(NoAnswer) as third:
         bench.read(A)
-    assert third.value.heard, 'it is there: it answered the question before'
+    assert third.value.responded, 'it is there: it answered the question before'
 
 
 def test_closing_ends_every_quarantine() -> None:
