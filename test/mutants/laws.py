@@ -346,6 +346,14 @@ LAWS = (
         ('test/unit/drive/test_own_timeout.py', '-k', 'was_killed and rtu'),
     ),
     Mutant(
+        9,
+        'an end without a confirmed stop takes the time-out of the drive away',
+        DRIVE,
+        '                self._watchdog.left(error)\n',
+        '                await self._watchdog.put_back(goes_on=True)\n',
+        ('test/unit/drive/test_own_timeout.py', '-k', 'without_a_confirmed_stop and rtu'),
+    ),
+    Mutant(
         5,
         'a request reaches over its parameter',
         'nfo_sinus_driver/drive/parameter_access.py',
