@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from nfo_sinus_driver.simulator.can_line import CanLine
 from nfo_sinus_driver.simulator.canopen import NODES
 from nfo_sinus_driver.simulator.classic import BROADCAST, Classic
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.lawicel import BIT_RATES, Adapter
-from nfo_sinus_driver.simulator.line import Line, Trace
+from nfo_sinus_driver.simulator.line import Line
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii, ModbusRtu, ModbusTcp, ThroughPlc
 from nfo_sinus_driver.simulator.movitrac import ADDRESSES, Movitrac
 from nfo_sinus_driver.simulator.plc import TELEGRAM
@@ -35,13 +36,13 @@ class _Row:
     """
     A protocol and its defaults ([M0 §6.1.2, §6.2.2], [M4 §2.2.2]).
 
-    :ivar make: makes it; it gets the time that a gateway waits. ``None``: a CAN bus has no bytes.
+    :ivar kind: what cuts its bytes into frames; ``None``: a CAN bus has no bytes.
     :ivar tables: its name in the tables of the families, by which a drive has a server for it.
     :ivar data_bits: those it can do with.
     :ivar bauds: the rates that it has; none: the drives say.
     """
 
-    make: Callable[[float], Protocol] | None
+    kind: type[Protocol] | None
     tables: str
     baud: int
     char_format: str
@@ -51,11 +52,11 @@ class _Row:
 
 
 PROTOCOLS: Mapping[str, _Row] = {
-    ModbusRtu.name: _Row(lambda _: ModbusRtu(), 'modbus', 19200, '8E1', '8'),
-    ModbusAscii.name: _Row(lambda _: ModbusAscii(), 'modbus', 19200, '7E1', '7'),
+    ModbusRtu.name: _Row(ModbusRtu, 'modbus', 19200, '8E1', '8'),
+    ModbusAscii.name: _Row(ModbusAscii, 'modbus', 19200, '7E1', '7'),
     ModbusTcp.name: _Row(ModbusTcp, 'modbus', 19200, '8E1', '8'),
-    Classic.name: _Row(lambda _: Classic(), 'classic', 9600, '7E1', '78', range(1, BROADCAST)),
-    Movitrac.name: _Row(lambda _: Movitrac(), 'movitrac', 9600, '8N1', '8', ADDRESSES),
+    Classic.name: _Row(Classic, 'classic', 9600, '7E1', '78', range(1, BROADCAST)),
+    Movitrac.name: _Row(Movitrac, 'movitrac', 9600, '8N1', '8', ADDRESSES),
     ThroughPlc.name: _Row(ThroughPlc, TELEGRAM, 19200, '8E1', '8'),
     CanLine.name: _Row(None, 'canopen', 125_000, '8N1', '8', NODES, BIT_RATES),
 }
@@ -81,23 +82,22 @@ class Endpoint:
     @property
     def tables(self) -> str:
         """The name of its protocol in the tables of the families."""
-        return PROTOCOLS[self.protocol].tables
+        return self._row.tables
 
     @property
     def spoken(self) -> str:
         """The protocol that the drives themselves speak."""
-        return self.tables if self._is_can else self.make(0.0).spoken
+        return self.tables if self._row.kind is None else self._row.kind.spoken
 
     @property
     def can_echo(self) -> bool:
         """Whether a half-duplex adapter can be at the line."""
-        return not self._is_can and self.make(0.0).serial
+        return self._row.kind is not None and self._row.kind.serial
 
     def make(self, gateway_timeout: float) -> Protocol:
         """Return the protocol of a serial line; a gateway waits so long for a drive (s)."""
-        make = PROTOCOLS[self.protocol].make
-        assert make is not None
-        return make(gateway_timeout)
+        assert self._row.kind is not None
+        return self._row.kind(gateway_timeout)
 
     @property
     def through_plc(self) -> bool:
@@ -116,48 +116,27 @@ class Endpoint:
         clock: Callable[[], float],
         *,
         gateway_timeout: float,
-        paced: bool,
-        turnaround: float,
         echo: bool,
-        always_heard: bool,
-        trace: Trace | None,
+        **how: Any,
     ) -> Wire:
         """
-        Return the line on its port; for what is given see :class:`Line` and `CanLine`.
+        Return the line on its port.
 
         :param stations: who is at a line of bytes: the drives, or what stands before them.
+        :param how: what :class:`Line` and :class:`CanLine` take alike.
         """
-        if self._is_can:
-            return CanLine(
-                port,
-                Adapter(),
-                drives,
-                self.timing,
-                paced=paced,
-                turnaround=turnaround,
-                always_heard=always_heard,
-                trace=trace,
-            )
-        return Line(
-            port,
-            self.make(gateway_timeout),
-            stations,
-            self.timing,
-            clock,
-            paced=paced,
-            turnaround=turnaround,
-            echo=echo,
-            always_heard=always_heard,
-            trace=trace,
-        )
+        if self._row.kind is None:
+            return CanLine(port, Adapter(), drives, self.timing, **how)
+        protocol = self.make(gateway_timeout)
+        return Line(port, protocol, stations, self.timing, clock, echo=echo, **how)
 
     @property
-    def _is_can(self) -> bool:
-        return self.protocol == CanLine.name
+    def _row(self) -> _Row:
+        return PROTOCOLS[self.protocol]
 
     def check(self, address: int) -> None:
         """Look whether an address is one of the protocol (ValueError: it is not)."""
-        possible = PROTOCOLS[self.protocol].addresses
+        possible = self._row.addresses
         if address not in possible:
             span = f'{possible.start} to {possible.stop - 1}'
             raise ValueError(f'address {address} is not possible: {span} over {self.protocol}')
@@ -176,12 +155,11 @@ def endpoint(
         raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
     if link is not None and tcp is not None:
         raise ValueError('a line is either a pseudo-terminal or a TCP port, not both')
-    make = PROTOCOLS[protocol].make
-    if make is not None and not make(0.0).serial:
+    row = PROTOCOLS[protocol]
+    if row.kind is not None and not row.kind.serial:
         if link is not None:
             raise ValueError(f'{protocol} needs a TCP port, not a link')
         tcp = tcp or 0
-    row = PROTOCOLS[protocol]
     timing = Timing(row.baud if baud is None else baud, char_format or row.char_format)
     if timing.char_format[0] not in row.data_bits:
         raise ValueError(f'{protocol} has {row.data_bits} data bits, {timing.char_format} has not')

@@ -21,10 +21,6 @@ BROADCAST = 0
 
 #: Added to t3.5 before silence is believed: the system may hold bytes of one frame apart (s).
 _SLACK = 0.002
-#: The longest pause within an ASCII frame (s), by the standard.
-_ASCII_PAUSE = 1.0
-#: How long the rest of a TCP frame may take (s).
-_TCP_PAUSE = 1.0
 
 #: Length of a request's whole RTU frame by function: fixed, or what the byte count at an index
 #: adds to the rest.
@@ -38,28 +34,25 @@ _MBAP = 6
 _MOST_IN_TCP = 254
 
 
-class _InFrames(Protocol):
-    """What RTU and ASCII have in common: an address, a PDU, and silence where no unit answers."""
+class _Modbus(Protocol):
+    """What the three have in common: an address, a PDU, and that only writes are for everybody."""
 
     @staticmethod
     def concerns(station: Station, request: Request) -> bool:
         """Whether the drive is meant; only writes are for everybody."""
-        return station.address == request.address or _for_all(request.address, request.body)
-
-    @staticmethod
-    @abc.abstractmethod
-    def wrap(address: int, pdu: bytes) -> bytes:
-        """Return the frame of a PDU."""
+        return request.address == station.address or _for_all(request)
 
     def answer(self, station: Station, request: Request) -> bytes:
         """Let the drive carry out a request; return the answer's frame."""
         pdu = server(station).answer(request.body)
-        if not pdu or _for_all(request.address, request.body):
-            return b''
-        return self.wrap(request.address, pdu)
+        return b'' if not pdu or _for_all(request) else self._framed(request, pdu)
+
+    @abc.abstractmethod
+    def _framed(self, request: Request, pdu: bytes) -> bytes:
+        """Return the frame that answers a request."""
 
 
-class ModbusRtu(_InFrames):
+class ModbusRtu(_Modbus):
     """RTU frames: cut by their length, and by silence where their CRC is not right."""
 
     name = 'modbus_rtu'
@@ -94,22 +87,19 @@ class ModbusRtu(_InFrames):
         body = bytes([address]) + pdu
         return body + pymodbus_compat.crc(body)
 
+    def _framed(self, request: Request, pdu: bytes) -> bytes:
+        return self.wrap(request.address, pdu)
 
-class ModbusAscii(_InFrames):
-    """ASCII frames: a colon, upper-case digits, LRC, CR LF; as slow as anybody likes."""
+
+class ModbusAscii(_Modbus):
+    """
+    ASCII frames: a colon, which begins one, upper-case digits, LRC, CR LF.
+
+    By the standard a frame may pause for a second.
+    """
 
     name = 'modbus_ascii'
     spoken = 'modbus_ascii'
-
-    @staticmethod
-    def gap(timing: Timing) -> float:
-        """None: the colon begins a frame."""
-        return 0.0
-
-    @staticmethod
-    def patience(timing: Timing) -> float:
-        """A second."""
-        return _ASCII_PAUSE
 
     @staticmethod
     def cut(buffer: bytes) -> int:
@@ -136,32 +126,21 @@ class ModbusAscii(_InFrames):
         """Return the frame of a PDU."""
         return pymodbus_compat.ascii_frame(address, pdu)
 
+    def _framed(self, request: Request, pdu: bytes) -> bytes:
+        return self.wrap(request.address, pdu)
 
-class ModbusTcp(Protocol):
-    """
-    Modbus TCP as of a gateway, behind which the drives are on an RTU line.
 
-    Units are drives. The body of a request is its transaction number and its PDU.
-
-    :param wait: how long the gateway waits for a drive (s), before it says that there was none.
-    """
+class ModbusTcp(_Modbus):
+    """Modbus TCP as of a gateway, behind which the drives are on an RTU line; units are drives."""
 
     name = 'modbus_tcp'
     spoken = 'modbus_rtu'
     serial = False
 
-    def __init__(self, wait: float) -> None:
-        self._wait = wait
-
     @staticmethod
     def gap(timing: Timing) -> float:
         """t3.5: what the drive keeps on the line behind the gateway."""
         return timing.t35
-
-    @staticmethod
-    def patience(timing: Timing) -> float:
-        """A second."""
-        return _TCP_PAUSE
 
     @staticmethod
     def cut(buffer: bytes) -> int:
@@ -175,39 +154,27 @@ class ModbusTcp(Protocol):
 
     @staticmethod
     def unwrap(frame: bytes) -> Request | None:
-        """Return unit, and transaction with PDU; ``None`` when it is none of Modbus."""
+        """Return transaction, unit and PDU; ``None`` when it is no frame of Modbus."""
         rest = int.from_bytes(frame[4:6], 'big')
         if len(frame) < _MBAP + 2 or frame[2:4] != b'\0\0' or len(frame) != _MBAP + rest:
             return None
-        return Request(frame[6], frame[:2] + frame[7:])
+        return Request(frame[6], frame[7:], transaction=int.from_bytes(frame[:2], 'big'))
 
     @staticmethod
     def wrap(transaction: int, unit: int, pdu: bytes) -> bytes:
         """Return the frame of a PDU."""
         return pymodbus_compat.tcp_frame(transaction, unit, pdu)
 
-    def answer(self, station: Station, request: Request) -> bytes:
-        """Let the drive carry out a request; return the answer's frame."""
-        pdu = server(station).answer(request.body[2:])
-        if not pdu or _for_all(request.address, request.body[2:]):
-            return b''
-        return self._framed(request, pdu)
-
-    @staticmethod
-    def concerns(station: Station, request: Request) -> bool:
-        """Whether the drive is meant; only writes are for everybody."""
-        return station.address == request.address or _for_all(request.address, request.body[2:])
-
     def instead(self, request: Request, there: bool) -> Reply | None:
         """Say, after having waited, that the drive does not answer; or that there is none."""
         if request.address == BROADCAST:
             return None
         reason = GatewayReason.NO_ANSWER if there else GatewayReason.NO_PATH
-        pdu = pymodbus_compat.encode_exception(request.body[2], reason)
-        return Reply(self._framed(request, pdu), self._wait if there else 0.0)
+        pdu = pymodbus_compat.encode_exception(request.body[0], reason)
+        return Reply(self._framed(request, pdu), self.wait if there else 0.0)
 
     def _framed(self, request: Request, pdu: bytes) -> bytes:
-        return self.wrap(int.from_bytes(request.body[:2], 'big'), request.address, pdu)
+        return self.wrap(request.transaction, request.address, pdu)
 
 
 class ThroughPlc(ModbusTcp):
@@ -216,9 +183,9 @@ class ThroughPlc(ModbusTcp):
     name = 'telegram1'
 
 
-def _for_all(address: int, pdu: bytes) -> bool:
+def _for_all(request: Request) -> bool:
     """Whether every drive obeys a request and none answers."""
-    return address == BROADCAST and is_write(pdu)
+    return request.address == BROADCAST and is_write(request.body)
 
 
 def _rtu_length(buffer: bytes) -> int:

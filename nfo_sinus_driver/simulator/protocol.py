@@ -22,11 +22,13 @@ class Request:
     :ivar address: whom it is for.
     :ivar body: what the protocol made of the rest.
     :ivar whole: it arrived undamaged; a drive may yet have something to say to one that did not.
+    :ivar transaction: what its answer is known by, where it is numbered.
     """
 
     address: int
     body: bytes
     whole: bool = True
+    transaction: int = 0
 
 
 class Station(Interface):
@@ -59,7 +61,11 @@ class Station(Interface):
 
 
 class Protocol(abc.ABC):
-    """How frames look, whom they concern and what comes back; by default as on a plain wire."""
+    """
+    How frames look, whom they concern and what comes back; by default as on a plain wire.
+
+    :param wait: how long a gateway waits for a drive (s), before it says that there was none.
+    """
 
     name: ClassVar[str]
     #: The protocol that the drives themselves speak: the one behind a gateway.
@@ -68,6 +74,9 @@ class Protocol(abc.ABC):
     serial: ClassVar[bool] = True
     #: The silence after which what is no whole frame is given up (s).
     pause: ClassVar[float] = 1.0
+
+    def __init__(self, wait: float = 0.0) -> None:
+        self.wait = wait
 
     def gap(self, timing: Timing) -> float:
         """The silence that a drive keeps between two frames (s): none where a byte begins one."""

@@ -115,7 +115,7 @@ def _tcp_body(frame: bytes) -> tuple[int, bytes] | None:
     if out_of_step or len(frames) != 1 or len(frame) != 6 + len(frames[0][1]):
         return None
     message = frames[0][1]
-    return message[0], frame[:2] + message[1:]
+    return message[0], message[1:]
 
 
 def _modbus_body(message: bytes | None) -> tuple[int, bytes] | None:
