@@ -154,7 +154,7 @@ def endpoint(
     if protocol not in PROTOCOLS:
         raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
     if link is not None and tcp is not None:
-        raise ValueError('a line is either a pseudo-terminal or a TCP port, not both')
+        raise ValueError('link and tcp exclude each other: a line is at one of both')
     row = PROTOCOLS[protocol]
     if row.kind is not None and not row.kind.serial:
         if link is not None:

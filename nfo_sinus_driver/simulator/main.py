@@ -13,7 +13,7 @@ import json
 import os
 import signal
 import sys
-from typing import Any
+from typing import Any, NoReturn
 
 from nfo_sinus_driver.catalog import CatalogError, Value, with_factory_line
 from nfo_sinus_driver.catalog.finding import find
@@ -120,45 +120,21 @@ def _simulator(options: argparse.Namespace) -> Simulator:
     :raises PortError: the port cannot be had.
     :raises ControlError: another simulator is there.
     """
-    if options.link is not None and options.tcp is not None:
-        raise ValueError('--link and --tcp exclude each other')
-    chosen = {name: getattr(options, name) for name in every_option()}
-    line = _line(options)
+    given = {name: value for name, value in vars(options).items() if value is not None}
+    del given['help_all']
+    plc = {name: given.pop(name) for name in _OF_THE_PLC if name in given}
+    # the line is as the options say, or else as the drive leaves the factory
+    line = {name: given.pop(name, None) for name in ('protocol', 'baud_rate', 'char_format')}
+    line = {**_USUAL_LINE, **with_factory_line(line, load(options.model).line)}
     return Simulator(
-        options.address or [line['address']],
-        model=options.model,
+        given.pop('address', [line['address']]),
         protocol=line['protocol'],
-        link=options.link,
-        tcp=options.tcp,
         baud=line['baud_rate'],
         char_format=line['char_format'],
-        also=options.also,
-        echo=options.echo,
-        gateway_timeout=options.gateway_timeout,
-        paced=options.paced,
-        turnaround=options.turnaround,
-        trace=options.trace,
-        control=options.control,
-        settings=_settings(options.model, options.set),
-        run_input=options.run_input,
-        boot_time=options.boot_time,
-        serial_numbers=options.serial,
-        plc=_plc(options),
-        **{name: value for name, value in chosen.items() if value is not None},
+        settings=_settings(options.model, given.pop('set')),
+        plc=PlcSetting(**plc) if plc else None,
+        **given,
     )
-
-
-def _line(options: argparse.Namespace) -> dict[str, Any]:
-    """Return how the line is set: as the options say, or else as the drive leaves the factory."""
-    given = {name: getattr(options, name) for name in ('protocol', 'baud_rate', 'char_format')}
-    return {**_USUAL_LINE, **with_factory_line(given, load(options.model).line)}
-
-
-def _plc(options: argparse.Namespace) -> PlcSetting | None:
-    """Return how the PLC is programmed; without an option for it ``None``."""
-    chosen = {name: getattr(options, name) for name in _OF_THE_PLC}
-    given = {name: value for name, value in chosen.items() if value is not None}
-    return PlcSetting(**given) if given else None
 
 
 def _settings(model: str, given: Sequence[str]) -> dict[str, Value]:
@@ -223,13 +199,35 @@ def _span(text: str) -> tuple[float, float]:
 
 def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
     """Return the parser; its help shows what the manuals leave open only ``with_experts``."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog='simulator',
         description='Simulates whole drives on a pseudo-terminal or TCP port.',
         epilog=_EPILOG,
     )
+    parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
+    _add_line(parser)
+    _add_drives(parser)
+    _add_plc(parser)
+    parser.add_argument(
+        '--help-all', action='store_true', help='show what can be chosen of a drive, too'
+    )
+    for name, (text, choices) in every_option().items():
+        shown = text if with_experts else argparse.SUPPRESS
+        parser.add_argument(f'--{name.replace("_", "-")}', choices=choices, help=shown)
+    return parser
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong with an option, without the usage: that is longer than a screen."""
+
+    def error(self, message: str) -> NoReturn:
+        """Leave the program."""
+        self.exit(2, f'{self.prog}: error: {message}\n')
+
+
+def _add_line(parser: argparse.ArgumentParser) -> None:
+    """Add what the line is."""
     add = parser.add_argument
-    add('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
     add('--protocol', choices=PROTOCOLS, help='default: modbus_rtu; with --family as its file says')
     add('--model', default=USUAL, choices=simulated(), help=f'default: {USUAL}')
     add(
@@ -273,20 +271,18 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
         'file says',
     )
     add('--echo', action='store_true', help='return every byte, as a half-duplex adapter does')
-    add(
+    _add_seconds(
+        parser,
         '--gateway-timeout',
-        type=_seconds,
+        f'how long the gateway of modbus_tcp waits for a drive (default: {GATEWAY_TIMEOUT})',
         default=GATEWAY_TIMEOUT,
-        metavar='SECONDS',
-        help=f'how long the gateway of modbus_tcp waits for a drive (default: {GATEWAY_TIMEOUT})',
     )
     add('--paced', action='store_true', help='bytes take the time they take on a real line')
-    add(
+    _add_seconds(
+        parser,
         '--turnaround',
-        type=_seconds,
+        'how long a drive takes before it answers (default: 0)',
         default=0.0,
-        metavar='SECONDS',
-        help='how long a drive takes before it answers (default: 0)',
     )
     add('--trace', metavar='FILE', help='write every frame with its time, one JSON object a line')
     add(
@@ -296,6 +292,11 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
         help='socket of the control channel (default: LINK.control; without --link in the '
         "system's temporary folder)",
     )
+
+
+def _add_drives(parser: argparse.ArgumentParser) -> None:
+    """Add how the drives are set."""
+    add = parser.add_argument
     add(
         '--set',
         action='append',
@@ -310,21 +311,26 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
         action='store_false',
         help='the digital input RUN is not active',
     )
-    add(
+    _add_seconds(
+        parser,
         '--boot-time',
-        type=_seconds,
+        'how long a drive is silent after power-on (default: 2)',
         default=2.0,
-        metavar='SECONDS',
-        help='how long a drive is silent after power-on (default: 2)',
     )
     add(
         '--serial',
+        dest='serial_numbers',
         action='append',
         default=[],
         metavar='TEXT',
         help='serial number of a drive, at most 16 characters; once for each drive, in the order '
         'of their addresses (default: made of the address)',
     )
+
+
+def _add_plc(parser: argparse.ArgumentParser) -> None:
+    """Add how a PLC before the drives is programmed."""
+    add = parser.add_argument
     add(
         '--block',
         dest='blocks',
@@ -334,64 +340,47 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
         help='where the PLC has the block of a drive, once for each drive, in the order of their '
         "addresses (default: at unit ADDRESS, register 0); these are telegram1's",
     )
-    add(
-        '--plc-cycle',
-        dest='cycle',
-        type=_seconds,
-        metavar='SECONDS',
-        help='cycle of the program of the PLC (default: 0.01)',
-    )
-    add(
-        '--exchange-time',
-        dest='exchange',
-        type=_seconds,
-        metavar='SECONDS',
-        help='from one telegram between PLC and drive to the next (default: 0.02)',
-    )
-    add(
-        '--ros-time',
-        type=_seconds,
-        metavar='SECONDS',
-        help="how long the driver's life counter may stand still for the PLC (default: 1)",
-    )
-    add(
-        '--drive-time',
-        type=_seconds,
-        metavar='SECONDS',
-        help='how long the PLC takes the data of a drive for valid that it does not reach '
-        '(default: 0.5)',
-    )
+    for option, dest, text in (
+        ('--plc-cycle', 'cycle', 'cycle of the program of the PLC (default: 0.01)'),
+        (
+            '--exchange-time',
+            'exchange',
+            'from one telegram between PLC and drive to the next (default: 0.02)',
+        ),
+        (
+            '--ros-time',
+            'ros_time',
+            "how long the driver's life counter may stand still for the PLC (default: 1)",
+        ),
+        (
+            '--drive-time',
+            'drive_time',
+            'how long the PLC takes the data of a drive for valid that it does not reach '
+            '(default: 0.5)',
+        ),
+    ):
+        _add_seconds(parser, option, text, dest=dest)
     add(
         '--answer-time',
         type=_span,
         metavar='LEAST:MOST',
         help='how long the PLC takes to answer (s), such as 0.05:0.4 (default: 0)',
     )
-    add(
-        '--no-function-23',
-        dest='write_and_read',
-        action='store_false',
-        default=None,
-        help='the PLC refuses function 23',
-    )
-    add(
-        '--not-released',
-        dest='released',
-        action='store_false',
-        default=None,
-        help='the PLC does not release the drives to ROS',
-    )
+    for option, dest, text in (
+        ('--no-function-23', 'write_and_read', 'the PLC refuses function 23'),
+        ('--not-released', 'released', 'the PLC does not release the drives to ROS'),
+    ):
+        add(option, dest=dest, action='store_false', default=None, help=text)
     add(
         '--layout',
         type=int,
         choices=(1, 2),
         help='layout of the blocks of the PLC; 2 has a mailbox for parameters (default: 1)',
     )
-    add(
+    _add_seconds(
+        parser,
         '--access-time',
-        type=_seconds,
-        metavar='SECONDS',
-        help="how long each of the PLC's WRREC and RDREC takes (default: 0.02)",
+        "how long each of the PLC's WRREC and RDREC takes (default: 0.02)",
     )
     add(
         '--longer-telegram',
@@ -399,11 +388,12 @@ def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
         default=None,
         help='the PLC exchanges the longer telegram that a family has beside the standard one',
     )
-    add('--help-all', action='store_true', help='show what can be chosen of a drive, too')
-    for name, (text, choices) in every_option().items():
-        shown = text if with_experts else argparse.SUPPRESS
-        add(f'--{name.replace("_", "-")}', choices=choices, help=shown)
-    return parser
+
+
+def _add_seconds(
+    parser: argparse.ArgumentParser, option: str, text: str, **more: Any
+) -> None:
+    parser.add_argument(option, type=_seconds, metavar='SECONDS', help=text, **more)
 
 
 _EXAMPLES = """

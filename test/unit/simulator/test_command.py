@@ -315,7 +315,10 @@ def test_wrong_arguments(capsys):
         with pytest.raises(SystemExit) as exit_:
             main(arguments.split())
         assert exit_.value.code == 2, arguments
-        assert text in capsys.readouterr().err, arguments
+        said = capsys.readouterr().err
+        assert text in said, arguments
+        # that of the simulator is longer than a screen
+        assert 'usage' not in said or arguments.startswith('inject'), arguments
 
 
 def test_a_place_that_cannot_be_had_and_help(capsys, folder):

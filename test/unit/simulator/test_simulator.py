@@ -315,7 +315,7 @@ def test_impossible_simulators():
         ({'baud': 115200}, '57600'),
         ({'char_format': '9E1'}, '8E1'),
         ({'char_format': '7E1'}, '8 data bits'),
-        ({'link': '/tmp/x', 'tcp': 0}, 'not both'),
+        ({'link': '/tmp/x', 'tcp': 0}, 'exclude each other'),
         ({'settings': {'control.acel': 1}}, "no parameter 'control.acel'"),
         ({'settings': {'control.accel': 1000}}, 'out of range'),
         ({'serial_numbers': ['1', '2']}, '2 serial numbers for 1 drives'),
