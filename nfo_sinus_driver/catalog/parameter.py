@@ -165,6 +165,11 @@ class Parameter:
         return self.access in (Access.READ, Access.READ_WRITE)
 
     @property
+    def is_writable(self) -> bool:
+        """Whether it can be written."""
+        return self.access in (Access.WRITE, Access.READ_WRITE)
+
+    @property
     def is_measured(self) -> bool:
         """Whether it is a number that the drive tells of itself, and no setting."""
         return self.is_readable and not self.is_kept and self.kind in (int, float)

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from nfo_sinus_driver.catalog import Access, Family, Value
+from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
 from nfo_sinus_driver.simulator.motor import measure
@@ -128,7 +128,7 @@ class SimulatedDrive:
         """Write a parameter as the bus does, a number of the memory, or be refused."""
         key = self.control_unit.key_of(key)
         parameter = self.memory.model[key]
-        if parameter.access not in (Access.WRITE, Access.READ_WRITE):
+        if not parameter.is_writable:
             raise Refused(Reason.ADDRESS, f'{key} cannot be written')
         Memory.check(self.control_unit.scaled(parameter), raw)
         if not self.control_unit.write(key, raw):
@@ -138,7 +138,7 @@ class SimulatedDrive:
             self._store(key, raw)
         counter = self.writes if key in self.settings else self.command_writes
         counter[key] += 1
-        self._settle()
+        self.control_unit.settle()
 
     # ---- what happens to it ----
 
@@ -149,16 +149,12 @@ class SimulatedDrive:
         :param cause_present: the cause lasts, so that it cannot be acknowledged yet.
         """
         self.control_unit.trip(code, cause_present=cause_present)
-        self._settle()
-
-    def end_fault_causes(self) -> None:
-        """Take away the causes of all faults; they still want acknowledging."""
-        self.faults.end_causes()
+        self.control_unit.settle()
 
     def set_run_input(self, active: bool) -> None:
         """Switch the digital input RUN."""
         self.control_unit.run_input = active
-        self._settle()
+        self.control_unit.settle()
 
     def set_from_keypad(self, key: str, value: Value) -> None:
         """Change a parameter at the keypad, in engineering units, or a ValueError."""
@@ -166,13 +162,13 @@ class SimulatedDrive:
             raise ValueError(f'{key} cannot be changed at the keypad')
         self.memory.set(key, value)
         self._store(key, self.memory.raw(key))
-        self._settle()
+        self.control_unit.settle()
 
     def factory_reset(self) -> None:
         """Give the parameters their factory values, but those of the line, so that it answers."""
         for key in self.settings - self.control_unit.line_settings:
             self._store(key, self.memory.factory_raw(key))
-        self._settle()
+        self.control_unit.settle()
 
     def power_cycle(self, boot_time: float | None = None) -> None:
         """Take the mains away and give them back: silent for the boot time (s), then anew."""
@@ -199,6 +195,11 @@ class SimulatedDrive:
         """The version of its firmware; ``None`` of a drive that does not tell it."""
         return self.memory.version
 
+    def has(self, parameter: Parameter) -> bool:
+        """Whether its firmware has a parameter of the family."""
+        since, version = parameter.since, self.version
+        return since is None or version is None or version >= since
+
     def peek(self, key: str) -> Value:
         """Return a parameter in engineering units, without side effects."""
         return Memory.show(self.memory.model[key], self._peek(key))
@@ -222,7 +223,7 @@ class SimulatedDrive:
         self.boots += 1
         self.control_unit.boot()
         self.heard()
-        self._settle()
+        self.control_unit.settle()
 
     @property
     def _resting(self) -> bool:
@@ -242,10 +243,7 @@ class SimulatedDrive:
         self.motor.advance(dt)
         self.counters.advance(dt, self.motor)
         if not resting:
-            self._settle()
-
-    def _settle(self) -> None:
-        self.control_unit.settle()
+            self.control_unit.settle()
 
 
 def _serial_number(text: str | None, address: int) -> str:
@@ -285,6 +283,6 @@ def describe(drive: SimulatedDrive) -> dict[str, Any]:
         'parameters': {
             key: drive.peek(key)
             for key, parameter in drive.memory.model.items()
-            if parameter.access in (Access.READ, Access.READ_WRITE)
+            if parameter.is_readable
         },
     }

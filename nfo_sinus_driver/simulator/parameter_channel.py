@@ -11,7 +11,7 @@ family says.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import enum
 
@@ -132,15 +132,21 @@ class _Failed(Exception):
 
 def entries_of(drive: SimulatedDrive, protocol: str) -> Entries:
     """Return the parameters of a drive as the tables of its family have them for a protocol."""
-    version = drive.version
     found = {}
     for parameter in drive.model.values():
-        since = parameter.since
-        younger = since is not None and version is not None and version < since
-        if protocol in parameter.addresses and not younger:
+        if protocol in parameter.addresses and drive.has(parameter):
             address = parameter.at(protocol)
             found[address.index, address.sub_index or 0] = _entry(drive, parameter, protocol)
     return found
+
+
+def read_only(words: Mapping[int, Sequence[Callable[[], int]]]) -> Entries:
+    """Return parameters that can only be read, of each PNU one for each sub-index from 0 on."""
+    return {
+        (pnu, sub): ParameterEntry(read)
+        for pnu, reads in words.items()
+        for sub, read in enumerate(reads)
+    }
 
 
 def _entry(drive: SimulatedDrive, parameter: Parameter, protocol: str) -> ParameterEntry:
@@ -153,8 +159,9 @@ def _entry(drive: SimulatedDrive, parameter: Parameter, protocol: str) -> Parame
         drive.write_raw(key, kept(parameter, raw, protocol))
         drive.control_unit.written(key, protocol)
 
-    readable = parameter.access is not Access.WRITE
-    writable = parameter.access in (Access.WRITE, Access.READ_WRITE)
     return ParameterEntry(
-        read if readable else None, write if writable else None, codec.size, codec.signed
+        None if parameter.access is Access.WRITE else read,
+        write if parameter.is_writable else None,
+        codec.size,
+        codec.signed,
     )

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import ClassVar
 
-from nfo_sinus_driver.catalog import Meaning, Parameter, Value
+from nfo_sinus_driver.catalog import Parameter, Value
 from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd, Status
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
 from nfo_sinus_driver.simulator.motor import Regulation, nearest
@@ -198,8 +198,7 @@ class G2ControlUnit(SinusControlUnit):
         """Be held no more; with AutoStop, a fault of the fieldbus where the bus commands [C91]."""
         self._is_held = False
         if self.memory.raw('serial.auto_stop') and self.bus_controls:
-            (code,) = (one.code for one in self.memory.model.codes(Meaning.FIELDBUS_FAILURE))
-            self.trip(code)
+            self.trip(self.faults.fieldbus_lost)
             self.settle()
 
     def fail_tuning(self, code: int) -> None:

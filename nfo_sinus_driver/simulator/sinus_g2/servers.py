@@ -29,9 +29,11 @@ from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, carried, kept
 from nfo_sinus_driver.simulator.motor import measure
 from nfo_sinus_driver.simulator.parameter_channel import (
+    Entries as ChannelEntries,
     ParameterChannel,
     ParameterEntry,
     entries_of,
+    read_only,
 )
 from nfo_sinus_driver.simulator.sinus import parts
 from nfo_sinus_driver.simulator.sinus.control_unit import LEVELS
@@ -147,7 +149,7 @@ class ClassicServer(classic.Server):
         parameter, _ = self._find(id_)
         key = parameter.key
         closed = key in _REFERENCES and not firmware.sets_references
-        if closed or parameter.access not in (Access.WRITE, Access.READ_WRITE):
+        if closed or not parameter.is_writable:
             raise Wrong(LineError.UNWRITABLE)
         raw = parameter.at('classic').number.decode(to_bytes([word]))
         if key == 'fieldbus.scmd':
@@ -183,10 +185,8 @@ class ClassicServer(classic.Server):
 
     def _find(self, id_: int) -> tuple[Parameter, int]:
         found = self._ids.get(id_)
-        if found is None or found[0].key in self._firmware.lacks:
-            raise Wrong(LineError.UNKNOWN)
-        since, version = found[0].since, self._drive.version
-        if since is not None and version is not None and version < since:
+        lacks = found is None or found[0].key in self._firmware.lacks
+        if found is None or lacks or not self._drive.has(found[0]):
             raise Wrong(LineError.UNKNOWN)
         return found
 
@@ -296,12 +296,9 @@ class CanopenServer(canopen.Server):
     def _places(self) -> Iterator[tuple[int, int, Parameter]]:
         """Give index and sub-index of each parameter."""
         model, shape = self.drive.model, self._shape
-        version = self.drive.version
         absent = _MISSING | (_STATE_MACHINE if shape.canopen_state_machine == ABSENT else set())
         for parameter in model.values():
-            since = parameter.since
-            younger = since is not None and version is not None and version < since
-            if younger or 'canopen' not in parameter.addresses:
+            if 'canopen' not in parameter.addresses or not self.drive.has(parameter):
                 continue
             address = parameter.at('canopen')
             if address.index in absent:
@@ -342,9 +339,10 @@ class CanopenServer(canopen.Server):
             drive.write_raw(key, kept(parameter, raw, 'canopen'))
             self._unit.written(key, 'canopen')
 
-        writable = parameter.access in (Access.WRITE, Access.READ_WRITE)
         readable = parameter.access is not Access.WRITE
-        return Entry(size, read if readable else None, write if writable else None)
+        return Entry(
+            size, read if readable else None, write if parameter.is_writable else None
+        )
 
     def _log_entry(self, entry: int) -> Entry:
         faults = self.drive.faults
@@ -439,7 +437,7 @@ class TelegramServer(telegram1.Server):
             unit.fieldbus.heard()
         return int(self._zsw1(stw1)), unit.actual
 
-    def _profile(self) -> Mapping[tuple[int, int], ParameterEntry]:
+    def _profile(self) -> ChannelEntries:
         """Return the parameters of PROFIdrive [M0 table 8], and the error log [M0 table 9]."""
         faults, number = self._drive.faults, self._drive.memory.number
         firmware = round(100 * number('fieldbus.sw_ver'))
@@ -456,13 +454,11 @@ class TelegramServer(telegram1.Server):
             968: (lambda: int(self._zsw1(self._word)),),
         }
         log = self._drive.model.error_logs['profibus']
-        found = {
+        entries = {
             (log.first + n, 0): ParameterEntry(functools.partial(faults.log_entry, n), size=4)
             for n in range(log.limit)
         }
-        for pnu, reads in readable.items():
-            found |= {(pnu, sub): ParameterEntry(read) for sub, read in enumerate(reads)}
-        return found
+        return {**read_only(readable), **entries}
 
     def _by_level(self, word: int) -> int:
         """Add what makes the drive switch on by a bit that has been there all the time."""

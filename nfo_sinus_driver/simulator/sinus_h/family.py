@@ -13,7 +13,12 @@ from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
 from nfo_sinus_driver.simulator.injections import Injections
 from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.parameter_channel import ParameterChannel, ParameterEntry
+from nfo_sinus_driver.simulator.parameter_channel import (
+    Entries,
+    ParameterChannel,
+    ParameterEntry,
+    read_only,
+)
 from nfo_sinus_driver.simulator.sinus_h import keypad
 from nfo_sinus_driver.simulator.sinus_h.control_unit import (
     Control,
@@ -65,8 +70,7 @@ class Server(telegram1.Server):
         self._unit.take_telegram(Control(stw1), setpoint)
         return int(self._unit.status_word), clipped(self._unit.actual)
 
-
-    def _profile(self) -> dict[tuple[int, int], ParameterEntry]:
+    def _profile(self) -> Entries:
         """Return the parameters of PROFIdrive [M3 §8]."""
         unit = self._unit
         readable: dict[int, tuple[Callable[[], int], ...]] = {
@@ -79,25 +83,19 @@ class Server(telegram1.Server):
             967: (lambda: int(unit.word),),
             968: (lambda: int(unit.status_word),),
         }
-        found = {
-            (pnu, sub): ParameterEntry(read)
-            for pnu, reads in readable.items()
-            for sub, read in enumerate(reads)
-        }
-        for number in range(4):
-            read, write = self._register(number)
-            found[1000 + number, 0] = ParameterEntry(read, write)
-        return {**found, (972, 0): ParameterEntry(lambda: 0, self._reset)}
+        registers = {(1000 + number, 0): self._register(number) for number in range(4)}
+        reset = ParameterEntry(lambda: 0, self._reset)
+        return {**read_only(readable), **registers, (972, 0): reset}
 
-    def _register(self, number: int) -> tuple[Callable[[], int], Callable[[int], None]]:
-        """Return what reads and writes one of PNU 1000 to 1003 [M3 §10]."""
+    def _register(self, number: int) -> ParameterEntry:
+        """Return one of PNU 1000 to 1003 [M3 §10]."""
 
         def write(word: int) -> None:
             self._by_address[number] = word
             if number == _COMMAND and word:
                 self._by_address[_ACKNOWLEDGE] = _DONE if self._carry_out(word) else _FAILED
 
-        return lambda: self._by_address[number], write
+        return ParameterEntry(lambda: self._by_address[number], write)
 
     def _carry_out(self, command: int) -> bool:
         """Write or read by address; false if the drive has none such, or does not take it."""

@@ -153,7 +153,7 @@ class AnyOrder(RuleBasedStateMachine):
         rig.line.mend()
         far.silence(0.0)
         far.motor.load = 0.3
-        far.end_fault_causes()
+        far.faults.end_causes()
         if self.laws.watched:
             # what happened last may not have been noticed, nor the line be trusted again
             self.let(2.5)
@@ -323,7 +323,7 @@ class AnyOrder(RuleBasedStateMachine):
     @precondition(lambda self: self.rig.far.faults)
     @rule(wait=WAITS)
     def end_cause(self, wait: float = 0.4) -> None:
-        self.rig.far.end_fault_causes()
+        self.rig.far.faults.end_causes()
         self.let(wait)
 
     @precondition(lambda self: self.rig.far.faults and self.rig.line.whole)
@@ -332,7 +332,7 @@ class AnyOrder(RuleBasedStateMachine):
         """Let the drive forget its fault, by its keypad or by itself."""
         self.until_noticed()
         self.laws.disturbed()
-        self.rig.far.end_fault_causes()
+        self.rig.far.faults.end_causes()
         self.forget_faults()
         self.let(wait)
 

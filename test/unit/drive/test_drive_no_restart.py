@@ -24,7 +24,7 @@ def test_a_stop_that_a_fault_kept_from_the_drive_is_given_when_another_master_en
         # it refuses every command now, and its run command stands
         rig.wait_until(lambda: rig.drive.blocked_by_fault)
         rig.far.faults.acknowledge()
-        rig.far._settle()
+        rig.far.control_unit.settle()
         rig.wait_until(lambda: rig.far.control_unit.scmd == Scmd.STOP, 2.0)
         rig.assert_only_enable_helps()
 
@@ -36,7 +36,7 @@ def test_a_fault_that_no_poll_shows_ends_a_ride() -> None:
         rig.far.trip(OVERLOAD)
         rig.far.faults.acknowledge()
         rig.far.control_unit.command(Scmd.STOP)
-        rig.far._settle()
+        rig.far.control_unit.settle()
         rig.assert_only_enable_helps()
 
 

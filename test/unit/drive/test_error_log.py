@@ -39,7 +39,7 @@ def trip_unseen(rig: Rig, *codes: int) -> None:
     for code in codes:
         rig.far.trip(code)
     rig.far.faults.acknowledge()
-    rig.far._settle()
+    rig.far.control_unit.settle()
 
 
 def asked(rig: Rig) -> list[str]:

@@ -104,7 +104,7 @@ def test_what_was_acknowledged_and_what_still_stands(way: str) -> None:
         assert answer.startswith('acknowledged 5 Overload, but 3 Temp Hi is still active: ')
         assert 'Let it cool' in answer
         assert rig.answer(rig.drive.acknowledge()).startswith('3 Temp Hi is still active: ')
-        rig.far.end_fault_causes()
+        rig.far.faults.end_causes()
         assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 3 Temp Hi'
         assert rig.answer(rig.drive.acknowledge()).startswith('nothing to acknowledge')
 

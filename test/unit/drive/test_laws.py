@@ -194,7 +194,7 @@ def acknowledge_beside(rig: Rig) -> None:
     rig.far.trip(rig.a_fault)
     rig.pass_time(0.5)
     rig.far.faults.acknowledge()
-    rig.far._settle()
+    rig.far.control_unit.settle()
 
 
 def fail_to_listen(rig: Rig) -> None:

@@ -79,14 +79,14 @@ def self_test(rig: Rig) -> None:
     """Begin anew as after power-on, but answering."""
     unit(rig).restart()
     rig.far.motor.release(at_once=True)
-    rig.far._settle()
+    rig.far.control_unit.settle()
     assert phase(rig) is N
 
 
 def initialise(rig: Rig) -> None:
     """End the self-test."""
     unit(rig).initialised = True
-    rig.far._settle()
+    rig.far.control_unit.settle()
 
 
 def turn(rig: Rig, retard: float = 0.3) -> None:

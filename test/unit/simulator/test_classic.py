@@ -448,7 +448,7 @@ def test_stop_in_spite_of_a_serial_fault():
     for inv_st in (SIO_FAIL, 24):
         bench.read('E00AC')
         assert bench.read('E00E9') == inv_st
-        bench.drive.end_fault_causes()
+        bench.drive.faults.end_causes()
 
 
 @both

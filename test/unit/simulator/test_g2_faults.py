@@ -54,7 +54,7 @@ def test_what_is_commanded_in_a_fault_is_dropped_with_the_last_fault(make_bench)
     bench.drive.trip(3, cause_present=True)
     acknowledge(bench)
     assert (bench.drive.control_unit.scmd, bench.drive.faults.codes) == (0x101, [3])
-    bench.drive.end_fault_causes()
+    bench.drive.faults.end_causes()
     assert bench.inv_st == 3, 'it is still to be acknowledged'
     acknowledge(bench)
     bench.drive.advance(1)
@@ -175,7 +175,7 @@ def test_a_power_cycle_ends_a_fault_whose_cause_is_gone(bench):
         bench.drive.power_cycle(0.1)
         bench.drive.advance(1)
         assert (bench.drive.faults.codes, bench.inv_st) == (codes, inv_st)
-        bench.drive.end_fault_causes()
+        bench.drive.faults.end_causes()
 
 
 def test_a_fault_under_the_terminals_runs_again_when_acknowledged(bench):
@@ -248,7 +248,7 @@ def test_a_fault_with_tries_ends_by_itself_and_the_motor_runs_again(make_bench):
         bench.drive.trip(code, cause_present=True)
         bench.drive.advance(4)
         assert bench.inv_st == code
-        bench.drive.end_fault_causes()
+        bench.drive.faults.end_causes()
         bench.drive.advance(1.9)
         assert (bench.inv_st, bench.running) == (code, False), 'it counts from there'
         bench.drive.advance(0.3)

@@ -301,7 +301,7 @@ def test_no_reset_while_the_cause_lasts(running):
         running.bits(RESET)
         assert running.fault == fault
         running.bits(0)
-        running.drive.end_fault_causes()
+        running.drive.faults.end_causes()
         assert running.fault == fault
         running.bits(RESET)
         assert running.fault == 0
@@ -329,7 +329,7 @@ def test_auto_reset_starts_the_motor_again_after_a_while(running):
     assert running.write(168, 1) == running.write(167, 3) == ACK
     trip(running, OVERCURRENT, cause_present=True)
     running.wait(5.0)
-    running.drive.end_fault_causes()
+    running.drive.faults.end_causes()
     running.wait(2.9)
     assert running.fault == OVERCURRENT, 'it counts from when the cause has gone'
     running.wait(0.2)
@@ -546,7 +546,7 @@ def happen(bench, what, *values):
     elif what == 'fault':
         trip(bench, values[0], cause_present=values[1])
     elif what == 'cause gone':
-        bench.drive.end_fault_causes()
+        bench.drive.faults.end_causes()
     else:
         bench.drive.power_cycle(0.0)
 

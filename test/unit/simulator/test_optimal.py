@@ -313,7 +313,7 @@ def test_a_fault_releases_the_motor_and_reading_02a4_acknowledges():
         assert optimal.read(CONTROL_FREQUENCY) == optimal.read(CONTROL_SPEED) == 0
         optimal.wait(2)
         assert optimal.read(STATUS_WITH_ACK) == optimal.read(STATUS) == code, 'its cause lasts'
-        optimal.drive.end_fault_causes()
+        optimal.drive.faults.end_causes()
         assert optimal.read(STATUS) == optimal.read(STATUS) == code
         assert optimal.read(STATUS_WITH_ACK) == code
         assert not optimal.bits & FAULT
@@ -343,7 +343,7 @@ def test_an_alarm_stops_nothing_and_a_fault_is_shown_before_it(optimal):
         assert optimal.bits & (ALARM | FAULT | READY) == ALARM | READY
         state = describe(optimal.drive)
         assert (state['fault'], state['alarms']) == (0, [code])
-        optimal.drive.end_fault_causes()
+        optimal.drive.faults.end_causes()
         assert optimal.read(STATUS_WITH_ACK) == code
         assert (optimal.text, optimal.bits & ALARM) == ('Bus Run', 0)
     optimal.drive.trip(53, cause_present=True)

@@ -219,7 +219,7 @@ def test_a_fault_whose_cause_lasts_stays(bench):
     bench.drive.trip(15, cause_present=True)
     bench.bits(OFF | 0x80)
     assert bench.zsw1 & 0x08
-    bench.drive.end_fault_causes()
+    bench.drive.faults.end_causes()
     bench.bits(OFF)
     bench.bits(OFF | 0x80)
     assert not bench.zsw1 & 0x08
@@ -304,7 +304,7 @@ def test_in_any_order_it_runs_forward_in_operation_alone(steps, options, mode):
         if what == 'fault':
             bench.drive.trip(11, cause_present=bool(low & 1))
         elif what == 'gone':
-            bench.drive.end_fault_causes()
+            bench.drive.faults.end_causes()
         elif what in ('stop', 'start'):
             bench.unit.press(what)
         elif what == 'power':
