@@ -124,52 +124,44 @@ CARDS: Mapping[str, tuple[int, int]] = {
 
 @dataclass(frozen=True)
 class MovitracVariant(Variant):
-    """
-    One way to fit out a drive, and to read the manual: by default the one its words are nearest to.
-
-    :ivar interface: what its line is; on ``rs232`` its address is of no significance [M4 §2.4.4].
-    :ivar status_numbers: how status and fault stand in index 284 [C105].
-    :ivar enable_bit: ``ored``: with an enable at the terminals the bit for it changes nothing, for
-        "all subsequent bits are ORed with the terminal signals"; ``anded``: both are needed;
-        ``either``: the bit alone will do.
-    :ivar timeout_stop: what fault 45 does to the motor: it ``coasts``, or the drive ``ramps`` it
-        down as if the enable were gone.
-    :ivar outside_remote_control: what becomes of bits and set-point that the control mode has no
-        use for [C110]: ``refused``, ``ignored``, or ``taken`` and followed once the mode allows.
-    :ivar stop_status: what a drive shows at standstill with an enable and no direction, after
-        Normal stop on the way down: ``no_enable``, or ``normal_stop`` still; or ``enable``, then
-        and on the way down.
-    :ivar settings_need: what a setting is not written without: ``nothing``; ``output_off``, so that
-        a driven motor refuses it (1Ch); or the controller ``inhibit`` (2Bh). The manual has these
-        return codes and does not say for which parameters.
-    """
+    """One way to fit out a drive, and to read the manual: the usual is what its words suggest."""
 
     option_card: str = choice(*CARDS, text='the option card that is plugged in')
+    #: On RS-232 its address is of no significance [M4 §2.4.4].
     interface: str = choice('rs485', 'rs232', text='what its line is')
+    #: [C105]
     status_numbers: str = choice(
         'binary', 'bcd', text='how status and fault number stand in index 284'
     )
+    #: ``ored``: with an enable at the terminals the bit for it changes nothing, for "all subsequent
+    #: bits are ORed with the terminal signals"; ``anded``: both are needed; ``either``: the bit
+    #: alone will do.
     enable_bit: str = choice(
         'ored',
         'anded',
         'either',
         text='whether the enable of the terminals will do, the bit is needed too, or either does',
     )
+    #: It ramps as if the enable were gone.
     timeout_stop: str = choice(
         'coasts', 'ramps', text='what fault 45, PC time-out, does to the motor'
     )
+    #: [C110]; what is taken is followed once the mode allows.
     outside_remote_control: str = choice(
         'ignored',
         'refused',
         'taken',
         text='what becomes of function bits and set-point without use in the control mode',
     )
+    #: After Normal stop on the way down; ``enable`` is shown there, too.
     stop_status: str = choice(
         'no_enable',
         'normal_stop',
         'enable',
         text='what is shown at standstill with an enable but no direction',
     )
+    #: A driven motor refuses it (1Ch), or there has to be the controller inhibit (2Bh). The manual
+    #: has these return codes and does not say for which parameters.
     settings_need: str = choice(
         'nothing', 'output_off', 'inhibit', text='what has to be so for a setting to be written'
     )

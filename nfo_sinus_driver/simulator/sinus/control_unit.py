@@ -99,56 +99,42 @@ FACTORY: Mapping[str, Value] = {
 }
 
 
-KEEPS, DROPS = 'keeps', 'drops'
-ALL, SCMD, NOTHING = 'all', 'scmd', 'nothing'
-TAKEN, REFUSED = 'taken', 'refused'
-CODE, STANDBY = 'code', 'standby'
-EDGES, LEVELS = 'edges', 'levels'
-
-
 @dataclass(frozen=True)
 class SinusVariant(Variant):
-    """
-    One way to read the manuals; by default a G2 that follows [M0 table 16].
-
-    :ivar newer_functions: how Modbus functions are treated that older firmware does not have.
-    :ivar run_command_in_fault: what becomes of a run command by a fault [C98]. ``keeps``: it
-        stands, and the motor starts by itself when the fault is over. ``drops``: an acknowledgement
-        ends it, also one that was given meanwhile, so a run needs a new one [M0 table 16]. A fault
-        that the drive ends by itself starts the motor again in either case: that is what RstDly and
-        ErrCnt are for. So do the terminals, whose RUN stands. With DriveControl the G2's state
-        machine decides.
-    :ivar refuses_in_fault: what is refused while a fault is active [C98], in whatever protocol:
-        ``all`` but DriveControl and MODE = Stop in a serial fault, the run command (``scmd``), or
-        ``nothing``.
-        Classic refuses all whatever this says [M0 §6.1.5].
-    :ivar stop_in_tuning: whether SCMD = Stop is ``taken`` while MODE is Inhibit, and ends the
-        tuning, or ``refused`` until it is over [C101].
-    :ivar tuning_ends_in: what is shown after a tuning: a ``code`` of success, or plain ``standby``
-        [C112].
-    :ivar commands: how commands count that stand in telegram 1: when a bit rises, or as long as it
-        stands.
-    """
+    """One way to read the manuals; by default a G2 that follows [M0 table 16]."""
 
     newer_functions: str = choice(
         *TREATMENTS,
         text='how drives treat functions 17, 23 and 43, which older ones do not have',
     )
+    #: What is kept starts the motor by itself when the fault is over; what is dropped, also by an
+    #: acknowledgement that was given meanwhile, needs a new run command [C98]. A fault that the
+    #: drive ends by itself starts the motor in either case: that is what RstDly and ErrCnt are for.
+    #: So do the terminals, whose RUN stands. With DriveControl the G2's state machine decides.
     run_command_in_fault: str = choice(
-        DROPS, KEEPS, text='what an acknowledged fault does to a run command'
+        'drops', 'keeps', text='what an acknowledged fault does to a run command'
     )
+    #: In whatever protocol: all but DriveControl and MODE = Stop in a serial fault, or the run
+    #: command [C98]. Classic refuses all whatever this says [M0 §6.1.5].
     refuses_in_fault: str = choice(
-        NOTHING, ALL, SCMD, text='what is refused while a fault is active; on Classic always all'
+        'nothing',
+        'all',
+        'scmd',
+        text='what is refused while a fault is active; on Classic always all',
     )
+    #: While MODE is Inhibit [C101].
     stop_in_tuning: str = choice(
-        TAKEN, REFUSED, text='whether SCMD = Stop ends a tuning, or is refused until it is over'
+        'taken', 'refused', text='whether SCMD = Stop ends a tuning, or is refused until it is over'
     )
+    #: [C112]
     tuning_ends_in: str = choice(
-        CODE, STANDBY, text='what a tuning that succeeds ends in: a code of success, or standby'
+        'code',
+        'standby',
+        text='what a tuning that succeeds ends in: a code of success, or standby',
     )
     commands: str = choice(
-        EDGES,
-        LEVELS,
+        'edges',
+        'levels',
         text='on telegram 1: a command counts when its bit rises, or as long as it stands',
     )
 
@@ -290,7 +276,7 @@ class SinusControlUnit(ControlUnit):
     def admit(self, key: str) -> None:
         """Refuse what the drive does not take while a fault is active."""
         refused = self.variant.refuses_in_fault
-        if self.faults and (refused == ALL or (refused == SCMD and key == self.run_command)):
+        if self.faults and (refused == 'all' or (refused == 'scmd' and key == self.run_command)):
             raise Refused(Reason.STATE, f'fault {self.faults.shown} is active')
 
     def stored(self, key: str) -> None:
@@ -332,7 +318,7 @@ class SinusControlUnit(ControlUnit):
 
     def acknowledged(self) -> None:
         """Take note that an acknowledgement ended the last fault."""
-        if self.variant.run_command_in_fault == DROPS:
+        if self.variant.run_command_in_fault == 'drops':
             self._drop_run_command()
 
     def _drop_run_command(self) -> None:

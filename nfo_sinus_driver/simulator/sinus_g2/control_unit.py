@@ -18,22 +18,10 @@ from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd, Status
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
 from nfo_sinus_driver.simulator.motor import Regulation, nearest
 from nfo_sinus_driver.simulator.sinus import control_unit
-from nfo_sinus_driver.simulator.sinus.control_unit import (
-    CODE,
-    REFUSED,
-    TERMINAL_SHARE,
-    SinusControlUnit,
-    Source,
-)
+from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE, SinusControlUnit, Source
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules, SinusFaults
 from nfo_sinus_driver.simulator.sinus_g2 import ds402
-from nfo_sinus_driver.simulator.sinus_g2.firmware import (
-    AS_STANDBY,
-    FOLLOWED,
-    PROFIDRIVE,
-    G2Variant,
-    firmware_of,
-)
+from nfo_sinus_driver.simulator.sinus_g2.firmware import G2Variant, firmware_of
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import (
     FAILURES,
     PROCEDURES,
@@ -281,7 +269,7 @@ class G2ControlUnit(SinusControlUnit):
         self.take(source)
 
     def _command(self, raw: int) -> None:
-        if raw != Scmd.STOP or self.variant.stop_in_tuning == REFUSED:
+        if raw != Scmd.STOP or self.variant.stop_in_tuning == 'refused':
             self._refuse_when_tuning()
         self.tuning, self._tuned = None, 0
         if raw in PROCEDURES:
@@ -320,7 +308,7 @@ class G2ControlUnit(SinusControlUnit):
             code, self._next_failure = self._next_failure, 0
             self.faults.trip(code, self.counters.operating_time, cause_present=False)
             return
-        if self.variant.tuning_ends_in == CODE:
+        if self.variant.tuning_ends_in == 'code':
             self._tuned = tuning.procedure.done
         tuning.store(self.memory)
         self.motor.plate = self.nameplate()
@@ -394,7 +382,7 @@ class G2ControlUnit(SinusControlUnit):
     @property
     def preparing(self) -> bool:
         """Whether it shows standby although the start has begun [C122]."""
-        return self._dc_brakes and self.variant.shown_in_dc_brk == AS_STANDBY
+        return self._dc_brakes and self.variant.shown_in_dc_brk == 'standby'
 
     def settle(self) -> None:
         """Carry out what stands: control word, state machine, power stage, demand."""
@@ -548,9 +536,9 @@ class G2ControlUnit(SinusControlUnit):
     @property
     def _sign_counts(self) -> bool:
         """Whether the sign of a set-point reverses: that of a drive profile does [C111]."""
-        by_telegram = self.fieldbus.active and self.variant.telegram_words == PROFIDRIVE
+        by_telegram = self.fieldbus.active and self.variant.telegram_words == 'profidrive'
         by_profile = by_telegram or self._by_profile
-        return by_profile or self.variant.sign_in_drive_control == FOLLOWED
+        return by_profile or self.variant.sign_in_drive_control == 'followed'
 
     def _through_rfg(self, reference: float) -> float:
         """What the ramp generator's bits of DriveControl make of the reference [M0 table 14]."""

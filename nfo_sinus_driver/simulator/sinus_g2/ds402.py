@@ -24,8 +24,6 @@ STATUS_WORD = 'fieldbus.status_word'
 MODE = 'fieldbus.modes_of_operation'
 #: Parameters that are objects of the profile, too.
 ALIASES: Mapping[str, str] = {'fieldbus.shutdown_option_code': 'control.st_mode'}
-#: While the motor ramps to a stop, it runs; or what follows is shown at once.
-RUNNING, READY = 'running', 'ready'
 
 _SHARED = 0xFF
 _TOLD = (
@@ -76,12 +74,12 @@ def status_word(status: Status, phase: Phase, ramp: str) -> int:
     """
     Return the StatusWord for the status of the state machine; reverse is no state of its own.
 
-    :param ramp: what it shows while the motor ramps to a stop.
+    :param ramp: while the motor ramps to a stop, it is shown ``running``; or ``ready`` at once.
     """
     word = status & _TOLD
     if status & Status.REV_OP_ENABLED:
         word |= Status.OP_ENABLED
-    return int(word & ~_LEFT.get(phase, Status(0)) if ramp == READY else word)
+    return int(word & ~_LEFT.get(phase, Status(0)) if ramp == 'ready' else word)
 
 
 class DriveProfile:

@@ -18,55 +18,15 @@ from nfo_sinus_driver.simulator.control_unit import choice
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus.control_unit import SinusVariant
 from nfo_sinus_driver.simulator.sinus.serial_side import LineRules
-from nfo_sinus_driver.simulator.sinus_g2 import ds402
 
-BARE, MINIMAL, FULL = 'bare', 'minimal', 'full'
-TABLE, NARROW, WIDE = 'table', 'narrow', 'wide'
-FROM_ONE, FROM_ZERO = 'from_one', 'from_zero'
-BY_SHAPE, NONE, HEARTBEAT, GUARDING, BOTH = 'by_shape', 'none', 'heartbeat', 'guarding', 'both'
-PRINTED, SHIFTED = '2F7C', '4F7D'
-HELD, FREE = 'held', 'free'
-PRESENT, ABSENT = 'present', 'absent'
 SW_VER = 'fieldbus.sw_ver'
 #: Its codes of SiProt [C5].
 _OLD_FORMAT_CODES = {'7E1': 0, '8N1': 1}
-#: The words of telegram 1.
-PROFIDRIVE, DRIVECONTROL = 'profidrive', 'drivecontrol'
-#: Whether the sign of a set-point reverses under DriveControl.
-IGNORED, FOLLOWED = 'ignored', 'followed'
-#: What it shows while it brakes a motor before the start.
-AS_RUNNING, AS_STANDBY = 'running', 'standby'
 
 
 @dataclass(frozen=True)
 class G2Variant(SinusVariant):
-    """
-    One way to read the manuals, and the chapter on CANopen ([M0 §6.4], [C102]).
-
-    :ivar dialect: the manual that describes its firmware; ``''``: as SWVer says.
-    :ivar shown_in_dc_brk: what status word and inverter status show while DC-Brk goes on [C122].
-    :ivar sign_in_drive_control: whether under DriveControl the sign of a set-point counts beside
-        bits 3 and 13 [C120]; that of a process value always does.
-    :ivar telegram_words: which words telegram 1 has.
-    :ivar canopen_profile: what there is of the communication profile, which the manual leaves
-        "TBD". ``full``: identity, texts, heartbeats, guarding; ``minimal``: device type, error
-        register, vendor and the heartbeat that a node sends; ``bare``: no object at all. A node
-        tells its boot-up and obeys network management in any case.
-    :ivar canopen_watch: what it watches a master by: its heartbeat (1016h), guarding (100Ch,
-        100Dh), ``both`` or ``none``; ``by_shape``: both where the profile is full, else none.
-    :ivar canopen_types: how many bytes values have, which the manual does not print: those of the
-        ``table``; ``narrow``: enumerations have one; ``wide``: everything has four.
-    :ivar canopen_sub_indices: the elements of arrays count ``from_one``, and sub-index 0 tells how
-        many there are; or ``from_zero``, as on PROFIBUS.
-    :ivar canopen_error_log: where the error log stands: at the index that is printed, at the one
-        that its parameters' numbers give [C2], or nowhere.
-    :ivar canopen_bus_mode: bus mode is ``held`` as soon as there is communication [M0 §6.4]; or the
-        drive is ``free`` to leave it, as on other buses.
-    :ivar canopen_state_machine: whether DriveControl, DriveStatus and the words of PROFIdrive are
-        there, which a module with a drive profile need not have [M0 §7].
-    :ivar canopen_ramp: what the StatusWord of CiA 402 shows while the motor ramps to a stop: that
-        it is ``running``, or that it is ``ready`` again.
-    """
+    """One way to read the manuals, and the chapter on CANopen ([M0 §6.4], [C102])."""
 
     dialect: str = choice(
         '',
@@ -75,50 +35,60 @@ class G2Variant(SinusVariant):
         text='the manual that describes the Classic protocol of the drives (default: as their '
         'firmware, fieldbus.sw_ver, says)',
     )
+    #: [C120]; that of a process value always does.
     sign_in_drive_control: str = choice(
-        IGNORED,
-        FOLLOWED,
+        'ignored',
+        'followed',
         text='under DriveControl: whether the sign of a set-point reverses beside its bit 13',
     )
+    #: [C122]
     shown_in_dc_brk: str = choice(
-        AS_RUNNING,
-        AS_STANDBY,
-        text='what it shows during the DC braking before a start, DC-Brk',
+        'running', 'standby', text='what it shows during the DC braking before a start, DC-Brk'
     )
     telegram_words: str = choice(
-        PROFIDRIVE,
-        DRIVECONTROL,
+        'profidrive',
+        'drivecontrol',
         text='on telegram 1: the words are those of PROFIdrive, or DriveControl and DriveStatus',
     )
+    #: Which the manual leaves "TBD". ``full``: identity, texts, heartbeats, guarding; ``minimal``:
+    #: device type, error register, vendor and the heartbeat that a node sends; ``bare``: no object
+    #: at all. A node tells its boot-up and obeys network management in any case.
     canopen_profile: str = choice(
-        FULL, MINIMAL, BARE, text='on CANopen: how much of the communication profile there is'
+        'full', 'minimal', 'bare', text='on CANopen: how much of the communication profile there is'
     )
+    #: ``by_shape``: both where the profile is full, else none.
     canopen_watch: str = choice(
-        BY_SHAPE,
-        NONE,
-        HEARTBEAT,
-        GUARDING,
-        BOTH,
+        'by_shape',
+        'none',
+        'heartbeat',
+        'guarding',
+        'both',
         text='on CANopen: what a master can be watched by',
     )
-    canopen_types: str = choice(TABLE, NARROW, WIDE, text='on CANopen: how many bytes values have')
-    canopen_sub_indices: str = choice(
-        FROM_ONE, FROM_ZERO, text='on CANopen: how the elements of arrays are numbered'
+    #: Which the manual does not print. ``narrow``: enumerations have one; ``wide``: all have four.
+    canopen_types: str = choice(
+        'table', 'narrow', 'wide', text='on CANopen: how many bytes values have'
     )
+    #: From one, sub-index 0 tells how many there are; from zero, as on PROFIBUS.
+    canopen_sub_indices: str = choice(
+        'from_one', 'from_zero', text='on CANopen: how the elements of arrays are numbered'
+    )
+    #: At the index that is printed, at the one that its parameters' numbers give [C2], or nowhere.
     canopen_error_log: str = choice(
-        PRINTED, SHIFTED, NONE, text='on CANopen: where the error log stands'
+        '2F7C', '4F7D', 'none', text='on CANopen: where the error log stands'
     )
     canopen_bus_mode: str = choice(
-        HELD, FREE, text='on CANopen: whether the module holds the drive in bus mode'
+        'held', 'free', text='on CANopen: whether the module holds the drive in bus mode'
     )
+    #: Which a module with a drive profile need not have [M0 §7].
     canopen_state_machine: str = choice(
-        PRESENT,
-        ABSENT,
+        'present',
+        'absent',
         text='on CANopen: whether DriveControl, DriveStatus and the PROFIdrive words are there',
     )
     canopen_ramp: str = choice(
-        ds402.RUNNING,
-        ds402.READY,
+        'running',
+        'ready',
         text='on CANopen: what StatusWord (6041h) shows while the motor ramps to a stop',
     )
 
@@ -126,13 +96,13 @@ class G2Variant(SinusVariant):
     def profile(self) -> Profile301:
         """What the node has of the communication profile."""
         watch = self.canopen_watch
-        if watch == BY_SHAPE:
-            watch = BOTH if self.canopen_profile == FULL else NONE
+        if watch == 'by_shape':
+            watch = 'both' if self.canopen_profile == 'full' else 'none'
         return Profile301(
-            mandatory=self.canopen_profile != BARE,
-            optional=self.canopen_profile == FULL,
-            consumes_heartbeats=watch in (HEARTBEAT, BOTH),
-            guards=watch in (GUARDING, BOTH),
+            mandatory=self.canopen_profile != 'bare',
+            optional=self.canopen_profile == 'full',
+            consumes_heartbeats=watch in ('heartbeat', 'both'),
+            guards=watch in ('guarding', 'both'),
         )
 
 

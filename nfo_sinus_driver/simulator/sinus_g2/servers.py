@@ -36,17 +36,7 @@ from nfo_sinus_driver.simulator.parameter_channel import (
     read_only,
 )
 from nfo_sinus_driver.simulator.sinus import parts
-from nfo_sinus_driver.simulator.sinus.control_unit import LEVELS
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
-from nfo_sinus_driver.simulator.sinus_g2.firmware import (
-    ABSENT,
-    DRIVECONTROL,
-    FROM_ONE,
-    HELD,
-    NARROW,
-    NONE,
-    WIDE,
-)
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
 
 # ---- Modbus ----
@@ -274,7 +264,7 @@ class CanopenServer(canopen.Server):
 
     def established(self) -> None:
         """Hold the drive in bus mode from now on."""
-        if self._shape.canopen_bus_mode == HELD:
+        if self._shape.canopen_bus_mode == 'held':
             self._unit.hold_bus_mode()
 
     def lost(self) -> None:
@@ -288,7 +278,7 @@ class CanopenServer(canopen.Server):
         for index in arrays:
             most = max(sub for other, sub in found if other == index)
             found[index, 0] = canopen.constant(most, 1)
-        if self._shape.canopen_error_log != NONE:
+        if self._shape.canopen_error_log != 'none':
             first = int(self._shape.canopen_error_log, 16)
             found |= {(first + n, 0): self._log_entry(n) for n in range(self.drive.faults.log_size)}
         return found
@@ -296,7 +286,7 @@ class CanopenServer(canopen.Server):
     def _places(self) -> Iterator[tuple[int, int, Parameter]]:
         """Give index and sub-index of each parameter."""
         model, shape = self.drive.model, self._shape
-        absent = _MISSING | (_STATE_MACHINE if shape.canopen_state_machine == ABSENT else set())
+        absent = _MISSING | (_STATE_MACHINE if shape.canopen_state_machine == 'absent' else set())
         for parameter in model.values():
             if 'canopen' not in parameter.addresses or not self.drive.has(parameter):
                 continue
@@ -305,17 +295,17 @@ class CanopenServer(canopen.Server):
                 continue
             sub_index = address.sub_index or 0
             counted = address.index < _PROFILE
-            if sub_index and counted and shape.canopen_sub_indices != FROM_ONE:
+            if sub_index and counted and shape.canopen_sub_indices != 'from_one':
                 sub_index -= 1
             yield address.index, sub_index, parameter
 
     def _size(self, parameter: Parameter) -> int:
         """Return how many bytes a parameter has."""
         usual = parameter.at('canopen').codec.size
-        if self._shape.canopen_types == WIDE:
+        if self._shape.canopen_types == 'wide':
             return max(usual, _WIDE)
         codes = parameter.labels
-        if self._shape.canopen_types == NARROW and codes and max(codes) < 0x80:
+        if self._shape.canopen_types == 'narrow' and codes and max(codes) < 0x80:
             return _NARROW
         return usual
 
@@ -425,7 +415,7 @@ class TelegramServer(telegram1.Server):
     def exchange(self, stw1: int, setpoint: int) -> tuple[int, int]:
         """Take control word and set-point; return status word and actual value."""
         unit, self._word = self._unit, stw1
-        if unit.variant.telegram_words == DRIVECONTROL:
+        if unit.variant.telegram_words == 'drivecontrol':
             unit.take_telegram(self._by_level(stw1), setpoint)
             return int(unit.status_word), unit.actual
         # without control by PLC the process data do not count, and what was before goes on
@@ -462,7 +452,7 @@ class TelegramServer(telegram1.Server):
 
     def _by_level(self, word: int) -> int:
         """Add what makes the drive switch on by a bit that has been there all the time."""
-        return word | Control.AUTO_INIT if self._unit.variant.commands == LEVELS else word
+        return word | Control.AUTO_INIT if self._unit.variant.commands == 'levels' else word
 
     def _zsw1(self, stw1: int) -> Zsw1:
         unit, motor = self._unit, self._unit.motor

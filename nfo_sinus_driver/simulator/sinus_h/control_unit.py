@@ -102,18 +102,17 @@ _EXITS = {
     (_S4, Order.QUICK_STOP): _S1,
     (_S4, Order.SWITCH_ON): _S3,
 }
-#: What follows only where unlisted exits are taken as other drives of the profile have them; with
-#: LEVELS S1 is left, too, by a word that has been there all the time.
-NONE, PROFIDRIVE, LEVELS = 'none', 'profidrive', 'levels'
 _PROFIDRIVE = {
     (_S3, Order.QUICK_STOP): _S1,
     (_S3, Order.COAST_STOP): _S1,
     (_S4, Order.SWITCH_OFF): _S2,
 }
+#: What follows only where unlisted exits are taken as other drives of the profile have them; with
+#: levels S1 is left, too, by a word that has been there all the time.
 _UNLISTED = {
-    NONE: {},
-    PROFIDRIVE: _PROFIDRIVE,
-    LEVELS: {
+    'none': {},
+    'profidrive': _PROFIDRIVE,
+    'levels': {
         **_PROFIDRIVE,
         (_S1, Order.SWITCH_ON): _S2,
         (_S1, Order.OPERATION_ENABLE): _S2,
@@ -129,7 +128,7 @@ class StateMachine:
     :ivar coasts: a motor that does not run any more runs free, else it stops as ADV-8 says.
     """
 
-    def __init__(self, unlisted: str = NONE) -> None:
+    def __init__(self, unlisted: str = 'none') -> None:
         self.state = _S1
         self.coasts = True
         self._exits = {**_EXITS, **_UNLISTED[unlisted]}
@@ -152,35 +151,24 @@ class StateMachine:
         self.state, self.coasts = _S1, coasts
 
 
-#: How bits 1 and 2 of the status word are read [C63].
-STATE, WORD = 'state', 'word'
-#: What STOP at the keypad does while the fieldbus commands: no manual says.
-STOPS, IGNORED = 'stops', 'ignored'
 #: The ramp that forces the frequency to 0 goes by the Dec time; the least that a ramp takes (s).
 _LEAST_RAMP = 0.01
 
 
 @dataclass(frozen=True)
 class SinusHVariant(Variant):
-    """
-    One way to read the manual.
-
-    :ivar unlisted_exits: which exits there are that the table does not print: ``none``, those of
-        ``profidrive``: QuickStop and CoastStop lead out of S3, and SwitchOFF out of S4; with
-        ``levels`` SwitchON leads out of S1, too.
-    :ivar echo_bits: bits 1 and 2 of ZSW1 tell the ``state``, as the patterns have it, or are
-        those of the ``word`` that has been input, as the table of the bits has it [C63].
-    :ivar keypad_stop: whether STOP at the keypad stops the motor.
-    """
+    """One way to read the manual."""
 
     unlisted_exits: str = choice(
-        NONE, PROFIDRIVE, LEVELS, text='exits of its states that the manual does not list'
+        *_UNLISTED, text='exits of its states that the manual does not list'
     )
+    #: As the patterns of the states have it, or the table of the bits [C63].
     echo_bits: str = choice(
-        STATE, WORD, text='bits 1 and 2 of ZSW1 tell the state, or those of the control word'
+        'state', 'word', text='bits 1 and 2 of ZSW1 tell the state, or those of the control word'
     )
+    #: No manual says.
     keypad_stop: str = choice(
-        STOPS, IGNORED, text='what STOP at the keypad does while the fieldbus commands'
+        'stops', 'ignored', text='what STOP at the keypad does while the fieldbus commands'
     )
 
 
@@ -241,7 +229,7 @@ class SinusHControlUnit(ControlUnit):
     def status_word(self) -> Status:
         """ZSW1 [M3 §7.2.2]."""
         status = _PATTERNS[self.machine.state]
-        if self.variant.echo_bits == WORD:
+        if self.variant.echo_bits == 'word':
             status &= ~(Status.READY_FOR_OPERATION | Status.OPERATION)
             status |= _if(self.word & Control.ON, Status.READY_FOR_OPERATION)
             status |= _if(self.word & Control.ENABLE_OPERATION, Status.OPERATION)
@@ -287,7 +275,7 @@ class SinusHControlUnit(ControlUnit):
             self._keypad_runs = commands == 0 and not self.faults
         else:
             self._keypad_runs = False
-            if commands == keypad.FIELDBUS_COMMANDS and self.variant.keypad_stop == STOPS:
+            if commands == keypad.FIELDBUS_COMMANDS and self.variant.keypad_stop == 'stops':
                 self.machine.inhibit(coasts=False)
         self.settle()
 

@@ -24,9 +24,6 @@ from nfo_sinus_driver.simulator.control_unit import choice
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
 from nfo_sinus_driver.simulator.motor import Regulation, nearest
 from nfo_sinus_driver.simulator.sinus.control_unit import (
-    DROPS,
-    KEEPS,
-    LEVELS,
     TERMINAL_SHARE,
     SinusControlUnit,
     SinusVariant,
@@ -48,7 +45,7 @@ class OptimalVariant(SinusVariant):
     """An Optimal: [M1] knows no refusal in a fault, and no table that ends a run command."""
 
     run_command_in_fault: str = choice(
-        KEEPS, DROPS, text='what an acknowledged fault does to a run command'
+        'keeps', 'drops', text='what an acknowledged fault does to a run command'
     )
 
 
@@ -70,7 +67,7 @@ class OptimalControlUnit(SinusControlUnit):
 
     def __init__(self, memory: Memory, address: int, variant: OptimalVariant) -> None:
         super().__init__(memory, address, variant, SinusFaults(memory.model))
-        self._by_level = variant.commands == LEVELS
+        self._by_level = variant.commands == 'levels'
         self._steps = ControlSteps(by_level=self._by_level)
         self._running = False
         self._sleeping = False

@@ -18,15 +18,6 @@ from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 from nfo_sinus_driver.simulator.family import load
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE, FUNCTION_BITS, SETPOINT
 from nfo_sinus_driver.simulator.movitrac31.parameters import Bit, Mode
-from nfo_sinus_driver.simulator.sinus.control_unit import (
-    ALL,
-    DROPS,
-    KEEPS,
-    NOTHING,
-    REFUSED,
-    SCMD,
-    TAKEN,
-)
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import TRIES
 
 _CONTROL = 'fieldbus.drive_control'
@@ -59,7 +50,7 @@ class SinusOrder(AnyOrder):
         drive_timeout=st.sampled_from((0.0, AS_THE_DRIVE_CAN, 2.0)),
         restart_after=st.sampled_from((None, None, 0, 1, 2)),
         keeps=st.booleans(),
-        refuses=st.sampled_from((ALL, ALL, SCMD, NOTHING)),
+        refuses=st.sampled_from(('all', 'all', 'scmd', 'nothing')),
         tunes_on=st.booleans(),
     )
     def begin(
@@ -71,7 +62,7 @@ class SinusOrder(AnyOrder):
         drive_timeout: float = 0.0,
         restart_after: int | None = None,
         keeps: bool = True,
-        refuses: str = ALL,
+        refuses: str = 'all',
         tunes_on: bool = True,
     ) -> None:
         """
@@ -97,9 +88,9 @@ class SinusOrder(AnyOrder):
             parameters.update(dict.fromkeys(TRIES.values(), 3))
             parameters.update({'error.rst_dly': restart_after, 'error.tr_time': 1})
         variant = {
-            'run_command_in_fault': KEEPS if keeps else DROPS,
+            'run_command_in_fault': 'keeps' if keeps else 'drops',
             'refuses_in_fault': refuses,
-            'stop_in_tuning': REFUSED if tunes_on else TAKEN,
+            'stop_in_tuning': 'refused' if tunes_on else 'taken',
         }
         self.begin_with(
             parameters,

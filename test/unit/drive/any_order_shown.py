@@ -23,7 +23,7 @@ from nfo_sinus_driver.simulator.movitrac31.commands import (
     SETPOINT,
 )
 from nfo_sinus_driver.simulator.movitrac31.parameters import Bit, Mode, Number
-from nfo_sinus_driver.simulator.sinus.control_unit import ALL, NOTHING, Source
+from nfo_sinus_driver.simulator.sinus.control_unit import Source
 
 #: What commands a drive of NFO [M0 §7], [M1]; of the mask and its word, the latter comes last.
 MODE, CONTROL, MASK = 'fieldbus.mode', 'fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'
@@ -185,11 +185,11 @@ class ShownSinus(Shown):
     def __init__(self, rig: Rig) -> None:
         super().__init__(rig)
         # by Classic all is refused [M0 §6.1.5]
-        refused = self._unit.variant.refuses_in_fault if rig.way.protocol != 'classic' else ALL
+        refused = self._unit.variant.refuses_in_fault if rig.way.protocol != 'classic' else 'all'
         # and what a command reads there comes word by word
         self.polls_wait = rig.way.protocol == 'classic'
-        self.powered_by_acknowledgement = refused == ALL
-        self.refuses_stop = refused != NOTHING and self._method == 'mode_scmd'
+        self.powered_by_acknowledgement = refused == 'all'
+        self.refuses_stop = refused != 'nothing' and self._method == 'mode_scmd'
 
     @property
     def by_bus(self) -> bool:

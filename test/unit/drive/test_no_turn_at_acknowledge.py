@@ -16,22 +16,15 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.families.sinus_g2.words import Mode
-from nfo_sinus_driver.simulator.sinus.control_unit import (
-    ALL,
-    DROPS,
-    KEEPS,
-    NOTHING,
-    SCMD as SCMD_ONLY,
-)
 
 #: How many acknowledgements each kind of drive goes through; a campaign has a thousand.
 ACKNOWLEDGEMENTS = int(os.environ.get('ACKNOWLEDGEMENTS', '6'))
 KINDS = (
-    {'run_command_in_fault': KEEPS, 'refuses_in_fault': NOTHING},
-    {'run_command_in_fault': KEEPS, 'refuses_in_fault': SCMD_ONLY},
-    {'run_command_in_fault': DROPS, 'refuses_in_fault': ALL},
+    {'run_command_in_fault': 'keeps', 'refuses_in_fault': 'nothing'},
+    {'run_command_in_fault': 'keeps', 'refuses_in_fault': 'scmd'},
+    {'run_command_in_fault': 'drops', 'refuses_in_fault': 'all'},
 )
-_WORST = {'run_command_in_fault': KEEPS, 'refuses_in_fault': ALL}
+_WORST = {'run_command_in_fault': 'keeps', 'refuses_in_fault': 'all'}
 #: InvSt with acknowledging [M0 table 5], and what stops.
 _ACK, _MODE, _SCMD = 'fieldbus.inv_st_with_ack', 'fieldbus.mode', 'fieldbus.scmd'
 _OVERLOAD = 5
@@ -209,7 +202,7 @@ def test_control_of_the_terminals_is_left_to_them() -> None:
 
 
 def test_a_fault_that_ends_by_itself_turns_nothing() -> None:
-    for kind in (kind for kind in KINDS if kind['refuses_in_fault'] != ALL):
+    for kind in (kind for kind in KINDS if kind['refuses_in_fault'] != 'all'):
         with Rig(options=kind) as rig:
             rig.turn()
             rig.far.trip(_OVERLOAD)

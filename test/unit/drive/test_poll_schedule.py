@@ -17,7 +17,6 @@ from support.rig import Rig
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
 
 STATUS, INV_ST = 'fieldbus.drive_status', 'fieldbus.inv_st'
 FREQUENCY, SPEED, TORQUE = 'status.frq_act', 'status.spd_act', 'status.trq_act'
@@ -50,7 +49,7 @@ def fast(parameters: Mapping[str, Any] | None = None) -> Rig:
     """Return a drive that is polled as fast as the line allows."""
     return Rig(
         parameters=parameters,
-        options={'refuses_in_fault': NOTHING},
+        options={'refuses_in_fault': 'nothing'},
         poll_rate=0.0,
         telemetry_rate=0.0,
     )

@@ -13,7 +13,6 @@ from support.wire import understand
 
 from nfo_sinus_driver.link import Refused
 from nfo_sinus_driver.simulator.modbus import server
-from nfo_sinus_driver.simulator.sinus.control_unit import NOTHING
 
 SETPOINT, STATUS, INV_ST = 'status.frq_set', 'fieldbus.drive_status', 'fieldbus.inv_st'
 SCMD = 'fieldbus.scmd'
@@ -47,7 +46,7 @@ def asked(rig: Rig, since: int = 0) -> list[tuple[str, int | None]]:
 def quiet(**settings: Any) -> Rig:
     """Return a motor that turns, so seldom polled that nothing waits for the line."""
     rig = Rig(
-        options={'refuses_in_fault': NOTHING}, poll_rate=1.0, telemetry_rate=0.0, **settings
+        options={'refuses_in_fault': 'nothing'}, poll_rate=1.0, telemetry_rate=0.0, **settings
     )
     rig.turn()
     rig.send(None)
