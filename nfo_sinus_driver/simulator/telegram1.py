@@ -4,18 +4,51 @@
 """
 Standard telegram 1 as a simulated drive takes it: control word and set-point, and what comes back.
 
-What the words mean is each family's business; how they come to the drive that of its master.
+The words of PROFIdrive are here, for the families that have them; how words come to the drive is
+the business of its master.
 """
 
 from __future__ import annotations
 
 import abc
+import enum
 from typing import ClassVar
 
 from nfo_sinus_driver.simulator.parameter_channel import ParameterChannel
 
 #: The most that a word of the telegram carries, signed.
 _MOST = 0x7FFF
+
+
+class Stw1(enum.IntFlag):
+    """The control word of PROFIdrive."""
+
+    ON = 1 << 0
+    NO_COAST_STOP = 1 << 1
+    NO_QUICK_STOP = 1 << 2
+    ENABLE_OPERATION = 1 << 3
+    ENABLE_RAMP = 1 << 4
+    UNFREEZE_RAMP = 1 << 5
+    ENABLE_SETPOINT = 1 << 6
+    FAULT_ACKNOWLEDGE = 1 << 7
+    CONTROL_BY_PLC = 1 << 10
+
+
+class Zsw1(enum.IntFlag):
+    """The status word of PROFIdrive."""
+
+    READY_TO_SWITCH_ON = 1 << 0
+    READY_TO_OPERATE = 1 << 1
+    OPERATION_ENABLED = 1 << 2
+    FAULT = 1 << 3
+    NO_COAST_STOP = 1 << 4
+    NO_QUICK_STOP = 1 << 5
+    SWITCHING_ON_INHIBITED = 1 << 6
+    WARNING = 1 << 7
+    WITHIN_TOLERANCE = 1 << 8
+    CONTROL_REQUESTED = 1 << 9
+    REACHED = 1 << 10
+    PULSES_ENABLED = 1 << 15
 
 
 class Server(abc.ABC):

@@ -15,7 +15,6 @@ set-point and actual value are scaled as the parameters are.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-import enum
 import functools
 import zlib
 
@@ -38,6 +37,7 @@ from nfo_sinus_driver.simulator.parameter_channel import (
 from nfo_sinus_driver.simulator.sinus import parts
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Phase
+from nfo_sinus_driver.simulator.telegram1 import Stw1, Zsw1
 
 # ---- Modbus ----
 
@@ -343,36 +343,16 @@ class CanopenServer(canopen.Server):
 
 #: What each bit of STW1 of PROFIdrive is in DriveControl.
 _CONTROL = {
-    1 << 0: Control.SWITCH_ON,
-    1 << 1: Control.ENABLE_VOLTAGE,
-    1 << 2: Control.DISABLE_QUICK_STOP,
-    1 << 3: Control.ENABLE_OP,
-    1 << 4: Control.ENABLE_RFG,
-    1 << 5: Control.UNLOCK_RFG,
-    1 << 6: Control.USE_REF_FOR_RFG,
-    1 << 7: Control.RESET_MALFUNCTION,
-    1 << 10: Control.NET_CTRL | Control.NET_REF,
+    Stw1.ON: Control.SWITCH_ON,
+    Stw1.NO_COAST_STOP: Control.ENABLE_VOLTAGE,
+    Stw1.NO_QUICK_STOP: Control.DISABLE_QUICK_STOP,
+    Stw1.ENABLE_OPERATION: Control.ENABLE_OP,
+    Stw1.ENABLE_RAMP: Control.ENABLE_RFG,
+    Stw1.UNFREEZE_RAMP: Control.UNLOCK_RFG,
+    Stw1.ENABLE_SETPOINT: Control.USE_REF_FOR_RFG,
+    Stw1.FAULT_ACKNOWLEDGE: Control.RESET_MALFUNCTION,
+    Stw1.CONTROL_BY_PLC: Control.NET_CTRL | Control.NET_REF,
 }
-_CONTROL_BY_PLC = 1 << 10
-
-
-class Zsw1(enum.IntFlag):
-    """ZSW1 of PROFIdrive, standard telegram 1."""
-
-    READY_TO_SWITCH_ON = 1 << 0
-    READY_TO_OPERATE = 1 << 1
-    OPERATION_ENABLED = 1 << 2
-    FAULT = 1 << 3
-    NO_COAST_STOP = 1 << 4
-    NO_QUICK_STOP = 1 << 5
-    SWITCHING_ON_INHIBITED = 1 << 6
-    WARNING = 1 << 7
-    WITHIN_TOLERANCE = 1 << 8
-    CONTROL_REQUESTED = 1 << 9
-    REACHED = 1 << 10
-    PULSES_ENABLED = 1 << 15
-
-
 #: The maker of the module: HMS.
 _HMS = 0x0109
 _SWITCHED_ON = Zsw1.READY_TO_SWITCH_ON | Zsw1.READY_TO_OPERATE
@@ -419,7 +399,7 @@ class TelegramServer(telegram1.Server):
             unit.take_telegram(self._by_level(stw1), setpoint)
             return int(unit.status_word), unit.actual
         # without control by PLC the process data do not count, and what was before goes on
-        if stw1 & _CONTROL_BY_PLC:
+        if stw1 & Stw1.CONTROL_BY_PLC:
             self._obeyed = stw1
             word = sum(bit for given, bit in _CONTROL.items() if stw1 & given)
             unit.take_telegram(self._by_level(word), setpoint)
@@ -457,9 +437,9 @@ class TelegramServer(telegram1.Server):
     def _zsw1(self, stw1: int) -> Zsw1:
         unit, motor = self._unit, self._unit.motor
         status = _STATES[unit.machine.phase]
-        if stw1 & 1 << 1:
+        if stw1 & Stw1.NO_COAST_STOP:
             status |= Zsw1.NO_COAST_STOP
-        if stw1 & 1 << 2:
+        if stw1 & Stw1.NO_QUICK_STOP:
             status |= Zsw1.NO_QUICK_STOP
         if unit.on_bus:
             status |= Zsw1.CONTROL_REQUESTED

@@ -18,36 +18,7 @@ from typing import Any
 from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus_h import keypad
-from nfo_sinus_driver.simulator.telegram1 import FieldbusWatch
-
-
-class Control(enum.IntFlag):
-    """STW1 [M3 §7.2.1]."""
-
-    ON = 1 << 0
-    NO_COAST_STOP = 1 << 1
-    NO_QUICK_STOP = 1 << 2
-    ENABLE_OPERATION = 1 << 3
-    ENABLE_RAMP = 1 << 4
-    UNFREEZE_RAMP = 1 << 5
-    ENABLE_SETPOINT = 1 << 6
-    FAULT_ACKNOWLEDGE = 1 << 7
-    CONTROL_BY_PLC = 1 << 10
-
-
-class Status(enum.IntFlag):
-    """ZSW1 [M3 §7.2.2]."""
-
-    READY_TO_SWITCH_ON = 1 << 0
-    READY_FOR_OPERATION = 1 << 1
-    OPERATION = 1 << 2
-    FAULT = 1 << 3
-    NO_COAST_STOP = 1 << 4
-    NO_QUICK_STOP = 1 << 5
-    SWITCHING_ON_INHIBITED = 1 << 6
-    WARNING = 1 << 7
-    SPEED_REACHED = 1 << 8
-    CONTROL_REQUESTED = 1 << 9
+from nfo_sinus_driver.simulator.telegram1 import FieldbusWatch, Stw1, Zsw1
 
 
 class State(enum.Enum):
@@ -69,24 +40,24 @@ class Order(enum.Enum):
     OPERATION_ENABLE = enum.auto()
 
     @classmethod
-    def of(cls, word: Control) -> Order:
+    def of(cls, word: Stw1) -> Order:
         """Return what a word commands."""
-        if not word & Control.NO_COAST_STOP:
+        if not word & Stw1.NO_COAST_STOP:
             return cls.COAST_STOP
-        if not word & Control.NO_QUICK_STOP:
+        if not word & Stw1.NO_QUICK_STOP:
             return cls.QUICK_STOP
-        if not word & Control.ON:
+        if not word & Stw1.ON:
             return cls.SWITCH_OFF
-        return cls.OPERATION_ENABLE if word & Control.ENABLE_OPERATION else cls.SWITCH_ON
+        return cls.OPERATION_ENABLE if word & Stw1.ENABLE_OPERATION else cls.SWITCH_ON
 
 
 _S1, _S2, _S3, _S4 = State
 #: The bits of each state [M3 §7.2.2].
 _PATTERNS = {
-    _S1: Status.SWITCHING_ON_INHIBITED,
-    _S2: Status.READY_TO_SWITCH_ON,
-    _S3: Status.READY_TO_SWITCH_ON | Status.READY_FOR_OPERATION,
-    _S4: Status.READY_TO_SWITCH_ON | Status.READY_FOR_OPERATION | Status.OPERATION,
+    _S1: Zsw1.SWITCHING_ON_INHIBITED,
+    _S2: Zsw1.READY_TO_SWITCH_ON,
+    _S3: Zsw1.READY_TO_SWITCH_ON | Zsw1.READY_TO_OPERATE,
+    _S4: Zsw1.READY_TO_SWITCH_ON | Zsw1.READY_TO_OPERATE | Zsw1.OPERATION_ENABLED,
 }
 #: The table of [M3 §6]. The diagram is missing, and with it perhaps exits that the table does not
 #: print [C65].
@@ -133,9 +104,9 @@ class StateMachine:
         self.coasts = True
         self._exits = {**_EXITS, **_UNLISTED[unlisted]}
 
-    def update(self, word: Control, *, inhibited: bool) -> None:
+    def update(self, word: Stw1, *, inhibited: bool) -> None:
         """Take the word of a telegram (inhibited: a fault keeps the module from switching on)."""
-        if not word & Control.CONTROL_BY_PLC:
+        if not word & Stw1.CONTROL_BY_PLC:
             # the whole word is ignored [M3 §7.2.1, C107]
             return
         order, before = Order.of(word), self.state
@@ -193,11 +164,11 @@ class SinusHControlUnit(ControlUnit):
     """
 
     variant: SinusHVariant
-    word: Control
+    word: Stw1
     setpoint: float
     machine: StateMachine
     #: The last word that was not ignored [C107].
-    _obeyed: Control
+    _obeyed: Stw1
     _lost: Lost
     _held: float
     _keypad_runs: bool
@@ -209,37 +180,37 @@ class SinusHControlUnit(ControlUnit):
 
     # ---- what it takes and shows ----
 
-    def take_telegram(self, word: Control, setpoint: int) -> None:
+    def take_telegram(self, word: Stw1, setpoint: int) -> None:
         """Take control word and set-point (0.01 Hz) of a telegram."""
         self.fieldbus.heard()
         if self._lost is Lost.HOLDS:
             self._lost = Lost.NOTHING
         rises = word & ~self.word
         self.word = word
-        if word & Control.CONTROL_BY_PLC:
+        if word & Stw1.CONTROL_BY_PLC:
             # without it the drive goes on at the last set-point, too [C116]
             self.setpoint = (setpoint & 0xFFFF) / 100
             self._obeyed = word
-            if rises & Control.FAULT_ACKNOWLEDGE:
+            if rises & Stw1.FAULT_ACKNOWLEDGE:
                 self.faults.acknowledge()
         self.machine.update(word, inhibited=bool(self.faults))
         self.settle()
 
     @property
-    def status_word(self) -> Status:
+    def status_word(self) -> Zsw1:
         """ZSW1 [M3 §7.2.2]."""
         status = _PATTERNS[self.machine.state]
         if self.variant.echo_bits == 'word':
-            status &= ~(Status.READY_FOR_OPERATION | Status.OPERATION)
-            status |= _if(self.word & Control.ON, Status.READY_FOR_OPERATION)
-            status |= _if(self.word & Control.ENABLE_OPERATION, Status.OPERATION)
-        status |= _if(self.word & Control.NO_COAST_STOP, Status.NO_COAST_STOP)
-        status |= _if(self.word & Control.NO_QUICK_STOP, Status.NO_QUICK_STOP)
-        status |= _if(self.word & Control.CONTROL_BY_PLC, Status.CONTROL_REQUESTED)
-        status |= _if(self.faults, Status.FAULT)
+            status &= ~(Zsw1.READY_TO_OPERATE | Zsw1.OPERATION_ENABLED)
+            status |= _if(self.word & Stw1.ON, Zsw1.READY_TO_OPERATE)
+            status |= _if(self.word & Stw1.ENABLE_OPERATION, Zsw1.OPERATION_ENABLED)
+        status |= _if(self.word & Stw1.NO_COAST_STOP, Zsw1.NO_COAST_STOP)
+        status |= _if(self.word & Stw1.NO_QUICK_STOP, Zsw1.NO_QUICK_STOP)
+        status |= _if(self.word & Stw1.CONTROL_BY_PLC, Zsw1.CONTROL_REQUESTED)
+        status |= _if(self.faults, Zsw1.FAULT)
         lost = self._lost is not Lost.NOTHING
-        status |= _if(lost or self.motor.limited or self.faults.alarms, Status.WARNING)
-        return status | _if(self._runs and self.motor.reached, Status.SPEED_REACHED)
+        status |= _if(lost or self.motor.limited or self.faults.alarms, Zsw1.WARNING)
+        return status | _if(self._runs and self.motor.reached, Zsw1.WITHIN_TOLERANCE)
 
     @property
     def actual(self) -> int:
@@ -251,7 +222,7 @@ class SinusHControlUnit(ControlUnit):
     def restart(self) -> None:
         """Begin as after power-on."""
         self.initialised = False
-        self.word = self._obeyed = Control(0)
+        self.word = self._obeyed = Stw1(0)
         self.setpoint = 0.0
         self.machine = StateMachine(self.variant.unlisted_exits)
         self.fieldbus.forget()
@@ -356,9 +327,9 @@ class SinusHControlUnit(ControlUnit):
             reference = self.setpoint
         if self._commanded:
             word = self._obeyed
-            if not word & Control.ENABLE_RAMP or not word & Control.ENABLE_SETPOINT:
+            if not word & Stw1.ENABLE_RAMP or not word & Stw1.ENABLE_SETPOINT:
                 reference = 0.0
-            elif not word & Control.UNFREEZE_RAMP:
+            elif not word & Stw1.UNFREEZE_RAMP:
                 reference = self.motor.ramp
         return min(reference, self.memory.number(keypad.MAX_FREQ))
 
@@ -375,5 +346,5 @@ class SinusHControlUnit(ControlUnit):
         }
 
 
-def _if(condition: object, bit: Status) -> Status:
-    return bit if condition else Status(0)
+def _if(condition: object, bit: Zsw1) -> Zsw1:
+    return bit if condition else Zsw1(0)

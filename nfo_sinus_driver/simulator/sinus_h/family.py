@@ -20,13 +20,8 @@ from nfo_sinus_driver.simulator.parameter_channel import (
     read_only,
 )
 from nfo_sinus_driver.simulator.sinus_h import keypad
-from nfo_sinus_driver.simulator.sinus_h.control_unit import (
-    Control,
-    SinusHControlUnit,
-    SinusHVariant,
-    Status,
-)
-from nfo_sinus_driver.simulator.telegram1 import clipped
+from nfo_sinus_driver.simulator.sinus_h.control_unit import SinusHControlUnit, SinusHVariant
+from nfo_sinus_driver.simulator.telegram1 import Stw1, Zsw1, clipped
 
 
 class Server(telegram1.Server):
@@ -36,8 +31,8 @@ class Server(telegram1.Server):
     With bit 0 clear alone it would stay in operation, and with bit 10 clear nothing counts [C107].
     """
 
-    lost_clears = int(Control.ON | Control.NO_QUICK_STOP)
-    lost_sets = int(Control.CONTROL_BY_PLC)
+    lost_clears = int(Stw1.ON | Stw1.NO_QUICK_STOP)
+    lost_sets = int(Stw1.CONTROL_BY_PLC)
 
     def __init__(self, drive: SimulatedDrive) -> None:
         assert isinstance(drive.control_unit, SinusHControlUnit)
@@ -61,13 +56,13 @@ class Server(telegram1.Server):
         """Alarm information, torque (0.1 %) and current (0.1 A) [M3 §7.2.5 to §7.2.7]."""
         unit = self._unit
         # which bit of it a trip sets is not printed [C69]
-        alarms = (1 if unit.faults else 0) | (_WARNING if unit.status_word & Status.WARNING else 0)
+        alarms = (1 if unit.faults else 0) | (_WARNING if unit.status_word & Zsw1.WARNING else 0)
         torque, current = clipped(1000 * unit.motor.torque), clipped(10 * unit.motor.current)
         return alarms, torque & 0xFFFF, current & 0xFFFF
 
     def exchange(self, stw1: int, setpoint: int) -> tuple[int, int]:
         """Take control word and set-point; return status word and actual value."""
-        self._unit.take_telegram(Control(stw1), setpoint)
+        self._unit.take_telegram(Stw1(stw1), setpoint)
         return int(self._unit.status_word), clipped(self._unit.actual)
 
     def _profile(self) -> Entries:
@@ -77,7 +72,7 @@ class Server(telegram1.Server):
             922: (lambda: _VENDOR_TELEGRAM if self._vendor else 1,),
             944: (lambda: len(unit.faults.log),),
             947: tuple(self._message(index) for index in range(_MESSAGES)),
-            953: (lambda: int(bool(unit.status_word & Status.WARNING)),),
+            953: (lambda: int(bool(unit.status_word & Zsw1.WARNING)),),
             964: tuple(map(_constant, (849, 1, 102, 2015, 2512))),
             965: (lambda: 0x0328,),
             967: (lambda: int(unit.word),),
