@@ -65,11 +65,17 @@ class Requests(abc.ABC):
     def write(self, register: int, words: Sequence[int]) -> None:
         """Write words from a register on (Refused: as the reason says)."""
 
-    @abc.abstractmethod
+    def require(self, register: int, count: int) -> None:
+        """See to it that words can be read, or :class:`Refused`: for function 23, if it has it."""
+        raise Refused(Reason.FUNCTION, 'there is no function 23')
+
     def write_and_read(
         self, register: int, words: Sequence[int], source: int, count: int
     ) -> tuple[int, ...]:
         """Write at ``register``, then read at ``source``; or none of both."""
+        self.require(source, count)
+        self.write(register, words)
+        return self.read(source, count)
 
     def answer(self, pdu: bytes) -> bytes:
         """Carry out a request PDU and return the answer PDU; empty if it stays silent."""
@@ -77,24 +83,21 @@ class Requests(abc.ABC):
         treated = self.treats(function)
         if treated == SILENT:
             return b''
+        if treated == REFUSED:
+            return pymodbus_compat.encode_exception(function, Reason.FUNCTION)
         try:
-            if treated == REFUSED:
-                raise Refused(Reason.FUNCTION, f'function {function} is not supported')
-            try:
-                return self._carry_out(function, pdu[1:])
-            except ValueError as error:
-                raise Refused(Reason.VALUE, str(error)) from error
+            return self._carry_out(function, pdu[1:])
+        except ValueError:
+            return pymodbus_compat.encode_exception(function, Reason.VALUE)
         except Refused as refused:
             return pymodbus_compat.encode_exception(function, refused.reason)
 
     # ---- requests ----
 
     def _carry_out(self, function: int, data: bytes) -> bytes:
-        if function == READ:
-            return pymodbus_compat.encode_read(self._read_words(data))
-        if function == READ_INPUT:
-            # the same registers by another function [M1]
-            return pymodbus_compat.encode_read_input(self._read_words(data))
+        if function in (READ, READ_INPUT):
+            # the same registers by either [M1]
+            return pymodbus_compat.encode_registers(function, self._read_words(data))
         if function == WRITE_SINGLE:
             return self._write_single(data)
         if function == WRITE_MULTIPLE:
@@ -133,9 +136,8 @@ class Requests(abc.ABC):
         right = right and data[8] == 2 * count and 1 <= wanted <= _MOST_READ
         if not right or len(data) != 9 + 2 * count:
             raise Refused(Reason.VALUE, f'a write of {count} and read of {wanted} is malformed')
-        return pymodbus_compat.encode_write_and_read(
-            self.write_and_read(register, words, source, wanted)
-        )
+        read = self.write_and_read(register, words, source, wanted)
+        return pymodbus_compat.encode_registers(WRITE_AND_READ, read)
 
     def _report_slave_id(self, data: bytes) -> bytes:
         if data:
@@ -201,13 +203,9 @@ class Server(Requests):
         self.drive.write_raw(parameter.key, kept(parameter, raw, 'modbus'))
         self.drive.control_unit.written(parameter.key, 'modbus')
 
-    def write_and_read(
-        self, register: int, words: Sequence[int], source: int, count: int
-    ) -> tuple[int, ...]:
-        """Write the parameter at ``register``, then read that at ``source``; or none of both."""
-        self._find(source, count)
-        self.write(register, words)
-        return self.read(source, count)
+    def require(self, register: int, count: int) -> None:
+        """See to it that a parameter stands at a register, and has so many."""
+        self._find(register, count)
 
     def _log_entry(self, register: int, count: int) -> tuple[int, ...] | None:
         """Return the entry of the error log at ``register``; ``None`` if it is none."""

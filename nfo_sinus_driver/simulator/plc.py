@@ -325,13 +325,9 @@ class Registers(modbus.Requests):
         channel, offset = self._find(register, len(words))
         channel.put(offset, tuple(words))
 
-    def write_and_read(
-        self, register: int, words: Sequence[int], source: int, count: int
-    ) -> tuple[int, ...]:
-        """Write, then read; or none of both."""
-        self._find(source, count)
-        self.write(register, words)
-        return self.read(source, count)
+    def require(self, register: int, count: int) -> None:
+        """See to it that a block has registers (Refused: ADDRESS)."""
+        self._find(register, count)
 
     def _find(self, register: int, count: int) -> tuple[Channel, int]:
         for channel in self._channels:

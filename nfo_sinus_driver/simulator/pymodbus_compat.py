@@ -51,14 +51,17 @@ _WRITE = (
     'pymodbus.register_write_message',
 )
 _ReadRequest = _first_of(_READ, 'ReadHoldingRegistersRequest')
-_ReadResponse = _first_of(_READ, 'ReadHoldingRegistersResponse')
-_ReadInputResponse = _first_of(_READ, 'ReadInputRegistersResponse')
 _WriteSingleRequest = _first_of(_WRITE, 'WriteSingleRegisterRequest')
 _WriteSingleResponse = _first_of(_WRITE, 'WriteSingleRegisterResponse')
 _WriteMultipleRequest = _first_of(_WRITE, 'WriteMultipleRegistersRequest')
 _WriteMultipleResponse = _first_of(_WRITE, 'WriteMultipleRegistersResponse')
 _WriteAndReadRequest = _first_of(_READ, 'ReadWriteMultipleRegistersRequest')
-_WriteAndReadResponse = _first_of(_READ, 'ReadWriteMultipleRegistersResponse')
+#: The answers that are registers, by their functions.
+_REGISTERS = {
+    3: _first_of(_READ, 'ReadHoldingRegistersResponse'),
+    4: _first_of(_READ, 'ReadInputRegistersResponse'),
+    23: _first_of(_READ, 'ReadWriteMultipleRegistersResponse'),
+}
 _MEI = ('pymodbus.pdu.mei_message', 'pymodbus.mei_message')
 _DeviceRequest = _first_of(_MEI, 'ReadDeviceInformationRequest')
 _DeviceResponse = _first_of(_MEI, 'ReadDeviceInformationResponse')
@@ -134,14 +137,9 @@ def decode_device(data: bytes) -> tuple[int, int]:
     return request.read_code, request.object_id
 
 
-def encode_read(words: Sequence[int]) -> bytes:
-    """Return the answer PDU of function 03."""
-    return _encoded(_ReadResponse(), registers=list(words))
-
-
-def encode_read_input(words: Sequence[int]) -> bytes:
-    """Return the answer PDU of function 04."""
-    return _encoded(_ReadInputResponse(), registers=list(words))
+def encode_registers(function: int, words: Sequence[int]) -> bytes:
+    """Return the answer PDU of function 03, 04 or 23."""
+    return _encoded(_REGISTERS[function](), registers=list(words))
 
 
 def encode_write_single(register: int, word: int) -> bytes:
@@ -152,11 +150,6 @@ def encode_write_single(register: int, word: int) -> bytes:
 def encode_write_multiple(register: int, count: int) -> bytes:
     """Return the answer PDU of function 16."""
     return _encoded(_WriteMultipleResponse(), address=register, count=count)
-
-
-def encode_write_and_read(words: Sequence[int]) -> bytes:
-    """Return the answer PDU of function 23."""
-    return _encoded(_WriteAndReadResponse(), registers=list(words))
 
 
 def encode_device(code: int, conformity: int, objects: Mapping[int, bytes]) -> bytes:

@@ -107,12 +107,6 @@ class Server(modbus.Requests):
         self.drive.command_writes[f'line.r{register:04x}'] += 1
         self._unit.settle()
 
-    def write_and_read(
-        self, register: int, words: Sequence[int], source: int, count: int
-    ) -> tuple[int, ...]:
-        """Refuse: no such drive has the function."""
-        raise Refused(Reason.FUNCTION, 'there is no function 23')
-
     def _check_count(self, count: int) -> None:
         if count > self._file.line.most_registers:
             raise Refused(Reason.VALUE, f'{count} registers are too many for a message')
