@@ -12,7 +12,7 @@ is its code.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import enum
 from fractions import Fraction
 import functools
@@ -123,20 +123,20 @@ class Parameter:
     name: str
     group: str
     addresses: Mapping[str, Address]
-    scale: str
-    unit: str
-    minimum: Fraction | None
-    maximum: Fraction | None
-    steps: Sequence[tuple[Fraction, Fraction]]
-    decimals: int
-    labels: Mapping[int, str]
     access: Access
-    stopped: bool
-    since: Fraction | None
-    older: bool
-    option: str
-    description: str
-    source: str
+    scale: str = ''
+    unit: str = ''
+    minimum: Fraction | None = None
+    maximum: Fraction | None = None
+    steps: Sequence[tuple[Fraction, Fraction]] = ()
+    decimals: int = 0
+    labels: Mapping[int, str] = field(default_factory=dict)
+    stopped: bool = False
+    since: Fraction | None = None
+    older: bool = False
+    option: str = ''
+    description: str = ''
+    source: str = ''
     none: int | None = None
 
     @functools.cached_property

@@ -315,7 +315,5 @@ def internal(key: str, address: Address, access: Access, unit: str = '') -> Para
     """Return a parameter that is no setting."""
     group = {'measured': 'Status'}.get(key.partition('.')[0], _FIELDBUS)
     return Parameter(
-        key=key, name=key, group=group, addresses={'modbus': address}, scale='', unit=unit,
-        minimum=None, maximum=None, steps=(), decimals=0, labels={}, access=access, stopped=False,
-        since=None, older=False, option='', description='', source='',
+        key=key, name=key, group=group, addresses={'modbus': address}, access=access, unit=unit
     )

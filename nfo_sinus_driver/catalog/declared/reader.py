@@ -28,7 +28,7 @@ from nfo_sinus_driver.catalog.declared.description import (
 )
 from nfo_sinus_driver.catalog.declared.parameter_table import with_parameters
 from nfo_sinus_driver.catalog.declared.places import WORD, PlacedCondition, Places, internal
-from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters
+from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters, with_scale
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
 from nfo_sinus_driver.catalog.parameter import Access, Parameter, Value
 from nfo_sinus_driver.catalog.status import Role
@@ -288,12 +288,11 @@ class _Reader:
     ) -> tuple[dict[str, Parameter], dict[Role, str]]:
         made: dict[str, Parameter] = {}
         roles: dict[Role, str] = {Role.STATUS_WORD: 'line.status'}
-        settings = Settings.scales(self._root)
         for name, node in self._root.get('measured').mapping.items():
             role, key = Role(name), f'measured.{name}'
             address = self._places.address(node, name)
             parameter = internal(key, address, Access.READ, _UNITS.get(name, ''))
-            made[key] = settings(node, parameter)
+            made[key] = with_scale(node, parameter)
             roles[role] = key
         self._require_own_registers(made)
         return made, roles

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 from nfo_sinus_driver.catalog.declared.places import Places
@@ -68,11 +68,10 @@ class Settings:
         decimals = len(str(float(factor)).partition('.')[2]) if factor and factor < 1 else 0
         return Parameter(
             key=key, name=node.text('name', name), group=group.replace('_', ' ').capitalize(),
-            addresses={}, scale='', unit=node.text('unit'), minimum=node.number('minimum'),
-            maximum=node.number('maximum'), steps=(), decimals=decimals,
-            labels=self._labels(key, node), access=access,
-            stopped=not node.flag('while_running', True), since=None, older=False, option='',
-            description=node.text('description'), source=node.text('source'),
+            addresses={}, access=access, unit=node.text('unit'), minimum=node.number('minimum'),
+            maximum=node.number('maximum'), decimals=decimals, labels=self._labels(key, node),
+            stopped=not node.flag('while_running', True), description=node.text('description'),
+            source=node.text('source'),
         )
 
     def _labels(self, key: str, node: Node) -> Mapping[int, str]:
@@ -163,26 +162,19 @@ class Settings:
 
     def scaled(self, node: Node, parameter: Parameter) -> Parameter:
         """Return a parameter with the scale and the empty value that a node gives it."""
-        found = self.scales(self._root)(node, parameter)
+        found = with_scale(node, parameter)
         if found.scale and found.scale not in self._root.get('parameters'):
             self._problems.add(
                 node['scaled_by'].line, f'{found.scale} is none of the parameters: add it there'
             )
         return found
 
-    @staticmethod
-    def scales(root: Node) -> Callable[[Node, Parameter], Parameter]:
-        """Return what gives a parameter its scale and its empty value."""
 
-        def scaled(node: Node, parameter: Parameter) -> Parameter:
-            none = node.get('none').scalar
-            return replace(
-                parameter,
-                scale=node.text('scaled_by'),
-                none=none if isinstance(none, int) else None,
-            )
-
-        return scaled
+def with_scale(node: Node, parameter: Parameter) -> Parameter:
+    """Return a parameter with the scale and the empty value that a node gives it, unchecked."""
+    none = node.get('none').scalar
+    scale = node.text('scaled_by')
+    return replace(parameter, scale=scale, none=none if isinstance(none, int) else None)
 
 
 def role_parameters(root: Node) -> Mapping[Role, str]:

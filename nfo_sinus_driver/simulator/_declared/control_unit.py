@@ -46,12 +46,13 @@ class DeclaredVariant(Variant):
 class DeclaredControlUnit(ControlUnit):
     """Takes the words of the file; what they mean it knows from the lists of the file alone."""
 
+    variant: DeclaredVariant
+
     def __init__(
         self, memory: Memory, address: int, variant: DeclaredVariant, drive: Description
     ) -> None:
         self._drive = drive
         super().__init__(memory, address, variant)
-        self._variant = variant
         self._orders = orders_of(drive)
         self._words: dict[Place, int] = {}
         self._run = self._reverse = self._coasts = self._quick = False
@@ -79,7 +80,7 @@ class DeclaredControlUnit(ControlUnit):
     def take(self, place: Place, word: int) -> None:
         """Take a word, or a coil, that is a command."""
         if not self.obeys:
-            if self._variant.in_local == 'refuses':
+            if self.variant.in_local == 'refuses':
                 raise Refused(Reason.STATE, 'the line has no control')
             return
         self._words[place] = word
@@ -180,9 +181,9 @@ class DeclaredControlUnit(ControlUnit):
                 wishes.append((order.shows, True, _AWAITED))
         codes = drive.codes
         if codes is None:
-            return compose(wishes, 0, 0)
+            return compose(tuple(wishes), 0, 0)
         number = self._number(fault) if is_fault else codes.none
-        return compose(wishes, codes.mask, number << codes.shift)
+        return compose(tuple(wishes), codes.mask, number << codes.shift)
 
     def _number(self, code: int) -> int:
         return _UNNAMED if code in self._flags else drive_number(code)
@@ -230,7 +231,7 @@ class DeclaredControlUnit(ControlUnit):
         """Run the motor, ramp it to a stop, or let it go."""
         motor = self.motor
         if self.faults:
-            self._run = self._run and self._variant.run_command_in_fault == 'keeps'
+            self._run = self._run and self.variant.run_command_in_fault == 'keeps'
             motor.release()
             return
         self._set_ramps()
@@ -245,13 +246,12 @@ class DeclaredControlUnit(ControlUnit):
     @property
     def _demand(self) -> float:
         """The frequency of the set-point (Hz), no greater than the drive allows."""
-        place, drive = self._drive.setpoint, self._drive
+        place = self._drive.setpoint
         value = self.memory.number(place.key) * self.scale(place.key)
         most = self.memory.number(place.limit, place.most) if place.limit else place.most
         value = max(-most, min(most, value))
         if place.mode == 'Speed':
             value = value * self.motor.plate.pole_pairs / 60
-        assert drive.setpoint is place
         return -abs(value) if self._reverse and place.direction is not None else value
 
     def _set_ramps(self) -> None:
@@ -301,7 +301,7 @@ class DeclaredControlUnit(ControlUnit):
 
     def admit(self, key: str) -> None:
         """Refuse the set-point where the line has no control."""
-        refuses = self._variant.in_local == 'refuses' and not self.obeys
+        refuses = self.variant.in_local == 'refuses' and not self.obeys
         if key == self._drive.setpoint.key and refuses:
             raise Refused(Reason.STATE, 'the line has no control')
 

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 import functools
 import itertools
 
@@ -20,17 +20,13 @@ _MOST_TRIED = 4096
 Wish = tuple[Condition, bool, int]
 
 
-def compose(wishes: Iterable[Wish], fixed_mask: int, fixed: int) -> int:
+@functools.lru_cache(maxsize=1024)
+def compose(wishes: tuple[Wish, ...], fixed_mask: int, fixed: int) -> int:
     """
     Return a status by which as much as possible is as wished.
 
     :param fixed_mask: bits that are what ``fixed`` has.
     """
-    return _composed(tuple(wishes), fixed_mask, fixed)
-
-
-@functools.lru_cache(maxsize=1024)
-def _composed(wishes: tuple[Wish, ...], fixed_mask: int, fixed: int) -> int:
     status = fixed & fixed_mask
     for group in _groups(wishes):
         mask = 0
