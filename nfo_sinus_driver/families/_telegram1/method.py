@@ -12,7 +12,7 @@ refused, so that nothing but an enable lets it run again [C108].
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -71,13 +71,19 @@ class Words(StatusWord):
         return facts if word & RELEASED else facts & ~Fact.NETWORK_CONTROL
 
 
-def code_of(word: int, state: State, *, fault: int, warning: int = 0) -> int:
-    """Return the code that a status word tells: fault, no release, warning, or its state."""
-    if word & fault:
-        return FAULT
-    if not word & RELEASED:
-        return NOT_RELEASED
-    return WARNING if word & warning else _BY_STATE[state]
+def code_by(
+    state_of: Callable[[int], State], *, fault: int, warning: int = 0
+) -> Callable[[int], int]:
+    """Return what gives the code that a status word tells, by its bits and the state of ZSW1."""
+
+    def code(word: int) -> int:
+        if word & fault:
+            return FAULT
+        if not word & RELEASED:
+            return NOT_RELEASED
+        return WARNING if word & warning else _BY_STATE[state_of(word & 0xFFFF)]
+
+    return code
 
 
 class Telegram1(ControlMethod):

@@ -55,13 +55,17 @@ _ELSEWHERE = (
     ('serial.master_slave', True, 'P880 to No'),
     ('serial.manual_operation', True, 'P870 to No at the keypad'),
 )
-#: The V/f pattern of each parameter set, and the least frequency of each pattern.
+#: The V/f pattern of each parameter set.
 _PATTERNS = ('frequency.vf_pattern_1', 'frequency.vf_pattern_2')
-_LEAST = {
-    'V/f pattern 1': 'frequency.f_min_1',
-    'V/f pattern 2': 'frequency.f_min_2',
-    'V/f pattern 3': 'frequency.f_min_3',
-}
+
+
+def _by_pattern(name: str) -> Mapping[str, str]:
+    """Return the parameter of each V/f pattern."""
+    return {f'V/f pattern {number}': f'frequency.{name}_{number}' for number in (1, 2, 3)}
+
+
+#: The least frequency; that at which a motor has its rated voltage; and the greatest.
+_LEAST, _BASE, _GREATEST = map(_by_pattern, ('f_min', 'f_base', 'f_max'))
 #: Changed while the motor is enabled, each could turn it otherwise than the line says.
 START_SETTINGS = frozenset(
     (
@@ -72,17 +76,6 @@ START_SETTINGS = frozenset(
         *(CONTROL_MODE, 'motor.enable_set_selection'),
     )
 )
-#: The frequency at which a motor has its rated voltage, and the greatest, by pattern.
-_BASE = {
-    'V/f pattern 1': 'frequency.f_base_1',
-    'V/f pattern 2': 'frequency.f_base_2',
-    'V/f pattern 3': 'frequency.f_base_3',
-}
-_GREATEST = {
-    'V/f pattern 1': 'frequency.f_max_1',
-    'V/f pattern 2': 'frequency.f_max_2',
-    'V/f pattern 3': 'frequency.f_max_3',
-}
 
 
 class Size(SetpointTarget):

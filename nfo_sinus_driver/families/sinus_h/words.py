@@ -29,9 +29,7 @@ STATUS_WORD = Words(
     # bit 2 is what the driver has commanded: with the state it tells that [C63]
     by_state={State.OPERATION_ENABLED: Fact.OPERATION_ENABLED},
     stateless=True,
-    code=lambda word: method.code_of(
-        word, state_of(word & 0xFFFF), fault=Status.FAULT, warning=Status.WARNING
-    ),
+    code=method.code_by(state_of, fault=Status.FAULT, warning=Status.WARNING),
     by_frequency=True,
     only_frequency=True,
 )

@@ -128,12 +128,7 @@ PROFILE = Profile(
         by_state={},
         by_clear_bit={_Bits.NO_QUICK_STOP: Fact.QUICK_STOP_ACTIVE},
         stateless=True,
-        code=lambda word: method.code_of(
-            word,
-            profidrive.state_of(word & 0xFFFF),
-            fault=_Bits.FAULT,
-            warning=_Bits.WARNING,
-        ),
+        code=method.code_by(profidrive.state_of, fault=_Bits.FAULT, warning=_Bits.WARNING),
         # on the ramp to a stop the states look alike, and bit 15 only says that pulses are enabled
         by_frequency=True,
         only_frequency=True,
@@ -167,10 +162,8 @@ PROFILE = replace(
                 by_bit=drivecontrol.STATUS_WORD.by_bit,
                 by_state=drivecontrol.STATUS_WORD.by_state,
                 frequency_beside=True,
-                code=lambda word: method.code_of(
-                    word,
-                    drivecontrol.state_of(word & 0xFFFF),
-                    fault=drivecontrol.Status.FAULTED,
+                code=method.code_by(
+                    drivecontrol.state_of, fault=drivecontrol.Status.FAULTED
                 ),
             ),
         ),

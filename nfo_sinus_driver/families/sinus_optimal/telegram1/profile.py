@@ -80,12 +80,7 @@ PROFILE = Profile(
         by_state=STATUS_WORD.by_state,
         stateless=True,
         frequency_beside=True,
-        code=lambda word: method.code_of(
-            word,
-            state_of(word & 0xFFFF),
-            fault=Status.FAULT_ACTIVE,
-            warning=Status.ALARM_ACTIVE,
-        ),
+        code=method.code_by(state_of, fault=Status.FAULT_ACTIVE, warning=Status.ALARM_ACTIVE),
     ),
     holders={},
     methods={'telegram1': OptimalTelegram1},
