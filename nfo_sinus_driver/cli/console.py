@@ -145,6 +145,12 @@ def columns(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list
     return lines
 
 
+def put_columns(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> None:
+    """Print rows with aligned columns."""
+    for line in columns(rows, right=right):
+        put(line)
+
+
 _CALLS = Calls(
     acknowledge='type nfo-sinus ack',
     enable='run it again',

@@ -9,8 +9,8 @@ import argparse
 import sys
 
 from nfo_sinus_driver import catalog
-from nfo_sinus_driver.catalog.finding import Found, every, find
-from nfo_sinus_driver.cli.console import columns, put
+from nfo_sinus_driver.catalog.finding import every, find
+from nfo_sinus_driver.cli.console import put, put_columns
 from nfo_sinus_driver.cli.options import Verb
 
 #: What many manuals print for the register that is sent as 0.
@@ -83,18 +83,14 @@ def notes(family: catalog.Family) -> list[str]:
 
 def put_families() -> None:
     """Print all families that are found, and where."""
-    rows = [(one.name, one.title, one.of, one.place) for one in sorted(every(), key=_order)]
-    for line in columns([('family', 'title', 'found in', 'place'), *rows]):
-        put(line)
-
-
-def _order(one: Found) -> str:
-    return one.name
+    found = sorted(every(), key=lambda one: one.name)
+    rows = [(one.name, one.title, one.of, one.place) for one in found]
+    put_columns([('family', 'title', 'found in', 'place'), *rows])
 
 
 def main() -> int:
     """Run the command ``families``."""
-    if sys.argv[1:2] and sys.argv[1] not in ('--ros-args',):
+    if sys.argv[1:2] and sys.argv[1] != '--ros-args':
         put('usage: families lists the families of drives that are found, and where')
         return 0 if sys.argv[1] in ('-h', '--help') else 2
     put_families()

@@ -19,6 +19,7 @@ from nfo_sinus_driver.cli.console import (
     listed,
     progress,
     put,
+    put_columns,
     require_yes,
     say,
 )
@@ -77,8 +78,7 @@ class Info(Verb):
         if options.json:
             put(as_json(facts, indent=2))
         else:
-            for line in columns([(name, fact or '-') for name, fact in facts.items()]):
-                put(line)
+            put_columns([(name, fact or '-') for name, fact in facts.items()])
         return 0
 
 
@@ -110,7 +110,7 @@ class List(Verb):
             for key, parameter in wanted.items()
         ]
         group = ''
-        for line, parameter in zip(columns(rows) if rows else (), wanted.values(), strict=True):
+        for line, parameter in zip(columns(rows), wanted.values(), strict=True):
             if parameter.group != group:
                 put(f'{chr(10) if group else ""}{parameter.group}')
                 group = parameter.group
@@ -138,8 +138,7 @@ class Get(Verb):
         if options.json:
             _put_values(wanted, values)
             return 0
-        for line in columns([(key, shown(values[key], wanted[key].unit)) for key in wanted]):
-            put(line)
+        put_columns([(key, shown(values[key], wanted[key].unit)) for key in wanted])
         return 0
 
 
@@ -165,21 +164,18 @@ class Errors(Verb):
             if options.erase and drive.read_status().driven:
                 raise CliError(f'the motor runs ({drive.state.describe()}): stop it first')
         rows = [_as_row(entry) for entry in entries]
+        if not options.json:
+            _put_entries(entries)
         if options.erase:
-            for line in _as_lines(entries) if not options.json else ():
-                put(line)
             return _erase(options, entries, rows)
         if options.json:
             put(as_json(rows, indent=2))
-            return 0
-        for line in _as_lines(entries):
-            put(line)
-        if not entries:
+        elif not entries:
             put('the error log is empty')
         return 0
 
 
-def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
+def _put_entries(entries: Sequence[LogEntry]) -> None:
     def hours(value: float, unit: str) -> str:
         return '-' if math.isnan(value) else f'{value:.1f} {unit}'
 
@@ -193,7 +189,7 @@ def _as_lines(entries: Sequence[LogEntry]) -> list[str]:
         )
         for entry in entries
     ]
-    return columns(rows, right=(0, 1))
+    put_columns(rows, right=(0, 1))
 
 
 def _as_row(entry: LogEntry) -> dict[str, object]:

@@ -20,10 +20,10 @@ from nfo_sinus_driver.cli.console import (
     Interrupted,
     UsageError,
     as_json,
-    columns,
     listed,
     progress,
     put,
+    put_columns,
     remark,
     say,
     signals_handled,
@@ -358,8 +358,7 @@ class Diff(Verb):
             put(as_json(table, indent=2))
         elif differing:
             rows = [(key, _cell(left, key, model), _cell(right, key, model)) for key in differing]
-            for line in columns([('', left.name, right.name), *rows]):
-                put(line)
+            put_columns([('', left.name, right.name), *rows])
         return int(bool(differing))
 
 
