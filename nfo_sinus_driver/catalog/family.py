@@ -169,7 +169,8 @@ class Family(Mapping[str, Parameter]):
         return abs(value) <= most and in_range
 
 
-def _folders() -> Mapping[str, Path]:
+def folders() -> Mapping[str, Path]:
+    """Return the folders that families have, by their names."""
     roots = [Path(root) for root in importlib.import_module(_FAMILIES).__path__]
     found = [path.parent for root in roots for path in root.glob('*/parameters.csv')]
     return {folder.name: folder for folder in sorted(found)}
@@ -177,12 +178,12 @@ def _folders() -> Mapping[str, Path]:
 
 def families() -> tuple[str, ...]:
     """Return the names of the families that there are folders of."""
-    return tuple(sorted(_folders()))
+    return tuple(sorted(folders()))
 
 
 def is_family(name: str) -> bool:
     """Tell whether a name is that of a folder, or the path of a file that describes a drive."""
-    return is_described(name) or name in _folders()
+    return is_described(name) or name in folders()
 
 
 def is_described(name: str) -> bool:
@@ -197,15 +198,13 @@ def usual_family() -> str:
 
 def _has_profile(name: str, method: str) -> bool:
     """Tell whether a control method has a profile of its own."""
-    folders = _folders()
-    if not method or name not in folders:
-        return False
-    return (folders[name] / method / 'profile.py').exists()
+    folder = folders().get(name)
+    return bool(method) and folder is not None and (folder / method / 'profile.py').exists()
 
 
 def _place(name: str, method: str) -> tuple[str, Path]:
     """Return package and folder of a family, or those that a control method of it has."""
-    folder = _folders()[name]
+    folder = folders()[name]
     package = f'{_FAMILIES}.{name}'
     if _has_profile(name, method):
         return f'{package}.{method}', folder / method
@@ -231,8 +230,7 @@ def load_profile(name: str, method: str = '') -> Profile:
     """
     if is_described(name):
         return _described(name).profile
-    folders = _folders()
-    if name not in folders:
+    if name not in folders():
         raise ValueError(f'unknown model {name!r}: choose one of {", ".join(families())}')
     package, folder = _place(name, method)
     if not (folder / '__init__.py').exists():

@@ -14,14 +14,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+import functools
 import importlib
 import importlib.metadata
 import importlib.util
+import logging
 import os
 from pathlib import Path
 
-from nfo_sinus_driver.catalog.family import DESCRIBED, families, is_described, load_profile
+from nfo_sinus_driver.catalog.family import DESCRIBED, folders, is_described, load_profile
 from nfo_sinus_driver.catalog.table import CatalogError
+
+_log = logging.getLogger(__name__)
 
 #: The type of the resource, and the group of the entry points.
 GROUP = 'nfo_sinus_driver.families'
@@ -62,33 +66,41 @@ def find(text: str) -> str:
         return _file(_in_package(text), text)
     if is_described(text) or os.sep in text:
         return _file(Path(text).expanduser().absolute(), text)
-    found = {one.name: one.model for one in reversed(list(every()))}
+    found: dict[str, list[Found]] = {}
+    for one in every():
+        found.setdefault(one.name, []).append(one)
     if text not in found:
         raise ValueError(
             f'there is no family {text!r}: choose one of {", ".join(sorted(found))}, the path of a '
             f'file NAME{DESCRIBED}, or package://PACKAGE/PATH'
         )
-    return _usable(found[text])
+    taken, *others = found[text]
+    for other in others:
+        # of one package the file in the first workspace hides the others: that is meant so
+        if other.of != taken.of:
+            _report_hidden(text, taken.place, other.place)
+    return _usable(taken.model)
+
+
+@functools.cache
+def _report_hidden(name: str, taken: str, hidden: str) -> None:
+    """Warn, once, of a family that is not found by its name."""
+    _log.warning(
+        f'two packages have a family {name}: {taken} is taken, not {hidden}; to have that one, '
+        'give its path as family'
+    )
 
 
 def every() -> Iterator[Found]:
     """Yield all families that are found by name; of two with one name the first counts."""
     _take_entry_points()
     root = Path(next(iter(importlib.import_module(GROUP).__path__)))
-    for name in families():
-        folder = _folder(name)
+    for name, folder in sorted(folders().items()):
         yield Found(name, name, str(folder), 'shipped' if root in folder.parents else 'entry point')
     for path in sorted((root / '_declared').glob(f'*{DESCRIBED}')):
         yield Found(_name(path), str(path), str(path), 'shipped')
     for package, path in _told_by_packages():
         yield Found(_name(path), str(path), str(path), f'package {package}')
-
-
-def _folder(name: str) -> Path:
-    for root in importlib.import_module(GROUP).__path__:
-        if (Path(root) / name / 'parameters.csv').exists():
-            return Path(root) / name
-    return Path(name)
 
 
 def _name(path: Path) -> str:
@@ -146,6 +158,3 @@ def _take_entry_points() -> None:
             root = str(Path(place).parent)
             if root not in paths:
                 paths.append(root)
-
-
-__all__ = ['GROUP', 'Found', 'every', 'find']

@@ -43,12 +43,38 @@ def test_by_name(prefix: Path) -> None:
     found = {one.name: one for one in every()}
     assert found['theirs'].of == 'package robot' and found['theirs'].title == 'Delta VFD-EL'
     assert {one.of for one in found.values()} == {'shipped', 'package robot'}
-    # of two with one name that counts which is shipped
-    shutil.copy(theirs, theirs.with_name('delta_vfd_el.vfd.yaml'))
-    (prefix / 'share' / 'ament_index' / 'resource_index' / GROUP / 'robot').write_text(
-        'config/delta_vfd_el.vfd.yaml'
+
+
+def test_of_two_with_one_name_that_counts_which_is_shipped_and_both_are_named_once(
+    prefix: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert find('theirs') and find('delta_vfd_el') and not caplog.messages
+    theirs = prefix / 'share' / 'robot' / 'config' / 'delta_vfd_el.vfd.yaml'
+    shutil.copy(DELTA, theirs)
+    index = prefix / 'share' / 'ament_index' / 'resource_index' / GROUP
+    (index / 'robot').write_text('config/delta_vfd_el.vfd.yaml')
+    assert find('delta_vfd_el') == find('delta_vfd_el') == str(DELTA)
+    (said,) = caplog.messages
+    assert said.startswith(
+        f'two packages have a family delta_vfd_el: {DELTA} is taken, not {theirs}; '
     )
-    assert find('delta_vfd_el') == str(DELTA)
+
+
+def test_of_two_workspaces_with_one_package_the_first_hides_the_other_without_a_word(
+    prefix: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    overlay = tmp_path / 'overlay'
+    shutil.copytree(prefix, overlay)
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'{overlay}{os.pathsep}{prefix}')
+    file = 'share/robot/config/theirs.vfd.yaml'
+    assert find('theirs') == str(overlay / file) and not caplog.messages
+    # as the file of another package it is not meant so
+    index = prefix / 'share' / 'ament_index' / 'resource_index' / GROUP
+    (index / 'robot').rename(index / 'other')
+    (prefix / 'share' / 'robot').rename(prefix / 'share' / 'other')
+    assert find('theirs') == str(overlay / file)
+    hidden = prefix / file.replace('robot', 'other')
+    assert f'{overlay / file} is taken, not {hidden}' in caplog.text
 
 
 @pytest.mark.parametrize(
