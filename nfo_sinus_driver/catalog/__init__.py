@@ -33,7 +33,7 @@ from nfo_sinus_driver.catalog.profile import (
     Reset,
     SetpointTarget,
 )
-from nfo_sinus_driver.catalog.status import Fact, Kind, Meaning, Role, State, StatusCode, StatusWord
+from nfo_sinus_driver.catalog.status import Fact, Kind, Meaning, Role, State, StatusCode
 from nfo_sinus_driver.catalog.table import CatalogError
 
 __all__ = [
@@ -63,7 +63,6 @@ __all__ = [
     'SetpointTarget',
     'State',
     'StatusCode',
-    'StatusWord',
     'Text',
     'Value',
     'codec_of',

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Set
+import contextlib
 import importlib
 from pathlib import Path
 from typing import Any
@@ -42,10 +43,8 @@ class Writer:
         self._count = 0
         self._writer = SequentialWriter()
         options = StorageOptions(uri=str(folder), storage_id='mcap', custom_data=remarks)
-        try:
+        with _failures_as(OSError):
             self._writer.open(options, _AS_THEY_ARE)
-        except RuntimeError as error:
-            raise OSError(str(error)) from error
 
     def add_topic(self, topic: str, type_: type, offered: QoSProfile) -> None:
         """Announce a topic."""
@@ -64,24 +63,20 @@ class Writer:
 
     def write(self, topic: str, stamp: int, data: bytes) -> None:
         """Write a message."""
-        try:
+        with _failures_as(OSError):
             self._writer.write(topic, data, stamp)
-        except RuntimeError as error:
-            raise OSError(str(error)) from error
 
     def close(self) -> None:
         """Make the bag whole."""
-        try:
+        with _failures_as(OSError):
             self._writer.close()
-        except RuntimeError as error:
-            raise OSError(str(error)) from error
 
 
 def read(folder: Path, wanted: Set[str]) -> Iterator[tuple[str, int, Any]]:
     """Yield topic, time of receipt (ns) and message; a ValueError where that fails."""
     compressed = metadata(folder).get('compression_format')
     reader = SequentialCompressionReader() if compressed else SequentialReader()
-    try:
+    with _failures_as(ValueError):
         reader.open(StorageOptions(uri=str(folder)), _AS_THEY_ARE)
         types = {
             one.name: _class_of(one.type)
@@ -92,8 +87,14 @@ def read(folder: Path, wanted: Set[str]) -> Iterator[tuple[str, int, Any]]:
             topic, data, stamp = reader.read_next()
             if topic in types:
                 yield topic, stamp, deserialize_message(data, types[topic])
+
+
+@contextlib.contextmanager
+def _failures_as(kind: type[Exception]) -> Iterator[None]:
+    try:
+        yield
     except RuntimeError as error:
-        raise ValueError(str(error)) from error
+        raise kind(str(error)) from error
 
 
 def _class_of(name: str) -> type:

@@ -42,15 +42,18 @@ def control_path(link: str | None = None, tcp: int | None = None) -> str:
     return str(Path(tempfile.gettempdir()) / f'nfo-simulator-{name}.control')
 
 
-def is_listening(path: str) -> bool:
-    """Whether a live simulator has its control channel at ``path``."""
+def require_free(path: str) -> None:
+    """See to it that no live simulator has its control channel at ``path`` (ControlError)."""
     with socket.socket(socket.AF_UNIX) as probe:
         probe.settimeout(1.0)
         try:
             probe.connect(path)
         except OSError:
-            return False
-    return True
+            return
+    raise ControlError(
+        f'a simulator already serves there (control channel {path}): stop it, or choose another '
+        '--link or --control'
+    )
 
 
 class _Server(socketserver.ThreadingMixIn, socketserver.UnixStreamServer):
@@ -94,11 +97,7 @@ class ControlServer:
 
     def __init__(self, path: str, handler: Handler) -> None:
         self.path = path
-        if is_listening(path):
-            raise ControlError(
-                f'a simulator already runs with its control channel at {path}: stop it, '
-                'or choose another --link or --control'
-            )
+        require_free(path)
         place = Path(path)
         if place.exists() and not place.is_socket():
             raise ControlError(f'{path} is no socket: choose another --control')

@@ -18,10 +18,6 @@ _LAYOUT = struct.Struct('>6H4x4H')
 #: Registers of a mailbox, where the first stands in the block, and how many the driver writes.
 REGISTERS, FIRST, WRITTEN = 12, 16, 6
 
-#: What +25 says.
-DONE, REFUSED, NONE_SUCH, BUSY, NO_ACCESS = range(5)
-#: Commands in +17.
-READ, WRITE = 1, 2
 #: Bytes of a record.
 RECORD = 16
 

@@ -34,13 +34,10 @@ class Port(Protocol):
         """Send; what is not taken is lost, as on a wire."""
 
     def hang_up(self) -> None:
-        """Go away, as an adapter does that is pulled out."""
+        """Go away, as an adapter does that is pulled out; it leaves nothing behind."""
 
     def come_back(self) -> None:
         """Be there again under the same name."""
-
-    def close(self) -> None:
-        """Go for good and leave nothing behind."""
 
 
 class PtyPort:
@@ -110,10 +107,6 @@ class PtyPort:
                 os.close(near)
                 self._ends = None
                 raise
-
-    def close(self) -> None:
-        """Close the pseudo-terminal and remove the link."""
-        self.hang_up()
 
     def _points_here(self) -> bool:
         assert self._link is not None
@@ -187,10 +180,6 @@ class TcpPort:
         """Listen again on the same port."""
         if self._listener.fileno() < 0:
             self._listener = self._listen()
-
-    def close(self) -> None:
-        """Close everything."""
-        self.hang_up()
 
     def _listen(self) -> socket.socket:
         listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)

@@ -16,14 +16,13 @@ from typing import Any
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families import USUAL
-from nfo_sinus_driver.simulator.control import ControlServer, control_path, is_listening
+from nfo_sinus_driver.simulator.control import ControlServer, control_path, require_free
 from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, endpoint, parse_endpoint
 from nfo_sinus_driver.simulator.family import load, simulated_drive
 from nfo_sinus_driver.simulator.injections import injections_of, the_drive
 from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
-from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.timing import sharpen_timers
 
 #: How often every drive catches up with the clock while no request comes (s).
@@ -139,15 +138,12 @@ class Simulator:
         with contextlib.ExitStack() as stack:
             if control == '' and first.tcp is None:
                 control = control_path(link)
-            if control and is_listening(control):
-                raise PortError(
-                    f'a simulator already serves there (control channel {control}): '
-                    'stop it, or choose another --link or --control'
-                )
+            if control:
+                require_free(control)
             self.lines = []
             for number, one in enumerate(endpoints):
                 port = one.open()
-                stack.callback(port.close)
+                stack.callback(port.hang_up)
                 stream = None
                 if trace is not None:
                     name = f'{trace}.{number + 1}' if number else trace
@@ -176,7 +172,6 @@ class Simulator:
                 self.control = control
             # nothing went wrong: keep it all until stop()
             self._clean_up = stack.pop_all()
-        self.protocol = protocol
         self.timing = first.timing
 
     def start(self) -> None:

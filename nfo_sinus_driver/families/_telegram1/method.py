@@ -43,7 +43,6 @@ CLEAR = 'telegram.clear'
 SETPOINT = 'telegram.setpoint'
 
 #: What the PLC says of the data, above ZSW1.
-VALID = 1 << 16
 RELEASED = 1 << 17
 FAULT_ACK = 1 << 7
 #: How long a word is given to reach the drive, and a fault to go by it, s.

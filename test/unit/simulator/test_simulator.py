@@ -20,7 +20,7 @@ import pytest
 
 from nfo_sinus_driver.link.canopen_link import CanopenLink
 from nfo_sinus_driver.link.interface import Address, LineSettings
-from nfo_sinus_driver.simulator.control import Client
+from nfo_sinus_driver.simulator.control import Client, ControlError
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.simulator import Simulator
@@ -90,7 +90,7 @@ def test_a_live_simulator_is_not_pushed_aside_and_a_dead_ones_socket_is_replaced
         dead.bind(f'{link}.control')
     with Simulator(link=link, control=''), Client.at_link(link) as client:
         assert client.state()['mode'] == 1
-        with pytest.raises(PortError, match='already serves'):
+        with pytest.raises(ControlError, match='already serves'):
             Simulator(link=link, control='')
     assert not os.path.lexists(f'{link}.control')
 
