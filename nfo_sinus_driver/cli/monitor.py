@@ -22,7 +22,7 @@ from typing import Any
 
 from nfo_sinus_driver.bus import Priority, Statistics
 from nfo_sinus_driver.catalog import Kind, Role, State
-from nfo_sinus_driver.cli.console import UsageError, as_json, put, remark, say
+from nfo_sinus_driver.cli.console import UsageError, as_json, columns, put, remark, say
 from nfo_sinus_driver.cli.options import Verb, add_flag, addresses, period
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, InverterStatus
@@ -49,20 +49,10 @@ _VALUES = {
     Role.ACTUAL_TORQUE: ('torque', 4, 0),
     Role.DC_LINK_VOLTAGE: ('dc_link_voltage', 4, 0),
 }
-#: The figures of the line: what stands above, and the width.
+#: What stands above the figures of the line.
 _COLUMNS = (
-    ('', 7),
-    ('used', 5),
-    ('cycle', 8),
-    ('min', 7),
-    ('median', 7),
-    ('p99', 7),
-    ('max', 7),
-    ('requests', 8),
-    ('no answer', 9),
-    ('damaged', 7),
-    ('refused', 7),
-    ('repeated', 8),
+    '', 'used', 'cycle', 'min', 'median', 'p99', 'max', 'requests', 'no answer', 'damaged',
+    'refused', 'repeated',
 )
 _CLEAR_LINE = '\r\x1b[K'
 #: The view of the running driver: only there ROS is known.
@@ -234,15 +224,8 @@ def _statistics_table(session: Session, numbers: Sequence[int]) -> list[str]:
     rows = [('line', session.statistics())]
     if len(numbers) > 1:
         rows += [(f'drive {number}', session.statistics(number)) for number in numbers]
-    cells = [[name for name, _ in _COLUMNS], *(_figures(*row) for row in rows)]
-    widths = [width for _, width in _COLUMNS]
-    return [
-        '  '.join(
-            f'{cell:>{width}}' if place else f'{cell:<{width}}'
-            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
-        )
-        for row in cells
-    ]
+    cells = [_COLUMNS, *(_figures(*row) for row in rows)]
+    return columns(cells, right=range(1, len(_COLUMNS)))
 
 
 def _figures(name: str, of: Statistics) -> list[str]:

@@ -347,7 +347,6 @@ class Server(abc.ABC):
                 found[0x1018, 0] = constant(1, 1)
                 for sub_index in (2, 3, 4):
                     del found[0x1018, sub_index]
-        if profile.mandatory:
             found[0x1017, 0] = Entry(
                 2, lambda: number(round(self._set.beat / _MILLISECOND), 2), self._set_beat
             )

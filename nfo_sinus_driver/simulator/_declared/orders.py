@@ -36,7 +36,7 @@ class Order:
     """
     One command: a row of words, each of which has to come after the one before.
 
-    :ivar shows: what the drive shows after what was written last, for a step that waits for it.
+    :ivar places: where its words go.
     """
 
     def __init__(self, drive: Description, steps: tuple[Step, ...]) -> None:
@@ -60,12 +60,7 @@ class Order:
                 self._row.append(((address.index, False), 0xFFFF, raw & 0xFFFF))
             elif isinstance(step, Await):
                 self._shown[len(self._row)] = step.condition
-        self._places = {place for place, _, _ in self._row}
-
-    @property
-    def places(self) -> set[Place]:
-        """Where its words go."""
-        return self._places
+        self.places = {place for place, _, _ in self._row}
 
     @property
     def last(self) -> tuple[Place, int] | None:
@@ -79,7 +74,7 @@ class Order:
 
     def take(self, place: Place, word: int) -> bool:
         """Take a word that was written; tell whether the command is complete by it."""
-        if place not in self._places:
+        if place not in self.places:
             return False
         if not self._fits(self._passed % len(self._row), place, word):
             self._passed = 0

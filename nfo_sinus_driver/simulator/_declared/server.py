@@ -85,9 +85,11 @@ class Server(modbus.Requests):
 
     def _write_at(self, register: int, words: Sequence[int]) -> int:
         parameter, part = self._at.get(register, (None, 0))
-        if (register, False) in self._commands and not self._is_setting(parameter):
+        is_setting = parameter is not None and not parameter.key.startswith('line.r')
+        if (register, False) in self._commands and not is_setting:
             self._unit.take((register, False), words[0])
-            self._note(register)
+            self.drive.command_writes[f'line.r{register:04x}'] += 1
+            self._unit.settle()
             return 1
         if parameter is None or part or parameter.access is Access.READ:
             raise Refused(Reason.ADDRESS, f'nothing is written at register {register:04X}h')
@@ -98,14 +100,6 @@ class Server(modbus.Requests):
         self.drive.write_raw(parameter.key, raw)
         self._unit.written(parameter.key, 'modbus')
         return count
-
-    def _is_setting(self, parameter: Parameter | None) -> bool:
-        internal = parameter is None or parameter.key.startswith('line.r')
-        return not internal
-
-    def _note(self, register: int) -> None:
-        self.drive.command_writes[f'line.r{register:04x}'] += 1
-        self._unit.settle()
 
     def _check_count(self, count: int) -> None:
         if count > self._file.line.most_registers:

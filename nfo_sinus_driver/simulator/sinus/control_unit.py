@@ -28,6 +28,7 @@ from nfo_sinus_driver.simulator.motor import Nameplate
 from nfo_sinus_driver.simulator.sinus.serial_side import (
     LINE_SETTINGS,
     LineRules,
+    Rules,
     SerialSide,
     SinusFaults,
 )
@@ -143,6 +144,8 @@ class SinusControlUnit(ControlUnit):
     """
     Takes the commands of a Sinus.
 
+    :param rules: gives how it takes its line by a protocol.
+
     :ivar source: who commands.
     :ivar scmd: the run command that stands, or Stop. It stands through a lost RUN input, so the
         motor starts by itself when that is over; through a fault as ``variant`` says.
@@ -167,11 +170,16 @@ class SinusControlUnit(ControlUnit):
     scmd: int
 
     def __init__(
-        self, memory: Memory, address: int, variant: SinusVariant, faults: SinusFaults
+        self,
+        memory: Memory,
+        address: int,
+        variant: SinusVariant,
+        faults: SinusFaults,
+        rules: Rules = lambda protocol: LineRules(),
     ) -> None:
         super().__init__(memory, address, variant, faults)
         memory.set('serial.address', address)
-        self.serial = SerialSide(memory, self.line_rules)
+        self.serial = SerialSide(memory, rules)
         self.source = Source.STOP
         self.scmd = _STOP
         self.by_fieldbus = False
@@ -182,10 +190,6 @@ class SinusControlUnit(ControlUnit):
         self._telegram: int | None = None
         #: Seconds of RunDly left; None while no run command stands.
         self._delay_left: float | None = None
-
-    def line_rules(self, protocol: str) -> LineRules:
-        """Return how it takes its line by a protocol."""
-        return LineRules()
 
     # ---- who commands ----
 

@@ -19,7 +19,7 @@ from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
 from nfo_sinus_driver.simulator.motor import Regulation, nearest
 from nfo_sinus_driver.simulator.sinus import control_unit
 from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE, SinusControlUnit, Source
-from nfo_sinus_driver.simulator.sinus.serial_side import LineRules, SinusFaults
+from nfo_sinus_driver.simulator.sinus.serial_side import SinusFaults
 from nfo_sinus_driver.simulator.sinus_g2 import ds402
 from nfo_sinus_driver.simulator.sinus_g2.firmware import G2Variant, firmware_of
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import (
@@ -138,7 +138,7 @@ class G2ControlUnit(SinusControlUnit):
     def __init__(self, memory: Memory, address: int, variant: G2Variant) -> None:
         self.firmware = firmware_of(memory, variant.dialect)
         faults = SinusFaults(memory.model, log_size=self.firmware.log_size)
-        super().__init__(memory, address, variant, faults)
+        super().__init__(memory, address, variant, faults, self.firmware.line_rules)
         #: The module of CANopen holds it in bus mode.
         self._is_held = False
         self.self_restart = SelfRestart(memory, faults)
@@ -152,10 +152,6 @@ class G2ControlUnit(SinusControlUnit):
         #: What InvSt says of the tuning that was finished, until the next command.
         self._tuned = 0
         self._next_failure = 0
-
-    def line_rules(self, protocol: str) -> LineRules:
-        """Return how it takes its line by a protocol."""
-        return self.firmware.line_rules(protocol)
 
     def restart(self) -> None:
         """Begin as after power-on."""
