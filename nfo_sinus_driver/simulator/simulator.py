@@ -14,11 +14,10 @@ import threading
 import time
 from typing import Any
 
-from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator.control import ControlServer, control_path, require_free
 from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
-from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, endpoint, parse_endpoint
+from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, Endpoint, endpoint, parse_endpoint
 from nfo_sinus_driver.simulator.family import load, simulated_drive
 from nfo_sinus_driver.simulator.injections import injections_of, the_drive
 from nfo_sinus_driver.simulator.line import Trace
@@ -49,12 +48,11 @@ class Simulator:
     :param turnaround: how long a drive takes before it answers (s).
     :param trace: a file to write every frame to.
     :param control: path of the control channel; ``''`` for the default one, ``None`` for none.
-    :param settings: parameters other than factory, in engineering units, by key.
-    :param boot_time: how long a drive is silent after power-on (s).
     :param serial_numbers: of the first drives, in the order of their addresses; the rest have
         their own.
     :param plc: how the PLC is programmed, where one stands before the drives.
-    :param options: what else can be chosen of drives of this family.
+    :param options: what else :func:`~nfo_sinus_driver.simulator.family.simulated_drive` takes:
+        ``settings``, ``run_input``, ``boot_time``, and what can be chosen of this family.
     :raises ValueError: a wrong address, model, protocol, baud rate, parameter or option.
     :raises PortError: the port or link cannot be had.
     :raises ControlError: another simulator is there.
@@ -85,9 +83,6 @@ class Simulator:
         turnaround: float = 0.0,
         trace: str | None = None,
         control: str | None = None,
-        settings: Mapping[str, Value] | None = None,
-        run_input: bool = True,
-        boot_time: float = 2.0,
         serial_numbers: Sequence[str] = (),
         plc: PlcSetting | None = None,
         **options: Any,
@@ -96,37 +91,17 @@ class Simulator:
         endpoints = [first, *map(parse_endpoint, also)]
         if echo and not first.can_echo:
             raise ValueError(f'{protocol} has no echo')
-        for address in _checked(addresses):
-            for one in endpoints:
-                one.check(address)
+        _require_possible(addresses, endpoints)
         if len(serial_numbers) > len(addresses):
             raise ValueError(f'{len(serial_numbers)} serial numbers for {len(addresses)} drives')
         self.drives = {
-            address: simulated_drive(
-                model,
-                address,
-                settings=settings,
-                run_input=run_input,
-                boot_time=boot_time,
-                serial_number=number,
-                **options,
-            )
+            address: simulated_drive(model, address, serial_number=number, **options)
             for address, number in itertools.zip_longest(addresses, serial_numbers)
         }
         for drive, one in itertools.product(self.drives.values(), endpoints):
             if one.tables not in drive.servers:
                 raise ValueError(f'{model} does not speak {one.protocol}')
-        self.plc: Plc | None = None
-        if first.through_plc:
-            if len(endpoints) > 1:
-                raise ValueError(f'{protocol}: behind a PLC drives have no other line')
-            self.plc = Plc(self.drives, plc or PlcSetting())
-        elif plc is not None or any(one.through_plc for one in endpoints):
-            raise ValueError(f'there is no PLC on a line of {protocol}')
-        else:
-            for drive in self.drives.values():
-                drive.control_unit.set_to([(one.spoken, one.timing) for one in endpoints])
-        stations = list(self.drives.values()) if self.plc is None else self.plc.units
+        self.plc = _plc_before(self.drives, endpoints, plc)
         self._kind = load(model).injections
         self._injections = injections_of(self._kind)
         self.lock = threading.RLock()
@@ -135,6 +110,7 @@ class Simulator:
         self.finished = threading.Event()
         self._wake_read, self._wake_write = -1, -1
         self._thread: threading.Thread | None = None
+        drives = list(self.drives.values())
         with contextlib.ExitStack() as stack:
             if control == '' and first.tcp is None:
                 control = control_path(link)
@@ -144,21 +120,17 @@ class Simulator:
             for number, one in enumerate(endpoints):
                 port = one.open()
                 stack.callback(port.hang_up)
-                stream = None
-                if trace is not None:
-                    name = f'{trace}.{number + 1}' if number else trace
-                    stream = stack.enter_context(open(name, 'w', encoding='utf-8'))
                 line = one.wire(
                     port,
-                    list(self.drives.values()),
-                    stations,
+                    drives,
+                    drives if self.plc is None else self.plc.units,
                     time.monotonic,
                     gateway_timeout=gateway_timeout,
                     paced=paced,
                     turnaround=turnaround,
                     echo=echo and not number,
                     always_heard=number > 0,
-                    trace=Trace(stream) if stream else None,
+                    trace=_trace(stack, trace, number),
                 )
                 self.lines.append(line)
             self.line = self.lines[0]
@@ -304,10 +276,36 @@ class Simulator:
         return min(line.due for line in self.lines)
 
 
-def _checked(addresses: Sequence[int]) -> Sequence[int]:
+def _require_possible(addresses: Sequence[int], endpoints: Sequence[Endpoint]) -> None:
+    """See to it that addresses are there, are different, and can be on all these lines."""
     for address in addresses:
         if addresses.count(address) > 1:
             raise ValueError(f'address {address} is given twice')
+        for one in endpoints:
+            one.check(address)
     if not addresses:
         raise ValueError('a line needs a drive')
-    return addresses
+
+
+def _plc_before(
+    drives: Mapping[int, SimulatedDrive], endpoints: Sequence[Endpoint], setting: PlcSetting | None
+) -> Plc | None:
+    """Return the PLC before the drives; where there is none they are set to their lines."""
+    protocol = endpoints[0].protocol
+    if endpoints[0].through_plc:
+        if len(endpoints) > 1:
+            raise ValueError(f'{protocol}: behind a PLC drives have no other line')
+        return Plc(drives, setting or PlcSetting())
+    if setting is not None or any(one.through_plc for one in endpoints):
+        raise ValueError(f'there is no PLC on a line of {protocol}')
+    for drive in drives.values():
+        drive.control_unit.set_to([(one.spoken, one.timing) for one in endpoints])
+    return None
+
+
+def _trace(stack: contextlib.ExitStack, path: str | None, number: int) -> Trace | None:
+    """Return what writes down the frames of a line, into a file that closes with the stack."""
+    if path is None:
+        return None
+    name = f'{path}.{number + 1}' if number else path
+    return Trace(stack.enter_context(open(name, 'w', encoding='utf-8')))
