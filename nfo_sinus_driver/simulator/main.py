@@ -330,64 +330,20 @@ def _add_drives(parser: argparse.ArgumentParser) -> None:
 
 def _add_plc(parser: argparse.ArgumentParser) -> None:
     """Add how a PLC before the drives is programmed."""
-    add = parser.add_argument
-    add(
-        '--block',
-        dest='blocks',
-        type=_block,
-        action='append',
-        metavar='UNIT:REGISTER',
-        help='where the PLC has the block of a drive, once for each drive, in the order of their '
-        "addresses (default: at unit ADDRESS, register 0); these are telegram1's",
-    )
-    for option, dest, text in (
-        ('--plc-cycle', 'cycle', 'cycle of the program of the PLC (default: 0.01)'),
-        (
-            '--exchange-time',
-            'exchange',
-            'from one telegram between PLC and drive to the next (default: 0.02)',
-        ),
-        (
-            '--ros-time',
-            'ros_time',
-            "how long the driver's life counter may stand still for the PLC (default: 1)",
-        ),
-        (
-            '--drive-time',
-            'drive_time',
-            'how long the PLC takes the data of a drive for valid that it does not reach '
-            '(default: 0.5)',
-        ),
-    ):
-        _add_seconds(parser, option, text, dest=dest)
-    add(
-        '--answer-time',
-        type=_span,
-        metavar='LEAST:MOST',
-        help='how long the PLC takes to answer (s), such as 0.05:0.4 (default: 0)',
-    )
-    for option, dest, text in (
-        ('--no-function-23', 'write_and_read', 'the PLC refuses function 23'),
-        ('--not-released', 'released', 'the PLC does not release the drives to ROS'),
-    ):
-        add(option, dest=dest, action='store_false', default=None, help=text)
-    add(
-        '--layout',
-        type=int,
-        choices=(1, 2),
-        help='layout of the blocks of the PLC; 2 has a mailbox for parameters (default: 1)',
-    )
-    _add_seconds(
-        parser,
-        '--access-time',
-        "how long each of the PLC's WRREC and RDREC takes (default: 0.02)",
-    )
-    add(
-        '--longer-telegram',
-        action='store_true',
-        default=None,
-        help='the PLC exchanges the longer telegram that a family has beside the standard one',
-    )
+    typed: dict[str, dict[str, Any]] = {
+        'blocks': {'type': _block, 'action': 'append', 'metavar': 'UNIT:REGISTER'},
+        'answer_time': {'type': _span, 'metavar': 'LEAST:MOST'},
+        'layout': {'type': int, 'choices': (1, 2)},
+    }
+    for one in dataclasses.fields(PlcSetting):
+        text = one.metadata['text']
+        how = typed.get(one.name, {'type': _seconds, 'metavar': 'SECONDS'})
+        if isinstance(one.default, bool):
+            how = {'action': 'store_false' if one.default else 'store_true'}
+        elif isinstance(one.default, (int, float)):
+            text = f'{text} (default: {one.default:g})'
+        option = one.metadata['option']
+        parser.add_argument(option, dest=one.name, default=None, help=text, **how)
 
 
 def _add_seconds(

@@ -39,37 +39,57 @@ _REGISTERS = {1: REGISTERS, 2: plc_mailbox.FIRST + plc_mailbox.REGISTERS}
 _GAP = (0,) * (plc_mailbox.FIRST - REGISTERS)
 
 
+def _option(option: str, default: Any, text: str) -> Any:
+    """Return a field that is an option of the command line, too."""
+    return field(default=default, metadata={'option': option, 'text': text})
+
+
 @dataclass(frozen=True)
 class PlcSetting:
     """
-    How a PLC is programmed.
+    How a PLC is programmed; each field is an option of the command line.
 
-    :ivar blocks: unit and first register of the block of each drive, in the order of the drives;
-        by default the drive's address, and 0.
-    :ivar cycle: of its program (s).
-    :ivar exchange: from one telegram with a drive to the next (s).
-    :ivar ros_time: how long the driver's life counter may stand still (s).
-    :ivar drive_time: how long no exchange with the drive may come (s).
-    :ivar answer_time: the least and the longest time that an answer takes (s).
-    :ivar write_and_read: it has function 23.
-    :ivar released: the drives are released to ROS.
-    :ivar layout: of the blocks; 2 has a mailbox for parameters.
-    :ivar access_time: how long WRREC takes, and RDREC (s).
-    :ivar longer_telegram: it exchanges the longer telegram that a family has.
     :raises ValueError: a time or a block that cannot be.
     """
 
-    blocks: Sequence[tuple[int, int]] = ()
-    cycle: float = 0.01
-    exchange: float = 0.02
-    ros_time: float = 1.0
-    drive_time: float = 0.5
-    answer_time: tuple[float, float] = (0.0, 0.0)
-    write_and_read: bool = True
-    released: bool = True
-    layout: int = 1
-    access_time: float = 0.02
-    longer_telegram: bool = False
+    blocks: Sequence[tuple[int, int]] = _option(
+        '--block',
+        (),
+        'where the PLC has the block of a drive, once for each drive, in the order of their '
+        "addresses (default: at unit ADDRESS, register 0); these are telegram1's",
+    )
+    cycle: float = _option('--plc-cycle', 0.01, 'cycle of the program of the PLC')
+    exchange: float = _option(
+        '--exchange-time', 0.02, 'from one telegram between PLC and drive to the next'
+    )
+    ros_time: float = _option(
+        '--ros-time', 1.0, "how long the driver's life counter may stand still for the PLC"
+    )
+    drive_time: float = _option(
+        '--drive-time',
+        0.5,
+        'how long the PLC takes the data of a drive for valid that it does not reach',
+    )
+    answer_time: tuple[float, float] = _option(
+        '--answer-time',
+        (0.0, 0.0),
+        'how long the PLC takes to answer (s), such as 0.05:0.4 (default: 0)',
+    )
+    write_and_read: bool = _option('--no-function-23', True, 'the PLC refuses function 23')
+    released: bool = _option(
+        '--not-released', True, 'the PLC does not release the drives to ROS'
+    )
+    layout: int = _option(
+        '--layout', 1, 'layout of the blocks of the PLC; 2 has a mailbox for parameters'
+    )
+    access_time: float = _option(
+        '--access-time', 0.02, "how long each of the PLC's WRREC and RDREC takes"
+    )
+    longer_telegram: bool = _option(
+        '--longer-telegram',
+        False,
+        'the PLC exchanges the longer telegram that a family has beside the standard one',
+    )
 
     def __post_init__(self) -> None:
         for name in ('cycle', 'exchange', 'ros_time', 'drive_time', 'access_time'):
