@@ -17,7 +17,7 @@ from typing import Any
 
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
 from nfo_sinus_driver.simulator.control_unit import ControlUnit
-from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
+from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, carried, home, kept
 from nfo_sinus_driver.simulator.motor import measure
 from nfo_sinus_driver.simulator.timing import Timing
 
@@ -139,6 +139,15 @@ class SimulatedDrive:
         counter = self.writes if key in self.settings else self.command_writes
         counter[key] += 1
         self.control_unit.settle()
+
+    def read_over(self, protocol: str, parameter: Parameter) -> int:
+        """Read a parameter; return the number that a protocol carries, the nearest it can."""
+        return carried(parameter, self.read_raw(parameter.key), protocol)
+
+    def write_over(self, protocol: str, parameter: Parameter, raw: int) -> None:
+        """Write a parameter by the number that a protocol carries, or be refused."""
+        self.write_raw(parameter.key, kept(parameter, raw, protocol))
+        self.control_unit.written(parameter.key, protocol)
 
     # ---- what happens to it ----
 

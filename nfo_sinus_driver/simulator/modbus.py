@@ -13,7 +13,7 @@ from typing import ClassVar
 from nfo_sinus_driver.catalog import Family, Parameter, to_bytes, to_words
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.memory import Reason, Refused, carried, kept
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.protocol import Station
 
 #: How a drive treats a function.
@@ -193,15 +193,14 @@ class Server(Requests):
         if entry is not None:
             return entry
         parameter = self._find(register, count)
-        raw = carried(parameter, self.drive.read_raw(parameter.key), 'modbus')
+        raw = self.drive.read_over('modbus', parameter)
         return to_words(parameter.at('modbus').number.encode(raw))
 
     def write(self, register: int, words: Sequence[int]) -> None:
         """Write the parameter at a register (Refused: as the reason says)."""
         parameter = self._find(register, len(words))
         raw = parameter.at('modbus').number.decode(to_bytes(words))
-        self.drive.write_raw(parameter.key, kept(parameter, raw, 'modbus'))
-        self.drive.control_unit.written(parameter.key, 'modbus')
+        self.drive.write_over('modbus', parameter, raw)
 
     def require(self, register: int, count: int) -> None:
         """See to it that a parameter stands at a register, and has so many."""

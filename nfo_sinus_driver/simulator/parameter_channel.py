@@ -14,10 +14,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import enum
+import functools
 
 from nfo_sinus_driver.catalog import Access, Parameter
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.memory import Reason, Refused, carried, kept
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 
 _READ, _CHANGE, _FAILED = 0x01, 0x02, 0x80
 _VALUE, _ERROR_FORMAT = 0x10, 0x44
@@ -150,15 +151,9 @@ def read_only(words: Mapping[int, Sequence[Callable[[], int]]]) -> Entries:
 
 
 def _entry(drive: SimulatedDrive, parameter: Parameter, protocol: str) -> ParameterEntry:
-    codec, key = parameter.at(protocol).number, parameter.key
-
-    def read() -> int:
-        return carried(parameter, drive.read_raw(key), protocol)
-
-    def write(raw: int) -> None:
-        drive.write_raw(key, kept(parameter, raw, protocol))
-        drive.control_unit.written(key, protocol)
-
+    codec = parameter.at(protocol).number
+    read = functools.partial(drive.read_over, protocol, parameter)
+    write = functools.partial(drive.write_over, protocol, parameter)
     return ParameterEntry(
         None if parameter.access is Access.WRITE else read,
         write if parameter.is_writable else None,

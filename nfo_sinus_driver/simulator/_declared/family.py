@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import functools
 from pathlib import Path
 from typing import Annotated, Literal
@@ -42,11 +43,10 @@ def family_of(path: str) -> SimulatedFamily:
     :raises CatalogError: the file is none, or wrong.
     """
     file = read(Path(path))
-    return SimulatedFamily(
+    return replace(
+        ANY,
         control_unit=functools.partial(DeclaredControlUnit, drive=file),
-        variant=DeclaredVariant,
         factory=file.defaults,
         servers={'modbus': functools.partial(Server, file=file)},
-        injections=DeclaredInjections,
         line=file.line.factory,
     )

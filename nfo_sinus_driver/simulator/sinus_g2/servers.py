@@ -25,7 +25,7 @@ from nfo_sinus_driver.simulator.canopen import Entries, Entry, Identity
 from nfo_sinus_driver.simulator.classic import LineError, Wrong
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.faults import Faults
-from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, carried, kept
+from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, carried
 from nfo_sinus_driver.simulator.motor import measure
 from nfo_sinus_driver.simulator.parameter_channel import (
     Entries as ChannelEntries,
@@ -153,11 +153,10 @@ class ClassicServer(classic.Server):
         if key == 'serial.address' and raw > firmware.most_address:
             raise Wrong(LineError.OUT_OF_RANGE)
         try:
-            drive.write_raw(key, kept(parameter, raw, 'classic'))
+            drive.write_over('classic', parameter, raw)
         except Refused as refused:
             blocked = refused.reason is Reason.STATE and drive.faults
             raise Wrong(LineError.BLOCKED if blocked else _FLAGS[refused.reason]) from refused
-        self._unit.written(key, 'classic')
 
     def refused(self, flag: LineError) -> bool:
         """Set the flag of SioErr; NAK but for what did not arrive whole."""
@@ -310,24 +309,17 @@ class CanopenServer(canopen.Server):
         return usual
 
     def _entry(self, parameter: Parameter) -> Entry:
-        address, size = parameter.at('canopen'), self._size(parameter)
-        codec, drive, key = address.number, self.drive, parameter.key
+        codec, size, drive = parameter.at('canopen').number, self._size(parameter), self.drive
 
         def read() -> bytes:
-            raw = carried(parameter, drive.read_raw(key), 'canopen')
-            if size == codec.size:
-                return codec.encode(raw)
+            raw = drive.read_over('canopen', parameter)
             return raw.to_bytes(size, 'little', signed=codec.signed)
 
         def write(data: bytes) -> None:
-            if size == codec.size:
-                raw = codec.decode(data)
-            else:
-                raw = int.from_bytes(data, 'little', signed=codec.signed)
+            raw = int.from_bytes(data, 'little', signed=codec.signed)
             if not codec.fits(raw):
-                raise Refused(Reason.VALUE, f'{key} cannot be {raw}')
-            drive.write_raw(key, kept(parameter, raw, 'canopen'))
-            self._unit.written(key, 'canopen')
+                raise Refused(Reason.VALUE, f'{parameter.key} cannot be {raw}')
+            drive.write_over('canopen', parameter, raw)
 
         readable = parameter.access is not Access.WRITE
         return Entry(
