@@ -14,27 +14,13 @@ import contextlib
 import importlib
 import os
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from rclpy.qos import QoSProfile
 import yaml
 
 #: Each imports its library; the first one that can be imported is taken.
 _MODULES = ('bags_rosbag2', 'bags_rosbags')
 _INFORMATION = 'rosbag2_bagfile_information'
-
-
-class Writer(Protocol):
-    """A bag that is being written; an OSError where that fails."""
-
-    def add_topic(self, topic: str, type_: type, offered: QoSProfile) -> None:
-        """Announce a topic, and the quality of service that its publishers offer."""
-
-    def write(self, topic: str, stamp: int, data: bytes) -> None:
-        """Write a message as it came, with the time of its receipt, ns."""
-
-    def close(self) -> None:
-        """Make the bag whole."""
 
 
 def why_none() -> str:
@@ -48,16 +34,14 @@ def why_none() -> str:
     )
 
 
-def create(folder: Path, remarks: dict[str, str]) -> Writer:
+def create(folder: Path, remarks: dict[str, str]) -> Any:
     """
-    Return a new bag.
+    Return a new bag, which its library writes; an OSError where that fails.
 
     :param folder: the bag, a folder that does not exist.
     :param remarks: what the bag is to say of itself.
-    :raises OSError: it cannot be made.
     """
-    writer: Writer = _module().Writer(folder, remarks)
-    return writer
+    return _module().Writer(folder, remarks)
 
 
 def read(folder: Path, is_wanted: Callable[[str], bool]) -> Iterator[tuple[str, int, Any]]:
@@ -68,8 +52,7 @@ def read(folder: Path, is_wanted: Callable[[str], bool]) -> Iterator[tuple[str, 
     :raises ValueError: it is no bag, or one that cannot be read.
     """
     wanted = {topic for topic, _ in topics(folder) if is_wanted(topic)}
-    found: Iterator[tuple[str, int, Any]] = _module().read(folder, wanted)
-    return found
+    return _module().read(folder, wanted)
 
 
 def metadata(folder: Path) -> dict[str, Any]:
@@ -78,8 +61,7 @@ def metadata(folder: Path) -> dict[str, Any]:
     found = yaml.safe_load(path.read_text()) if path.is_file() else None
     if not isinstance(found, dict) or _INFORMATION not in found:
         raise ValueError('it is no bag: a folder with a metadata.yaml is one')
-    described: dict[str, Any] = found[_INFORMATION]
-    return described
+    return found[_INFORMATION]
 
 
 def topics(folder: Path) -> list[tuple[str, str]]:

@@ -37,7 +37,7 @@ _FOR_EVER = {'sec': 9223372036, 'nsec': 854775807}
 
 
 class Writer:
-    """A new bag; see :class:`~nfo_sinus_driver.demo.bags.Writer`."""
+    """A new bag; an OSError where it cannot be made or written."""
 
     def __init__(self, folder: Path, remarks: dict[str, str]) -> None:
         self._count = 0
@@ -47,7 +47,7 @@ class Writer:
             self._writer.open(options, _AS_THEY_ARE)
 
     def add_topic(self, topic: str, type_: type, offered: QoSProfile) -> None:
-        """Announce a topic."""
+        """Announce a topic, and the quality of service that its publishers offer."""
         name = name_of(type_)
         self._count += 1
         self._writer.create_topic(
@@ -62,7 +62,7 @@ class Writer:
         )
 
     def write(self, topic: str, stamp: int, data: bytes) -> None:
-        """Write a message."""
+        """Write a message as it came, with the time of its receipt, ns."""
         with _failures_as(OSError):
             self._writer.write(topic, data, stamp)
 
@@ -101,10 +101,9 @@ def _class_of(name: str) -> type:
     """Return the class of a type, such as ``std_srvs/srv/SetBool_Event``."""
     package, kind, type_ = name.split('/')
     try:
-        found: type = getattr(importlib.import_module(f'{package}.{kind}'), type_)
+        return getattr(importlib.import_module(f'{package}.{kind}'), type_)
     except (AttributeError, ImportError) as error:
         raise ValueError(f'its type {name} is not installed: {error}') from error
-    return found
 
 
 def _as_recorded(qos: QoSProfile) -> str:

@@ -29,7 +29,7 @@ _FOR_EVER = QosTime(9223372036, 854775807)
 
 
 class Writer:
-    """A new bag; see :class:`~nfo_sinus_driver.demo.bags.Writer`."""
+    """A new bag; an OSError where it cannot be made or written."""
 
     def __init__(self, folder: Path, remarks: dict[str, str]) -> None:
         self._connections: dict[str, Connection] = {}
@@ -44,7 +44,7 @@ class Writer:
         self._writer.open()
 
     def add_topic(self, topic: str, type_: type, offered: QoSProfile) -> None:
-        """Announce a topic."""
+        """Announce a topic, and the quality of service that its publishers offer."""
         name = name_of(type_)
         self._connections[topic] = self._writer.add_connection(
             topic,
@@ -55,7 +55,7 @@ class Writer:
         )
 
     def write(self, topic: str, stamp: int, data: bytes) -> None:
-        """Write a message."""
+        """Write a message as it came, with the time of its receipt, ns."""
         self._writer.write(self._connections[topic], stamp, data)
 
     def close(self) -> None:

@@ -150,8 +150,7 @@ def _set_time(axes: Axes, length: float, *, shown: bool) -> None:
 
 
 def _lines_of(axes: Axes) -> list[Artist]:
-    lines: list[Artist] = axes.get_legend_handles_labels()[0]
-    return lines
+    return axes.get_legend_handles_labels()[0]
 
 
 def _draw_title(
