@@ -101,13 +101,11 @@ class _Checker:
                 self._problems.add(node.line, f'{where} needs {key!r}{hint}')
 
     def _check_array(self, node: Node, rule: Mapping[str, Any], where: str) -> None:
-        least, most = rule.get('minItems', 0), rule.get('maxItems', len(node.items))
-        if not least <= len(node.items) <= most:
-            wanted = f'{least}' if least == most else f'{least} to {most}' if most else f'{least}'
+        count, least, most = len(node.items), rule.get('minItems', 0), rule.get('maxItems')
+        if count < least or (most is not None and count > most):
+            others = '' if least == most else ' or more' if most is None else f' to {most}'
             self._problems.add(
-                node.line, f'{where} has {len(node.items)} entries: it needs {wanted} or more'
-                if 'maxItems' not in rule
-                else f'{where} has {len(node.items)} entries: it needs {wanted}'
+                node.line, f'{where} has {count} entries: it needs {least}{others}'
             )
         for number, item in enumerate(node.items, 1):
             self.check(item, rule.get('items', {}), f'entry {number} of {where}')
