@@ -11,33 +11,10 @@ import os
 from pathlib import Path
 import socket
 import tty
-from typing import Protocol
 
 
 class PortError(Exception):
     """The port cannot be had; the message says why and what to do."""
-
-
-class Port(Protocol):
-    """The far end of a line."""
-
-    #: What a master opens.
-    name: str
-
-    def filenos(self) -> list[int]:
-        """The descriptors to wait on for reading."""
-
-    def receive(self) -> bytes:
-        """Return what has arrived; nothing is fine."""
-
-    def send(self, data: bytes) -> None:
-        """Send; what is not taken is lost, as on a wire."""
-
-    def hang_up(self) -> None:
-        """Go away, as an adapter does that is pulled out; it leaves nothing behind."""
-
-    def come_back(self) -> None:
-        """Be there again under the same name."""
 
 
 class PtyPort:
@@ -49,6 +26,8 @@ class PtyPort:
 
     :param link: the symbolic link to make, or ``None``.
     :raises PortError: the link's place is taken by something else.
+
+    :ivar name: what a master opens.
     """
 
     def __init__(self, link: str | None = None) -> None:
@@ -195,3 +174,7 @@ class TcpPort:
             ) from error
         listener.listen(1)
         return listener
+
+
+#: Where a line ends; what is sent and not taken is lost, as on a wire.
+Port = PtyPort | TcpPort
