@@ -85,7 +85,8 @@ class Screen:
         while self._waiting:
             to_error, text = self._waiting.popleft()
             stream = sys.stderr if to_error else sys.stdout
-            cleared = _CLEAR_LINE if self._status_stands and _is_terminal(stream) else ''
+            terminal = stream is not None and stream.isatty()
+            cleared = _CLEAR_LINE if self._status_stands and terminal else ''
             self._status_stands = self._status_stands and not cleared
             self._print(stream, f'{cleared}{text}\n')
         status, self._status = self._status, None
@@ -99,10 +100,6 @@ class Screen:
             _write(stream, text)
         except (OSError, ValueError):
             self.gone = self.gone or stream is sys.stdout
-
-
-def _is_terminal(stream: TextIO | None) -> bool:
-    return stream is not None and stream.isatty()
 
 
 def _write(stream: TextIO | None, text: str) -> None:

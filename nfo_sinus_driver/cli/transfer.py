@@ -104,8 +104,10 @@ class Load(Verb):
             require_names(file.values, drive.parameters.data, str(drive), _NOTHING)
             data = _differing(file, drive, options)
             for key in data:
+                # as bytes where they mean nothing
+                old = values.get(key, shown_raw(drive.parameters.data[key]))
                 new = drive.params.value(key, data[key])
-                put(str(Change(key, _old(drive, values, key), new, drive.model[key].unit)))
+                put(str(Change(key, old, new, drive.model[key].unit)))
             count = 'one parameter' if len(data) == 1 else f'{len(data)} parameters'
             if not data:
                 remark(f'nothing to write: {drive} has all of it already')
@@ -190,11 +192,6 @@ def _left_as_it_is(file: ParameterFile, drive: OfflineDrive, keys: list[str]) ->
     ]
     head = 'settings of the line stay as they are without --allow-communication-changes:'
     return listed(head, lines)
-
-
-def _old(drive: OfflineDrive, values: Mapping[str, Value], key: str) -> Value:
-    """Return what the drive has, as bytes where they mean nothing."""
-    return values.get(key, shown_raw(drive.parameters.data[key]))
 
 
 def _require_standstill(drive: OfflineDrive, data: Mapping[str, bytes]) -> None:

@@ -105,7 +105,7 @@ def _picture_of(run: Recording) -> Figure:
         _set_time(axes, run.length, shown=axes is current)
         _mark(axes, run)
     _draw_states(states, run)
-    _name_calls(states, run)
+    _name_moments(states, [(call.time, f'▼ {call.name}') for call in run.calls], 1.06, 0.3)
     _draw_frequency(frequency, run)
     _draw_quantity(speed, run.speed, 'motor speed (rpm)', _GREEN)
     _draw_quantity(current, run.current, 'output current (A)', _PURPLE, marker='o')
@@ -131,7 +131,8 @@ def _picture_of_line(runs: Sequence[Recording]) -> Figure:
         for axes in (states, frequency):
             _set_time(axes, length, shown=axes is panels[-1])
             _mark(axes, run)
-        _draw_motor(states, run)
+        _set_bars(states, {0.48: 'motor'})
+        _draw_phases(states, run, 0.0)
         _draw_frequency(frequency, run)
         frequency.set_ylabel(f'{run.drive.rpartition("/")[2]}\n({run.unit})')
         _name_stops(frequency, run)
@@ -185,11 +186,6 @@ def _draw_states(axes: Axes, run: Recording) -> None:
     for span in run.texts:
         fault = span.what in faulty
         _draw_span(axes, span, 0.0, '#F9DCCB' if fault else '#F0F0F0', _INK, bold=fault)
-
-
-def _draw_motor(axes: Axes, run: Recording) -> None:
-    _set_bars(axes, {0.48: 'motor'})
-    _draw_phases(axes, run, 0.0)
 
 
 def _set_bars(axes: Axes, names: dict[float, str]) -> None:
@@ -289,10 +285,6 @@ def _mark(axes: Axes, run: Recording) -> None:
     for span in run.faults:
         axes.axvspan(span.begin, span.end, color=_VERMILION, alpha=0.10, linewidth=0, zorder=0)
         axes.axvline(span.begin, color=_VERMILION, linewidth=2.2, zorder=5)
-
-
-def _name_calls(axes: Axes, run: Recording) -> None:
-    _name_moments(axes, [(call.time, f'▼ {call.name}') for call in run.calls], 1.06, 0.3)
 
 
 def _name_stops(axes: Axes, run: Recording) -> None:

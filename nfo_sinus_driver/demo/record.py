@@ -152,7 +152,10 @@ def _record(bag: Path, options: argparse.Namespace, arguments: Sequence[str]) ->
         stack.callback(rclpy.try_shutdown)
         drives = _drives_of_graph() if options.all else [options.drive or '/nfo_sinus']
         # nothing is received any more when the bag is closed
-        recorder = stack.enter_context(Recorder(bag, drives, {}, _report_heard))
+        recorder = Recorder(
+            bag, drives, {}, lambda drive: print(f'record: {drive} is heard', flush=True)
+        )
+        stack.enter_context(recorder)
         executor = SingleThreadedExecutor()
         executor.add_node(recorder)
         stack.enter_context(spinning(executor))
@@ -187,10 +190,6 @@ def _drives_of_graph() -> list[str]:
 
 def _where() -> str:
     return f'in this ROS_DOMAIN_ID ({os.environ.get("ROS_DOMAIN_ID", "0")})'
-
-
-def _report_heard(drive: str) -> None:
-    print(f'record: {drive} is heard', flush=True)
 
 
 def _wait(recorder: Recorder, seconds: float) -> None:

@@ -300,7 +300,8 @@ def _stops(statuses: Iterable[tuple[float, Any]]) -> Iterator[Stop]:
     newest: Stop | None = None
     before: str | None = None
     for time, status in statuses:
-        reason = _reason(status)
+        # a bag from before there were any has none
+        reason = _reasons(type(status)).get(getattr(status, 'stop_reason', 0), '')
         text = str(getattr(status, 'stop_text', ''))
         is_new = before is not None and reason != before and (before, reason) not in _BETTER
         if newest is not None and (is_new or not reason):
@@ -315,13 +316,9 @@ def _stops(statuses: Iterable[tuple[float, Any]]) -> Iterator[Stop]:
         yield newest
 
 
-def _reason(status: Any) -> str:
-    """Return the reason of the last stop; empty: none, or a bag from before there were any."""
-    return _reasons(type(status)).get(getattr(status, 'stop_reason', 0), '')
-
-
 @functools.cache
 def _reasons(message: type) -> dict[int, str]:
+    """Return the reasons of stops that a message has constants for, but for none."""
     names = [name for name in dir(message) if name.startswith(_REASON) and name != f'{_REASON}NONE']
     words = (name.removeprefix(_REASON).lower().replace('_', ' ') for name in names)
     return {getattr(message, name): word for name, word in zip(names, words, strict=True)}

@@ -73,8 +73,8 @@ class DemoSequence(Node):
     def run(self, bench: Bench) -> None:
         """Go through it, or a StepError."""
 
-        def near(hertz: float) -> Callable[[], bool]:
-            return lambda: abs(self._actual - hertz) < _NEAR
+        def near(hertz: float) -> Callable[[], object]:
+            return lambda: self._status and abs(self._status.actual - hertz) < _NEAR
 
         def reach(hertz: float) -> None:
             self._say(f'set-point {hertz:g} Hz')
@@ -148,11 +148,6 @@ class DemoSequence(Node):
     def _say(self, text: str) -> None:
         """Print a line between those of the timeline."""
         print(f'{self._now():6.1f} s  -- {text}', flush=True)
-
-    @property
-    def _actual(self) -> float:
-        """Actual frequency, Hz."""
-        return float('nan') if self._status is None else self._status.actual
 
     def _call(self, client: Any, request: Any, name: str) -> None:
         if not client.wait_for_service(PATIENCE):

@@ -44,6 +44,10 @@ class State(enum.IntEnum):
     PRE_OPERATIONAL = 0x7F
 
 
+#: By what they permit, the least first.
+_BY_POWER = (State.STOPPED, State.PRE_OPERATIONAL, State.OPERATIONAL)
+
+
 class Command(enum.IntEnum):
     """What a node has to do."""
 
@@ -201,7 +205,7 @@ class Server(abc.ABC):
         if self._set.watch_until <= now:
             self._set.watch_until = _NEVER
             self._set.is_lost = True
-            self.state = min(self.state, State.PRE_OPERATIONAL, key=_by_power)
+            self.state = min(self.state, State.PRE_OPERATIONAL, key=_BY_POWER.index)
             self.lost()
             yield from self._emergency(_WATCHED_IS_SILENT)
         if self._set.beat_at <= now:
@@ -387,11 +391,6 @@ class Server(abc.ABC):
     def _set_life(self, data: bytes) -> None:
         self._set.life_factor = data[0]
         self._set.watch_until = _NEVER
-
-
-def _by_power(state: State) -> int:
-    """Order the states by what they permit."""
-    return (State.STOPPED, State.PRE_OPERATIONAL, State.OPERATIONAL).index(state)
 
 
 @contextlib.contextmanager

@@ -182,13 +182,9 @@ class Commands:
 
     def lists(self) -> dict[str, Any]:
         """Return them by name, and whether no run command stands behind prepare."""
-        return {**self._lists, 'prepare_stops': self._prepare_stops}
-
-    @property
-    def _prepare_stops(self) -> bool:
-        """Whether prepare takes back all that run leaves."""
         run, left = left_by(self._lists['run']), left_by(self._lists['prepare'])
-        return bool(run) and all(key in left and takes_back(run[key], left[key]) for key in run)
+        stops = bool(run) and all(key in left and takes_back(run[key], left[key]) for key in run)
+        return {**self._lists, 'prepare_stops': stops}
 
     def _check_pauses(self, name: str) -> None:
         pauses = [step.seconds for step in self._lists[name] if isinstance(step, Pause)]

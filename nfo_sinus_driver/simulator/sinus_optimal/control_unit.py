@@ -217,7 +217,8 @@ class OptimalControlUnit(SinusControlUnit):
     def reference(self) -> float:
         """The reference that is followed in a run, signed (Hz)."""
         plate = self.motor.plate
-        if self._by_telegram:
+        if self.source is Source.CONTROL_WORD and self.fieldbus.active:
+            # it comes by telegram, with the control word
             share = min(max(self._telegram_setpoint, -MOST_OF_TELEGRAM), MOST_OF_TELEGRAM)
             return self.telegram_unit * share
         if self.scmd != Smode.FIELDBUS:
@@ -228,11 +229,6 @@ class OptimalControlUnit(SinusControlUnit):
         else:
             most, scale = _MOST_SPEEDS * plate.speed, plate.pole_pairs / 60
         return scale * min(max(setpoint, -most), most)
-
-    @property
-    def _by_telegram(self) -> bool:
-        """Whether the reference comes by telegram, with the control word."""
-        return self.source is Source.CONTROL_WORD and self.fieldbus.active
 
     @property
     def telegram_unit(self) -> float:
