@@ -22,7 +22,7 @@ from nfo_sinus_driver.simulator.canopen import ANSWERS, Server
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.lawicel import Adapter
 from nfo_sinus_driver.simulator.line import Trace
-from nfo_sinus_driver.simulator.line_faults import LineFaults, Reply
+from nfo_sinus_driver.simulator.line_faults import LineFaults
 from nfo_sinus_driver.simulator.ports import Port
 from nfo_sinus_driver.simulator.timing import Timing
 from nfo_sinus_driver.simulator.wire import Wire
@@ -66,23 +66,6 @@ class _Waiting:
         return identifier << 1 | self.frame.extended, self.order
 
 
-class CanFaults(LineFaults):
-    """
-    What goes wrong between a node and the master.
-
-    Frames have a check sum, and a damaged one is sent again at once, so damage only takes time.
-    Noise is what comes out of a serial adapter beside its lines. The line sees to both.
-    """
-
-    def damaged(self, reply: Reply) -> Reply:
-        """Return an answer that was damaged."""
-        return reply
-
-    def noisy(self, reply: Reply) -> Reply:
-        """Return an answer with noise before it."""
-        return reply
-
-
 class CanLine(Wire):
     """
     One bus with several drives on it.
@@ -108,7 +91,7 @@ class CanLine(Wire):
         trace: Trace | None = None,
     ) -> None:
         self._bit = 1 / timing.baud if paced else 0.0
-        super().__init__(port, timing, CanFaults())
+        super().__init__(port, timing, LineFaults(whole=True))
         self.speed = f'{timing.baud} bit/s'
         self._adapter = adapter
         self._drives = drives

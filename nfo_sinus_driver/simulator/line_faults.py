@@ -54,10 +54,18 @@ class Reply:
 
 
 class LineFaults:
-    """The faults that wait for the next answers, and those that come by chance or by the clock."""
+    """
+    The faults that wait for the next answers, and those that come by chance or by the clock.
 
-    def __init__(self, bits: int = 8, seed: int = 0) -> None:
+    :param bits: of a byte on the line.
+    :param whole: noise and damage are noted alone, and leave answers as they are: of a CAN bus,
+        whose frames have a check sum. A damaged one is sent again at once, so damage only takes
+        time; noise is what comes out of a serial adapter beside its lines. The line sees to both.
+    """
+
+    def __init__(self, bits: int = 8, seed: int = 0, *, whole: bool = False) -> None:
         self._bits = bits
+        self._whole = whole
         self.dead_until = float('-inf')
         self._bursts: _Bursts | None = None
         self._rates: dict[str, _Rate] = {}
@@ -134,19 +142,16 @@ class LineFaults:
         if fault.what == 'delay':
             note = _noted(reply, 'delayed')
             return [replace(reply, delay=reply.delay + fault.seconds, note=note)]
-        if fault.what == 'noise':
-            return [replace(self.noisy(reply), note=_noted(reply, 'noise'))]
-        return [replace(self.damaged(reply), note=_noted(reply, 'damaged'))]
+        data = reply.data
+        if not self._whole:
+            data = self.noise() + data if fault.what == 'noise' else self._damaged(data)
+        return [replace(reply, data=data, note=_noted(reply, _NOTES[fault.what]))]
 
-    def noisy(self, reply: Reply) -> Reply:
-        """Return an answer with noise before it."""
-        return replace(reply, data=self.noise() + reply.data)
-
-    def damaged(self, reply: Reply) -> Reply:
-        """Return an answer with a flipped bit."""
-        damaged = bytearray(reply.data)
+    def _damaged(self, data: bytes) -> bytes:
+        """Return bytes with a flipped bit."""
+        damaged = bytearray(data)
         damaged[self._random.randrange(len(damaged))] ^= 1 << self._random.randrange(self._bits)
-        return replace(reply, data=bytes(damaged))
+        return bytes(damaged)
 
 
 def _noted(reply: Reply, note: str) -> str:
