@@ -17,12 +17,13 @@ from typing import Any, TypeVar
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.console import say
 from nfo_sinus_driver.cli.screen import Screen
-from nfo_sinus_driver.cli.session import EventListener, Session
+from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.drive import (
     Cause,
     Drive,
     DriveError,
     Event,
+    Listener,
     Report,
     Severity,
     Telemetry,
@@ -73,7 +74,7 @@ class Ended(Exception):
         return _KEYS.get(self.signal, self.signal)
 
 
-class ControlSession(EventListener):
+class ControlSession(Listener):
     """
     One drive under command.
 

@@ -27,8 +27,6 @@ from nfo_sinus_driver.drive import (
     LogEntry,
     Report,
     Severity,
-    Snapshot,
-    Telemetry,
 )
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.link import BusSettings, Refused
@@ -36,23 +34,7 @@ from nfo_sinus_driver.link import BusSettings, Refused
 _T = TypeVar('_T')
 
 
-class EventListener:
-    """Listens to the events of a drive, and to no more of what it has to report."""
-
-    def on_snapshot(self, snapshot: Snapshot) -> None:
-        """Ignore the result of a poll."""
-
-    def on_telemetry(self, telemetry: Telemetry) -> None:
-        """Ignore measured values."""
-
-    def on_parameters(self, keys: Collection[str]) -> None:
-        """Ignore new values of settings."""
-
-    def on_log_entry(self, entry: LogEntry) -> None:
-        """Ignore new entries of the error log; those that matter are events, too."""
-
-
-class OfflineDrive(EventListener):
+class OfflineDrive(Listener):
     """
     A drive that is read, and its settings written, without the connection that commands it.
 

@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from nfo_sinus_driver.catalog import InverterStatus, Kind, Role
 from nfo_sinus_driver.drive.events import Event, Report
@@ -95,7 +95,7 @@ class Telemetry:
     measured: Mapping[str, float] = field(default_factory=dict)
 
 
-class Listener(Protocol):
+class Listener:
     """Receives what is published; called by the bus worker, which it must not keep waiting."""
 
     def on_snapshot(self, snapshot: Snapshot) -> None:
