@@ -141,12 +141,16 @@ def entries_of(drive: SimulatedDrive, protocol: str) -> Entries:
     return found
 
 
-def read_only(words: Mapping[int, Sequence[Callable[[], int]]]) -> Entries:
-    """Return parameters that can only be read, of each PNU one for each sub-index from 0 on."""
+def read_only(words: Mapping[int, Sequence[int | Callable[[], int]]]) -> Entries:
+    """
+    Return parameters that can only be read, of each PNU one for each sub-index from 0 on.
+
+    :param words: what each is, or what gives it.
+    """
     return {
-        (pnu, sub): ParameterEntry(read)
-        for pnu, reads in words.items()
-        for sub, read in enumerate(reads)
+        (pnu, sub): ParameterEntry(word if callable(word) else functools.partial(int, word))
+        for pnu, given in words.items()
+        for sub, word in enumerate(given)
     }
 
 

@@ -403,15 +403,15 @@ class TelegramServer(telegram1.Server):
         """Return the parameters of PROFIdrive [M0 table 8], and the error log [M0 table 9]."""
         faults, number = self._drive.faults, self._drive.memory.number
         firmware = round(100 * number('fieldbus.sw_ver'))
-        readable = {
+        readable: dict[int, tuple[int | Callable[[], int], ...]] = {
             918: (lambda: self._drive.address,),
-            922: (lambda: 1,),
-            924: (lambda: 2, lambda: 15),
+            922: (1,),
+            924: (2, 15),
             944: (lambda: len(faults.log),),
             947: (lambda: faults.shown, *(_history(faults, n) for n in range(1, 8))),
-            950: (lambda: 8, lambda: 1),
-            964: (lambda: _HMS, lambda: 0, lambda: firmware, lambda: 2013, lambda: 101),
-            965: (lambda: 0x2903,),
+            950: (8, 1),
+            964: (_HMS, 0, firmware, 2013, 101),
+            965: (0x2903,),
             967: (lambda: self._word,),
             968: (lambda: int(self._zsw1(self._word)),),
         }

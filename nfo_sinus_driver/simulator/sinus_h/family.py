@@ -68,13 +68,13 @@ class Server(telegram1.Server):
     def _profile(self) -> Entries:
         """Return the parameters of PROFIdrive [M3 §8]."""
         unit = self._unit
-        readable: dict[int, tuple[Callable[[], int], ...]] = {
+        readable: dict[int, tuple[int | Callable[[], int], ...]] = {
             922: (lambda: _VENDOR_TELEGRAM if self._vendor else 1,),
             944: (lambda: len(unit.faults.log),),
             947: tuple(self._message(index) for index in range(_MESSAGES)),
             953: (lambda: int(bool(unit.status_word & Zsw1.WARNING)),),
-            964: tuple(map(_constant, (849, 1, 102, 2015, 2512))),
-            965: (lambda: 0x0328,),
+            964: (849, 1, 102, 2015, 2512),
+            965: (0x0328,),
             967: (lambda: int(unit.word),),
             968: (lambda: int(unit.status_word),),
         }
@@ -125,10 +125,6 @@ class Server(telegram1.Server):
         if value == 1:
             self._unit.restart()
             self._unit.initialised = True
-
-
-def _constant(word: int) -> Callable[[], int]:
-    return lambda: word
 
 
 #: PNU 1002 and 1003 among the four; what writes, and what 1003 says.
