@@ -378,7 +378,7 @@ LAWS = (
         'nfo_sinus_driver/drive/snapshot.py',
         'NAN = math.nan',
         'NAN = 0.0',
-        (INTERFACE, '-k', 'before_anybody_answers'),
+        (INTERFACE, '-k', 'before_any_drive_answers'),
     ),
     Mutant(
         8,

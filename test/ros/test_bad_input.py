@@ -82,7 +82,7 @@ def test_a_busy_port_is_waited_for_and_its_holder_is_named(bench: Bench) -> None
 
 
 @needs('serial')
-def test_a_second_driver_on_the_port_is_told_who_has_it(bench: Bench) -> None:
+def test_a_second_driver_on_the_port_reports_what_has_it(bench: Bench) -> None:
     bench.simulator()
     first = bench.driver(through=EXECUTED)
     bench.client().connected()
@@ -128,7 +128,7 @@ def _checks_in_order(driver: Process, *words: str) -> None:
     assert places == sorted(places)
 
 
-def test_nobody_at_the_address_names_what_to_check_in_order(bench: Bench) -> None:
+def test_no_drive_at_the_address_names_what_to_check_in_order(bench: Bench) -> None:
     drive = bench.simulator('--address', '3')
     driver = bench.driver('-p', 'address:=4')
     _says(driver, bench.way.no_answer[0], '4', 'retrying')
@@ -153,7 +153,7 @@ def test_wrong_parity_is_silence_and_named_among_the_things_to_check(bench: Benc
 
 
 @needs('characters')
-def test_garbage_is_told_apart_from_silence(bench: Bench) -> None:
+def test_garbage_is_distinguished_from_silence(bench: Bench) -> None:
     drive = bench.simulator()
     drive.inject('damage', 1000000)
     driver = bench.driver()

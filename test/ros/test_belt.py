@@ -18,7 +18,7 @@ _BELT = ('-p', 'scale:=0.02', '-p', 'unit:=m/s')
 
 @needs('reverse')
 @pytest.mark.parametrize('sign', [1, -1])
-def test_a_belt_is_commanded_and_told_in_its_own_unit(bench: Bench, sign: int) -> None:
+def test_a_belt_is_commanded_and_reported_in_its_own_unit(bench: Bench, sign: int) -> None:
     simulator = bench.simulator()
     bench.driver('-p', f'scale:={sign * 0.02}', '-p', 'unit:=m/s')
     client = bench.client().connected()

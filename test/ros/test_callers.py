@@ -17,7 +17,7 @@ from nfo_sinus_driver.node.callers import Call
 
 
 @pytest.mark.parametrize('error', [rclpy_implementation.RCLError('x'), InvalidHandle('x')])
-def test_what_the_middleware_cannot_tell_spoils_no_answer(error: Exception) -> None:
+def test_what_the_middleware_does_not_know_spoils_no_answer(error: Exception) -> None:
     def fail(*_: Any) -> None:
         raise error
 

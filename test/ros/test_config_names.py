@@ -205,7 +205,7 @@ def test_one_enclave_commands_all_that_can_be_commanded(policy: Policy, services
     assert commander['call'] == driver['execute']
 
 
-def test_anybody_looks_and_nobody_but_one_commands(policy: Policy, services: Names) -> None:
+def test_all_may_read_and_only_one_may_command(policy: Policy, services: Names) -> None:
     driver = policy[_DRIVER]
     for enclave, rules in policy.items():
         if enclave != _DRIVER:

@@ -49,7 +49,7 @@ def file(bench: Bench, tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize('family', [NAME, f'package://{PACKAGE}/{NAME}.vfd.yaml'])
-def test_a_ride(bench: Bench, file: Path, family: str) -> None:
+def test_a_run(bench: Bench, file: Path, family: str) -> None:
     drive = bench.simulator('--family', str(file), '--set', 'ramp.accel=0.5')
     driver = bench.driver('-p', f'family:={family}', '-p', 'drive_timeout:=2.0', through=('env',))
     client = bench.client().connected()

@@ -26,7 +26,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
         assert made.violations() == []
 
 
-def test_a_ride_by_the_drive_profile_alone(bench: Bench) -> None:
+def test_a_run_by_the_drive_profile_alone(bench: Bench) -> None:
     alone = ('--canopen-state-machine', 'absent', '--set', 'control.mode=Speed')
     drive = bench.simulator(*RAMPS, *alone, paced=False)
     bench.driver('-p', 'control_method:=ds402')

@@ -150,7 +150,7 @@ def test_the_node_answers_and_the_status_flows_meanwhile(bench: Bench) -> None:
     assert future.result().success, future.result().message
 
 
-def test_the_action_tells_how_it_goes_and_what_changed(bench: Bench) -> None:
+def test_the_action_reports_its_progress_and_what_changed(bench: Bench) -> None:
     _, client = start(bench)
     tuner = Tuner(client)
     status, result = tuner.result(tuner.begin(Tune.Goal.FULL))

@@ -95,7 +95,7 @@ def test_the_energy_is_reset_or_the_answer_says_why_not(rig: Rig) -> None:
         assert not answer.success and _NOT_THERE in answer.message
 
 
-def test_the_action_tells_every_stage(rig: Rig) -> None:
+def test_the_action_reports_every_stage(rig: Rig) -> None:
     tuner = Tuner(rig.client)
     status, result = tuner.result(tuner.begin(Tune.Goal.STATOR_RESISTANCE))
     if not rig.tunes:

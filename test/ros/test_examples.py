@@ -111,7 +111,7 @@ def ride(bench: Bench, *arguments: str) -> Process:
 
 
 @needs('reverse')
-def test_a_ride_goes_up_and_down_and_stops(bench: Bench) -> None:
+def test_a_run_goes_up_and_down_and_stops(bench: Bench) -> None:
     drive = one(bench)
     process = ride(bench, '--frequency', '-20', '--hold', '1.5')
     runs(process, drive, -20.0)
@@ -121,7 +121,7 @@ def test_a_ride_goes_up_and_down_and_stops(bench: Bench) -> None:
     assert '/nfo_sinus/stop: stop' in process.text
 
 
-def test_rides_that_end_early_leave_the_motor_stopped(bench: Bench) -> None:
+def test_runs_that_end_early_leave_the_motor_stopped(bench: Bench) -> None:
     # one after the other, for the start of a driver is what takes long
     drive = one(bench)
     process = ride(bench)
@@ -152,7 +152,7 @@ def test_rides_that_end_early_leave_the_motor_stopped(bench: Bench) -> None:
     stands(drive)
 
 
-def test_a_fault_is_told_and_acknowledged_only_where_that_is_wanted(bench: Bench) -> None:
+def test_a_fault_is_reported_and_acknowledged_only_where_that_is_wanted(bench: Bench) -> None:
     drive = one(bench)
     overload = bench.drives.overload
     process = ride(bench)
@@ -182,7 +182,7 @@ def test_a_fault_is_told_and_acknowledged_only_where_that_is_wanted(bench: Bench
     assert not drive.state()['driven']
 
 
-def test_a_ride_that_makes_no_sense_does_not_begin(bench: Bench) -> None:
+def test_a_run_that_makes_no_sense_does_not_begin(bench: Bench) -> None:
     process = ride(bench, '--rate', '0')
     assert process.wait() == 2
     assert 'argument --rate: invalid' in process.text

@@ -87,7 +87,7 @@ def test_a_dropped_answer_is_sent_again(
     assert served.to_drop == 0
 
 
-def test_who_cannot_be_answered_holds_nobody_up(
+def test_a_client_that_cannot_be_answered_delays_no_other(
     served: Served, client: Client, caplog: pytest.LogCaptureFixture
 ) -> None:
     served.to_drop = 4

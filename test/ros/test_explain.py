@@ -91,7 +91,7 @@ def bag(tmp_path: Path) -> Path:
     return folder
 
 
-def test_it_is_told_from_the_bag_alone_why_it_stopped_each_time(
+def test_the_bag_alone_explains_each_stop(
     bag: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert plot([str(bag), '--drive', _DRIVE, '--explain']) == 0
@@ -115,7 +115,7 @@ def test_each_line_has_a_picture_with_its_stops(bag: Path) -> None:
     assert first.began == second.began
 
 
-def test_a_bag_that_begins_after_a_stop_tells_of_none(tmp_path: Path) -> None:
+def test_a_bag_that_begins_after_a_stop_explains_none(tmp_path: Path) -> None:
     told = [
         (f'{_DRIVE}/status', at, status(at, DriveStatus.REASON_FAULT, 'fault 5'))
         for at in (0.0, 1.0)

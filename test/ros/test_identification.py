@@ -83,7 +83,7 @@ def test_it_is_asked_once_for_each_connection(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize('treated', ['refused', 'silent'])
-def test_a_drive_that_does_not_tell_connects_and_runs(bench: Bench, treated: str) -> None:
+def test_a_drive_without_an_identity_connects_and_runs(bench: Bench, treated: str) -> None:
     drive = bench.simulator('--newer-functions', treated, *_QUICK)
     # else a machine that stands still asks again, to be certain whose answer it has
     driver = bench.driver('-p', 'response_timeout:=4.0')
@@ -104,7 +104,7 @@ def test_a_drive_that_does_not_tell_connects_and_runs(bench: Bench, treated: str
     assert 'ERROR' not in driver.text
 
 
-def test_a_motor_found_running_is_stopped_before_anybody_asks_who_it_is(bench: Bench) -> None:
+def test_a_motor_found_running_is_stopped_before_the_drive_is_identified(bench: Bench) -> None:
     # with a drive that keeps silence to such questions, so that a stop behind them would be late
     drive = bench.simulator('--newer-functions', 'silent', *_QUICK)
     driver = bench.driver()
@@ -124,7 +124,7 @@ def test_a_motor_found_running_is_stopped_before_anybody_asks_who_it_is(bench: B
     assert drive.state()['scmd'] == 0
 
 
-def test_two_drives_are_told_apart(bench: Bench) -> None:
+def test_two_drives_are_distinguished(bench: Bench) -> None:
     bench.simulator('--address', '1', '--address', '2', '--serial', 'LEFT', '--serial', 'RIGHT')
     parameters = bench.folder / 'two.yaml'
     parameters.write_text(

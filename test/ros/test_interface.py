@@ -116,7 +116,7 @@ def test_every_topic_says_what_the_drive_does(bench: Bench) -> None:
         assert client.newest('status').reverse == ('reverse' not in bench.way.untold)
 
 
-def test_bus_statistics_and_diagnostics_flow_before_anybody_answers(bench: Bench) -> None:
+def test_bus_statistics_and_diagnostics_flow_before_any_drive_answers(bench: Bench) -> None:
     bench.simulator('--address', '7')
     driver = bench.driver(*FULL_RATE)
     client = bench.client()
@@ -143,7 +143,7 @@ def _diagnosis(client: Client, name: str) -> DiagnosticStatus | None:
 
 
 @needs('direct')
-def test_diagnostics_of_an_address_where_nobody_is_are_steady(bench: Bench) -> None:
+def test_diagnostics_of_an_address_without_a_drive_are_steady(bench: Bench) -> None:
     bench.simulator('--address', '7')
     driver = bench.driver(*FULL_RATE)
     client = bench.client()
@@ -195,7 +195,7 @@ def test_diagnostics_name_a_fault_with_its_remedy(bench: Bench) -> None:
     assert inv_st.remedy
 
 
-def test_diagnostics_of_a_ride_name_its_fault_and_cry_over_no_stop_that_goes_well(
+def test_diagnostics_of_a_run_name_its_fault_and_cry_over_no_stop_that_goes_well(
     bench: Bench,
 ) -> None:
     drive = bench.simulator()
@@ -410,7 +410,7 @@ def test_two_drives_on_one_bus_and_one_of_them_silent(bench: Bench) -> None:
 
 
 @needs('direct')
-def test_each_drive_tells_its_own_statistics(bench: Bench) -> None:
+def test_each_drive_publishes_its_own_statistics(bench: Bench) -> None:
     drive = bench.simulator('--address', '1', '--address', '2')
     parameters = bench.folder / 'two.yaml'
     # so long that no answer of the other is late on a busy machine; and one that is silent is

@@ -85,7 +85,7 @@ def test_joint_command_turns_the_shaft_and_its_state_says_so(bench: Bench, ratio
         )
 
 
-def test_a_joint_command_without_our_joint_is_told_once(bench: Bench) -> None:
+def test_a_joint_command_without_our_joint_is_reported_once(bench: Bench) -> None:
     simulator, client = start(bench)
     assert client.enable().success
     other = JointState(name=['left', 'right'], velocity=[9.0, 9.0])

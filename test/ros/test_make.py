@@ -21,7 +21,7 @@ _DEMO_TIME = 300.0
 _BACKGROUND = ('env', '--ignore-signal=INT,QUIT')
 
 
-def test_the_demo_rides_to_its_end_with_nothing_but_ros(tmp_path: Path) -> None:
+def test_the_demo_runs_to_its_end_with_nothing_but_ros(tmp_path: Path) -> None:
     # what records and draws it is not installed: test_demo_record.py has the other case
     libraries = ('rosbag2_py', 'rosbags', 'matplotlib')
     for name in libraries:

@@ -132,7 +132,7 @@ def test_before_there_is_a_driver_it_says_how_one_is_started(bench: Bench) -> No
 
 
 @needs('watched')
-def test_only_the_namespaces_that_were_asked_for(bench: Bench) -> None:
+def test_only_the_namespaces_that_were_given(bench: Bench) -> None:
     start(bench)
     bench.view('/robot').wait_for('No drive in /robot yet')
     bench.view('conveyor').wait_for('2 drives')

@@ -64,7 +64,7 @@ def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
         assert client.change_state(Transition.TRANSITION_CLEANUP)
 
 
-def test_no_enable_survives_a_stop_that_was_asked_for_after_it(bench: Bench) -> None:
+def test_no_enable_survives_a_later_stop(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(0.5), paced=False)
     bench.driver()
     client = bench.client().connected()

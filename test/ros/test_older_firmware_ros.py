@@ -62,7 +62,7 @@ def test_settings_are_written_while_the_motor_turns_by_the_bus(bench: Bench) -> 
     assert drive.state()['parameters']['freque.f_fix1'] == 12.5
 
 
-def test_whoever_else_has_control_keeps_it(bench: Bench) -> None:
+def test_another_holder_of_control_keeps_it(bench: Bench) -> None:
     drive = bench.simulator(*_QUICK, '--no-run-input', paced=False)
     bench.driver()
     client: Client = bench.client().connected()

@@ -33,7 +33,7 @@ def _changes(client: Client, name: str) -> list[Any]:
     ]
 
 
-def test_a_change_at_the_keypad_shows_and_is_told_once(bench: Bench) -> None:
+def test_a_change_at_the_keypad_shows_and_is_reported_once(bench: Bench) -> None:
     drive = bench.simulator(paced=False)
     driver = bench.driver(*COUNTED)
     client = _listening(bench)
@@ -124,7 +124,7 @@ def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
     says_once(driver, f'changed at the drive: freque.f_fix2: 15 -> {most} Hz')
 
 
-def test_a_code_without_any_meaning_is_told_and_does_no_harm(bench: Bench) -> None:
+def test_a_code_without_any_meaning_is_reported_and_does_no_harm(bench: Bench) -> None:
     stubborn = bench.enter_context(Stubborn(bench))
     stubborn.drive.memory.put('control.auto_start', 7)
     driver = bench.driver(*COUNTED)

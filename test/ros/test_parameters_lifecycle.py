@@ -13,7 +13,7 @@ from ways import needs
 pytestmark = needs('parameters')
 
 
-def test_monitor_writes_nothing_whatever_is_asked(bench: Bench) -> None:
+def test_monitor_writes_nothing_whatever_is_called(bench: Bench) -> None:
     drive = bench.simulator(paced=False)
     driver = bench.driver(
         *QUIET,

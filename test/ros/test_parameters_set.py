@@ -203,7 +203,7 @@ def test_communication_is_changed_with_permission_that_can_be_taken_back(rig: Ri
 
 
 @needs('later')
-def test_who_changes_the_line_is_told_how_to_follow(rig: Rig) -> None:
+def test_a_change_of_the_line_says_how_to_follow(rig: Rig) -> None:
     client = rig.client
     assert set_one(client, 'allow_communication_changes', True).successful
     try:
@@ -221,7 +221,7 @@ def test_who_changes_the_line_is_told_how_to_follow(rig: Rig) -> None:
     ('name', 'value', 'setting'),
     [('serial.address', 2, 'address (2)'), ('serial.si_baud', '4800bps', 'baud_rate (4800bps)')],
 )
-def test_who_loses_the_drive_by_a_change_of_the_line_is_told_how_to_follow(
+def test_a_change_of_the_line_that_loses_the_drive_says_how_to_follow(
     bench: Bench, name: str, value: Value, setting: str
 ) -> None:
     bench.simulator(paced=False)

@@ -227,7 +227,7 @@ def test_a_drive_that_goes_silent_in_the_middle_is_known_again_when_it_is_back(
     _agree(client, stubborn)
 
 
-def test_a_silent_drive_is_told_soon_and_nothing_changes(
+def test_a_silent_drive_is_reported_soon_and_nothing_changes(
     stubborn: Stubborn, client: Client
 ) -> None:
     before = stubborn.parameters()
@@ -247,7 +247,7 @@ def test_a_silent_drive_is_told_soon_and_nothing_changes(
     _agree(client, stubborn)
 
 
-def test_a_port_that_is_gone_is_told_soon(
+def test_a_port_that_is_gone_is_reported_soon(
     bench: Bench, stubborn: Stubborn, client: Client
 ) -> None:
     stubborn.simulator.inject('hangup', 5.0)

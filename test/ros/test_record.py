@@ -54,7 +54,7 @@ def _is_png(path: Path) -> bool:
 
 
 @needs('own')
-def test_the_ride_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
+def test_the_run_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     bench.simulator()
     bench.driver('-r', '__ns:=/line1', '-p', 'drives:=[infeed]')
     client = bench.client(_DRIVE).connected()
@@ -149,7 +149,7 @@ def test_all_drives_are_recorded_and_it_is_explained_why_they_stopped(bench: Ben
 
 
 @needs('own')
-def test_a_recorder_that_hears_nothing_says_what_to_check(bench: Bench) -> None:
+def test_a_recorder_without_messages_says_what_to_check(bench: Bench) -> None:
     recorder = _recorder(bench, '--output', str(bench.folder / 'out'), '--for', '6')
     assert recorder.wait() == 1
     assert 'nothing is heard of /nfo_sinus yet' in recorder.text
@@ -181,7 +181,7 @@ def test_a_recorder_refuses_what_cannot_be() -> None:
     assert done.returncode == 1 and 'no bag can be written to /proc/none/ride' in done.stderr
 
 
-def test_who_a_drive_is_is_told_by_its_own_diagnostics() -> None:
+def test_the_identity_of_a_drive_comes_from_its_own_diagnostics() -> None:
     def told(name: str, serial: str) -> SimpleNamespace:
         values = {'firmware': '4.38', 'serial number': serial}
         pairs = [SimpleNamespace(key=key, value=value) for key, value in values.items()]

@@ -76,7 +76,7 @@ def test_a_callback_that_raises_keeps_no_later_message_out(
     assert not subscriber.alive
 
 
-def test_it_ends_though_nobody_ever_spoke(node: Node) -> None:
+def test_it_ends_without_a_message(node: Node) -> None:
     subscriber = SetpointSubscriber()
     subscriber.subscribe(node, Float32, '/one', lambda _: None)
     subscriber.start()

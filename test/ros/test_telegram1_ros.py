@@ -85,7 +85,7 @@ def turns(client: Client, value: float) -> None:
 
 
 @pytest.mark.parametrize('behind', TELEGRAM1, indirect=True)
-def test_a_ride_and_what_ends_it(bench: Bench) -> None:
+def test_a_run_and_what_ends_it(bench: Bench) -> None:
     drive, client = start(bench)
     model = bench.way.model
     enable(client)

@@ -29,7 +29,7 @@ def _requests(bench: Bench) -> list[Request]:
     return [request for request in asked if request is not None]
 
 
-def test_a_ride_breaks_no_law_on_the_wire(bench: Bench) -> None:
+def test_a_run_breaks_no_law_on_the_wire(bench: Bench) -> None:
     way = bench.way
     drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver(*FULL_RATE, '-p', 'drive_timeout:=16.0')

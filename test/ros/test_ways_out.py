@@ -83,7 +83,7 @@ def test_the_end_of_the_launch_that_started_it_stops_the_motor(bench: Bench) -> 
 
 
 @pytest.mark.parametrize('given', ['gone', 'soon', '0', ''])
-def test_a_driver_that_ends_with_nobody_does_not_start(bench: Bench, given: str) -> None:
+def test_a_driver_that_ends_with_no_process_does_not_start(bench: Bench, given: str) -> None:
     if given == 'gone':
         with subprocess.Popen(('true',)) as launch:
             launch.wait()

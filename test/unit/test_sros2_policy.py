@@ -57,7 +57,7 @@ def policy(text: str) -> ElementTree.Element:
     return ElementTree.fromstring(text, ElementTree.XMLParser(target=builder))
 
 
-def test_policy_is_one_for_sros2_and_a_wrong_one_is_seen() -> None:
+def test_policy_is_one_for_sros2_and_a_wrong_one_is_noticed() -> None:
     text = POLICY.read_text()
     assert list(wrong_in_policy(policy(text))) == []
     for right, wrong in (

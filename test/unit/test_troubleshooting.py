@@ -454,7 +454,7 @@ def test_what_is_logged_is_found() -> None:
         assert said in found, source
 
 
-def test_what_has_no_entry_is_found_and_what_only_informs_is_told_apart() -> None:
+def test_what_has_no_entry_is_found_and_what_only_informs_is_distinguished() -> None:
     page = '| message | why |\n|---|---|\n| `the motor … broke: 5` | `it` wore out |\n'
     asked = [
         Sentence('a', ('the motor ', ' broke: ', '')),

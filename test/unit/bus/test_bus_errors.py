@@ -36,7 +36,7 @@ def test_call_that_raises(bus: Bus, error: BaseException) -> None:
 
 
 @RAISED
-def test_call_that_raises_keeps_nobody_else_out(
+def test_call_that_raises_keeps_no_other_out(
     bus: Bus, link: FakeLink, error: BaseException
 ) -> None:
     with link.held():
@@ -121,7 +121,7 @@ def test_resync_reads_that_raise(bus: Bus, link: FakeLink, monkeypatch: pytest.M
     assert result(ask(bus, 1, Priority.POLL)) == packed(1)
 
 
-def test_unit_in_doubt_keeps_nobody_waiting(bus: Bus, link: FakeLink) -> None:
+def test_unit_in_doubt_keeps_no_other_waiting(bus: Bus, link: FakeLink) -> None:
     ready = threading.Event()
 
     def answer(done: Done) -> bytes:

@@ -46,7 +46,7 @@ def test_port_that_is_lost_and_comes_back(bus: Bus, link: FakeLink) -> None:
     assert bus.statistics().reconnects == 1
 
 
-def test_lost_port_is_told_to_all_though_one_who_hears_of_it_ends_another(
+def test_lost_port_is_reported_to_all_though_one_of_them_ends_another(
     bus: Bus, link: FakeLink
 ) -> None:
     link.answer = raiser(PortError('gone'))

@@ -16,7 +16,7 @@ from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Task
 from nfo_sinus_driver.link import NotReady
 
 
-def test_sleep_takes_its_time_and_keeps_nobody_waiting(bus: Bus, link: FakeLink) -> None:
+def test_sleep_takes_its_time_and_keeps_no_other_waiting(bus: Bus, link: FakeLink) -> None:
     woken: list[float] = []
 
     async def sleeper() -> None:
@@ -85,7 +85,7 @@ def test_waking_does_not_shorten_the_next_sleep(bus: Bus) -> None:
     assert stages == ['first', 'second']
 
 
-def test_waking_one_who_waits_for_an_answer_does_nothing(bus: Bus, link: FakeLink) -> None:
+def test_waking_a_task_that_waits_for_an_answer_does_nothing(bus: Bus, link: FakeLink) -> None:
     async def job() -> bytes:
         return (await bus.read(UNIT, register(9), Priority.REFRESH)).data
 

@@ -155,7 +155,7 @@ def test_polls_of_units_that_do_not_answer_have_half_the_time() -> None:
     assert max(gaps) == pytest.approx(timeout)
 
 
-def test_units_that_do_not_answer_wait_for_nobody_when_nobody_else_waits() -> None:
+def test_units_that_do_not_answer_do_not_wait_when_no_other_waits() -> None:
     scheduler = Scheduler(lambda unit: True)
     for _ in range(10):
         scheduler.add(entry(Priority.POLL))
@@ -168,7 +168,7 @@ def test_what_only_a_part_of_the_background_wants_goes_to_no_other() -> None:
     assert found[Priority.REFRESH] == pytest.approx(BACKGROUND_SHARE, rel=0.02)
 
 
-def test_who_asked_for_nothing_is_owed_little() -> None:
+def test_an_idle_background_is_owed_little() -> None:
     scheduler = Scheduler()
     for _ in range(1000):
         scheduler.add(entry(Priority.POLL))
@@ -293,7 +293,7 @@ def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
 
 
 @pytest.mark.parametrize('kind', [Priority.POLL, Priority.SERVICE, Priority.SETPOINT])
-def test_between_two_stops_that_nobody_answers_the_most_urgent_has_its_turn(
+def test_between_two_stops_without_an_answer_the_most_urgent_has_its_turn(
     kind: Priority,
 ) -> None:
     scheduler = Scheduler({2, 4}.__contains__)
@@ -311,7 +311,7 @@ def test_between_two_stops_that_nobody_answers_the_most_urgent_has_its_turn(
         scheduler.took(_READ)
 
 
-def test_a_stop_that_is_answered_gives_way_to_nobody() -> None:
+def test_a_stop_that_is_answered_gives_way_to_none() -> None:
     scheduler = Scheduler(lambda unit: False)
     stops = [stop_of(2), stop_of(2)]
     for waiting in (*stops, entry(Priority.POLL)):

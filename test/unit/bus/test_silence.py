@@ -13,7 +13,7 @@ from nfo_sinus_driver.bus.scheduler import Silences
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, PortError, Refused
 
 
-def test_who_is_not_asked_is_not_silent() -> None:
+def test_a_unit_without_requests_is_not_silent() -> None:
     silences = Silences()
     silences.note(1, 5.0, None)
     assert silences.lasts(1, 1000.0) == silences.lasts(2, 1000.0) == 0.0
@@ -53,7 +53,7 @@ def test_a_port_that_is_gone_says_nothing_of_who_is_behind_it() -> None:
     assert not silences.is_silent(1)
 
 
-def test_who_is_missing_is_asked_seldom_as_long_as_others_answer() -> None:
+def test_a_missing_unit_gets_few_requests_as_long_as_others_answer() -> None:
     silences = Silences()
     for unit in (1, 2, 3):
         silences.note(unit, 10.0, None)

@@ -160,7 +160,7 @@ def test_a_unit_that_was_connected_to_again_has_reconnects(clock: SimpleNamespac
     assert found == [0, 2, 0, 0]
 
 
-def test_who_only_asks_leaves_no_trace(clock: SimpleNamespace) -> None:
+def test_reading_figures_leaves_no_trace(clock: SimpleNamespace) -> None:
     recorder = Recorder(lambda: clock.now)
     assert recorder.statistics(9).transactions == 0
     assert math.isnan(recorder.statistics(9).round_trip_median)

@@ -225,7 +225,7 @@ def test_a_bad_file_is_refused_with_its_line_and_a_sentence(tmp_path: Path, name
     assert 1 <= line <= text.count('\n') + 1
 
 
-def test_all_that_is_wrong_is_told_at_once(tmp_path: Path) -> None:
+def test_all_that_is_wrong_is_reported_at_once(tmp_path: Path) -> None:
     text = GOOD.replace('bit: 3', 'bit: 0').replace('default: 5', 'default: 500')
     text = text.replace('value: Bus}', 'value: Panel}')
     assert len(complaints(tmp_path, text)) == 3

@@ -152,7 +152,7 @@ def test_a_bad_table_is_refused_with_its_line_and_a_sentence(tmp_path: Path, nam
     assert any(one.startswith(place) and said in one for one in found), found
 
 
-def test_all_that_is_wrong_in_the_cells_is_told_at_once(tmp_path: Path) -> None:
+def test_all_that_is_wrong_in_the_cells_is_reported_at_once(tmp_path: Path) -> None:
     table = TABLE.replace('ramp.accel,30', 'ramp.accel,x').replace('pole_pairs', 'poles')
     assert len(_complaints(tmp_path, table)) == 2
 

@@ -340,7 +340,7 @@ def test_the_three_formulas() -> None:
         assert adi and row.at('modbus').index == 0x210 + 4 * (int(adi[1]) - 1) + beside, row.key
 
 
-def test_two_that_are_one_object_are_told_apart_by_the_sub_index() -> None:
+def test_two_that_are_one_object_are_distinguished_by_the_sub_index() -> None:
     # the elements of an array count from 0 on PROFIBUS, on CANopen 0 is their number
     for protocol, first in (('profibus', 0), ('canopen', 1)):
         keys: dict[int, list[tuple[str, int | None]]] = {}

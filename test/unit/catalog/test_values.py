@@ -150,7 +150,7 @@ def test_every_parameter_through_a_float32(bits: int) -> None:
 
 
 @given(st.integers(2, 5000))
-def test_seconds_as_a_person_types_them(tenths: int) -> None:
+def test_seconds_as_they_are_typed(tenths: int) -> None:
     # 0.1 + 0.2 is not 0.3: neither that nor a text of one decimal may be refused
     for seconds in (tenths / 10, tenths * 0.1, float(f'{tenths / 10:.1f}')):
         raw = tenths * 100

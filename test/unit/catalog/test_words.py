@@ -387,7 +387,7 @@ def test_facts_of_each_bit(name: str) -> None:
         assert [tells.facts(1 << bit, kind) for bit in range(16)] == expected
 
 
-def test_quick_stop_of_the_g2_is_told_by_the_state() -> None:
+def test_quick_stop_of_the_g2_shows_in_the_state() -> None:
     for word, quick in ((0x8007, True), (0xC003, True), (0x8027, False), (0x0000, False)):
         facts = G2.profile.status_word.facts(word, Kind.STATUS)
         assert (Fact.QUICK_STOP_ACTIVE in facts) == quick, word
@@ -414,7 +414,7 @@ def test_facts_of_the_movitrac() -> None:
 
 @pytest.mark.parametrize('name', families())
 @given(word=WORD, listed=KIND)
-def test_no_fact_is_told_that_is_not_valid(name: str, word: int, listed: Kind) -> None:
+def test_no_fact_is_reported_that_is_not_valid(name: str, word: int, listed: Kind) -> None:
     tells = load_family(name).profile.status_word
     facts = tells.facts(word, listed)
     assert not facts & ~tells.valid

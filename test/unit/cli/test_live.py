@@ -53,13 +53,13 @@ def test_however_it_is_ended_the_terminal_is_as_it_was(bench: Bench, end: int | 
         terminal.wait_for('median')
 
 
-def test_one_that_is_not_there_is_told_without_a_view(bench: Bench) -> None:
+def test_one_that_is_not_there_is_reported_without_a_view(bench: Bench) -> None:
     with view(bench, '--address', 7, '--response-timeout', 0.05, '--retries', 0) as terminal:
         assert terminal.wait() == 1
         terminal.wait_for('no response')
 
 
-def test_lines_where_they_are_asked_for(bench: Bench) -> None:
+def test_lines_where_they_are_requested(bench: Bench) -> None:
     with view(bench, '--lines', '--period', 0.05) as terminal:
         terminal.wait_for('24 Stop', 'rpm', gone=['standing'])
         terminal.press('\x03')

@@ -241,7 +241,7 @@ def test_ctrl_c_while_it_waits_for_the_start(make_bench: MakeBench) -> None:
     assert bench.stopped and state['inv_st'] != 25
 
 
-def test_output_that_nobody_reads_any_more(bench: Bench) -> None:
+def test_output_whose_reader_has_ended(bench: Bench) -> None:
     with bench.riding('--period', 0.05) as process:
         assert process.stdout is not None and process.stderr is not None
         process.stdout.close()
@@ -553,7 +553,7 @@ def test_what_makes_no_sense(
     assert not bench.state()['command_writes']
 
 
-def test_nobody_answers(nfo: Nfo) -> None:
+def test_no_drive_answers(nfo: Nfo) -> None:
     done = nfo('run', 10, '--address', 9, '--response-timeout', 0.1, '--retries', 0)
     assert done.status == 1 and 'no response from address 9' in done.err
 

@@ -132,7 +132,7 @@ def test_errors(nfo: Nfo, bench: Bench) -> None:
     assert bench.writes() == []
 
 
-def test_errors_of_a_model_that_tells_none(nfo: Nfo) -> None:
+def test_errors_of_a_model_without_a_log(nfo: Nfo) -> None:
     done = nfo('errors', '--model', 'sinus_optimal')
     assert done.status == 1 and done.out == ''
     assert 'not documented' in done.err
@@ -146,7 +146,7 @@ def test_options_stand_before_and_behind_the_verb(nfo: Nfo, bench: Bench) -> Non
     assert '7.5' not in nfo('get', 'control.accel').out
 
 
-def test_nobody_answers(nfo: Nfo) -> None:
+def test_no_drive_answers(nfo: Nfo) -> None:
     done = nfo('info', '--address', 9, '--response-timeout', 0.1, '--retries', 0)
     assert done.status == 1 and done.out == ''
     assert 'no response from address 9' in done.err
@@ -215,7 +215,7 @@ def test_scan_asks_every_address_that_a_drive_may_have(
     assert options.addresses == tuple(range(first, last + 1))
 
 
-def test_scan_tries_all_settings_and_finds_nobody_twice(nfo: Nfo) -> None:
+def test_scan_tries_all_settings_and_finds_no_drive_twice(nfo: Nfo) -> None:
     done = nfo('scan', '--addresses', '1-2', '--all-settings', '--json', '--retries', 1)
     assert done.status == 0, done.err
     found = json.loads(done.out)
@@ -226,7 +226,7 @@ def test_scan_tries_all_settings_and_finds_nobody_twice(nfo: Nfo) -> None:
     ]
 
 
-def test_scan_finds_nobody(nfo: Nfo) -> None:
+def test_scan_finds_no_drive(nfo: Nfo) -> None:
     done = nfo('scan', '--addresses', '3-4', '--all-settings', '--response-timeout', 0.02)
     assert done.status == 1 and done.out == ''
     assert 'no response' in done.err
@@ -351,7 +351,7 @@ def test_monitor(nfo: Nfo, bench: Bench) -> None:
     assert bench.drive().motor.driven
 
 
-def test_monitor_of_several_drives_tells_of_each_and_of_the_line(nfo: Nfo, bench: Bench) -> None:
+def test_monitor_of_several_drives_shows_each_and_the_line(nfo: Nfo, bench: Bench) -> None:
     done = nfo('monitor', '--addresses', '1,2', '--count', 3, '--period', 0.05)
     assert done.status == 0
     assert [line.split()[1] for line in done.out.splitlines()] == ['1', '2'] * 3
@@ -368,7 +368,7 @@ def test_monitor_of_several_drives_tells_of_each_and_of_the_line(nfo: Nfo, bench
     assert done.err == ''
 
 
-def test_monitor_tells_which_of_several_drives_is_missing(nfo: Nfo, bench: Bench) -> None:
+def test_monitor_reports_which_of_several_drives_is_missing(nfo: Nfo, bench: Bench) -> None:
     bench.simulator.inject('silence', 60, address=2)
     done = nfo(
         'monitor', '--addresses', '1,2', '--count', 2, '--period', 0.01,
@@ -392,7 +392,7 @@ def test_monitor_does_not_acknowledge(nfo: Nfo, bench: Bench) -> None:
     assert bench.drive().control_unit.status_code == 5
 
 
-def test_monitor_tells_of_a_drive_that_goes_silent(nfo: Nfo, bench: Bench) -> None:
+def test_monitor_reports_a_drive_that_goes_silent(nfo: Nfo, bench: Bench) -> None:
     bench.on_read('status.dc_link', lambda: bench.simulator.inject('silence', 60, address=1))
     done = nfo('monitor', '--count', 3, '--period', 0.01, '--json')
     assert done.status == 1
@@ -435,7 +435,7 @@ def test_a_busy_port_names_its_holder(nfo: Nfo, bench: Bench) -> None:
         holder.communicate()
 
 
-def test_output_that_nobody_reads(bench: Bench) -> None:
+def test_output_without_a_reader(bench: Bench) -> None:
     process = bench.begin('monitor', '--period', 0.05)
     assert process.stdout is not None and process.stderr is not None
     process.stdout.readline()

@@ -45,7 +45,7 @@ CAMPAIGN = settings(
 
 
 @pytest.mark.parametrize('machine', MACHINES)
-def test_each_event_ends_a_ride(machine: type[AnyOrder]) -> None:
+def test_each_event_ends_a_run(machine: type[AnyOrder]) -> None:
     """Whatever hypothesis makes up, each event has its history, and so has what follows it."""
     state = machine()
     state.begin_for_each_event()
@@ -89,7 +89,7 @@ def test_a_set_point_from_before_enable_turns_nothing(machine: type[AnyOrder]) -
 
 
 @pytest.mark.parametrize('machine', [G2ModeScmd, G2DriveControl])
-def test_a_fault_that_ends_by_itself_ends_the_ride(machine: type[AnyOrder]) -> None:
+def test_a_fault_that_ends_by_itself_ends_the_run(machine: type[AnyOrder]) -> None:
     state = machine()
     state.begin(restart_after=1)
     try:

@@ -34,7 +34,7 @@ def written(rig: Rig, begun: int = 0) -> list[str]:
 
 
 @every_shape
-def test_the_messages_of_a_ride(way: str) -> None:
+def test_the_messages_of_a_run(way: str) -> None:
     with Rig(way) as rig:
         rig.connect()
         begun = len(rig.line.frames)

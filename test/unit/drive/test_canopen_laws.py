@@ -164,7 +164,7 @@ def test_a_long_ramp_leaves_no_fault_behind() -> None:
 # --- what a bus tells -----------------------------------------------------------------------------
 
 
-def test_a_drive_that_started_anew_is_disarmed_at_once() -> None:
+def test_a_drive_that_restarted_is_no_longer_enabled_at_once() -> None:
     # its silence alone would say so after a minute
     with Rig('canopen', lost_after=60.0, options={'boot_time': 0.01}) as rig:
         rig.turn()

@@ -60,7 +60,7 @@ def test_a_drive_follows_its_own_reference_and_no_set_point(
         ('Freque', 'Speed', 'fieldbus.input_freq_setpoint'),
     ],
 )
-def test_an_old_set_point_of_a_mode_that_is_not_told_does_not_turn_the_motor(
+def test_an_old_set_point_of_a_mode_that_is_not_known_does_not_turn_the_motor(
     real: str, assumed: str, register: str
 ) -> None:
     with Rig(

@@ -32,7 +32,7 @@ def fault_of(rig: DescribedRig) -> int:
     return listed[0] if listed else 198
 
 
-def test_ten_files_have_all_that_a_ride_is_about() -> None:
+def test_ten_files_have_all_that_a_run_needs() -> None:
     files = [read(path) for path in SHIPPED.values()]
     assert len(files) >= 10
     for file in files:
@@ -42,7 +42,7 @@ def test_ten_files_have_all_that_a_ride_is_about() -> None:
 
 
 @pytest.mark.parametrize(('name', 'protocol'), RIDES)
-def test_a_ride(name: str, protocol: str) -> None:
+def test_a_run(name: str, protocol: str) -> None:
     with DescribedRig(SHIPPED[name], protocol) as rig:
         rig.connect(parameters=True)
         rig.enable()

@@ -233,7 +233,7 @@ def test_it_is_driven(tmp_path: Path, name: str, protocol: str) -> None:
         assert not rig.notes.said(Cause.DRIVER_ERROR), rig.notes.events
 
 
-def test_a_fault_with_a_number_that_the_driver_needs_is_told_behind(tmp_path: Path) -> None:
+def test_a_fault_with_a_number_that_the_driver_needs_is_renumbered(tmp_path: Path) -> None:
     with DescribedRig(described(tmp_path)) as rig:
         rig.connect()
         rig.far.trip(1195)

@@ -20,7 +20,7 @@ OVERLOAD = 5
 MODE, SCMD = 'fieldbus.mode', 'fieldbus.scmd'
 
 
-def test_a_ride() -> None:
+def test_a_run() -> None:
     with Rig().connect() as rig:
         assert rig.answer(rig.drive.enable()) == (
             'enabled; it follows set-points that arrive from now on'
@@ -122,7 +122,7 @@ def test_dc_braking_before_a_start_is_waited_for(way: str, delay: int) -> None:
         assert not rig.turns
 
 
-def test_an_open_run_input_is_told_although_the_drive_could_be_braking() -> None:
+def test_an_open_run_input_is_reported_although_the_drive_could_be_braking() -> None:
     brakes = {'control.dc_brk': 6}
     with Rig(options={'run_input': False}, parameters=brakes).connect() as rig:
         assert 'its RUN input (DIN1) is not active' in rig.answer(rig.drive.enable(), 10.0)
@@ -175,7 +175,7 @@ every_serial = pytest.mark.parametrize(
 
 @every_serial
 @pytest.mark.parametrize('strict', [False, True])
-def test_acknowledge_a_fault_that_ended_a_ride(
+def test_acknowledge_a_fault_that_ended_a_run(
     way: str, strict: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if strict:

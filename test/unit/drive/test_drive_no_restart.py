@@ -29,7 +29,7 @@ def test_a_stop_that_a_fault_kept_from_the_drive_is_given_when_another_master_en
         rig.assert_only_enable_helps()
 
 
-def test_a_fault_that_no_poll_shows_ends_a_ride() -> None:
+def test_a_fault_that_no_poll_shows_ends_a_run() -> None:
     # it comes and is acknowledged between two polls, by what stops it, too
     with Rig() as rig:
         rig.turn()
@@ -40,7 +40,7 @@ def test_a_fault_that_no_poll_shows_ends_a_ride() -> None:
         rig.assert_only_enable_helps()
 
 
-def test_a_control_mode_that_is_changed_at_the_keypad_ends_a_ride() -> None:
+def test_a_control_mode_that_is_changed_at_the_keypad_ends_a_run() -> None:
     with Rig() as rig:
         rig.turn()
         rig.far.set_from_keypad('control.mode', 'Speed')

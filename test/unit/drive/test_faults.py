@@ -181,7 +181,7 @@ def test_a_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts() 
         rig.assert_only_enable_helps()
 
 
-def test_a_fault_that_is_over_before_a_poll_either_stops_the_ride_or_changes_nothing() -> None:
+def test_a_fault_that_is_over_before_a_poll_either_stops_the_run_or_changes_nothing() -> None:
     # it restarts at once: only the reaction to the fault shows, for 20 ms
     with Rig(parameters={**RESTARTS, 'error.rst_dly': 0}, poll_rate=5.0) as rig:
         rig.turn()

@@ -250,7 +250,7 @@ def test_2_after_a_fault_and_its_acknowledgement_nothing_turns(way: str) -> None
 
 @every_way
 @every_stop
-def test_2_a_stop_ends_an_enable_that_was_asked_for_before(way: str, stop: str) -> None:
+def test_2_a_stop_ends_an_enable_that_was_requested_before(way: str, stop: str) -> None:
     with Rig(way) as rig:
         rig.connect()
         enable = rig.drive.enable()
@@ -355,7 +355,7 @@ def test_3_without_fresh_set_points_it_stops(way: str) -> None:
 
 
 @every_way
-def test_4_a_ride_writes_no_setting_but_what_control_needs(way: str) -> None:
+def test_4_a_run_writes_no_setting_but_what_control_needs(way: str) -> None:
     with Rig(way) as rig:
         rig.turn()
         rig.result(rig.drive.disconnect(4.0))

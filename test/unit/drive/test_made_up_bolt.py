@@ -127,7 +127,7 @@ def test_a_status_is_one_read_and_the_frequency_comes_with_it() -> None:
         assert reads[: len(reads) // 2 * 2] == [TOLD, HERTZ] * (len(reads) // 2)
 
 
-def test_the_word_tells_the_sign_of_what_is_measured() -> None:
+def test_the_word_has_the_sign_of_what_is_measured() -> None:
     with Bench() as rig:
         rig.turn_at_40()
         rig.bolt.registers[TURNS] = 1200
@@ -240,7 +240,7 @@ def test_what_a_drive_cannot_measure_is_its_familys() -> None:
 
 
 @pytest.mark.parametrize('role', ['status_word', 'actual_frequency'])
-def test_what_tells_whether_it_runs_has_to_be_there(
+def test_what_shows_whether_it_runs_has_to_be_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, role: str
 ) -> None:
     folder = tmp_path / f'without_{role}'

@@ -104,20 +104,20 @@ def test_it_is_found() -> None:
         assert rig.found == 'acme'
 
 
-def test_one_that_tells_nothing_is_the_one_of_which_nothing_tells() -> None:
+def test_one_without_an_identity_is_the_model_without_one() -> None:
     with Bench() as rig:
         del rig.acme.registers[KIND]
         assert rig.found == 'sinus_optimal'
 
 
-def test_of_two_that_tell_nothing_a_person_has_to_say(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_two_without_an_identity_the_user_has_to_choose(monkeypatch: pytest.MonkeyPatch) -> None:
     silent = dataclasses.replace(load_family('acme').profile, told_by='')
     monkeypatch.setitem(load_family('acme').__dict__, 'profile', silent)
     with Bench() as rig, raises(Cause.SEVERAL_MODELS):
         _ = rig.found
 
 
-def test_a_ride() -> None:
+def test_a_run() -> None:
     with Bench() as rig:
         acme = rig.acme
         rig.connect(parameters=True)

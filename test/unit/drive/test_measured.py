@@ -75,7 +75,7 @@ def test_the_usual_ones_of_every_model_are_measured_values_of_it(model: str) -> 
 
 
 @pytest.mark.parametrize('way', ['rtu', 'optimal'])
-def test_a_drive_that_is_only_watched_tells_the_setpoint_that_another_gave_it(way: str) -> None:
+def test_a_monitored_drive_reports_the_setpoint_of_another_master(way: str) -> None:
     with Rig(way, control_method='monitor').connect() as rig:
         target = rig.drive.model.profile.setpoints['Freque'].key
         rig.far.memory.set(target, 12.5)

@@ -178,7 +178,7 @@ def test_a_motor_that_another_master_reverses_is_stopped_and_its_direction_shown
 
 
 @pytest.mark.parametrize('way', ['rtu', 'optimal', 'movitrac'])
-def test_a_motor_that_another_master_speeds_up_is_told_and_given_its_set_point(way: str) -> None:
+def test_a_motor_that_another_master_speeds_up_is_reported_and_set_back(way: str) -> None:
     with Rig(way) as rig:
         rig.turn()
         key = rig.drive.model.profile.setpoints['Freque'].key

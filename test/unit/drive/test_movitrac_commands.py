@@ -48,7 +48,7 @@ def test_an_enable_asks_little_of_a_drive_whose_settings_were_read(
         assert not CARDS & set(asked)
 
 
-def test_a_card_that_was_fitted_meanwhile_is_asked_for_again() -> None:
+def test_a_card_that_was_fitted_meanwhile_is_read_again() -> None:
     with make(parameters={'terminal.input_48': 'CW/Stop'}) as rig:
         rig.connect()
         rig.result(rig.drive.parameters.read())
@@ -165,7 +165,7 @@ def test_an_enable_is_refused_in_another_operating_mode(
 @pytest.mark.parametrize(('enable_bit', 'at_once'), [
     ('anded', True), ('ored', False), ('either', False),
 ])
-def test_a_rapid_stop_takes_the_enable_and_tells_whether_the_drive_takes_its_stop_ramp(
+def test_a_rapid_stop_takes_the_enable_and_says_whether_the_drive_takes_its_stop_ramp(
     enable_bit: str, at_once: bool
 ) -> None:
     ramps = {'ramp.t11_down': 4.0, 'ramp.t13_stop': 0.5}

@@ -23,7 +23,7 @@ def identity(**parameters: Any) -> Identity:
         return rig.drive.identity
 
 
-def test_it_tells_its_size_and_its_software() -> None:
+def test_it_identifies_its_size_and_its_software() -> None:
     with make() as rig:
         rig.connect()
         assert str(rig.drive.identity) == 'MOVITRAC 31C015-503-4-00, firmware 821 123 4.11'
@@ -40,14 +40,14 @@ def test_a_part_number_is_put_together_as_the_manual_says(word: int, number: str
     assert identity(special__software_system=word).versions == number
 
 
-def test_a_size_that_the_manual_does_not_list_is_told_as_its_number() -> None:
+def test_a_size_that_the_manual_does_not_list_is_shown_as_its_number() -> None:
     with make() as rig:
         rig.far.memory.put(SIZE, 9900)
         rig.connect()
         assert rig.drive.identity.model == 'MOVITRAC 31.. (output stage 99)'
 
 
-def test_what_a_drive_refuses_to_tell_is_left_out() -> None:
+def test_what_a_drive_refuses_to_show_is_left_out() -> None:
     with make() as rig:
         rig.meet = lambda key, data: 'refused' if key in (TYPE, SIZE, SOFTWARE) else None
         rig.connect()

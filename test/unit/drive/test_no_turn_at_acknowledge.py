@@ -133,7 +133,7 @@ def test_two_transactions_at_most_where_everything_is_refused() -> None:
         assert not rig.far.motor.driven
 
 
-def test_the_stop_that_everything_depends_on_is_repeated_until_it_is_heard() -> None:
+def test_the_stop_that_everything_depends_on_is_repeated_until_it_is_answered() -> None:
     with Rig(options=_WORST) as rig:
         watch = fallen_still(rig)
         stops: list[tuple[float, str]] = []

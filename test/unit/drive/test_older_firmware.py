@@ -418,7 +418,7 @@ def test_a_stop_is_not_confirmed_by_a_current_limit(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize('press', ['start', 'ext'])
-def test_a_motor_that_others_run_is_seen_to_run_and_left_alone(press: str) -> None:
+def test_a_motor_that_others_run_shows_and_is_left_alone(press: str) -> None:
     with Rig('classic v5.0').connect() as rig:
         rig.far.control_unit.press(press)
         rig.pass_time(1.0)

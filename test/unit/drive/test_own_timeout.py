@@ -25,7 +25,7 @@ timed = pytest.mark.parametrize('way', TIMED)
 
 
 @timed
-def test_9_a_drive_that_is_polled_seldom_hears_the_driver_in_time(way: str) -> None:
+def test_9_a_drive_that_is_polled_seldom_gets_a_request_in_time(way: str) -> None:
     with by_default(way, poll_rate=0.05, telemetry_rate=0.0) as rig:
         rig.connect()
         rig.enable()
@@ -74,7 +74,7 @@ def test_9_a_driver_that_was_suspended_for_too_long_starts_nothing_when_it_is_ba
 
 
 @pytest.mark.parametrize(('way', 'drives', 'baud'), [('rtu', 32, 19200), ('classic', 16, 9600)])
-def test_9_a_drive_hears_the_driver_in_time_while_all_others_are_enabled(
+def test_9_a_drive_gets_a_request_in_time_while_all_others_are_enabled(
     way: str, drives: int, baud: int
 ) -> None:
     # so many that its polls wait for seconds

@@ -76,7 +76,7 @@ def test_a_speed_that_the_scale_cannot_carry_is_clamped() -> None:
 
 
 @pytest.mark.parametrize('way', ['rtu', 'classic', 'canopen'])
-def test_scales_that_no_bus_tells_are_chosen(way: str) -> None:
+def test_scales_that_cannot_be_read_are_chosen(way: str) -> None:
     # FrqScl 1/100: a set-point of 20 Hz is 2000 counts, and 200 counts are 2 Hz
     with Rig(way, frequency_scale=0.01) as rig:
         registers, key = rig.drive.params, 'status.frq_set'

@@ -85,7 +85,7 @@ def test_a_tuning_of_a_driver_before_is_stopped_by_an_exit_too() -> None:
         assert rig.far.control_unit.tuning is not None
 
 
-def test_what_was_asked_for_before_a_stop_was_confirmed_is_refused_after_it() -> None:
+def test_what_was_requested_before_a_stop_was_confirmed_is_refused_after_it() -> None:
     with Rig() as rig:
         rig.turn()
         stop, requested_at = rig.drive.stop(), rig.clock.now
@@ -185,7 +185,7 @@ def test_a_stop_that_ends_with_the_driver_is_no_success() -> None:
         assert isinstance(stop.exception(), DriveError)
 
 
-def test_what_was_seen_before_a_new_reason_to_stop_confirms_nothing() -> None:
+def test_a_status_from_before_a_new_reason_to_stop_confirms_nothing() -> None:
     with Rig() as rig:
         rig.turn()
         begun = len(rig.written(SCMD))
@@ -228,7 +228,7 @@ def test_many_callers_share_one_stop() -> None:
 
 
 @pytest.mark.parametrize('way', [*STOPS, 'keypad'])
-def test_who_sees_a_drive_disarmed_sees_that_its_stop_is_not_confirmed(way: str) -> None:
+def test_a_drive_that_shows_as_not_enabled_shows_its_unconfirmed_stop(way: str) -> None:
     # other threads look at any moment, and take "not armed, no stop pending" for the end of a stop
     with Rig() as rig:
         rig.turn()

@@ -53,7 +53,7 @@ def test_whatever_stops_a_drive_stops_what_stops_with_it(way: str, stop: str) ->
 
 
 @pytest.mark.parametrize('way', SEVERAL)
-def test_it_is_told_to_stop_right_after_the_other(way: str) -> None:
+def test_it_is_sent_the_stop_right_after_the_other(way: str) -> None:
     with Rig(way, drives=2) as rig:
         couple(rig, 1, 2)
         rig.turn()

@@ -130,7 +130,7 @@ def test_speed_mode_of_a_telegram_needs_the_nominal_speed(model: str) -> None:
 
 
 @every_family
-def test_a_drive_that_tells_nothing_nominal_has_its_own_limit(way: str) -> None:
+def test_a_drive_without_nominal_values_has_its_own_limit(way: str) -> None:
     with Rig(way) as rig:
         rig.connect()
         rig.enable()

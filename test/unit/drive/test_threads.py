@@ -130,7 +130,7 @@ def meanwhile(*actions: Callable[[], object]) -> Iterator[None]:
         future.result()
 
 
-def test_a_ride_and_all_is_reported_by_the_worker(real: Real) -> None:
+def test_a_run_and_all_is_reported_by_the_worker(real: Real) -> None:
     real.enable()
     with meanwhile(lambda: real.drive.set_setpoint(20.0)):
         wait_until(lambda: abs(real.far.motor.frequency - 20.0) < 0.2)

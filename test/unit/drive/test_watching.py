@@ -128,7 +128,7 @@ def warnings(rig: Rig) -> list[str]:
 
 
 @pytest.mark.parametrize('way', WAYS)
-def test_what_ends_a_ride_is_shown_and_reported_once_with_a_remedy(way: str) -> None:
+def test_what_ends_a_run_is_shown_and_reported_once_with_a_remedy(way: str) -> None:
     for name, event in EVENTS.items():
         if ONLY.get(name, way) != way:
             continue
@@ -256,7 +256,7 @@ def test_a_condition_that_comes_and_goes_is_not_reported_each_time() -> None:
         assert len(rig.notes.events) == 1
 
 
-def test_a_refused_set_point_does_not_end_the_ride_after_it() -> None:
+def test_a_refused_set_point_does_not_end_the_run_after_it() -> None:
     with turning(G2, poll_rate=1.0) as rig:
         rig.send(None)
         answered = rig.far.write_raw

@@ -192,7 +192,7 @@ def test_the_end_of_a_tuning_is_a_stop_and_that_of_a_reset_is_none() -> None:
         assert rig.drive.snapshot.stop_reason is StopReason.PROCEDURE
 
 
-def test_a_control_mode_changed_at_the_drive_is_told_as_that() -> None:
+def test_a_control_mode_changed_at_the_drive_is_reported_as_that() -> None:
     with Rig() as rig:
         rig.turn()
         rig.far.set_from_keypad('control.mode', 'Speed')

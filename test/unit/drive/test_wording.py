@@ -168,7 +168,7 @@ def families_on(protocol: str) -> list[str]:
     ]
 
 
-def test_what_all_families_are_told_names_nothing_of_one() -> None:
+def test_what_all_families_share_names_nothing_of_one() -> None:
     named = []
     for path, (_, tree) in zip(SAYING, trees(SAYING), strict=True):
         for text in texts(tree):

@@ -91,7 +91,7 @@ def test_a_run_command_that_was_left_is_taken_back_before_and_behind_the_control
     play(method.take_control(), stop(), (Write('line.r000c', 6), None), stop(head=True))
 
 
-def test_what_keeps_it_from_starting_is_told_before_anything_is_written(tmp_path: Path) -> None:
+def test_what_keeps_it_from_starting_is_reported_before_anything_is_written(tmp_path: Path) -> None:
     requires = [{'parameter': 'source.command', 'value': 'Bus', 'text': 'set P01 to 1'}]
     method = played(tmp_path, control={'requires': requires})
     remote, local_runs = (Read(STATUS), 1 << 9), (Read(STATUS), 1)

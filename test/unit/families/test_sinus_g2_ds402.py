@@ -109,7 +109,7 @@ def test_each_step_of_a_run_waits_for_the_one_before() -> None:
     )
 
 
-def test_a_refused_stop_is_told_only_where_the_bus_may_have_control() -> None:
+def test_a_refused_stop_is_reported_only_where_the_bus_may_have_control() -> None:
     stop = (Write(WORD, SHUTDOWN, retry=False), REFUSED)
     play(METHOD.stop('Speed'), stop, LOCAL)
     zero = (Write(TARGET, 0.0, retry=False), None)

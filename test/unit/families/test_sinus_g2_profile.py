@@ -118,7 +118,7 @@ def test_stop() -> None:
     play(scmd().stop('Freque'), (stop, None), (to_zero, REFUSED))
 
 
-def test_a_refused_stop_is_told_where_the_bus_may_have_control() -> None:
+def test_a_refused_stop_is_reported_where_the_bus_may_have_control() -> None:
     first = Refusal('the first')
     refused, to_zero = (Write(SCMD, 0, retry=False), first), (zero(retry=False), None)
     for mode in (BUS, INHIBIT, REFUSED):
@@ -256,7 +256,7 @@ def test_the_run_bits_are_reset_and_the_others_left() -> None:
     )
 
 
-def test_a_refused_reset_is_told_where_the_network_has_control() -> None:
+def test_a_refused_reset_is_reported_where_the_network_has_control() -> None:
     # a mask is not the only way to reset them
     refused = (change(RUN_BITS), REFUSED), (Read(WORD, retry=False), 0xC07F)
     refused += ((Write(WORD, 0xC076, retry=False), REFUSED),)

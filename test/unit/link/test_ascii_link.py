@@ -143,7 +143,7 @@ def test_answer_takes_as_long_as_it_is(baud: int) -> None:
     bench.wire.check_gaps()
 
 
-def test_a_unit_tells_who_it_is() -> None:
+def test_a_unit_identifies_itself() -> None:
     bench = Bench()
     texts = {17: b'\x01\x11\x10' + b'0123456789ABCDEF'}
     objects = b'\x01\x2b\x0e\x02\x02\x00\x00\x02\x04\x09NFO Sinus\x05\x081.50/400'

@@ -340,7 +340,7 @@ def test_a_socket_lets_in_what_is_wanted_and_nothing_else(paper: PaperSocket) ->
     assert paper.options == [(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, expected)]
 
 
-def test_a_link_lets_in_answers_signs_of_life_and_what_others_ask(paper: PaperSocket) -> None:
+def test_a_link_lets_in_answers_signs_of_life_and_requests_of_others(paper: PaperSocket) -> None:
     CanopenLink.on_port('can0', LineSettings(125_000, '8N1')).open()
     ((_, _, filters),) = paper.options
     identifiers = [identifier for identifier, _ in struct.iter_unpack('=II', filters)]
@@ -366,7 +366,7 @@ def test_frames_of_a_socket(paper: PaperSocket) -> None:
     assert not paper.is_open
 
 
-def test_nobody_acknowledges(paper: PaperSocket) -> None:
+def test_no_node_acknowledges(paper: PaperSocket) -> None:
     port = make()
     port.open()
     paper.fails['send'] = errno.ENOBUFS

@@ -75,7 +75,7 @@ def test_a_refusal_says_why() -> None:
     assert bench.asked == [0x3000, A.index]
 
 
-def test_who_a_node_is() -> None:
+def test_identity_of_a_node() -> None:
     bench = Bench()
     bench.bus.servers[UNIT].objects |= {(0x1018, 2): bytes(4), (0x1018, 4): bytes(4)}
     inquiry = bench.link.identify(UNIT)
@@ -228,7 +228,7 @@ def test_four_questions_are_enough_for_one_to_be_certain() -> None:
     assert bench.asked[:5] == [A.index, 0x1000, 0x1001, 0x1018, A.index]
 
 
-def test_a_node_without_the_objects_that_each_has_tells_as_much() -> None:
+def test_a_node_without_the_objects_that_each_has_serves_as_well() -> None:
     bench = Bench(DROP)
     for place in MANDATORY:
         del bench.bus.servers[UNIT].objects[place]
@@ -246,7 +246,7 @@ def test_what_is_late_of_one_node_is_nothing_to_another() -> None:
     assert bench.asked == [A.index, A.index]
 
 
-def test_an_answer_told_twice_is_taken_once() -> None:
+def test_an_answer_sent_twice_is_taken_once() -> None:
     bench = Bench(Fate(), Fate(what='double'))
     bench.read(A)
     first = bench.read(A).data
@@ -343,7 +343,7 @@ def test_a_node_that_started_anew_is_made_operational_again(reads: int) -> None:
     assert not bench.link.supervision.take_restarted()
 
 
-def test_whoever_writes_is_heard_ten_times_a_second() -> None:
+def test_a_client_that_writes_sends_ten_heartbeats_a_second() -> None:
     bench = Bench()
     bench.write(A)
     until = bench.bus.now + 2

@@ -51,14 +51,14 @@ def elapse(bench: Bench, seconds: float) -> list[tuple[float, Frame]]:
     return bench.bus.other[before:]
 
 
-def test_a_line_on_which_nobody_asked_anything_is_left_alone() -> None:
+def test_a_line_without_requests_is_left_alone() -> None:
     bench = Bench()
     assert bench.link.supervision.due == math.inf
     bench.read(A)
     assert elapse(bench, 1.0) == []
 
 
-def test_a_restart_is_noticed_while_nobody_asks_anything() -> None:
+def test_a_restart_is_noticed_without_requests() -> None:
     bench = Bench()
     bench.read(A)
     bench.bus.arrive(bench.bus.now + 0.5, Frame(0x705, b'\0'))
@@ -66,7 +66,7 @@ def test_a_restart_is_noticed_while_nobody_asks_anything() -> None:
     assert bench.link.supervision.take_restarted() == {5}
 
 
-def test_whoever_has_written_is_heard_while_it_says_nothing_else() -> None:
+def test_a_client_that_has_written_sends_its_heartbeat() -> None:
     bench = Bench()
     bench.write(A)
     assert len([frame for _, frame in elapse(bench, 2.0) if frame == BEAT]) >= 19
@@ -75,7 +75,7 @@ def test_whoever_has_written_is_heard_while_it_says_nothing_else() -> None:
     assert elapse(bench, 1.0) == []
 
 
-def test_whoever_waits_for_a_silent_node_is_heard_by_the_others() -> None:
+def test_a_client_that_waits_for_a_silent_node_sends_its_heartbeat() -> None:
     bench = Bench(Fate(), *[DROP] * 20)
     bench.write(A)
     for _ in range(20):
@@ -122,7 +122,7 @@ def test_what_stands_there_already_is_not_written_again() -> None:
     assert far.carry_out(1.5).means == HEARTBEAT_MEANS
 
 
-def test_nobody_elses_watch_is_taken_away() -> None:
+def test_no_watch_of_another_client_is_taken_away() -> None:
     other = bytes.fromhex('E8030300')
     far = _Objects({(0x1016, 0): b'\2', (0x1016, 1): other, (0x1016, 2): bytes(4)})
     assert far.carry_out(1.5).means == HEARTBEAT_MEANS
@@ -163,7 +163,7 @@ def test_a_node_that_has_nothing_for_it() -> None:
     assert far.carry_out(2.0).means == ''
 
 
-def test_a_step_that_nobody_answers_is_done_again() -> None:
+def test_a_step_without_an_answer_is_done_again() -> None:
     far = _Objects(HEARTBEAT_OBJECTS)
     watch = far.bench.link.supervision.watch(UNIT, 1.5)
     watch.step()

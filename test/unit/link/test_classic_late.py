@@ -188,7 +188,7 @@ def test_damaged_answer() -> None:
         bench.read(A)
 
 
-def test_bytes_that_nobody_asked_for_put_reads_in_quarantine() -> None:
+def test_unrequested_bytes_put_reads_in_quarantine() -> None:
     bench = Bench()
     bench.read(A)
     bench.wire.now += 1

@@ -197,7 +197,7 @@ def test_drives_that_answer_fast_need_little_time_for_a_broadcast() -> None:
         assert min(2 * delay * TIMEOUT, 0.1) - 0.001 <= pause <= 0.101
 
 
-def test_nobody_reads_a_broadcast() -> None:
+def test_a_broadcast_cannot_be_read() -> None:
     bench = Bench()
     with pytest.raises(ValueError, match='broadcast'):
         bench.read(A, unit=95)

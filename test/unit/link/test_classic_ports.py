@@ -209,7 +209,7 @@ def test_answer_byte_by_byte(drive: PtyDrive, link: ClassicLink) -> None:
     link.write(1, SETPOINT, packed(5))
 
 
-def test_nobody_there(hasty: ClassicLink) -> None:
+def test_no_unit_there(hasty: ClassicLink) -> None:
     with pytest.raises(NoAnswer):
         hasty.read(2, SPEED)
     with pytest.raises(NoAnswer):

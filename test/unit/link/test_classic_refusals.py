@@ -99,6 +99,6 @@ def test_what_was_known_of_a_drive_ends_with_the_connection() -> None:
     assert SIO_ERR not in bench.asked
 
 
-def test_a_reason_that_nobody_tells() -> None:
+def test_a_reason_that_is_not_known() -> None:
     bench = Bench(Fate(what='refuse'), Fate(what='drop'))
     bench.refused(Refused.DEVICE_FAILURE, 'why is not known')

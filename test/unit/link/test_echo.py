@@ -43,7 +43,7 @@ def kind(request: pytest.FixtureRequest) -> Iterator[str]:
 # --- the echo by itself ---------------------------------------------------------------------------
 
 
-def test_nothing_is_stripped_before_an_echo_was_heard() -> None:
+def test_nothing_is_stripped_before_an_echo_came() -> None:
     echo = Echo()
     echo.sent(b'abc')
     assert echo.strip(b'abcd') == b'abcd'
@@ -307,7 +307,7 @@ def test_second_refusal_is_noticed_even_where_resync_reads_are_refused() -> None
     bench.expect(DamagedAnswer, lambda: bench.read(B))
 
 
-def test_same_words_without_resync_reads_are_believed_when_it_was_asked_who_it_is() -> None:
+def test_same_words_without_resync_reads_are_believed_after_an_identification() -> None:
     bench = Bench(resync=())
     bench.slave = SameWords(bench.wire)
     for address in (A, B, A):

@@ -120,7 +120,7 @@ def test_values_of_any_length_both_ways(value: bytes) -> None:
 
 
 @given(st.binary(max_size=4), st.sampled_from(sorted(NUMBERS)))
-def test_a_wrong_length_is_refused_and_told(value: bytes, index: int) -> None:
+def test_a_wrong_length_is_refused_and_reported(value: bytes, index: int) -> None:
     link, node = linked()
     size = len(node.object_dictionary[index]) // 8
     if value and len(value) != size:

@@ -38,7 +38,7 @@ def _what(decoder: str) -> str:
     return finding.what
 
 
-def test_a_check_sum_that_nobody_checks_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_check_sum_that_is_not_checked_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rtu, 'crc', lambda data: judges.seal_rtu(data)[-2:])
     assert _first('rtu') is None
     monkeypatch.setattr(rtu, 'crc', lambda data: AnyBytes())

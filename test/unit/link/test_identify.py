@@ -127,7 +127,7 @@ class Script:
         return reply, float(len(self.asked))
 
 
-def test_two_questions_tell_all() -> None:
+def test_two_questions_are_enough() -> None:
     script = Script(DeviceObjects(tuple(G2.items())), SERIAL)
     assert asked_all(ModbusInquiry(1, script)) == KNOWN
     assert script.asked == [ReadDevice(1, REGULAR, 0), ReportSlaveId(1)]
@@ -158,7 +158,7 @@ def test_only_what_is_ahead_and_known_is_read_on(following: int) -> None:
     assert [type(question) for question in script.asked] == [ReadDevice, ReadDevice, ReportSlaveId]
 
 
-def test_objects_that_nobody_knows_are_passed_over() -> None:
+def test_unknown_objects_are_passed_over() -> None:
     script = Script(DeviceObjects(((0, b'NFO'), (7, b'x'), (0x80, b'y'))), b'')
     assert asked_all(ModbusInquiry(1, script)) == Identification(vendor='NFO')
 
@@ -190,7 +190,7 @@ def test_a_question_that_could_not_be_sent_is_asked_later() -> None:
 # --- on a line in virtual time --------------------------------------------------------------------
 
 @pytest.mark.parametrize('baud', [1200, 19200, 57600])
-def test_a_g2_tells_who_it_is(baud: int) -> None:
+def test_a_g2_identifies_itself(baud: int) -> None:
     unit = Unit(LineSettings(baud_rate=baud, response_timeout=TIMEOUT))
     assert unit.identify() == KNOWN
     assert unit.functions == [43, 17]

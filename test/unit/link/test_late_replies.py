@@ -160,7 +160,7 @@ def test_a_line_is_trusted_again_after_a_while() -> None:
     assert late.doubt_about(Ask('c'), NOW) is Doubt.NONE, 'that is about the one before'
 
 
-def test_what_comes_unasked_may_come_once_more() -> None:
+def test_what_comes_unrequested_may_come_once_more() -> None:
     late = make()
     late.note_unrequested(NOW)
     assert late.quarantined(UNIT, NOW) == set(), 'nothing was asked yet'

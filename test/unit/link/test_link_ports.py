@@ -491,12 +491,12 @@ def test_url_that_may_lead_somewhere_is_not_refused(url: str) -> None:
 
 
 @pytest.mark.parametrize('port', ['10.0.0.1:502', 'server:4001', '[::1]:1'])
-def test_host_and_port_without_a_kind_of_url_are_told_the_kind(port: str) -> None:
+def test_host_and_port_without_a_kind_of_url_are_refused_with_the_kind(port: str) -> None:
     with pytest.raises(ValueError, match=f'^port .*write socket://{re.escape(port)} for'):
         open_link('modbus_rtu', port, LineSettings())
 
 
-def test_a_device_without_its_folder_is_told_the_whole_path() -> None:
+def test_a_device_without_its_folder_is_refused_with_the_whole_path() -> None:
     with pytest.raises(PortError, match=r'ttyNone does not exist: should it be /dev/ttyNone\?'):
         SerialPort('ttyNone', LineSettings()).open()
 

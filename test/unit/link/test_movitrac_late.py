@@ -187,7 +187,7 @@ def test_doubled_value_is_not_taken_for_that_of_another_drive(lump: bool) -> Non
     assert bench.read(A, unit=2).data == bench.answer_of(1)
 
 
-def test_value_told_again_before_it_can_be_the_answer() -> None:
+def test_value_sent_again_before_it_can_be_the_answer() -> None:
     bench = Bench()
     bench.read(A)
     again = bytes.fromhex('C8 00 19') + bench.answer_of(0)
@@ -226,7 +226,7 @@ def test_the_same_question_on_a_line_without_speed() -> None:
     assert bench.asked == [A.index, A.index, B.index] * 5
 
 
-def test_bytes_that_nobody_asked_for_put_reads_in_quarantine() -> None:
+def test_unrequested_bytes_put_reads_in_quarantine() -> None:
     bench = Bench()
     bench.read(A)
     bench.wire.now += 1

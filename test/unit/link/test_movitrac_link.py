@@ -94,7 +94,7 @@ def test_a_write_that_fails_behind_a_read_may_be_done() -> None:
     assert vars(raised.value)['maybe_done']
 
 
-def test_nobody_is_asked_who_he_is() -> None:
+def test_no_drive_is_asked_for_its_identity() -> None:
     bench = Bench()
     inquiry = bench.link.identify(UNIT)
     assert inquiry.done and inquiry.found == Identification()
@@ -301,7 +301,7 @@ def test_the_manual_knows_one_setting_of_the_line() -> None:
             open_link('movitrac', '/dev/x', LineSettings(9600, char_format))
 
 
-def test_what_to_check_where_nobody_answers() -> None:
+def test_what_to_check_where_no_drive_answers() -> None:
     check = Bench().link.protocol.check
     for word in ('X4', 'X20', 'USS 11A', 'UST 11A', 'P842', '67/68', 'P880', '9600', '8N1'):
         assert word in check

@@ -76,7 +76,7 @@ def test_however_many_answers_are_lost_something_is_asked_at_once(
     assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1)
 
 
-def test_a_unit_of_which_nothing_is_known_is_asked_who_it_is() -> None:
+def test_a_unit_of_which_nothing_is_known_is_identified() -> None:
     bench = Bench([LOST], resync=())
     bench.expect(NoAnswer, lambda: bench.read(A))
     assert bench.read(B).data == bench.answer_of(2)
@@ -154,7 +154,7 @@ def test_whatever_is_lost_late_doubled_or_damaged_the_line_is_used(
     st.lists(st.builds(Fate, st.floats(0, 3), st.sampled_from(['answer', 'drop'])), max_size=25),
     st.lists(st.sampled_from(sorted(NAMES)), max_size=25),
 )
-def test_nobody_waits_where_answers_are_only_lost_or_late(
+def test_no_request_waits_where_answers_are_only_lost_or_late(
     fates: list[Fate], names: list[str]
 ) -> None:
     bench = modbus_bench('G2', iter(fates))
@@ -369,7 +369,7 @@ def test_classic_a_stop_is_sent_into_noise_that_does_not_end() -> None:
     ),
     st.lists(st.sampled_from([0xE9, 0x29, 0x1E, 0xB6]), max_size=25),
 )
-def test_classic_nobody_waits_longer_than_a_time_out(
+def test_classic_no_request_waits_longer_than_a_time_out(
     fates: list[ClassicFate], numbers: list[int]
 ) -> None:
     bench = ClassicBench(*fates)

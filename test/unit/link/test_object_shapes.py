@@ -79,7 +79,7 @@ def test_what_the_catalog_has_no_room_for_is_no_value() -> None:
     st.data(), st.sampled_from([1, 2, 4]), st.sampled_from([1, 2, 4, 8]), st.booleans(),
     st.sampled_from([WRONG_LENGTH, sdo.TOO_LONG]),
 )
-def test_a_length_that_nobody_has_told_is_found_by_trying(
+def test_a_length_that_is_not_known_is_found_by_trying(
     data: st.DataObject, size: int, length: int, signed: bool, abort: int
 ) -> None:
     value = data.draw(numbers(min(size, length), signed=signed))
@@ -164,7 +164,7 @@ def test_nothing_comes_between_the_acknowledging_and_the_stop(
     assert asked(bench) == expected
 
 
-def test_another_refusal_does_not_tell_how_an_array_is_numbered() -> None:
+def test_another_refusal_does_not_show_how_an_array_is_numbered() -> None:
     bench = inv_st(0, 1)
     bench.bus.servers[UNIT].refuses[INV_ST, 2] = NO_OBJECT
     for address in (WITHOUT_ACK, WITH_ACK):

@@ -68,7 +68,7 @@ def test_the_stop_is_the_very_next_frame(modbus: Callable[..., Bench], fate: Fat
     assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1)
 
 
-def test_nothing_is_listened_for_behind_an_answer_that_was_told_before(
+def test_the_line_is_not_read_behind_an_answer_that_came_before(
     modbus: Callable[..., Bench],
 ) -> None:
     # the status that was read a moment ago has the very bytes

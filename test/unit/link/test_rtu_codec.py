@@ -230,7 +230,7 @@ def test_answer_to_something_else_is_passed_over(
 
 
 @given(st.data(), exchanges(CLOSE))
-def test_exception_to_somebody_else_is_passed_over(
+def test_exception_to_another_unit_is_passed_over(
     data: st.DataObject, exchange: tuple[Request, bytes]
 ) -> None:
     request, held = exchange

@@ -303,7 +303,7 @@ def test_refusal_of_another_function_is_believed_in_quarantine() -> None:
     assert error.code == bench.slave.code(1)
 
 
-def test_refusals_that_nobody_can_tell_apart_keep_no_reads_out() -> None:
+def test_refusals_that_cannot_be_distinguished_keep_no_reads_out() -> None:
     # a drive comes back from a power cycle and refuses what is written to it again and again
     bench = Bench([Fate(what='drop'), *[Fate(what='refuse')] * 3])
     bench.expect(NoAnswer, lambda: bench.write(B, 0))
@@ -331,7 +331,7 @@ def test_doubled_answer_is_noticed(lump: bool) -> None:
     assert bench.asked == [0x400, 0x258, 0x264]
 
 
-def test_bytes_that_nobody_asked_for_put_reads_in_quarantine() -> None:
+def test_unrequested_bytes_put_reads_in_quarantine() -> None:
     bench = Bench()
     bench.read(A)
     bench.wire.arrive(bench.wire.now, opinion.read_answer(UNIT, [99]))

@@ -220,7 +220,7 @@ def test_what_does_not_answer_a_read(message: str) -> None:
     assert upload.request is not None and upload.value == b''
 
 
-def test_a_segment_told_twice_is_taken_once() -> None:
+def test_a_segment_sent_twice_is_taken_once() -> None:
     upload = Upload(UNIT, 0x1008, 0)
     first = bytes.fromhex('00 4E 46 4F 20 53 69 6E')
     assert upload.take(bytes.fromhex('41 08 10 00 0A 00 00 00'))

@@ -76,7 +76,7 @@ def test_any_bytes_at_all(
     'header',
     ['0001 0001 0006', '0001 0000 0000', '0001 0000 0001', '0001 0000 00FF', '3A30 3130 3330'],
 )
-def test_somebody_else_is_there(header: str) -> None:
+def test_another_device_is_there(header: str) -> None:
     reader = FrameReader()
     assert reader.feed(bytes.fromhex(header)) == []
     assert reader.out_of_step

@@ -227,7 +227,7 @@ def test_once_the_read_was_sent_it_may_have_been_done(gateway: Gateway, patient:
     assert len(gateway.requests) == 3
 
 
-def test_late_answer_is_told_by_its_number(gateway: Gateway, hasty: TcpLink) -> None:
+def test_late_answer_is_recognised_by_its_number(gateway: Gateway, hasty: TcpLink) -> None:
     late: list[bytes] = []
 
     def keep(frame: Frame) -> bytes:
@@ -355,7 +355,7 @@ def test_gateway_that_closes_the_connection(gateway: Gateway, patient: TcpLink) 
     assert gateway.connections == 2
 
 
-def test_connection_closed_while_nobody_looked(gateway: Gateway, patient: TcpLink) -> None:
+def test_connection_closed_between_two_requests(gateway: Gateway, patient: TcpLink) -> None:
     gateway.then(lambda frame: None)
     with pytest.raises(PortError):
         patient.read(1, A)
@@ -397,7 +397,7 @@ def test_words_that_let_a_motor_run_are_forgotten_with_a_mute_connection(
     assert {message[1] for _, message in gateway.requests} == {3}
 
 
-def test_somebody_else_answers(gateway: Gateway, patient: TcpLink) -> None:
+def test_another_unit_answers(gateway: Gateway, patient: TcpLink) -> None:
     # a serial device server that passes on what a drive sends
     gateway.then(lambda frame: bytes.fromhex('01 03 02 00 25 79 9F'))
     remedy = f'protocol to modbus_rtu and port to socket://127.0.0.1:{gateway.port}'
@@ -420,7 +420,7 @@ def test_numbers_go_round(gateway: Gateway, patient: TcpLink) -> None:
     assert [number for number, _ in gateway.requests] == [0xFFFF, 1, 2]
 
 
-def test_nobody_there() -> None:
+def test_no_unit_there() -> None:
     with socket.socket() as free:
         free.bind(('127.0.0.1', 0))
         port = free.getsockname()[1]
@@ -430,7 +430,7 @@ def test_nobody_there() -> None:
     link.close()
 
 
-def test_host_that_nobody_knows() -> None:
+def test_host_that_is_not_known() -> None:
     with pytest.raises(PortError, match=r'no\.such\.host\.invalid:502 cannot be reached'):
         TcpLink('no.such.host.invalid', 502, 1.0).open()
 

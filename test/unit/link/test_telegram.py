@@ -95,7 +95,7 @@ def run(block: telegram.Block) -> None:
     block.write(NEXT, command(RUN))
 
 
-def test_before_anybody_commands_it_is_only_read(plc: Plc, block: telegram.Block) -> None:
+def test_before_the_first_command_it_is_only_read(plc: Plc, block: telegram.Block) -> None:
     assert block.read(STATUS).data == command(0x0207, 3)
     assert block.read(ACTUAL).data == b'\x80\0'
     assert block.read(ACTUAL).data == b'\x80\0'
@@ -181,7 +181,7 @@ def test_nothing_is_said_of_data_that_are_not_valid(plc: Plc, block: telegram.Bl
     assert block.write_and_read(SETPOINT, b'\0\0', STATUS).data == b''
 
 
-def test_not_released_is_told(plc: Plc, block: telegram.Block) -> None:
+def test_not_released_is_reported(plc: Plc, block: telegram.Block) -> None:
     plc.told[3] = 1
     assert block.read(STATUS).data == command(0x0207, 1)
 

@@ -33,7 +33,7 @@ def test_same_words_cost_no_request_and_hardly_any_time() -> None:
 
 
 @pytest.mark.parametrize('again', [0.05, 0.1, 0.15])
-def test_answer_told_twice_is_not_taken_for_the_next(again: float) -> None:
+def test_answer_sent_twice_is_not_taken_for_the_next(again: float) -> None:
     # the unit takes as long as it does, and the second copy comes within that
     bench = trusting([Fate(delay=0.2), Fate(0.2, 'double', again=again), Fate(delay=0.2)])
     bench.read(D)
@@ -44,7 +44,7 @@ def test_answer_told_twice_is_not_taken_for_the_next(again: float) -> None:
     assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1) != first
 
 
-def test_line_that_told_something_twice_is_not_trusted_for_a_while() -> None:
+def test_line_with_an_answer_sent_twice_is_not_trusted_for_a_while() -> None:
     bench = trusting([Fate(what='double')])
     bench.read(A)
     bench.wire.now += 0.01

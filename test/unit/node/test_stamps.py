@@ -42,14 +42,14 @@ class Clocks:
         return Stamps(self.node, self.steady)
 
 
-def test_a_moment_is_told_in_the_time_of_the_node() -> None:
+def test_a_moment_is_given_in_the_time_of_the_node() -> None:
     clocks = Clocks()
     clocks.time = 5000 * _MS
     assert abs(clocks.stamps().of(4.25) - (_EPOCH + 4250 * _MS)) < 0.01 * _MS
     assert clocks.stamps().of(math.nan) == 0
 
 
-def test_a_wait_between_the_clocks_is_not_told_as_time() -> None:
+def test_a_wait_between_the_clocks_does_not_count_as_time() -> None:
     clocks = Clocks()
     clocks.time = 5000 * _MS
     # 300 ms before the node's clock is read, then as long behind it
@@ -57,7 +57,7 @@ def test_a_wait_between_the_clocks_is_not_told_as_time() -> None:
     assert abs(clocks.stamps().of(5.0) - (_EPOCH + 5000 * _MS)) < 0.01 * _MS
 
 
-def test_a_machine_that_always_waits_is_told_the_best_there_is() -> None:
+def test_a_machine_that_always_waits_gets_the_best_there_is() -> None:
     clocks = Clocks()
     clocks.waits = [wait for size in (40, 9, 30, 50, 60) for wait in (1000, size * _MS, 1000)]
     error = clocks.stamps().of(1.0) - (_EPOCH + 1000 * _MS)

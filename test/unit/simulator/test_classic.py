@@ -251,7 +251,7 @@ def test_the_setpoint_is_that_of_the_control_mode():
 
 
 @both
-def test_a_ride(dialect):
+def test_a_run(dialect):
     bench = ClassicBench(dialect)
     assert bench.read('E00E9') == 24
     bench.run(250)

@@ -113,7 +113,7 @@ def test_local_control_is_not_remote_and_the_control_word_is_not_processed() -> 
     assert number(bus, STATUS) & 0x200
 
 
-def test_whoever_commands_last_has_the_reference() -> None:
+def test_the_last_command_has_the_reference() -> None:
     bus = running()
     bus.write(SCMD, 0, word(0x101))
     bus.wait(5.0)

@@ -68,7 +68,7 @@ def dictionary():
     return found
 
 
-def test_canopen_commands_nodes_and_hears_them():
+def test_canopen_commands_nodes_and_receives_their_frames():
     with Simulator([1, 2], protocol='canopen', boot_time=0.3) as simulator:
         bus = can.Bus(
             interface='slcan', channel=simulator.port, bitrate=125_000, sleep_after_open=0.0

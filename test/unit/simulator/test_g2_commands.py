@@ -135,7 +135,7 @@ def test_commands_that_erase(bench):
 # ---- running by the bus ----
 
 
-def test_a_ride_as_the_status_shows_it(bench):
+def test_a_run_as_the_status_shows_it(bench):
     bench.write('status.frq_set', 40)
     bench.run(30, 1.5)
     assert bench.read('status.frq_act') == pytest.approx(15, abs=0.2)

@@ -231,7 +231,7 @@ def test_a_silent_drive_neither_answers_nor_obeys(protocol):
     assert rig.heard.endswith(rig.words.answer)
 
 
-def test_a_damaged_request_is_met_with_silence_and_is_not_heard():
+def test_a_damaged_request_gets_no_answer_and_does_not_count():
     for protocol, key, heard_until in (
         ('modbus_rtu', 'serial.sio_tot', 14), ('movitrac', 'serial.pc_timeout', 145)
     ):

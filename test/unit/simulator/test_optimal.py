@@ -381,7 +381,7 @@ def test_power_cycle(optimal):
         assert optimal.read(DRIVE_CONTROL) == 0
 
 
-def test_the_state_tells_the_truth_by_the_keys_of_the_g2(optimal, bench):
+def test_the_state_has_the_truth_by_the_keys_of_the_g2(optimal, bench):
     assert describe(optimal.drive).keys() == describe(bench.drive).keys()
     optimal.run(20, 5)
     state = describe(optimal.drive)

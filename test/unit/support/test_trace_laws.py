@@ -54,7 +54,7 @@ _GOOD = [_POLL, *_WHO, _MODE, _ZERO, _RUN, _POLL, _STOP, '02 10 0250 0002 04 FFF
 
 
 @pytest.mark.parametrize('protocol', _PROTOCOLS)
-def test_a_good_ride_has_nothing_to_complain_of(protocol: str) -> None:
+def test_a_good_run_has_nothing_to_complain_of(protocol: str) -> None:
     frames = [frame for text in _GOOD for frame in (_request(text, 0.002, protocol), _ANSWER)]
     assert violations(frames, _GAP, protocol=protocol) == []
 
@@ -90,7 +90,7 @@ def test_a_good_ride_has_nothing_to_complain_of(protocol: str) -> None:
         ([_ZERO, *_WHO, _RUN, *_WHO, _RUN], 'without set-point 0'),
     ],
 )
-def test_a_bad_ride_is_found_out(protocol: str, bad: list[str], complaint: str) -> None:
+def test_a_bad_run_is_found_out(protocol: str, bad: list[str], complaint: str) -> None:
     found = violations([_request(text, 0.002, protocol) for text in bad], _GAP, protocol=protocol)
     assert len(found) == 1
     assert complaint in found[0]
@@ -128,7 +128,7 @@ _CLASSIC_GOOD = [
 ]
 
 
-def test_a_good_ride_over_classic_has_nothing_to_complain_of() -> None:
+def test_a_good_run_over_classic_has_nothing_to_complain_of() -> None:
     assert violations(_CLASSIC_GOOD, _GAP, protocol='classic') == []
 
 
@@ -151,7 +151,7 @@ def test_a_good_ride_over_classic_has_nothing_to_complain_of() -> None:
         ([*_BOTH_RUN, _classic(95, _SETPOINT, 1), _classic(1, _SCMD, 0x101)], 'without set-point'),
     ],
 )
-def test_a_bad_ride_over_classic_is_found_out(bad: list[dict], complaint: str) -> None:
+def test_a_bad_run_over_classic_is_found_out(bad: list[dict], complaint: str) -> None:
     (found,) = violations(bad, _GAP, protocol='classic')
     assert complaint in found
 

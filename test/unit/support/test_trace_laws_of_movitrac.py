@@ -32,7 +32,7 @@ def _complaints(*requests: str) -> list[str]:
     )
 
 
-def test_a_good_ride_has_nothing_to_complain_of() -> None:
+def test_a_good_run_has_nothing_to_complain_of() -> None:
     assert _complaints(*_GOOD) == []
     # an enable that failed half-way, with no direction at the terminals and the motor at rest
     put_back = 'a9 01 00cd 00000100', _ZERO, 'b5 01 000d', 'b5 01 0000', 'a9 01 00cd 00000000'
@@ -63,7 +63,7 @@ def test_a_good_ride_has_nothing_to_complain_of() -> None:
         (['b5 40 0000'], 'is for address 64'),
     ],
 )  # fmt: skip
-def test_a_bad_ride_is_found_out(bad: list[str], complaint: str) -> None:
+def test_a_bad_run_is_found_out(bad: list[str], complaint: str) -> None:
     found = _complaints(*bad)
     assert len(found) == 1
     assert complaint in found[0]

@@ -131,7 +131,7 @@ def test_every_drive_is_in_the_table_and_the_chosen_one_in_full(
     through(source, steps, size)
 
 
-def test_a_fault_is_told_with_cause_and_remedy_and_trouble_is_found_by_a_key() -> None:
+def test_a_fault_is_reported_with_cause_and_remedy_and_trouble_is_found_by_a_key() -> None:
     source = Hand(*conveyor(32))
 
     async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
@@ -238,14 +238,14 @@ def test_names_are_in_the_order_of_their_numbers() -> None:
     assert sorted(names, key=natural) == ['7', '/a/drive_1', '/a/drive_2', '/a/drive_10', '/drive']
 
 
-def test_names_are_shortened_where_that_tells_nothing() -> None:
+def test_names_are_shortened_where_that_loses_nothing() -> None:
     names = ['/conveyor/infeed', '/conveyor/a_name_that_is_too_long_for_it']
     assert list(short_names(names, 16).values()) == ['infeed', '…too_long_for_it']
     assert short_names(['/conveyor/infeed'], 16) == {'/conveyor/infeed': '/conveyor/infeed'}
     assert short_names(['/a/x', '/b/x'], 16) == {'/a/x': '/a/x', '/b/x': '/b/x'}
 
 
-def test_a_unit_of_a_person_s_own_is_no_markup_and_small_values_are_seen() -> None:
+def test_a_unit_of_the_user_is_no_markup_and_small_values_show() -> None:
     belt = replace(_RUNS, unit='[m/s]', setpoint=0.0432, actual=-0.00001)
 
     async def steps(app: MonitorApp, pilot: Pilot[None]) -> None:
@@ -291,7 +291,7 @@ def test_the_worst_stands_first_in_a_narrow_head() -> None:
     through(Hand(*drives), steps)
 
 
-def test_the_date_is_told_of_what_was_not_today() -> None:
+def test_the_date_is_shown_of_what_was_not_today() -> None:
     source = Hand(_RUNS)
     notes = [Note(1.0e9, Level.WARNING, '/drive', 'old'), Note(math.nan, Level.INFO, '/drive', 'x')]
     source.picture = replace(source.picture, notes=notes)
