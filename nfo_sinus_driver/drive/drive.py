@@ -141,11 +141,6 @@ class Drive:
         return self._error_log_monitor.newest
 
     @property
-    def powered_since(self) -> float:
-        """From this operating hour on the drive is known to have had power; NaN: not known."""
-        return self.log.powered_since
-
-    @property
     def stop_unconfirmed(self) -> bool:
         """A stop was requested that the drive has not confirmed yet."""
         return self._controller is not None and self._controller.stopping

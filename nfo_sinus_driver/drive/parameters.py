@@ -153,20 +153,12 @@ class Parameters:
             # the drive has it, even if no manual allows it [C19]
             return known
         model = self._state.model
-        if key not in model or not model[key].is_setting or not self.reaches(key):
+        if key not in model or not model[key].is_setting or not self._params.is_addressable(key):
             raise ParameterError(key, Report(Cause.NO_SETTING, key=key))
         try:
             return self._params.value(key, self._params.encode(key, value))
         except ValueError as error:
             raise ParameterError(key, Report(Cause.NOT_POSSIBLE, why=str(error))) from None
-
-    def limits(self, key: str) -> tuple[float, float, float]:
-        """Return the least value of a number, the greatest, and the step of the drive."""
-        return self._params.limits(key)
-
-    def reaches(self, key: str) -> bool:
-        """Return whether a parameter can be reached over this line."""
-        return self._params.is_addressable(key)
 
     def available(self, only: Collection[str] | None = None) -> list[str]:
         """Return the keys of the settings that the drive has, or of ``only`` some, in order."""

@@ -90,14 +90,16 @@ class Setpoint:
         #: Encodes a set-point. A program that sends the same one again and again has it encoded
         #: once: that takes longer than all else that is done for it.
         self._encode = functools.lru_cache(maxsize=1)(self._encoded)
-        self._following_since = math.inf
+        #: Since when the drive follows set-points, s of the clock of the bus; else infinite.
+        self.following_since = math.inf
         #: What the drive has and since when, by address; nothing where that is not known, and minus
         #: infinity where it may have taken a later write.
         self._written: dict[Address, tuple[bytes, float]] = {}
         self._age_task: Task | None = None
-        self._expired = False
-        #: The report of the time-out, until set-points arrive again.
-        self._timed_out: Report | None = None
+        #: No set-point has come for so long that the drive was given 0.
+        self.expired = False
+        #: The report of the set-point time-out, until set-points arrive again.
+        self.timed_out: Report | None = None
         self._waits_for_answer = False
         self._busy_since = math.inf
         self._clamp_reported = False
@@ -118,12 +120,7 @@ class Setpoint:
     @property
     def following(self) -> bool:
         """The drive follows set-points."""
-        return self._following_since < math.inf
-
-    @property
-    def following_since(self) -> float:
-        """Since when it does, s of the clock of the bus; infinite while it does not."""
-        return self._following_since
+        return self.following_since < math.inf
 
     @property
     def directed(self) -> bool:
@@ -131,20 +128,10 @@ class Setpoint:
         return self._target is None or self._target.directed
 
     @property
-    def expired(self) -> bool:
-        """No set-point has come for so long that the drive was given 0."""
-        return self._expired
-
-    @property
-    def timed_out(self) -> Report | None:
-        """The report of the set-point time-out, until set-points arrive again."""
-        return self._timed_out
-
-    @property
     def age(self) -> float:
         """How long ago the newest valid set-point came, s; NaN if none did since the enable."""
         at = self._request.at
-        return self._bus.now() - at if at > self._following_since else NAN
+        return self._bus.now() - at if at > self.following_since else NAN
 
     def connected(self) -> None:
         """Find out anew whether the drive returns its status with a set-point."""
@@ -163,19 +150,19 @@ class Setpoint:
         self.control_mode = control_mode
         self._limits = limits
         self._target, follows = target, target is not None
-        self._following_since = self._bus.now()
+        self.following_since = self._bus.now()
         self._keys, self._written = {}, {}
         self._encode.cache_clear()
         if target is not None:
             for step in target.writes(0.0):
                 address, data = self._params.target(step)
                 self._keys[address] = step.key
-                self._written[address] = data, self._following_since
+                self._written[address] = data, self.following_since
         self.commanded = 0.0 if follows else NAN
         self._had = [(0.0, math.inf)]
         self.clamped = self._clamp_reported = False
-        self._expired = False
-        self._timed_out = None
+        self.expired = False
+        self.timed_out = None
         self._waits_for_answer = False
         self._busy_since = math.inf
         if follows:
@@ -183,7 +170,7 @@ class Setpoint:
 
     def stop_following(self) -> None:
         """Follow nothing any more."""
-        self._following_since = math.inf
+        self.following_since = math.inf
         self.commanded = NAN
         self.clamped = False
         if self._age_task is not None:
@@ -262,7 +249,7 @@ class Setpoint:
 
     def _counts(self, request: Request) -> bool:
         """Return whether a request came after the drive was enabled, and is still fresh."""
-        return request.at > self._following_since and not self._is_old(request.at)
+        return request.at > self.following_since and not self._is_old(request.at)
 
     def _encoded(self, value: float, before: float) -> tuple[tuple[Address, bytes], ...]:
         """Return what is written, and where, for a set-point in place of the one before."""
@@ -300,9 +287,9 @@ class Setpoint:
         """Note that a request counts; return what it is limited to."""
         limited = self._limited(request)
         self.clamped = limited != request.value
-        self._expired = False
-        if self._timed_out is not None:
-            self._timed_out = None
+        self.expired = False
+        if self.timed_out is not None:
+            self.timed_out = None
             self._state.notify(Severity.INFO, Cause.SETPOINTS_AGAIN)
         return limited
 
@@ -430,9 +417,9 @@ class Setpoint:
         try:
             while True:
                 timeout = self._state.settings.setpoint_timeout
-                last = max(self._request.at, self._following_since)
+                last = max(self._request.at, self.following_since)
                 left = last + timeout - self._bus.now() if timeout else math.inf
-                if left > 0 or self._expired:
+                if left > 0 or self.expired:
                     await self._bus.sleep(min(left, _WATCH_PERIOD) if left > 0 else _WATCH_PERIOD)
                 else:
                     await self._expire(timeout)
@@ -444,9 +431,9 @@ class Setpoint:
         assert self._target is not None
         zero = self._target.writes(0.0, self._meant(self._standing))
         if self._standing != dict(map(self._params.target, zero)):
-            if self._timed_out is None:
-                self._timed_out = Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
-                self._state.notify(Severity.WARNING, self._timed_out)
+            if self.timed_out is None:
+                self.timed_out = Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
+                self._state.notify(Severity.WARNING, self.timed_out)
             before = self._request
             for step in zero:
                 if self._request is not before:
@@ -470,4 +457,4 @@ class Setpoint:
                 self._busy_since = math.inf
             if self._request is before:
                 self._has(0.0)
-        self._expired = True
+        self.expired = True

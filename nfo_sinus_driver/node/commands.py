@@ -235,7 +235,7 @@ class ErrorLogServices:
             return count
         if all(math.isnan(entry.operating_time) for entry in entries):
             return f'{count}; the drive does not say when they came'
-        since = self._managed.drive.powered_since
+        since = self._managed.drive.log.powered_since
         return (
             f'{count}, {undated} of them without the wall time: that is known only as long as the '
             f'drive is known to have had power, from operating hour {since:.1f} on'

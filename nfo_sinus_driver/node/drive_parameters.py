@@ -184,7 +184,7 @@ def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
         if parameter.key in given:
             value = coerce(parameter, given[parameter.key].value)
             # what cannot be reached over this line is reported when the drive is connected
-            reached = drive.parameters.reaches(parameter.key)
+            reached = drive.params.is_addressable(parameter.key)
             wanted[parameter.key] = (
                 drive.parameters.coerce(parameter.key, value) if reached else value
             )
@@ -205,7 +205,7 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
     )
     if isinstance(value, (bool, str)):
         return shown
-    low, high, step = drive.parameters.limits(key)
+    low, high, step = drive.params.limits(key)
     if not parameter.on_step(value):
         # rclpy refuses what is on none, and the drive is right
         step = 0.0

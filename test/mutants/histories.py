@@ -94,8 +94,8 @@ HISTORIES = (
         2,
         'in any order: a set-point from before enable is taken over',
         SETPOINT,
-        '        self._following_since = self._bus.now()\n',
-        '        self._following_since = 0.0\n        self._bus.request(self._slot)\n',
+        '        self.following_since = self._bus.now()\n',
+        '        self.following_since = 0.0\n        self._bus.request(self._slot)\n',
         OPTIMAL_SCMD,
     ),
     Mutant(

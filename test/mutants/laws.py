@@ -148,8 +148,8 @@ LAWS = (
         2,
         'a set-point from before enable is taken over',
         SETPOINT,
-        '        self._following_since = self._bus.now()\n',
-        '        self._following_since = 0.0\n        self._bus.request(self._slot)\n',
+        '        self.following_since = self._bus.now()\n',
+        '        self.following_since = 0.0\n        self._bus.request(self._slot)\n',
         (NO_RESTART, '-k', 'from_before_enable'),
     ),
     Mutant(

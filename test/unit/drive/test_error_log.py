@@ -361,7 +361,7 @@ def test_an_entry_has_its_wall_time_if_the_drive_has_had_power_ever_since() -> N
             else:
                 assert newest.age == pytest.approx((rig.clock.now - tripped) / 3600, abs=0.11)
                 assert began < newest.at == pytest.approx(tripped, abs=400.0)
-                assert rig.drive.powered_since == HOURS
+                assert rig.drive.log.powered_since == HOURS
 
 
 def test_an_entry_from_before_a_loss_has_no_wall_time() -> None:
