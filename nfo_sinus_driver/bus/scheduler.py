@@ -257,7 +257,7 @@ class Silences:
         self._pause_ends = -math.inf
 
     def note(self, unit: int, now: float, error: LinkError | None, seconds: float = 0.0) -> None:
-        """Note the outcome of a request that kept the line for so long, s."""
+        """Note the outcome of a request that kept the line for ``seconds``."""
         if error is None or error.responded or isinstance(error, Refused):
             pause = now - self._last_frame_at.get(unit, now)
             self._longest[unit] = max(self._longest.get(unit, 0.0), pause)

@@ -181,7 +181,7 @@ class Bus:
         return self._link.remarks.texts
 
     def require_sign_of_life(self, unit: int, seconds: float) -> None:
-        """Try another connection to the far end when nothing came from it for so long, s."""
+        """Try another connection to the far end when nothing came from it for ``seconds``."""
         self.call(lambda: self._lost_after.update({unit: seconds}))
 
     def on_restart(self, unit: int, call: Callable[[], None]) -> None:

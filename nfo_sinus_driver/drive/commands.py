@@ -115,14 +115,14 @@ async def carry_out(
         except (Refused, NoAnswer, DamagedAnswer) as error:
             if not (onward or isinstance(error, Refused)):
                 raise
-            if not await _stands(step, params, priority, error):
+            if not await _was_written(step, params, priority, error):
                 refusal = Refusal(str(error))
                 refusal.__cause__ = error
         if isinstance(step, profile.Write):
             written_at = params.now()
 
 
-async def _stands(
+async def _was_written(
     step: profile.Step, params: ParameterAccess, priority: Priority, error: LinkError
 ) -> bool:
     """Return whether the drive has taken a write that it did not answer, where that can be read."""

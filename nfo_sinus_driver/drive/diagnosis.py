@@ -152,7 +152,7 @@ _LIFE_STOOD = 0.2
 _CAUGHT = 0.95
 #: A smaller fall of the frequency may be a fluctuation, Hz.
 _LEAST_FALL = 0.5
-#: A condition that comes and goes is reported again only after so long without it, s.
+#: How long a condition has to be absent before it is reported again, s.
 _AGAIN_AFTER = 10.0
 
 

@@ -255,7 +255,7 @@ class Drive:
 
     @on_bus
     async def disconnect(self, timeout: float, why: Report = _LEFT) -> Report:
-        """Stop the motor, wait at most so long, s, for standstill, and release control."""
+        """Stop the motor, wait ``timeout`` s at most for standstill, and release control."""
         # no client may enable it until the motor stands still
         self._set_active(False)
         try:
@@ -284,7 +284,7 @@ class Drive:
 
     @on_bus
     async def stop_for_good(self, patience: float, why: Report = _ENDS) -> Report | None:
-        """Stop the motor within so many s; it can never be enabled again."""
+        """Stop the motor within ``patience`` s; it can never be enabled again."""
         if self._controller is not None:
             self._controller.close(why)
         if not self.ever_responded:
@@ -358,7 +358,7 @@ class Drive:
 
     @on_bus
     async def error_log(self, most: int = 0) -> tuple[LogEntry, ...]:
-        """Read the error log, newest entry first; at most so many entries, 0: all."""
+        """Read the error log, newest entry first; ``most`` entries at most, 0: all."""
         self._require_connected()
         return await self.log.read_now(most)
 

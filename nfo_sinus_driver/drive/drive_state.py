@@ -97,7 +97,7 @@ class DriveState:
         )
         self.turning = _turning(self.model)
         method = settings.method_class
-        #: A PLC stops the drive after so long without a word of the driver, s; 0: there is none.
+        #: How long after the driver's last message a PLC stops the drive, s; 0: no PLC.
         self.plc_time = method.plc_time
         #: Its parameters.
         self.params = ParameterAccess(
@@ -391,7 +391,7 @@ class DriveState:
         self.connected = self.responsive = True
 
     def lost(self) -> None:
-        """Note that it is connected no more."""
+        """Note that it is not connected any more."""
         self.connected = False
 
     @property

@@ -73,12 +73,12 @@ class ErrorLog:
         return self.documented and self.area.timed
 
     async def read_now(self, most: int = 0) -> tuple[LogEntry, ...]:
-        """Read it, newest first; at most so many entries, 0: all that every drive has, 32 [C4]."""
+        """Read it, newest first; ``most`` entries at most, 0: the 32 that every drive has [C4]."""
         area = self.area
         entries = await self._read(min(most or area.entries, area.limit), 0, Priority.POLL)
         if not area.timed:
             return tuple([await self._with_readings(*found) for found in enumerate(entries)])
-        return self.understood(entries, await self.read_time(Priority.POLL))
+        return self.decode(entries, await self.read_time(Priority.POLL))
 
     async def _with_readings(self, number: int, entry: int) -> LogEntry:
         """Return what an entry without a time says, and what the drive has kept of it."""
@@ -116,7 +116,7 @@ class ErrorLog:
         reply = await self._params.read_reply(key, priority, retry=priority <= Priority.POLL)
         hours = self._params.number(key, reply.data)
         elapsed = (reply.arrived - self._shown_at) / _HOUR
-        # what is shown is less than a tick behind what was counted
+        # the hours shown are less than a tick behind those counted
         if not hours > self.powered_since + elapsed * (1 - _DRIFT) - TICK:
             self.powered_since, self._shown_at = hours, reply.arrived
         return hours
@@ -125,14 +125,14 @@ class ErrorLog:
         """Note that the drive may have been off until now."""
         self.powered_since = math.nan
 
-    def understood(self, entries: Sequence[int], now: float) -> tuple[LogEntry, ...]:
+    def decode(self, entries: Sequence[int], now: float) -> tuple[LogEntry, ...]:
         """
         Decode entries, newest first, at operating time ``now``, h.
 
         The age of an entry is the difference of operating times, to a tick, if the drive has had
         power ever since.
         """
-        return tuple(self._understood(entry, now) for entry in entries)
+        return tuple(self._decode(entry, now) for entry in entries)
 
     async def erase_now(self) -> Report:
         """Erase the error log by SCMD [M0 table 18], and check that it is empty."""
@@ -226,14 +226,14 @@ class ErrorLog:
         )
         return area.codec.decode(data)
 
-    def _understood(self, entry: int, now: float) -> LogEntry:
+    def _decode(self, entry: int, now: float) -> LogEntry:
         code, then = self.area.code(entry), self.area.hours(entry)
         clock, age, at, latest = self._state.bus.now, math.nan, math.nan, math.nan
         # one tick of tolerance, for the drive rounds
         if now > then - TICK:
             age = max(0.0, now - then)
             latest = clock() - max(0.0, age - TICK) * _HOUR
-            # what is in the tick of the first reading may be from before it was switched on
+            # an entry in the tick of the first reading may be from before it was switched on
             if then > self.powered_since:
                 at = clock() - age * _HOUR
         text = self._state.nameplate.text_of(code)
@@ -318,13 +318,13 @@ class ErrorLogMonitor:
         newest = self._known = news[0] if news else known or 0
         fault = self._fault
         if known is None:
-            self.newest = next(iter(log.understood(news, now)), None)
+            self.newest = next(iter(log.decode(news, now)), None)
             # entries older than this driver are no news, but for that of the active fault
             code = fault and fault.code
             news = [entry for entry in news if log.area.code(entry) == code]
         elif not news and fault is not None and self._repeats(fault, newest, now):
             news = [newest]
-        entries = [self._sighted(entry, began) for entry in log.understood(news, now)]
+        entries = [self._dated(entry, began) for entry in log.decode(news, now)]
         self._looked_at = began
         if entries:
             self._reported_at = self._state.bus.now()
@@ -336,7 +336,7 @@ class ErrorLogMonitor:
         same = area.code(newest) == fault.code and now - area.hours(newest) < 2 * TICK
         return same and self._reported_at < fault.at - _SOON
 
-    def _sighted(self, entry: LogEntry, began: float) -> LogEntry:
+    def _dated(self, entry: LogEntry, began: float) -> LogEntry:
         """Return a new entry with the moment when it came, where that is known."""
         fault = self._fault
         if fault and fault.code == entry.code and self._state.fault_is_fresh:

@@ -13,7 +13,7 @@ class ExclusiveAccess:
 
     def __init__(self, what: str) -> None:
         self.what = what
-        #: The procedure shall stop what it does, or not begin it.
+        #: The procedure has to stop, or must not begin.
         self.aborted = False
 
     def abort(self) -> None:

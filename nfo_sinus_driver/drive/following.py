@@ -12,12 +12,12 @@ from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, Report, Severity
 from nfo_sinus_driver.drive.setpoint import Setpoint
 
-#: By more than this a frequency has to fall, Hz, within so long, s: the slowest ramp, of 2000 s,
-#: falls by 0.1 in 4 s, and no drive shows it in greater steps.
+#: How much a frequency has to fall, Hz, and within how long, s: the slowest ramp, of 2000 s, falls
+#: by 0.1 in 4 s, and no drive shows it in greater steps.
 _FALL = 0.04
 _FALLS_WITHIN = 5.0
 #: A slower motor stands still, or its frequency fluctuates, Hz.
-_STANDS = 0.5
+_STANDSTILL = 0.5
 #: From here on a motor counts as turning backwards, Hz: slip and measuring errors show less.
 _BACKWARDS = 2.0
 #: How long a drive may take to begin to follow another set-point, s.
@@ -25,7 +25,7 @@ _REACTION = 1.0
 #: Slip, its compensation and overshoot exceed a set-point by this share of it and this much, Hz.
 _BEYOND = 0.1
 _BEYOND_BY = 3.0
-#: A motor so far below its set-points that has slowed down by so much goes to a stop: Hz.
+#: How far below its set-points a motor is, and by how much it has slowed down, if it stops: Hz.
 _SHORT, _FALLEN = 1.0, 0.4
 #: What is compared with set-points, and what one of its units is for 1 Hz of a four-pole motor.
 _COMPARED = {'Freque': (Role.ACTUAL_FREQUENCY, 1.0), 'Speed': (Role.ACTUAL_SPEED, 30.0)}
@@ -39,7 +39,7 @@ class _Fall:
         self._fell_at = math.inf
 
     def take(self, size: float, at: float, wobble: float = _FALL) -> bool:
-        """Take a size; return whether it has not fallen for so long that no ramp is that slow."""
+        """Take a size; return whether it has not fallen for longer than any ramp takes."""
         if size < self.least - wobble:
             self.least, self._fell_at = size, at
         return at - self._fell_at > _FALLS_WITHIN
@@ -60,8 +60,8 @@ class Following:
         """Begin anew."""
         self._after_expiry, self._backwards, self._beyond = _Fall(), _Fall(), _Fall()
         #: The direction of all recent set-points; 0: none, or both.
-        self._way = 0
-        self._wrong_way = 0
+        self._direction = 0
+        self._wrong_polls = 0
         #: The speed from which the drive slows it down, below its set-points.
         self._falls_from = 0.0
         self._reported = False
@@ -85,14 +85,14 @@ class Following:
         elif role is not None and self._goes_to_a_stop(actual.value, least, most, unit):
             cause = Cause.STOPPED_BY_ITSELF
         elif role is not None:
-            self._look_beyond(actual.value, measured.at, max(-least, most), unit)
+            self._check_overspeed(actual.value, measured.at, max(-least, most), unit)
         turning = self._state.turning
         now = frequency / turning.hertz
         return cause and self._state.report(cause, now=now, unit=turning.unit)
 
     def _goes_on(self, frequency: float, at: float) -> bool:
         """Return whether it does not slow down, although set-points have ceased."""
-        if not self._setpoint.expired or not abs(frequency) > _STANDS:
+        if not self._setpoint.expired or not abs(frequency) > _STANDSTILL:
             self._after_expiry = _Fall()
             return False
         return self._after_expiry.take(abs(frequency), at)
@@ -105,22 +105,22 @@ class Following:
         """
         if not self._setpoint.directed:
             return False
-        way = 0
+        direction = 0
         if least >= 0 and most > 0:
-            way = 1
+            direction = 1
         elif most <= 0 and least < 0 and self._signed:
-            way = -1
-        if way != self._way:
+            direction = -1
+        if direction != self._direction:
             # a motor that ramps down from the other direction has not begun at standstill
-            self._way, self._backwards, self._wrong_way = way, _Fall(), 0
-        if not way:
+            self._direction, self._backwards, self._wrong_polls = direction, _Fall(), 0
+        if not direction:
             return False
-        back = -way * frequency
+        back = -direction * frequency
         endless = self._backwards.take(max(back, 0.0), at)
-        begun = self._backwards.least < _STANDS
-        self._wrong_way = self._wrong_way + 1 if back > _BACKWARDS and (begun or endless) else 0
+        begun = self._backwards.least < _STANDSTILL
+        self._wrong_polls = self._wrong_polls + 1 if back > _BACKWARDS and (begun or endless) else 0
         # one impossible value stops no motor
-        return self._wrong_way > 1
+        return self._wrong_polls > 1
 
     def _goes_to_a_stop(self, actual: float, least: float, most: float, unit: float) -> bool:
         """
@@ -132,8 +132,8 @@ class Following:
         status = self._state.status
         if status is None or not (status.word is None or status.by_frequency):
             return False
-        way = 1 if least > 0 else -1 if most < 0 else 0
-        size, wanted = way * actual, min(abs(least), abs(most))
+        direction = 1 if least > 0 else -1 if most < 0 else 0
+        size, wanted = direction * actual, min(abs(least), abs(most))
         short = 0 < size < wanted * (1 - _BEYOND) - _SHORT * unit
         if not (short and status.means(Meaning.SLOWING)):
             self._falls_from = 0.0
@@ -141,7 +141,7 @@ class Following:
         self._falls_from = max(self._falls_from, size)
         return size < self._falls_from - _FALLEN * unit
 
-    def _look_beyond(self, value: float, at: float, most: float, unit: float) -> None:
+    def _check_overspeed(self, value: float, at: float, most: float, unit: float) -> None:
         """Report a motor that turns faster than its set-point, and write that again."""
         size, margin = abs(value), _BEYOND_BY * unit
         if not size > most * (1 + _BEYOND) + margin:

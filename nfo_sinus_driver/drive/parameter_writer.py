@@ -203,7 +203,7 @@ class ParameterWriter:
         except LinkError as error:
             failure = failure or error
         if kept == data:
-            # whatever became of the answer to the write, a repeated one too
+            # with or without an answer to the write, even after a repeated one
             return (Written(key, before, data),)
         refused = not_changed(key, await self._why(key, data, kept, failure))
         if kept == before and isinstance(failure, Refused):

@@ -42,7 +42,7 @@ _KEEP_ALIVE_SHARE = 1 / 3
 _LATEST_SHARE = 0.5
 #: How long before its own time-out stops it a lost drive is tried again and again, s.
 _LAST_CHANCE = 0.6
-#: How often at most, if the port is gone too, s.
+#: The shortest pause between two tries, if the port is gone, too, s.
 _SHORTEST_PAUSE = 0.02
 #: The quantity that a control mode controls, which is measured with every poll.
 _ACTUAL = {
@@ -300,7 +300,7 @@ class Poller:
 
     @property
     def _silent_for_long(self) -> bool:
-        """It has answered no request for so long that it is lost."""
+        """It has answered no request for ``lost_after``."""
         silent = self._bus.silences.lasts(self._unit, self._bus.now())
         return silent >= self._state.settings.lost_after
 
@@ -314,7 +314,7 @@ class Poller:
 
     @property
     def _slow_period(self) -> float:
-        """How old may be what is not part of every poll, s."""
+        """How old the values may be that not every poll reads, s."""
         return max(_SLOW_PERIOD, _SLOW_TURNS * self._turn)
 
     @property
@@ -508,14 +508,14 @@ def take_snapshot(
     stop: Report | None = None,
 ) -> Snapshot:
     """Return the snapshot of a poll; without a status while the drive is not connected."""
-    standing = (state.connected, setpoint.following, state.settings.method)
+    common = (state.connected, setpoint.following, state.settings.method)
     if status is None:
-        return Snapshot(state.bus.now(), *standing, stop=stop)
+        return Snapshot(state.bus.now(), *common, stop=stop)
     code = status.listed
     watched = state.settings.method == MONITOR
     return Snapshot(
         status.at,
-        *standing,
+        *common,
         status=status,
         control_mode=state.control_mode,
         unit=state.unit,

@@ -96,7 +96,7 @@ class Setpoint:
         #: infinity where it may have taken a later write.
         self._written: dict[Address, tuple[bytes, float]] = {}
         self._age_task: Task | None = None
-        #: No set-point has come for so long that the drive was given 0.
+        #: No set-point has come within ``setpoint_timeout``: the drive was given 0.
         self.expired = False
         #: The report of the set-point time-out, until set-points arrive again.
         self.timed_out: Report | None = None
@@ -169,7 +169,7 @@ class Setpoint:
             self._age_task = self._bus.spawn(self._watch_age())
 
     def stop_following(self) -> None:
-        """Follow nothing any more."""
+        """Follow no more set-points."""
         self.following_since = math.inf
         self.commanded = NAN
         self.clamped = False
@@ -231,7 +231,7 @@ class Setpoint:
         return min(_REWRITE_PERIOD, timeout * _KEEP_ALIVE_SHARE) if timeout else _REWRITE_PERIOD
 
     def _is_old(self, at: float) -> bool:
-        """Return whether a request waited so long for the line that it has expired meanwhile."""
+        """Return whether a request has expired while it waited for the line."""
         timeout = self._state.settings.setpoint_timeout
         return bool(timeout) and self._bus.now() - at > timeout
 
@@ -257,16 +257,16 @@ class Setpoint:
         return tuple(map(self._params.target, self._target.writes(value, before)))
 
     def _due(self, request: Request) -> list[tuple[Address, bytes]]:
-        """Return what has to be written for a request: what the drive lacks, or has for long."""
+        """Return the writes for a request: what the drive does not have, or not recently."""
         assert self._target is not None
         found: list[tuple[Address, bytes]] = []
-        before_all = self._meant(self._standing)
+        before_all = self._decoded(self._in_drive)
         for address, data in self._encode(self._limited(request), before_all):
-            if not self._stands(address, data):
+            if not self._is_current(address, data):
                 found.append((address, data))
         return found
 
-    def _stands(self, address: Address, data: bytes) -> bool:
+    def _is_current(self, address: Address, data: bytes) -> bool:
         """Return whether the drive has the same there, and it need not be written again."""
         before, since = self._written.get(address, (b'', -math.inf))
         if data != before or since == -math.inf:
@@ -274,7 +274,7 @@ class Setpoint:
         return self._is_once(address) or self._bus.now() - since < self._rewrite_period
 
     def _is_once(self, address: Address) -> bool:
-        """Return whether what is written there is never written again."""
+        """Return whether this address is written only once."""
         return self._target is not None and self._keys[address] in self._target.written_once
 
     def _limited(self, request: Request) -> float:
@@ -284,7 +284,7 @@ class Setpoint:
         return max(-most, min(most, taken))
 
     def _accept(self, request: Request) -> float:
-        """Note that a request counts; return what it is limited to."""
+        """Note that a request counts; return its limited value."""
         limited = self._limited(request)
         self.clamped = limited != request.value
         self.expired = False
@@ -309,7 +309,7 @@ class Setpoint:
             return None
         # each of several writes has its own turn, and a newer set-point may come between
         address, data = due[0]
-        self._may_have(self._meant({**self._standing, address: data}))
+        self._may_have(self._decoded({**self._in_drive, address: data}))
         by_itself = len(due) > 1 or self._is_once(address)
         if by_itself or self._combining is _Combining.GIVEN_UP:
             return self._bus.write(self._unit, address, data, Priority.SETPOINT)
@@ -342,7 +342,7 @@ class Setpoint:
             self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
             assert transfer.data is not None
-            asked = self._meant({**self._standing, transfer.address: transfer.data})
+            asked = self._decoded({**self._in_drive, transfer.address: transfer.data})
             self._refused(Report(Cause.SETPOINT_REFUSED, value=asked, error=str(error)))
         elif isinstance(error, Interrupted):
             # no status is needed: the PLC has stopped the drive, and does not let it go on
@@ -354,7 +354,7 @@ class Setpoint:
         self._busy_since = math.inf
         self._written[address] = data, self._bus.now()
         if len(self._written) == len(self._keys):
-            self._has(self._meant(self._standing))
+            self._has(self._decoded(self._in_drive))
 
     def _missed(self, error: LinkError, address: Address) -> None:
         """
@@ -400,18 +400,18 @@ class Setpoint:
         return now < self._busy_since + _LONGEST_BUSY
 
     @property
-    def _standing(self) -> dict[Address, bytes]:
+    def _in_drive(self) -> dict[Address, bytes]:
         """The bytes that the drive has, as far as they are known."""
         return {address: data for address, (data, _) in self._written.items()}
 
-    def _meant(self, standing: Mapping[Address, bytes]) -> float:
+    def _decoded(self, data: Mapping[Address, bytes]) -> float:
         """Return the set-point that bytes mean to the drive, after its own rounding."""
         assert self._target is not None
-        if len(standing) < len(self._keys):
+        if len(data) < len(self._keys):
             return NAN
         keys = self._keys.items()
         value = self._params.value
-        return self._target.value({key: value(key, standing[address]) for address, key in keys})
+        return self._target.value({key: value(key, data[address]) for address, key in keys})
 
     async def _watch_age(self) -> None:
         try:
@@ -429,8 +429,8 @@ class Setpoint:
 
     async def _expire(self, timeout: float) -> None:
         assert self._target is not None
-        zero = self._target.writes(0.0, self._meant(self._standing))
-        if self._standing != dict(map(self._params.target, zero)):
+        zero = self._target.writes(0.0, self._decoded(self._in_drive))
+        if self._in_drive != dict(map(self._params.target, zero)):
             if self.timed_out is None:
                 self.timed_out = Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
                 self._state.notify(Severity.WARNING, self.timed_out)
@@ -441,7 +441,7 @@ class Setpoint:
                     return
                 self._may_have(0.0)
                 address, data = self._params.target(step)
-                if self._is_once(address) and self._stands(address, data):
+                if self._is_once(address) and self._is_current(address, data):
                     continue
                 try:
                     await self._params.write(replace(step, retry=False), Priority.STOP)

@@ -171,7 +171,7 @@ class DriveSettings:
     )
     idle_poll_rate: float = setting(
         0.0,
-        'as poll_rate, but while the motor stands and is not enabled',
+        'as poll_rate, but while the motor stands still and is not enabled',
         0, 1000, unit='Hz', zero='as poll_rate',
     )
     telemetry_rate: float = setting(2.0, 'measured values', 0, 100, unit='Hz', zero='off')

@@ -28,7 +28,7 @@ _LOST_RETRY_PERIOD = 1.0
 _COMPLAINT_PERIOD = 5.0
 #: The interval grows each time, up to this, s.
 _LONGEST_COMPLAINT_PERIOD = 60.0
-#: After so many stops in a row without an answer the drive is tried with other requests.
+#: After how many stops in a row without an answer the drive is tried with other requests.
 _UNANSWERED_BEFORE_FORCE = 4
 #: The slowest ramp, of 2000 s, shows in the frequency by then, s, however coarse that is.
 _RAMP_SHOWS_BY = 7.0
@@ -164,7 +164,7 @@ class StopSequence:
                 await self._fault_gone()
                 self._due = complain_at = self._bus.now() + drive_state.TIMEOUT
                 continue
-            stands = self._stands
+            stands = self._at_standstill
             if self._bus.now() >= complain_at or (stood and not stands):
                 pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
                 complain_at = self._bus.now() + pause
@@ -185,7 +185,7 @@ class StopSequence:
             self._state.notify(Severity.INFO, self._state.report(Cause.STOP_CONFIRMED_LATE))
 
     @property
-    def _stands(self) -> bool:
+    def _at_standstill(self) -> bool:
         """The drive has just shown that the motor stands still, and no run command."""
         status = self._state.status
         if status is None or self._bus.now() - status.at > _RETRY_PERIOD:
@@ -222,7 +222,7 @@ class StopSequence:
 
     @property
     def _is_lost(self) -> bool:
-        """The drive has been silent for so long that the next poll gives it up."""
+        """The drive has been silent for ``lost_after``: the next poll will find it lost."""
         settings = self._state.settings
         silent = self._bus.silences.lasts(settings.address, self._bus.now())
         return silent >= settings.lost_after

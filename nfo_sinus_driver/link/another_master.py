@@ -35,7 +35,7 @@ DOUBTFUL = 'another master asked at the same time'
 
 #: How long another master counts as present after a request of it, s.
 _PRESENT_FOR = 60.0
-#: So many of its frames within that time are no noise.
+#: How many of its frames within that time are no noise.
 _SURE = 3
 #: How many of our own requests may still come back, or be answered by the same bytes.
 _OWN = 8
@@ -77,7 +77,7 @@ def message_lengths(beginning: bytes) -> set[int]:
 
 
 @dataclass(frozen=True)
-class _Question:
+class _OpenRequest:
     """A request of another master to a unit, and until when it may be answered."""
 
     unit: int
@@ -269,7 +269,7 @@ class AnotherMaster:
         self._messages = messages
         self._buffer = b''
         self._own: deque[bytes] = deque(maxlen=_OWN)
-        self._standing: dict[int, _Question] = {}
+        self._open_requests: dict[int, _OpenRequest] = {}
 
     def sent(self, frame: bytes) -> None:
         """Note a request of ours: it may come back, and is not of another master."""
@@ -281,16 +281,16 @@ class AnotherMaster:
 
     def open_until(self, unit: int) -> float:
         """Return until when an answer of a unit may be to another master; 0: it is not."""
-        question = self._standing.get(unit)
-        return 0.0 if question is None else question.until
+        request = self._open_requests.get(unit)
+        return 0.0 if request is None else request.until
 
     def take_late(self, unit: int, now: float) -> bytes:
         """Return the beginning of the answer to a request that is overdue and may come late."""
-        question = self._standing.get(unit)
-        if question is None or now < question.until:
+        request = self._open_requests.get(unit)
+        if request is None or now < request.until:
             return b''
-        del self._standing[unit]
-        return question.answer_head
+        del self._open_requests[unit]
+        return request.answer_head
 
     def hear(self, data: bytes, now: float) -> bool:
         """Take bytes that are no answer to us; those of no frame are kept for a while."""
@@ -313,7 +313,7 @@ class AnotherMaster:
 
     def take_rest(self, unit: int) -> bytes:
         """Return the bytes of no frame of another master, now that the line is silent."""
-        if unit in self._standing:
+        if unit in self._open_requests:
             # the beginning of the answer, perhaps
             return b''
         rest, self._buffer = self._buffer, b''
@@ -322,7 +322,7 @@ class AnotherMaster:
     def clear(self) -> None:
         """Forget what came: the port is closed."""
         self._buffer = b''
-        self._standing.clear()
+        self._open_requests.clear()
 
     def _find(self, now: float) -> bool:
         buffer = self._buffer
@@ -340,13 +340,13 @@ class AnotherMaster:
         unit, function = message[:2]
         if self._is_own(frame, message):
             return False
-        question = self._standing.get(unit)
-        if question is not None and question.is_answered_by(message):
-            del self._standing[unit]
+        request = self._open_requests.get(unit)
+        if request is not None and request.is_answered_by(message):
+            del self._open_requests[unit]
             return True
         head = _answer_head(message)
         if not head:
             return False
         self._sightings.add(now, _ANOTHER_MODBUS_MASTER)
-        self._standing[unit] = _Question(unit, function, head, now + self._response_timeout)
+        self._open_requests[unit] = _OpenRequest(unit, function, head, now + self._response_timeout)
         return True

@@ -57,7 +57,7 @@ def guarding_request(unit: int) -> Frame:
 
 
 def start(unit: int) -> Frame:
-    """Return what makes a node operational; there is no answer to it."""
+    """Return the command that makes a node operational; it has no answer."""
     return Frame(_COMMANDS, bytes((_START, unit)))
 
 
@@ -188,7 +188,7 @@ class CanopenSupervision:
         self._beat_due = 0.0
 
     def guard(self, unit: int, period: float) -> None:
-        """Request the state of a node so often, s."""
+        """Request the state of a node once in each period, s."""
         self._guarded[unit] = _Guarding(period, 0.0)
 
     def entry_of(self, unit: int) -> int:

@@ -21,7 +21,7 @@ LATEST_REPLY = 4
 SUSPECT_FOR = 60.0
 #: How much later than its slowest recent reply a unit may reply.
 _LATER = 1.25
-#: By how much a slow reply is remembered with each of the next ones.
+#: The share of a slow reply that is remembered with each of the next ones.
 _DECAY = 0.95
 
 

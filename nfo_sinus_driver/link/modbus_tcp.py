@@ -90,9 +90,9 @@ _PORT = 502
 #: the thread has other work.
 _CONNECT_TIMEOUT = 3.0
 _SLICE = 0.02
-#: So many connections in a row that the gateway closes after one answer are no coincidence.
+#: How many connections in a row that the gateway closes after one answer are no coincidence.
 _CLOSINGS = 2
-#: For so many requests that were given up an answer is recognised as late.
+#: For how many of the last requests given up an answer is recognised as late.
 _GIVEN_UP = 64
 _HINT = 'is the gateway switched on and its address right?'
 _CLOSED_HINT = (

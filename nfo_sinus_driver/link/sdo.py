@@ -438,7 +438,7 @@ def _others(abort: int, length: int) -> Sequence[int]:
 
 
 def _fitted(data: bytes, length: int, *, signed: bool) -> bytes | None:
-    """Return a number in so many bytes; ``None``: it has more."""
+    """Return a number in ``length`` bytes; ``None``: it needs more."""
     number = int.from_bytes(data, 'little', signed=signed)
     try:
         return number.to_bytes(length, 'little', signed=signed)
@@ -447,7 +447,7 @@ def _fitted(data: bytes, length: int, *, signed: bool) -> bytes | None:
 
 
 def _resized(data: bytes, length: int, *, signed: bool) -> bytes:
-    """Return a number in so many bytes (Refused: it has more)."""
+    """Return a number in ``length`` bytes (Refused: it needs more)."""
     fitted = _fitted(data, length, signed=signed)
     if fitted is None:
         number = int.from_bytes(data, 'little', signed=signed)

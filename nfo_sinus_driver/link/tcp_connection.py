@@ -14,8 +14,8 @@ from typing import Protocol
 
 #: How long bytes may stay unacknowledged before the connection counts as lost, s.
 _ACKNOWLEDGE_TIMEOUT = 5
-#: An idle connection is probed after so long, so often, and so many times, s: a gateway that has
-#: lost it says so, and one that is gone does not answer.
+#: After how long an idle connection is probed, how often, s, and how many times: a gateway that
+#: has lost it says so, and one that is gone does not answer.
 _KEEPALIVE = {socket.TCP_KEEPIDLE: 2, socket.TCP_KEEPINTVL: 1, socket.TCP_KEEPCNT: 3}
 _READ_SIZE = 4096
 #: The addresses of a name, while they can be reached: a lookup may take long.

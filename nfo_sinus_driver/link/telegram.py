@@ -64,7 +64,7 @@ SETPOINT = 5
 #: To be read: three words of a longer telegram, from here on; refused where there are none.
 MORE = 6
 
-#: After so long without a new count from us the PLC stops the drive, s.
+#: How long after the last new count from us the PLC stops the drive, s.
 PLC_TIME = 1.0
 #: How often the life counter of the PLC moves until a word has reached the drive, and the drive's
 #: answer the block [C117].

@@ -45,11 +45,11 @@ class Autostart:
 
     @property
     def over(self) -> bool:
-        """It does not try any more."""
+        """It has stopped trying."""
         return self._over.is_set()
 
     def give_up(self) -> None:
-        """Do not try any more; a try that is under way goes on."""
+        """Stop trying; a try under way goes on."""
         self._over.set()
 
     def join(self, timeout: float) -> None:

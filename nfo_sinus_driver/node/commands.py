@@ -111,7 +111,7 @@ class Commands:
         timeout: float,
         describe: Callable[[_T], str],
     ) -> Any:
-        """Send a command that may take so long, s, and answer with a description of its result."""
+        """Send a command that may take ``timeout`` s, and answer with its result, described."""
         try:
             response.message = describe(command().result(timeout))
             response.success = True

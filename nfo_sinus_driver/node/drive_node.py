@@ -118,7 +118,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         context.add(self.managed)
 
     def stop_for_good(self, patience: float, why: str) -> Future[Report | None]:
-        """Stop the motor within so many s; no client can start it again."""
+        """Stop the motor within ``patience`` s; no client can start it again."""
         self._ending = True
         self.lifecycle.end()
         self._setpoints.be_quiet(True)
@@ -132,7 +132,7 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     @property
     def later_parameters(self) -> list[str]:
-        """The names of the parameters that will be declared when the drive is there."""
+        """The names of the parameters that are declared once the drive is connected."""
         return [parameter.key for parameter in self.managed.drive.model.kept]
 
     # --- lifecycle ----------------------------------------------------------------------------

@@ -207,7 +207,7 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
         return shown
     low, high, step = drive.params.limits(key)
     if not parameter.on_step(value):
-        # rclpy refuses what is on none, and the drive is right
+        # rclpy refuses a value between two steps, and the drive is right
         step = 0.0
     low, high = min(low, value), max(high, value)
     if isinstance(value, int):

@@ -14,7 +14,7 @@ from std_msgs.msg import Float32
 
 #: How often the graph should be checked, s.
 PERIOD = 2.0
-#: How a message of each type is written; the value is harmless to whatever follows it.
+#: How a message of each type is written; the value is harmless.
 _WRITTEN = {
     Float32: '{data: 0.0}',
     Setpoint: '{value: 0.0, unit: 0}',

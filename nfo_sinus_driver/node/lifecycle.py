@@ -66,7 +66,7 @@ class Lifecycle:
             self._autostart.start()
 
     def end(self) -> None:
-        """End autostart, if there is one; a try that is under way goes on."""
+        """End autostart; a try under way goes on."""
         self._autostart.give_up()
 
     def join(self, timeout: float) -> None:

@@ -162,7 +162,7 @@ class DriverProcess:
         return not unconfirmed
 
     def _may_be_there(self, node: DriveNode) -> bool:
-        """Return whether it may run: a drive that never answered was never started by us."""
+        """Return whether a drive may be there: one that never answered was never started."""
         return node.managed.drive.ever_responded or self._context.bus.port_error is None
 
 
@@ -323,7 +323,7 @@ def _await_end(
 def _reason_to_end(
     signals: HeldSignals, starters: list[OtherProcess], timeout: float
 ) -> str | None:
-    """Take the next signal within so many s; return why the driver has to end, if it has to."""
+    """Take the next signal within ``timeout`` s; return why the driver has to end, if it has."""
     number = signals.next(timeout)
     for starter in starters:
         if starter.ended:

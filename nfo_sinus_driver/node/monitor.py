@@ -50,13 +50,13 @@ from nfo_sinus_driver.view.picture import (
 
 #: How often the graph is searched for nodes, s.
 _DISCOVERY_PERIOD = 1.0
-#: A driver publishes every drive at least once a second: after so long without it has ended, s.
+#: After how long without a message a driver has ended, s: each drive has one a second at least.
 _GONE_AFTER = 3.5
 #: The longest period of telemetry that is assumed, s.
 _LONGEST_TELEMETRY = 30.0
-#: After so long without an answer a stop is reported as not confirmed, s.
+#: After how long without an answer a stop is reported as not confirmed, s.
 _ANSWER_TIME = 5.0
-#: Before that no answer is missing, s.
+#: How long an answer may take before it is shown as missing, s.
 _SOON = 1.0
 
 _LEVELS = {

@@ -66,7 +66,7 @@ def _given_to(name: str) -> Mapping[str, Parameter]:
 
 
 def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
-    """Return a warning for each parameter that was given to a node that has none such."""
+    """Return a warning for each parameter that was given to a node that does not have it."""
     nodes = list(nodes)
     given = {node.get_name(): overrides_of(node).keys() for node in nodes}
     known = {node.get_name(): declared_names(node) for node in nodes}
@@ -92,7 +92,7 @@ def _owners(name: str, known: Mapping[str, set[str]]) -> list[str]:
 
 
 def declared_names(node: Node) -> set[str]:
-    """Return the parameters that a node has, or will have once its drive is there."""
+    """Return the parameters that a node has, or will have once its drive is connected."""
     # those of a drive are declared when it is connected
     later: Iterable[str] = getattr(node, 'later_parameters', ())
     return set(node.get_parameters_by_prefix('')) | set(later)
