@@ -228,7 +228,7 @@ def log_unexpected(future: Future[Any]) -> None:
     """Log the error of a task that is not awaited, unless it was cancelled or the line failed."""
     error = future.exception()
     if error is not None and not isinstance(error, (Cancelled, LinkError)):
-        _log.error('a job on the bus failed', exc_info=error)
+        _log.error('a task on the bus failed', exc_info=error)
 
 
 class Sleepers:

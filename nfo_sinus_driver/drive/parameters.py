@@ -109,7 +109,7 @@ class Parameters:
         self._keys: tuple[str, ...] = ()
         self._data: dict[str, bytes] = {}
         self._values: dict[str, Value] = {}
-        self._wanted = DesiredConfig(self, state)
+        self._desired = DesiredConfig(self, state)
         self._turn = Lock(state.bus)
         #: What is being written, and may still be put back.
         self._changing: Collection[str] = ()
@@ -139,7 +139,7 @@ class Parameters:
     @property
     def drift(self) -> tuple[Change, ...]:
         """What differs from the wanted settings, as wanted -> what the drive has."""
-        return self._wanted.drift
+        return self._desired.drift
 
     def describe(self, key: str, before: Value, data: bytes) -> Change:
         """Return the difference between a value and what bytes mean."""
@@ -311,7 +311,7 @@ class Parameters:
                 if hint is None:
                     raise
                 raise error.followed_by(hint) from error
-            self._wanted.follow(coerced)
+            self._desired.follow(coerced)
             written = {change.key for change in changes}
             for key in data:
                 self._learn(key, data[key], quiet=key in written)
@@ -358,7 +358,7 @@ class Parameters:
                     self._learn(key, data, quiet=True)
                 if data != old:
                     found.append(self.describe(key, self._writer.value(key, old), data))
-            self._wanted.follow({change.key: change.new for change in found})
+            self._desired.follow({change.key: change.new for change in found})
             return tuple(found)
 
         async with self._alone(keys):
@@ -392,7 +392,7 @@ class Parameters:
     @on_bus
     async def apply(self, wanted: Mapping[str, Value], *, write: bool) -> None:
         """Take settings as the wanted ones, and report later drift; ``write``: write them now."""
-        await self._wanted.apply_now(wanted, write=write)
+        await self._desired.apply_now(wanted, write=write)
 
     @on_bus
     async def refresh(self) -> Report:
@@ -434,7 +434,7 @@ class Parameters:
             _log.exception('a new value of %s could not be reported', key)
 
     def _report_change(self, change: Change, own: bool) -> None:
-        if not self._wanted.report_drift(change.key) and not own:
+        if not self._desired.report_drift(change.key) and not own:
             self._state.notify(Severity.INFO, Cause.CHANGED_AT_DRIVE, change=change)
 
 

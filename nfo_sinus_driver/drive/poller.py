@@ -97,7 +97,7 @@ class Poller:
         #: Since when every poll failed, although the drive may have answered.
         self._failing_since = math.inf
         #: How often in a row it could not be connected to.
-        self._failures = 0
+        self._failed_reconnects = 0
         #: When a value was last asked for, and how long it took, s: long, where the line is full.
         self._requested_at = self._turn = 0.0
         #: When the control mode was last read.
@@ -168,8 +168,8 @@ class Poller:
     def _begin_anew(self, error: LinkError | DriveError) -> None:
         """Treat the drive as lost until it is connected to again, and poll anew."""
         self._bus.cancel(self._task)
-        self._lose(error)
-        self._failures = 0
+        self._mark_lost(error)
+        self._failed_reconnects = 0
         self.begin()
 
     def set_active(self, active: bool) -> None:
@@ -197,7 +197,7 @@ class Poller:
         """Reset the counts of failures: the drive is connected."""
         self._bus.recorder.connected(self._unit)
         self._failing_since = math.inf
-        self._failures = 0
+        self._failed_reconnects = 0
         self._complaint = None
         self._received = None
         self._state.forget_polled()
@@ -216,10 +216,10 @@ class Poller:
                     await self._read_status()
                 self._failing_since = math.inf
             except (LinkError, DriveError) as error:
-                self._failed(error)
+                self._on_poll_failed(error)
             except Exception as error:
                 # a drive that is no longer watched must not go on running
-                self._failed(DriveError(Cause.DRIVER_ERROR, error=repr(error)))
+                self._on_poll_failed(DriveError(Cause.DRIVER_ERROR, error=repr(error)))
             if due:
                 if self._state.connected and self.active and polled_at > 0:
                     self._bus.recorder.cycle(self._unit, started - polled_at)
@@ -253,7 +253,7 @@ class Poller:
         state = self._state
         if not state.connected:
             # a drive that stays silent costs its neighbours less and less
-            pause = min(_RECONNECT_PERIOD * self._failures, _SLOWEST_RECONNECT)
+            pause = min(_RECONNECT_PERIOD * self._failed_reconnects, _SLOWEST_RECONNECT)
             frame_at = self._bus.silences.last_frame_at(self._unit)
             strikes_in = frame_at + state.timeout.seconds - self._bus.now()
             if strikes_in > 0:
@@ -446,11 +446,11 @@ class Poller:
                 self._setpoint.answered()
                 return answer
 
-    def _failed(self, error: LinkError | DriveError) -> None:
+    def _on_poll_failed(self, error: LinkError | DriveError) -> None:
         state, now = self._state, self._bus.now()
         state.unanswered()
         if not state.connected:
-            self._failures += 1
+            self._failed_reconnects += 1
             if isinstance(error, DriveError) and error.report != self._complaint:
                 # what keeps the drive from being used is reported once
                 self._complaint = error.report
@@ -463,9 +463,9 @@ class Poller:
         at_once = isinstance(error, (PortError, NoData, Interrupted))
         at_once = at_once or _is(error, Cause.OLD_DATA)
         if at_once or self._silent_for_long or unwatched:
-            self._lose(error)
+            self._mark_lost(error)
 
-    def _lose(self, error: LinkError | DriveError) -> None:
+    def _mark_lost(self, error: LinkError | DriveError) -> None:
         """Treat the drive as lost until it can be connected to again, and report why."""
         state = self._state
         state.lost()

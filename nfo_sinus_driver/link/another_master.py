@@ -168,12 +168,12 @@ class OtherRequests:
     A request of another master is open until its answer comes, or may be late. What could answer
     one that was open during our exchange is no certain answer to us, unless both are the same.
 
-    :param patience: how long an answer may take, s.
+    :param answer_timeout: how long an answer may take, s.
     """
 
-    def __init__(self, remarks: Remarks, patience: float, codec: Codec) -> None:
+    def __init__(self, remarks: Remarks, answer_timeout: float, codec: Codec) -> None:
         self._sightings = Sightings(remarks)
-        self._patience = patience
+        self._answer_timeout = answer_timeout
         self._codec = codec
         self._requests = codec.enquiry, codec.select
         self._reader = codec.reader()
@@ -239,7 +239,7 @@ class OtherRequests:
                 self._own = None
             else:
                 self._sightings.add(now, ANOTHER_MASTER)
-                self._open, self._open_until = message, now + self._patience
+                self._open, self._open_until = message, now + self._answer_timeout
                 self._meanwhile.append(message)
                 self._length += len(self._codec.encode(message))
                 found = True

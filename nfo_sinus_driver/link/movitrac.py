@@ -438,7 +438,7 @@ class MovitracLink(CodecLink):
         if not is_glitch(data):
             super()._note_unrequested(data, request)
 
-    def _patience(self, unit: int) -> float:
+    def _longest_delay(self, unit: int) -> float:
         longest = self._late.longest(unit)
         unsettled = bool(self._late.quarantined(unit, self._now()))
         return LONGEST_RESPONSE_TIME if unsettled or not longest else longest

@@ -442,7 +442,7 @@ class CodecLink(RequestLink[Any]):
         if late := self._another.take_late(now):
             self._late.expect(late, now)
 
-    def _patience(self, unit: int) -> float:
+    def _longest_delay(self, unit: int) -> float:
         """Return how late an answer may begin, s."""
         return 0.0
 
@@ -479,16 +479,16 @@ class CodecLink(RequestLink[Any]):
     def _transact(self, request: Any) -> tuple[Any, float]:
         char_time = self._settings.char_time
         before, self._last, self._again = self._last, None, False
-        patience = self._patience(request.unit)
+        delay = self._longest_delay(request.unit)
         self._another.sent(request)
         sent = self._send(request, self._codec.encode(request))
         try:
-            answer, arrived, behind = self._receive(request, sent + patience)
+            answer, arrived, behind = self._receive(request, sent + delay)
             length = len(self._codec.encode(answer)) * char_time
             # a character less, for no clock is exact
             early = arrived < sent + length - char_time
             self._again = early and before is not None and before[1] == answer
-            self._confirm(request, answer, arrived, sent + patience + length)
+            self._confirm(request, answer, arrived, sent + delay + length)
         except (NoAnswer, DamagedAnswer):
             self._late.expect(request, self._now())
             if self._echo.give_up():

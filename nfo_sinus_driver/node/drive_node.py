@@ -22,7 +22,7 @@ from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.callers import Call
 from nfo_sinus_driver.node.commands import Commands, ErrorLogServices, TuningServices
 from nfo_sinus_driver.node.declaring import coerce, declare
-from nfo_sinus_driver.node.drive_parameters import DriveParameters, wanted_state
+from nfo_sinus_driver.node.drive_parameters import DriveParameters, desired_config
 from nfo_sinus_driver.node.factory_settings import with_factory_address
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
@@ -106,7 +106,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             lambda: self.managed.drive.snapshot.enabled,
         )
         try:
-            self._wanted = wanted_state(self, self.managed.drive)
+            self._desired = desired_config(self, self.managed.drive)
         except DriveError as error:
             raise ValueError(wording.say(error)) from error
         self.add_on_set_parameters_callback(self._check_settings)
@@ -154,7 +154,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             self._stop_for('let go', self.managed.disconnect)
             return TransitionCallbackReturn.FAILURE
         self._drive_parameters.declare(self.managed.drive)
-        self._apply_wanted_state()
+        self._apply_desired_config()
         self.lifecycle.note_transition()
         return TransitionCallbackReturn.SUCCESS
 
@@ -204,9 +204,9 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._drive_parameters.undeclare()
         return TransitionCallbackReturn.SUCCESS
 
-    def _apply_wanted_state(self) -> None:
+    def _apply_desired_config(self) -> None:
         """Write the parameters of the parameter file to the drive, once in a process."""
-        wanted, self._wanted = self._wanted, {}
+        wanted, self._desired = self._desired, {}
         write = self.get_parameter('apply_parameters').value
         if wanted:
             self.managed.drive.parameters.apply(wanted, write=write).result()

@@ -176,8 +176,8 @@ def coerce(parameter: CatalogParameter, given: object) -> Value:
     return given
 
 
-def wanted_state(node: Node, drive: Drive) -> dict[str, Value]:
-    """Return the settings of a drive that were given to its node, by file or by ``-p``."""
+def desired_config(node: Node, drive: Drive) -> dict[str, Value]:
+    """Return the settings of the drive that were given to its node, by file or by ``-p``."""
     given = overrides_of(node)
     wanted: dict[str, Value] = {}
     for parameter in drive.model.settings:

@@ -90,7 +90,7 @@ def start(command: list[str], environment: dict[str, str], log: Path) -> Fork:
 
 @functools.cache
 def _server() -> subprocess.Popen[str]:
-    # whoever loses his parent, as the forks do, becomes our child, so that we see how he ends
+    # a process that loses its parent, as the forks do, becomes our child: we see how it ends
     assert ctypes.CDLL(None).prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
     return subprocess.Popen(
         [sys.executable, __file__],

@@ -143,7 +143,7 @@ class Walk(contextlib.ExitStack):
         self.enabled = False
 
 
-#: What ends a ride; each has one to end.
+#: What ends a run; each has one to end.
 ENDS = (
     Walk.stop,
     Walk.quick_stop,

@@ -31,7 +31,7 @@ _DEMO = (sys.executable, '-m', 'nfo_sinus_driver.demo')
 _DEMO_TIME = 300.0
 #: A busy machine may leave out every other message of what comes at a steady rate.
 _SHARE = 0.5
-#: What the ramps (10 Hz/s) and the pauses of the ride add up to at the least, s.
+#: What the ramps (10 Hz/s) and the pauses of the run add up to at the least, s.
 _LEAST_LENGTH = 20.0
 _SETPOINT_RATE = 10.0
 #: How late a message may be in the middle, and at the worst, s; the status of a poll is stamped

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Over every way into a drive: the same node, one whole ride, and the same motor at the end.
+Over every way into a drive: the same node, one whole run, and the same motor at the end.
 
 The laws over every way are in test/unit/drive/test_laws.py, in virtual time.
 """
@@ -159,7 +159,7 @@ def test_it_turns_either_way_and_stops(rig: Rig, frequency: float) -> None:
 @pytest.mark.shared
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
 def test_a_signal_stops_the_motor_and_gives_control_back(bench: Bench, number: int) -> None:
-    """And a whole ride, on a line that takes its time, has broken no law."""
+    """And a whole run, on a line that takes its time, has broken no law."""
     drive = bench.simulator(*bench.drives.ramps(0.3), *_BOOT)
     driver = bench.driver(*_MODEST)
     client = bench.client().connected()

@@ -47,7 +47,7 @@ def test_a_fault_a_lost_line_and_stops_by_keys(bench: Bench, columns: int) -> No
     with first.setpoints(20.0), second.setpoints(25.0):
         # no standstill before this: with its message it is taken for what was asked for
         view.wait_for('► 2 running', '20.0 Hz', '25.0 Hz', 'enabled')
-        # whoever is discovered first is chosen, and remains so when the other comes above it
+        # whatever is discovered first is chosen, and remains so when the other comes above it
         view.press(_UP + 's')
         wait_until(lambda: not simulator.state(1)['turning'], 'the one that was chosen stands')
         view.wait_for('■ 1 standing', '► 1 running')

@@ -108,7 +108,7 @@ def test_what_differs_is_written_once_and_drift_is_left_alone(bench: Bench) -> N
     registers = {register(name) for name in ('control.accel', 'motor.u_nom')}
     assert registers.isdisjoint(write.register for write in wire.writes())
 
-    # whoever sets it by hand has another wish
+    # an operator who sets it has another wish
     assert set_one(client, 'control.accel', 9.0).successful
     _drifts(client, '')
 

@@ -4,7 +4,7 @@
 """
 Through a PLC by telegram 1, with ROS: the laws over Optimal, Sinus H and G2.
 
-A ride is over each of them, and every other case over one: over all it is tested without ROS.
+A run is over each of them, and every other case over one: over all it is tested without ROS.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A whole ride, judged from the trace that the simulated drive's end of the line has written."""
+"""A whole run, judged from the trace that the simulated drive's end of the line has written."""
 
 from __future__ import annotations
 

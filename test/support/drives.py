@@ -155,7 +155,7 @@ class Sinus(Drives):
 
 class OnCanopen(Sinus):
     """
-    A G2 on CANopen: its module holds it in bus mode, whoever is there [M0 §6.4].
+    A G2 on CANopen: its module holds it in bus mode, whatever is there [M0 §6.4].
 
     It watches over the heartbeat of the driver, which shows in no parameter.
     """

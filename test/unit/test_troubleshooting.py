@@ -63,7 +63,7 @@ NEVER_SHOWN = {
     'node/messages.py:inv_st': 'made only of a status that came',
 }
 LEVELS = {'error', 'warning', 'warn', 'fatal', 'critical', 'exception'}
-#: Exceptions that carry a sentence to whoever reads the log, an answer or the terminal; and all
+#: Exceptions that carry a sentence to whatever reads the log, an answer or the terminal; and all
 #: that are a kind of ``LinkError``.
 EXCEPTIONS = {
     *('LinkError', 'NodeError', 'NotPossible', 'ValueError', 'RuntimeError', 'StepError'),
@@ -310,7 +310,7 @@ def causes_in(node: ast.AST) -> Iterator[ast.Attribute]:
 
 
 def only_informing(code: Code) -> set[Cause]:
-    """Return the causes that are told as information wherever they are mentioned."""
+    """Return the causes that are reported as information wherever they are mentioned."""
     nodes = [node for _, node in code.nodes()]
     informing = {one for node in nodes if informs(node) for one in causes_in(node)}
     mentions = {one for node in nodes if isinstance(node, ast.Attribute) for one in (node,)

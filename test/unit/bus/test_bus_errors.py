@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Whatever is raised, whoever raises it, the bus goes on."""
+"""Whatever is raised, whatever raises it, the bus goes on."""
 
 from __future__ import annotations
 

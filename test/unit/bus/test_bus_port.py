@@ -35,7 +35,7 @@ def test_port_that_is_lost_and_comes_back(bus: Bus, link: FakeLink) -> None:
     assert isinstance(writer.outcomes[0][1], PortError)
     assert link.closed >= 1
     wait_until(lambda: bus.port_error is not None and str(bus.port_error) == 'still gone')
-    # who asks now is told at once
+    # a new request fails at once
     assert isinstance(failure(ask(bus, 1, Priority.STOP)), PortError)
     sent = len(link.done)
     link.answer = lambda done: packed(done.number)

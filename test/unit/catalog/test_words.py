@@ -126,7 +126,7 @@ MEANINGS = {
         Meaning.FIELDBUS_FAILURE: ('Bus Fail', ''),
     },
     'movitrac31': {
-        # who has control is told by P841 alone
+        # who has control is reported by P841 alone
         Meaning.ANONYMOUS: ('', ''),
         Meaning.SERIAL_FAILURE: ('PC time out', ''),
     },
@@ -339,7 +339,7 @@ def test_a_fault_of_the_movitrac_may_ramp_or_coast() -> None:
 def test_every_word_of_the_movitrac_has_a_code_and_a_state(word: int) -> None:
     code, state = shown_by(word)
     assert 0 <= code <= 255 and state in State
-    # whether there is a fault is told by the code, too
+    # whether there is a fault is reported by the code, too
     facts = MOVITRAC.profile.status_word.facts(word, Kind.STATUS)
     assert (code >= 100) == bool(word >> 24) == (Fact.FAULT in facts)
 

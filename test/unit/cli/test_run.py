@@ -57,7 +57,7 @@ def nothing_commanded(bench: Bench) -> bool:
     return bench.writes() == [] and not bench.state()['command_writes']
 
 
-# --- the ride -------------------------------------------------------------------------------------
+# --- the run -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize('way', WAYS)

@@ -314,7 +314,7 @@ def test_scan_writes_no_file_of_drives_that_make_no_line(
         scan._write_params(options, found, {1: (19200, '8E1'), 2: (9600, '8E1')})
     assert '2: 9600 8E1' in str(raised.value)
     assert '(nfo-sinus set serial.si_baud=...)' in str(raised.value)
-    # it has none that anybody knows
+    # it has none that is known
     for facts in found.values():
         facts['model'] = 'sinus_optimal'
     with pytest.raises(CliError, match=r'set them alike \(at the keypad\)'):

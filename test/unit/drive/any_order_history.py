@@ -29,7 +29,7 @@ NOISY = 2.0
 #: A stop that a fault keeps a drive from taking is not repeated within this, s.
 REFUSED = 0.3
 
-#: Commands that end a ride.
+#: Commands that end a run.
 STOPS = ('stop', 'quick_stop', 'deactivate', 'disconnect', 'stop_for_good')
 #: Commands that may turn the motor.
 _TURN = ('enable', 'tune')
@@ -53,7 +53,7 @@ class Command:
 
 
 class History:
-    """Keeps what has happened to a rig, and whether anybody may want the motor to run since."""
+    """Keeps what has happened to a rig, and whether a client may want the motor to run since."""
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -83,7 +83,7 @@ class History:
         self.disturbed_at = rig.clock.now
         self._running_since: float | None = None
         self._conditions = tuple(self._present_conditions())
-        #: When the last fault came, and when the ride was enabled that ended by it alone, if the
+        #: When the last fault came, and when the run was enabled that ended by it alone, if the
         #: drive may end that fault by itself.
         self._faulted_at = -math.inf
         self._ended_by_fault: float | None = None
@@ -303,7 +303,7 @@ class History:
             self._ended_by_fault = enabled_at if by_itself and sum(ended) == 1 else None
 
     def _forgive_fault(self) -> None:
-        """Let a ride go on whose fault came, and ended by itself, before it had to be noticed."""
+        """Let a run go on whose fault came, and ended by itself, before it had to be noticed."""
         due = max(self.settled_since, self._faulted_at) + self.noticed
         if self._ended_by_fault is not None and self.now < due:
             self.enabled_at = self._ended_by_fault

@@ -21,7 +21,7 @@ from nfo_sinus_driver.drive import Cause, Severity, Snapshot
 
 #: Within this it is said that a motor cannot be stopped, s.
 SAID = 5.0
-#: No command keeps anybody waiting longer, s.
+#: No command keeps a client waiting longer, s.
 LONGEST_COMMAND = 12.0
 
 #: For so many transactions a motor may have current that an acknowledgement has let go.
@@ -138,7 +138,7 @@ class Laws(History):
             raise Broken(f'an acknowledgement turns the motor for {POWERED} transactions')
 
     def _judge_standing(self) -> None:
-        """A run command of a past ride is taken back; one of another master when it is seen."""
+        """A run command of a past run is taken back; one of another master when it is seen."""
         if self._foreign:
             since = self.now if self._running_since is None else self._running_since
             # a drive that is not connected is not watched

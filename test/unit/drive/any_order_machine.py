@@ -24,7 +24,7 @@ SETPOINTS = st.sampled_from((20.0, -20.0, 0.0, 5.0, 50.0, 400.0, -1e5, 0.004))
 #: Faults of the drive, and how long it is silent after power-on, as its machine says.
 FAULTS = st.runner().flatmap(lambda machine: st.sampled_from(machine.faults))
 BOOT_TIMES = st.runner().flatmap(lambda machine: st.sampled_from(machine.boot_times))
-#: What ends a ride, likewise.
+#: What ends a run, likewise.
 ENDERS = st.runner().flatmap(lambda machine: st.sampled_from(machine.enders))
 
 WHOLE = precondition(lambda self: self.rig.line.whole)
@@ -39,7 +39,7 @@ class AnyOrder(RuleBasedStateMachine):
     :cvar driver: other settings of the driver.
     :cvar faults: codes of some of its faults.
     :cvar boot_times: how long it may be silent after power-on, s.
-    :cvar enders: what ends a ride, the names of methods that take the time to wait.
+    :cvar enders: what ends a run, the names of methods that take the time to wait.
     """
 
     protocol: ClassVar[str] = 'modbus_rtu'
@@ -83,7 +83,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.activate()
 
     def begin_for_each_event(self) -> None:
-        """Begin in the way that shows most of what ends a ride; each family its own."""
+        """Begin in the way that shows most of what ends a run; each family its own."""
         raise NotImplementedError
 
     def put_right(self) -> None:
@@ -196,7 +196,7 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(wait=WAITS)
     def stop_while_reading(self, wait: float = 0.4) -> None:
-        """Stop a ride while all the parameters are read, which keeps the line busy."""
+        """Stop a run while all the parameters are read, which keeps the line busy."""
         self.ride()
         reading = self.rig.drive.parameters.read()
         self.let(0.05)
@@ -285,7 +285,7 @@ class AnyOrder(RuleBasedStateMachine):
     def fault_in_a_ride_acknowledged(
         self, code: int, between: float = 0.4, wait: float = 1.0
     ) -> None:
-        """Acknowledge a fault that has ended a ride, with the run command standing perhaps."""
+        """Acknowledge a fault that has ended a run, with the run command standing perhaps."""
         self.ride()
         self.fault(code, wait=between)
         if self.laws.watched:
@@ -378,7 +378,7 @@ class AnyOrder(RuleBasedStateMachine):
         wait=st.sampled_from((1.0, 2.5)),
     )
     def end_ride(self, event: str, after: float = 1.0, wait: float = 1.0) -> None:
-        """Let something that ends a ride happen in one."""
+        """Let something that ends a run happen in one."""
         self.ride(wait=after)
         getattr(self, event)(wait=wait)
 
@@ -405,7 +405,7 @@ class AnyOrder(RuleBasedStateMachine):
         wait=WAITS,
     )
     def lose_line(self, state: str, give: str, seconds: float, wait: float = 2.5) -> None:
-        """Lose the line in a ride for so long that the drive is lost; stop it meanwhile."""
+        """Lose the line in a run for so long that the drive is lost; stop it meanwhile."""
         self.ride()
         self.break_line(state, wait=0.02)
         if give and self.laws.watched:

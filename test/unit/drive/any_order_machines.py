@@ -190,7 +190,7 @@ class SinusOrder(AnyOrder):
         # it is not read with every poll
         self.let(max(wait, 2.5))
 
-    # --- what ends a ride -------------------------------------------------------------------------
+    # --- what ends a run -------------------------------------------------------------------------
 
     def press_stop(self, wait: float) -> None:
         self.press('stop', wait)
@@ -402,7 +402,7 @@ class MovitracOrder(AnyOrder):
         self.by_another(('fieldbus.factory_setting', 100))
         self.let(wait)
 
-    # --- what ends a ride -------------------------------------------------------------------------
+    # --- what ends a run -------------------------------------------------------------------------
 
     def standard_at_keypad(self, wait: float) -> None:
         self.control_mode_at_keypad('Standard', wait)

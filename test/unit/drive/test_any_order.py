@@ -76,7 +76,7 @@ def test_a_set_point_from_before_enable_turns_nothing(machine: type[AnyOrder]) -
         state.enable(wait=1.0)
         assert state.rig.drive.following
         assert state.rig.far.motor.frequency == 0
-        # nor does one from the ride before
+        # nor does one from the run before
         state.send(20.0, wait=1.0)
         assert state.rig.far.motor.frequency > 19.0
         state.send(None, wait=0.1)

@@ -16,7 +16,7 @@ from nfo_sinus_driver.catalog.declared import read
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.simulator._declared.control_unit import DeclaredControlUnit
 
-#: Whole rides, each over both lines of Modbus.
+#: Whole runs, each over both lines of Modbus.
 RIDES = list(itertools.product(SHIPPED, ('modbus_rtu', 'modbus_tcp')))
 
 

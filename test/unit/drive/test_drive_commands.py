@@ -58,7 +58,7 @@ def test_a_stop_says_what_it_finds() -> None:
         rig.pass_time(0.5)
         for command in (rig.drive.stop, rig.drive.quick_stop):
             assert rig.answer(command()).startswith('the bus has no control of this drive')
-            # whoever runs it at the keypad is not disturbed
+            # a motor run by the keypad is not disturbed
             assert rig.far.motor.driven
         assert rig.written(MODE) == []
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What ends a ride is heard to its end at once, and answered, however full the line is."""
+"""What ends a run is carried out at once, and answered, however full the line is."""
 
 from __future__ import annotations
 

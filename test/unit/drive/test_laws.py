@@ -30,7 +30,7 @@ from nfo_sinus_driver.drive import Cause, Drive, Severity
 _SOON = 1.5
 #: After so long each setting was read again, s.
 _ROUND = 12.0
-#: The set-point of a ride, Hz.
+#: The set-point of a run, Hz.
 _SPEED = 20.0
 
 STOPS: dict[str, Callable[[Drive], Future[Any]]] = {

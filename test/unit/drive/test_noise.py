@@ -35,7 +35,7 @@ def made(line: str = 'rtu', **settings: Any) -> Rig:
 
 
 def ends(rig: Rig) -> list[str]:
-    """Return why the driver gave the motor up since the ride began, each time."""
+    """Return why the driver gave the motor up since the run began, each time."""
     return [one.text for one in rig.notes.events if one.text.startswith(_ENDS)]
 
 

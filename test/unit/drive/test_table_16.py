@@ -5,7 +5,7 @@
 The driver led through every state and exit of [M0 table 16].
 
 What the simulated drive makes of its control word is in test/unit/simulator; here is what the
-driver makes of what the drive does, whoever brought it there.
+driver makes of what the drive does, whatever brought it there.
 """
 
 from __future__ import annotations

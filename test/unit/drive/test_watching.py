@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What happens to a drive is noticed within two polls, published, reported once, and ends the ride.
+What happens to a drive is noticed within two polls, published, reported once, and ends the run.
 
 That nothing restarts by itself is a law (test_laws.py); here it is what is said, and when.
 """

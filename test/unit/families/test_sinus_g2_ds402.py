@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a G2 is told by its drive profile, step by step, whatever it answers."""
+"""The commands to a G2 by its drive profile, step by step, whatever it answers."""
 
 from __future__ import annotations
 

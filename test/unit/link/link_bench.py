@@ -51,7 +51,7 @@ class Bench:
         self.link = self.link_class(self.wire, settings, self.wire.monotonic)
         self.link.open()
         if not trusted:
-            # as behind a line that has told something twice before
+            # as behind a line that has sent something twice before
             self.link._late.note_unrequested(self.wire.now)
         self.link.use_resync_reads(UNIT, resync)
 

@@ -115,7 +115,7 @@ def test_another_client_is_reported_once_with_what_to_do() -> None:
     bench.read(A)
     for number in range(4):
         bench.bus.arrive(bench.bus.now, Frame(REQUESTS, bytes.fromhex('4013200001000000')))
-        # who asks a node that is not asked here is free to do so
+        # another client may use a node that gets no requests here
         bench.bus.arrive(bench.bus.now, Frame(0x601, bytes.fromhex('4013200001000000')))
         bench.read(B)
         assert bench.link.remarks.foreign_frames == number + 1

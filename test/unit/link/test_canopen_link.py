@@ -361,7 +361,7 @@ def test_a_client_that_writes_sends_ten_heartbeats_a_second() -> None:
 
 
 def one_fault_at_a_time(fates: list[Fate]) -> list[Fate]:
-    """Let whoever told something twice tell the next thing at once."""
+    """Let what was sent twice be followed by the next answer at once."""
     before = [GOOD, *fates]
     return [
         GOOD if former.what == 'double' else fate

@@ -98,7 +98,7 @@ def test_what_cannot_be_confused_needs_no_resync_read() -> None:
     bench = Bench([Fate(1.5)])
     bench.expect(NoAnswer, lambda: bench.read(A))
     assert bench.read(C).data == bench.answer_of(1)
-    # and it has told that nothing is left
+    # and it has shown that nothing is left
     assert bench.read(B).data == bench.answer_of(2)
     assert len(bench.asked) == 3
 

@@ -120,7 +120,7 @@ class Wire:
 
 
 class AsciiWire(Wire):
-    """The same for Modbus ASCII; whoever is at the far end speaks RTU."""
+    """The same for Modbus ASCII; whatever is at the far end speaks RTU."""
 
     def __init__(self, settings: LineSettings) -> None:
         super().__init__(settings)

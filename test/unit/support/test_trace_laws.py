@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The judge of traces sees each kind of violation, and nothing in a good ride."""
+"""The judge of traces sees each kind of violation, and nothing in a good run."""
 
 from __future__ import annotations
 

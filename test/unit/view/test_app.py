@@ -125,7 +125,7 @@ def test_every_drive_is_in_the_table_and_the_chosen_one_in_full(
         assert 'q quit' in text and 'stop ALL' in text
         last = f'/conveyor/drive_{count}' if count > 1 else '/drive'
         await pilot.press('ctrl+end')
-        # the one that is chosen is told in full
+        # the one that is chosen is reported in full
         await shown(app, pilot, f' {last}  ')
 
     through(source, steps, size)
