@@ -100,7 +100,7 @@ def test_an_enable_that_waits_behind_a_stop_is_refused_when_its_turn_comes(bench
         wait_until(lambda: all(call.done() for call in (*stops, late)), 'enable answers')
         assert all(stop.result().success for stop in stops)
         assert not late.result().success, late.result().message
-        assert 'ask again' in late.result().message or 'on its way' in late.result().message
+        assert 'request it again' in late.result().message or 'on its way' in late.result().message
         drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
         assert client.enable().success, 'asked for after the stop it is carried out'
 
