@@ -97,7 +97,7 @@ class Cause(enum.Enum):
     FAULT_FORBIDS = f'fault {{status}} is active: {_REMEDY}; then {{call.acknowledge}}'
     OTHER_METHOD_RUNS = (
         'the motor still runs by control_method {method} ({status}): another one has to wait '
-        'until it stands'
+        'until it stands still'
     )
     WRONG_CONTROL_MODE = (
         'the drive is in control mode {mode}, expected is {expected}: set {key} in the drive or '
@@ -141,7 +141,7 @@ class Cause(enum.Enum):
     STOP_UNCONFIRMED_AT_END = 'the stop is NOT confirmed: this {call.program} is ending'
     CANNOT_STOP = f'CANNOT STOP THE MOTOR: {{why}}; retrying. {_EMERGENCY}'
     CANNOT_STOP_BUT_STANDS = (
-        'the stop is NOT confirmed: {why}; retrying. The drive shows that the motor stands '
+        'the stop is NOT confirmed: {why}; retrying. The drive shows that the motor stands still '
         '({status}); the {enable_input} or the emergency stop keeps it so'
     )
     STOP_CONFIRMED_LATE = 'the stop is confirmed now: {status}'
@@ -161,8 +161,8 @@ class Cause(enum.Enum):
     CONTROL_KEPT = '{stop}; the bus keeps control: {why}'
     LEFT_TO_RAMP = '{stop}; it was left to its ramp, under bus control'
     RELEASE_BLOCKED = (
-        'fault {status} is active and the drive takes no command: a run command may still stand '
-        'in it when the fault is acknowledged'
+        'fault {status} is active and the drive takes no command: a run command may still be '
+        'active when the fault is acknowledged'
     )
     ONLY_WATCHED = 'only watched'
     # --- what a stop that is not confirmed waits for
@@ -245,7 +245,7 @@ class Cause(enum.Enum):
     )
     STARTED_AFTER_FAULT = (
         'the fault ended by itself or at the drive, and the motor started '
-        f'by the run command that stood there ({{status}}): stopping it; {_GO_ON}'
+        f'by the run command that was still active ({{status}}): stopping it; {_GO_ON}'
     )
     # --- set-points
     SETPOINT_REFUSED = 'it refused set-point {value:g}: {error}'

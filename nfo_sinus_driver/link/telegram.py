@@ -86,8 +86,8 @@ _NO_MAILBOX = (
     'docs/plc.md'
 )
 _NO_MORE = 'the PLC does not show the longer telegram (bit 2 of register +3 of its block is 0)'
-_NOTHING_STANDS = (
-    'no control word of this driver stands in the block: it has not been written yet, or the PLC '
+_NO_CONTROL_WORD = (
+    'no control word of this driver is in the block: it has not been written yet, or the PLC '
     f'was not reached for longer than its time, {PLC_TIME:g} s; enable again'
 )
 
@@ -267,7 +267,7 @@ class Block:
             word, setpoint = struct.unpack('>HH', data)
             return (word, setpoint), part == NEXT
         if self._command is None:
-            raise Refused(Refused.DEVICE_FAILURE, _NOTHING_STANDS)
+            raise Refused(Refused.DEVICE_FAILURE, _NO_CONTROL_WORD)
         word, _ = self._command
         value = int.from_bytes(data, 'big')
         if part == CLEAR:

@@ -177,7 +177,7 @@ def test_a_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts() 
         rig.pass_time(1.0)
         for cause in (Cause.CANNOT_STOP, Cause.RUNS_UNASKED):
             assert not rig.notes.said(cause)
-        assert rig.notes.said('the motor started by the run command that stood there')
+        assert rig.notes.said('the motor started by the run command that was still active')
         rig.assert_only_enable_helps()
 
 
