@@ -21,6 +21,8 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile('ours')
+#: After how many new objects garbage is looked for; Python's own number makes tests a tenth slower.
+_SELDOM = 50_000
 if not FULL:
     # newer versions also try numbers of the modules that are loaded by then, which are others in
     # each worker
@@ -36,6 +38,7 @@ def pytest_collection() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Look for it among what is made from now on."""
+    """Look for it among what is made from now on, seldom: each test makes a whole drive."""
     gc.freeze()
+    gc.set_threshold(_SELDOM)
     gc.enable()

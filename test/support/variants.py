@@ -6,12 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+import functools
 from pathlib import Path
 from typing import Any
 
 from nfo_sinus_driver import families
 from nfo_sinus_driver.catalog import Role, load_family
-from nfo_sinus_driver.catalog.declared import SUFFIX, read
+from nfo_sinus_driver.catalog.declared import SUFFIX, Description, read
 
 _HARDEST = {
     'sinus_g2': {'run_command_in_fault': 'keeps', 'refuses_in_fault': 'all'},
@@ -40,6 +41,11 @@ def shipped(name: str) -> str:
     return str(path)
 
 
+@functools.cache
+def _file(path: str) -> Description:
+    return read(Path(path))
+
+
 def hardest(model: str = 'sinus_g2') -> Mapping[str, str]:
     """Return its options for a drive family; none where drives of it are so anyway."""
     return _HARDEST.get(model, {})
@@ -47,8 +53,8 @@ def hardest(model: str = 'sinus_g2') -> Mapping[str, str]:
 
 def ramps(model: str, up: float, down: float) -> dict[str, float]:
     """Return the settings of a drive family for its ramps, s; of a file those that it names."""
-    if model.endswith('.vfd.yaml'):
-        file = read(Path(model))
+    if model.endswith(SUFFIX):
+        file = _file(model)
         return {key: time for key, time in ((file.accel, up), (file.decel, down)) if key}
     return dict(zip(_RAMPS[model], (up, down), strict=True))
 

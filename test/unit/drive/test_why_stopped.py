@@ -83,11 +83,13 @@ class Stop(NamedTuple):
 
     :ivar reasons: what may be said of it: more than one where some drives do not tell them apart.
     :ivar ways: on which it can happen.
+    :ivar seconds: after which it is known, and nothing more comes of it, s.
     """
 
     happen: Callable[[Rig], object]
     reasons: Collection[StopReason]
     ways: Collection[str] = tuple(WAYS)
+    seconds: float = 5.0
 
 
 _R = StopReason
@@ -113,7 +115,7 @@ STOPS = {
     # one that keeps its mode, or a PLC, does not tell it from a loss
     'power cycle': Stop(lose_power, {_R.POWER_CYCLE, _R.DRIVE_LOST}),
     'refused set-point': Stop(refuse_setpoint, {_R.SETPOINT_REFUSED}, DISOBEDIENT),
-    'ignored set-point': Stop(ignore_setpoint, {_R.NOT_FOLLOWING}, DISOBEDIENT),
+    'ignored set-point': Stop(ignore_setpoint, {_R.NOT_FOLLOWING}, DISOBEDIENT, 8.0),
     'sleeping driver': Stop(suspend, {_R.DRIVE_TIMEOUT}, TIMED),
     'killed driver': Stop(restart_driver, {_R.NOT_ENABLED}),
 }
@@ -127,7 +129,7 @@ def test_after_each_stop_it_is_known_why(way: str, stop: str) -> None:
         rig.turn()
         assert rig.drive.snapshot.stop_reason is StopReason.NONE
         STOPS[stop].happen(rig)
-        rig.pass_time(8.0)
+        rig.pass_time(STOPS[stop].seconds)
         assert rig.drive.snapshot.stop_reason in STOPS[stop].reasons, said(rig.drive.snapshot.stop)
 
 
