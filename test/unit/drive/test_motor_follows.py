@@ -40,9 +40,9 @@ def test_a_run_input_that_is_back_before_the_motor_stands_does_not_start_it(
 ) -> None:
     parameters = {'control.accel': 0.3, 'control.retard': retard}
     with Rig(way, parameters=parameters, poll_rate=50.0) as rig:
-        rig.turn()
-        rig.send(value)
-        rig.pass_time(5.0 + retard)
+        rig.turn(value)
+        rig.pass_time(5.0)
+        assert rig.far.motor.frequency == pytest.approx(value, abs=0.5)
         rig.far.set_run_input(False)
         rig.pass_time(retard / 5)
         size = abs(rig.far.motor.frequency)
@@ -51,7 +51,8 @@ def test_a_run_input_that_is_back_before_the_motor_stands_does_not_start_it(
         rig.pass_time(1.0)
         assert abs(rig.far.motor.frequency) < size, 'it goes on to a stop'
         assert rig.notes.said(Cause.STOPPED_BY_ITSELF)
-        rig.pass_time(retard)
+        rig.wait_until(lambda: not rig.far.motor.turning, retard)
+        rig.pass_time(2.0)
         assert not rig.turns and not rig.drive.following
 
 
