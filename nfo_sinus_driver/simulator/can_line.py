@@ -95,6 +95,7 @@ class CanLine(Wire):
         self.speed = f'{timing.baud} bit/s'
         self._adapter = adapter
         self._drives = drives
+        self._servers = [(drive.control_unit, _server_of(drive)) for drive in drives]
         self._turnaround = turnaround
         self._always_heard = always_heard
         self._trace = trace
@@ -160,10 +161,8 @@ class CanLine(Wire):
 
     def _nodes(self) -> Iterator[Server]:
         """Give the nodes that take part in the bus."""
-        for drive in self._drives:
-            if self._always_heard or drive.control_unit.hears(_NAME, self.timing):
-                server = drive.servers[_NAME]
-                assert isinstance(server, Server)
+        for unit, server in self._servers:
+            if self._always_heard or unit.hears(_NAME, self.timing):
                 yield server
 
     def _carries(self, now: float) -> bool:
@@ -228,6 +227,13 @@ class CanLine(Wire):
                 since = max(ready + reply.delay, self._answered.get(address, ready))
                 self._answered[address] = since
                 self._put(answer._replace(data=reply.data), since, node, reply.note)
+
+
+def _server_of(drive: SimulatedDrive) -> Server:
+    """Return what answers for a drive on a CAN bus."""
+    server = drive.servers[_NAME]
+    assert isinstance(server, Server)
+    return server
 
 
 def _raw(frame: Frame) -> bytes:

@@ -108,10 +108,9 @@ class Line(Wire):
 
     @property
     def _due(self) -> float:
-        times = [self._receiver.due]
-        if self._deliveries:
-            times.append(self._deliveries[0].at)
-        return min((time for time in times if time is not None), default=float('inf'))
+        arrives = self._receiver.due
+        delivers = self._deliveries[0].at if self._deliveries else float('inf')
+        return delivers if arrives is None else min(arrives, delivers)
 
     def _unplugged(self) -> None:
         self._receiver.clear()

@@ -217,10 +217,10 @@ class Motor:
         """The output active power (W); negative while the motor feeds back."""
         if not self.driven:
             return 0.0
-        plate = self.plate
+        plate, current = self.plate, self.current
         nominal = plate.power * self._stator * 60 / (plate.speed * plate.pole_pairs)
-        apparent = math.sqrt(3) * self.voltage * self.current
-        power = self.torque * nominal + 3 * plate.resistance * self.current**2
+        apparent = math.sqrt(3) * self.voltage * current
+        power = self.torque * nominal + 3 * plate.resistance * current**2
         return min(max(power, -apparent), apparent)
 
     @property

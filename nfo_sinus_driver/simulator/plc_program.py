@@ -54,8 +54,7 @@ class Block:
 
     def registers(self) -> tuple[int, ...]:
         """Return the block as it stands in holding registers."""
-        data = _LAYOUT.pack(*(getattr(self, one.name) for one in fields(self)))
-        return struct.unpack(f'>{REGISTERS}H', data)
+        return struct.unpack(f'>{REGISTERS}H', _LAYOUT.pack(*vars(self).values()))
 
     def put(self, offset: int, words: tuple[int, ...]) -> None:
         """Set registers from ``offset`` on, as a Modbus master does."""
