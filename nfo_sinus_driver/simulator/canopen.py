@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 import enum
+import functools
 
 from nfo_sinus_driver.simulator import sdo
 from nfo_sinus_driver.simulator.can_frames import Frame
@@ -168,7 +169,11 @@ class Server(abc.ABC):
         self._set = _Settings()
         #: How often the drive had started when the node last did.
         self._boots = 0
-        self._entries = {**self._communication(), **self.entries()}
+
+    @functools.cached_property
+    def _entries(self) -> Entries:
+        # most drives are on another line, and asked for none
+        return {**self._communication(), **self.entries()}
 
     # ---- what a family says ----
 

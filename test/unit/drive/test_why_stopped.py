@@ -89,7 +89,7 @@ class Stop(NamedTuple):
     happen: Callable[[Rig], object]
     reasons: Collection[StopReason]
     ways: Collection[str] = tuple(WAYS)
-    seconds: float = 5.0
+    seconds: float = 2.5
 
 
 _R = StopReason
@@ -111,13 +111,13 @@ STOPS = {
     'keypad': Stop(
         lambda rig: rig.far.control_unit.press('stop'), {_R.CONTROL_TAKEN}, SERIAL_G2
     ),
-    'silent line': Stop(lose_line, {_R.DRIVE_LOST}),
+    'silent line': Stop(lose_line, {_R.DRIVE_LOST}, seconds=5.0),
     # one that keeps its mode, or a PLC, does not tell it from a loss
-    'power cycle': Stop(lose_power, {_R.POWER_CYCLE, _R.DRIVE_LOST}),
-    'refused set-point': Stop(refuse_setpoint, {_R.SETPOINT_REFUSED}, DISOBEDIENT),
+    'power cycle': Stop(lose_power, {_R.POWER_CYCLE, _R.DRIVE_LOST}, seconds=5.0),
+    'refused set-point': Stop(refuse_setpoint, {_R.SETPOINT_REFUSED}, DISOBEDIENT, 5.0),
     'ignored set-point': Stop(ignore_setpoint, {_R.NOT_FOLLOWING}, DISOBEDIENT, 8.0),
-    'sleeping driver': Stop(suspend, {_R.DRIVE_TIMEOUT}, TIMED),
-    'killed driver': Stop(restart_driver, {_R.NOT_ENABLED}),
+    'sleeping driver': Stop(suspend, {_R.DRIVE_TIMEOUT}, TIMED, 5.0),
+    'killed driver': Stop(restart_driver, {_R.NOT_ENABLED}, seconds=5.0),
 }
 _CASES = [(way, stop) for way in WAYS for stop, one in STOPS.items() if way in one.ways]
 
