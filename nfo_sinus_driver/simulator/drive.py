@@ -206,8 +206,10 @@ class SimulatedDrive:
 
     def has(self, parameter: Parameter) -> bool:
         """Whether its firmware has a parameter of the family."""
-        since, version = parameter.since, self.version
-        return since is None or version is None or version >= since
+        if parameter.since is None:
+            return True
+        version = self.version
+        return version is None or version >= parameter.since
 
     def peek(self, key: str) -> Value:
         """Return a parameter in engineering units, without side effects."""

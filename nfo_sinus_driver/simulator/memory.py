@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 import enum
 from fractions import Fraction
+import functools
 import math
 
 from nfo_sinus_driver.catalog import Family, Parameter, Role, Value
@@ -70,7 +71,7 @@ class Memory:
         }
         self._raw = {key: self._least(parameter) for key, parameter in model.items()}
         for key, value in factory.items():
-            self.set(key, value)
+            self._raw[key] = _factory_raw(model, key, value)
         self._factory = dict(self._raw)
         for key, value in settings.items():
             self.set(key, value)
@@ -108,9 +109,7 @@ class Memory:
         """Store a value in engineering units, as someone at the keypad would, or a ValueError."""
         if key not in self.model:
             raise ValueError(f'{self.model.name} has no parameter {key!r}')
-        parameter = self.model[key]
-        data = parameter.encode(value, home(parameter))
-        self._raw[key] = parameter.at(home(parameter)).number.decode(data)
+        self._raw[key] = _raw_of(self.model[key], value)
 
     @staticmethod
     def show(parameter: Parameter, raw: int) -> Value:
@@ -141,6 +140,18 @@ class Memory:
         if low is None or low <= 0:
             return 0
         return -int(-Fraction(low) / parameter.factor(home(parameter)) // 1)
+
+
+# every drive of a family begins with the same; True is not 1
+@functools.lru_cache(maxsize=None, typed=True)
+def _factory_raw(model: Family, key: str, value: Value) -> int:
+    return _raw_of(model[key], value)
+
+
+def _raw_of(parameter: Parameter, value: Value) -> int:
+    """Return the raw number of a value in engineering units (ValueError: it is not possible)."""
+    data = parameter.encode(value, home(parameter))
+    return parameter.at(home(parameter)).number.decode(data)
 
 
 class Reason(enum.IntEnum):
