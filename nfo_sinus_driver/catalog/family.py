@@ -11,7 +11,7 @@ More folders are found where the search path of that package, its ``__path__``, 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, ItemsView, Iterator, Mapping, ValuesView
 from dataclasses import dataclass, replace
 from fractions import Fraction
 import functools
@@ -87,6 +87,14 @@ class Family(Mapping[str, Parameter]):
 
     def __len__(self) -> int:
         return len(self.parameters)
+
+    def items(self) -> ItemsView[str, Parameter]:
+        """Return keys and parameters; a Mapping would look each up."""
+        return self.parameters.items()
+
+    def values(self) -> ValuesView[Parameter]:
+        """Return the parameters, likewise."""
+        return self.parameters.values()
 
     # one is loaded once: it is equal to none but itself
     __eq__ = object.__eq__
