@@ -98,7 +98,7 @@ def test_a_refused_set_point_and_a_loss_leave_no_stop_that_is_not_shown() -> Non
     with Rig() as rig:
         rig.turn()
         controller = rig.drive._controller
-        controller.judge = lambda seen: False  # type: ignore[method-assign]
+        controller.on_status = lambda status: False  # type: ignore[method-assign]
         controller.refused(Report(Cause.NO_ANSWER_YET))
         rig.pass_time(0.3)
         assert controller.state is ControlState.IDLE
