@@ -27,6 +27,8 @@ from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
 _NEVER = float('inf')
 #: How much later an answer comes that is late, in response time-outs.
 _LATE = 1.5
+#: How frames begin that a CANopen node answers, as an adapter takes them: SDO, and guarding.
+_ANSWERED = (b't6', b'r7')
 #: How long a gateway takes to accept a connection, s.
 _ACCEPTS_AFTER = 0.001
 
@@ -190,6 +192,8 @@ class Line:
         self.wire.stations = [one for one in self._stations if one.address not in addresses]
 
     def _fate(self, frame: bytes) -> str | None:
+        if self._protocol.name == 'canopen' and frame[:2] not in _ANSWERED:
+            return self.plan(frame) or ('unheard' if self.state == 'silent' else None)
         if self._next:
             return self._next.pop(0)
         if (what := self.plan(frame)) is not None:

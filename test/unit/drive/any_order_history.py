@@ -88,6 +88,8 @@ class History:
         self._faulted_at = -math.inf
         self._ended_by_fault: float | None = None
         self._stop_due: int | None = None
+        #: How much had been asked when keypad or terminals took the drive from the bus last.
+        self._taken_away = -1
         #: When a stop was last written, taken or refused.
         self._stop_tried_at = -math.inf
         #: When the drive was last seen to tune.
@@ -296,6 +298,7 @@ class History:
         given = self._stood and not self._foreign
         unmoved = not given or ended == [False, False, True, False]
         if any(ended) and not (unmoved and self.pending('enable')):
+            self._taken_away = len(self._rig.asked) if ended[1] and sum(ended) == 1 else -1
             self.lose(self.noticed + (self.times.control_told if ended[1] else 0.0))
         if ended[0]:
             self._faulted_at = self.now

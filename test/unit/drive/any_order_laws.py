@@ -245,9 +245,13 @@ class Laws(History):
             raise Broken(f'monitor wrote {key}')
         for complaint in self.shown.wrong(key, number):
             raise Broken(complaint)
+        stops = self.shown.stops(key, number)
+        # what was on its way as the drive was taken from the bus may take it back
+        if self._taken_away == len(self._rig.asked) - 1 and not stops:
+            self.enabled_at = next((one.at for one in self._commands if one.name == 'enable'), None)
         # a stop goes ahead of everything but what it has to read itself
         due = self._stop_due
-        if self.shown.stops(key, number):
+        if stops:
             self._stop_due = None
             self._stop_tried_at = self.now
         before = 0 if due is None else len(self._rig.asked) - 1 - due
