@@ -277,8 +277,11 @@ class StopSequence:
         if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
             if await self._method.remove(control_mode) is Removal.COMMAND:
                 return _Outcome.CONFIRMED
-            self._unconfirmed = report_of(failure)
-            return _Outcome.BLOCKED_BY_FAULT
+            # some faults end as control is released
+            status = await self._state.read_status(Priority.LOOK, retry=False)
+            if status.faulted:
+                self._unconfirmed = report_of(failure)
+                return _Outcome.BLOCKED_BY_FAULT
         unconfirmed = self._why_unconfirmed(status, failure)
         if unconfirmed is not None and self._needs_force(status, failure):
             unconfirmed = await self._force(control_mode, reasons, unconfirmed)

@@ -9,7 +9,7 @@ from concurrent.futures import Future
 import itertools
 
 from any_order_machine import AnyOrder
-from any_order_machines import G2DriveControl, G2ModeScmd, Movitrac
+from any_order_machines import Canopen, G2DriveControl, G2ModeScmd, Movitrac
 import pytest
 from support.rig import Rig
 
@@ -43,6 +43,20 @@ def test_a_start_that_the_run_input_ends_does_not_wait_for_it() -> None:
         assert not state.laws.standing
         state.run_input_on(wait=3.0)
         assert not state.rig.far.motor.driven
+    finally:
+        state.teardown()
+
+
+def test_an_end_is_not_blocked_by_a_fault_that_it_has_ended() -> None:
+    # over CANopen MODE = Stop ends the fault, and the bus keeps control
+    state = Canopen()
+    state.begin(drive_timeout=-1.0, refuses='scmd')
+    try:
+        state.deactivate(wait=0.0)
+        state.lose_line_for_long(state='silent', wait=0.1)
+        state.acknowledge(wait=2.5)
+        state.run_by_another(wait=2.5)
+        state.shut_down(wait=0.0)
     finally:
         state.teardown()
 
