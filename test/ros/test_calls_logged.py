@@ -16,7 +16,7 @@ _TRIGGERS = (
 
 @needs('own')
 def test_each_command_is_logged_once_with_the_name_of_its_client(bench: Bench) -> None:
-    bench.simulator()
+    simulator = bench.simulator()
     driver = bench.driver()
     client = bench.client().connected()
     name = client.node.get_fully_qualified_name()
@@ -28,19 +28,23 @@ def test_each_command_is_logged_once_with_the_name_of_its_client(bench: Bench) -
     for service in ('stop_all', 'disable_all', 'enable_all'):
         others.call(service, Trigger)
     other = others.node.get_fully_qualified_name()
+    simulator.inject('fault', 5)
+    client.wait_for('inv_st', lambda inv_st: inv_st.code == 5, 'the fault')
+    assert not client.call('enable', SetBool, data=True).success
     expected = [
         f'/nfo_sinus/enable (true) called by {name}',
         f'/nfo_sinus/enable (false) called by {name}',
         *(f'/nfo_sinus/{service} called by {name}' for service in (*_TRIGGERS, 'tune_basic')),
         *(f'/nfo_sinus_bus/{one} called by {other}' for one in ('stop_all', 'disable_all')),
         f'/nfo_sinus_bus/enable_all called by {other}',
+        f'/nfo_sinus/enable (true) called by {name}: fault 5 ',
     ]
     wait_until(lambda: all(line in driver.text for line in expected), f'{expected}')
     assert driver.text.count(' called by ') == len(expected), driver.text
     # and with what came of it
     assert f'/nfo_sinus/enable (true) called by {name}: enabled; it follows' in driver.text
     assert f'/nfo_sinus/enable (false) called by {name}: stopp' in driver.text
-    # one that is refused is a warning: this drive has no rapid stop
+    # one that is refused is a warning
     for line in driver.text.splitlines():
-        assert 'rapid_stop called by' not in line or '[WARN]' in line
-        assert '/stop called by' not in line or '[INFO]' in line
+        if ' called by ' in line:
+            assert ('[WARN]' if 'fault 5' in line else '[INFO]') in line
