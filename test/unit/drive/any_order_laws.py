@@ -17,7 +17,7 @@ from typing import Any
 from any_order_history import SETPOINT_TIMEOUT, STOPS, Command, History
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause, Severity, Snapshot
+from nfo_sinus_driver.drive import Cause, DriveError, Severity, Snapshot
 
 #: Within this it is said that a motor cannot be stopped, s.
 SAID = 5.0
@@ -197,7 +197,7 @@ class Laws(History):
 
     def _judge_answer(self, command: Command) -> None:
         error = command.future.exception()
-        if error is not None and type(error).__name__ != 'DriveError':
+        if error is not None and not isinstance(error, DriveError):
             raise Broken(f'{command.name} raised {error!r}')
         if command.name == 'enable':
             self._judge_enabled(command, error)
