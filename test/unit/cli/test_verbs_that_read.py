@@ -337,7 +337,8 @@ def test_monitor(nfo: Nfo, bench: Bench) -> None:
     assert done.status == 0
     lines = done.out.splitlines()
     assert len(lines) == 3
-    assert all('31 ' in line and ' Hz ' in line for line in lines)
+    # on a busy machine its ramp may be over by then
+    assert all(('31 ' in line or '30 ' in line) and ' Hz ' in line for line in lines)
     head, line = done.err.splitlines()
     names = ('used', 'cycle', 'min', 'median', 'p99', 'max')
     assert [head.index(name) for name in names] == sorted(head.index(name) for name in names)
