@@ -14,19 +14,14 @@ from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import BusStatistics, DriveStatus, InvSt, Telemetry
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool, Trigger
 
 from nfo_sinus_driver.demo import bags
-from nfo_sinus_driver.node.qos import LATCHED, NEWEST, RELIABLE
+from nfo_sinus_driver.node.qos import LATCHED, NEWEST, RELIABLE, ROSOUT, newest
 
 _EVENT = '_service_event'
-_ROSOUT = QoSProfile(
-    depth=1000,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
 #: How many messages may wait while the machine is busy with something else.
 _DEPTH = 1000
 
@@ -53,7 +48,7 @@ def topics_of(*drives: str) -> dict[str, tuple[type, QoSProfile]]:
             f'{line}/enable_all/{_EVENT}': (Trigger.Event, RELIABLE),
             f'{line}/statistics': (BusStatistics, RELIABLE),
         }
-    return {**found, '/diagnostics': (DiagnosticArray, RELIABLE), '/rosout': (Log, _ROSOUT)}
+    return {**found, '/diagnostics': (DiagnosticArray, RELIABLE), '/rosout': (Log, ROSOUT)}
 
 
 def replay_warning(*drives: str) -> str:
@@ -141,7 +136,7 @@ class Recorder(Node):
             if type_ is DriveStatus:
                 self._hear(topic.removesuffix('/status'))
 
-        deep = QoSProfile(depth=_DEPTH, reliability=qos.reliability, durability=qos.durability)
+        deep = newest(_DEPTH, qos.reliability, qos.durability)
         self.create_subscription(type_, topic, write, deep, raw=True)
 
     def _hear(self, drive: str) -> None:

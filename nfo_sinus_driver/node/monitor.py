@@ -28,14 +28,14 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.utilities import get_default_context
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE
+from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE, ROSOUT
 from nfo_sinus_driver.version import VERSION
 from nfo_sinus_driver.view import show, why_unavailable
 from nfo_sinus_driver.view.picture import (
@@ -78,8 +78,6 @@ _TRIGGER = 'std_srvs/srv/Trigger'
 #: The name while it is not known yet which node a publisher belongs to.
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'
 _NOT_KNOWN_YET = rclpy_implementation.RCLError
-#: The end of what was logged before the view was open.
-_ROSOUT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 #: What lines about new entries of the error log begin with.
 _ERROR_LOG = 'error log: '
 #: For how long a line of the log waits for its node to be found, s.
@@ -181,7 +179,7 @@ class GraphSource:
         self._thread.start()
         self._driver_nodes: dict[str, _DriverNode] = {}
         self._rosout = _Topics(self._node)
-        self._rosout.add(Log, '/rosout', _ROSOUT)
+        self._rosout.add(Log, '/rosout', ROSOUT)
         self._log_lines: list[tuple[float, Log]] = []
         self._calls: list[_Call] = []
         #: Why the last stop of a node is not confirmed, by its name.

@@ -15,6 +15,7 @@ import math
 from typing import Any
 
 from any_order_history import SETPOINT_TIMEOUT, STOPS, Command, History
+from any_order_shown import CONTROL
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause, DriveError, Severity, Snapshot
@@ -246,8 +247,9 @@ class Laws(History):
         for complaint in self.shown.wrong(key, number):
             raise Broken(complaint)
         stops = self.shown.stops(key, number)
-        # what was on its way as the drive was taken from the bus may take it back
-        if self._taken_away == len(self._rig.asked) - 1 and not stops:
+        # the run command of DriveControl takes control, too: from a STOP that it crosses on its way
+        crossed = self._taken_away == len(self._rig.asked) - 1
+        if crossed and key == CONTROL and not stops:
             self.enabled_at = next((one.at for one in self._commands if one.name == 'enable'), None)
         # a stop goes ahead of everything but what it has to read itself
         due = self._stop_due
