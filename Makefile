@@ -67,9 +67,9 @@ unit: setup ## tests without ROS, with the oldest and the newest libraries (FULL
 			test/unit, $(USES_PYMODBUS) test/unit/cli test/unit/node); \
 	fi
 
-ros: setup ## end-to-end tests with rclpy (WAY=classic_v2: over another way; WAY=all: over every)
+ros: setup ## end-to-end tests with rclpy (CONNECTION=classic_v2: over another one; CONNECTION=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
-	@tools/run python $(PYTEST) -n $$(tools/workers 8) $(if $(WAY),--way $(WAY)) test/ros
+	@tools/run python $(PYTEST) -n $$(tools/workers 8) $(if $(CONNECTION),--connection $(CONNECTION)) test/ros
 
 coverage: setup ## which lines and branches of the driver the tests go through, unit and ros
 	@rm -rf .venv/coverage && mkdir .venv/coverage

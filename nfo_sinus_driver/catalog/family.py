@@ -466,7 +466,7 @@ def _require_fitting(
 def _wrong_in(profile: Profile, keys: Collection[str]) -> Iterator[str]:
     if not 0 <= profile.status_word.shown <= _WIDEST_WORD:
         yield 'shown is wider than a status word, 32 bits'
-    for key in (profile.told_by, *(target.key for target in profile.setpoints.values())):
+    for key in (profile.identified_by, *(target.key for target in profile.setpoints.values())):
         if key and key not in keys:
             yield f'no parameter is {key}'
 

@@ -99,7 +99,7 @@ def every() -> Iterator[Found]:
         yield Found(name, name, str(folder), 'shipped' if root in folder.parents else 'entry point')
     for path in sorted((root / '_declared').glob(f'*{DESCRIBED}')):
         yield Found(_name(path), str(path), str(path), 'shipped')
-    for package, path in _told_by_packages():
+    for package, path in _declared_by_packages():
         yield Found(_name(path), str(path), str(path), f'package {package}')
 
 
@@ -136,7 +136,7 @@ def _in_package(text: str) -> Path:
     )
 
 
-def _told_by_packages() -> Iterator[tuple[str, Path]]:
+def _declared_by_packages() -> Iterator[tuple[str, Path]]:
     for prefix in _prefixes():
         index = prefix / 'share' / 'ament_index' / 'resource_index' / GROUP
         for resource in sorted(index.glob('*')):

@@ -562,7 +562,7 @@ class Profile:
     broadcast_stop: Write | None = None
     names_itself: bool = False
     product: Callable[[], Steps[Product]] | None = None
-    told_by: str = ''
+    identified_by: str = ''
     writes_and_reads: bool = False
     releases: Value = ''
     older: OlderDialect | None = None

@@ -46,7 +46,7 @@ def main() -> int:
     bag = None if no_bag else folder / 'ride'
     if missing:
         what = 'no plot' if bag else 'neither a bag nor a plot'
-        print(f'There will be {what} of the ride: {", ".join(missing)}', flush=True)
+        print(f'There will be {what} of the run: {", ".join(missing)}', flush=True)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     with own_domain() as domain, tempfile.TemporaryFile() as log, Bench(log) as bench:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
@@ -66,9 +66,9 @@ def main() -> int:
             return 1
         except KeyboardInterrupt:
             handle_signals(signal.SIG_IGN)
-            print('ended before the ride was done', file=sys.stderr)
+            print('ended before the run was done', file=sys.stderr)
             return _INTERRUPTED
-    print('The ride is done: every step happened.')
+    print('The run is done: every step happened.')
     if bag:
         print(f'Its bag: {bag}; {replay_warning("/nfo_sinus")}')
     if not missing:
@@ -100,7 +100,7 @@ def _sequence(bag: Path | None) -> Iterator[DemoSequence]:
 
 def _output_folder() -> Path:
     parser = argparse.ArgumentParser(
-        prog='demo', description='A short ride of a simulated drive, recorded and drawn.',
+        prog='demo', description='A short run of a simulated drive, recorded and drawn.',
     )
     parser.add_argument(
         '--output', type=Path, metavar='DIR',

@@ -27,9 +27,9 @@ async def detect_model(bus: Bus, unit: int) -> str:
         if len(models) > 1 and await bus.identify(unit, Priority.SERVICE) != Identification():
             models = [model for model in models if model.profile.names_itself]
         for model in models if len(models) > 1 else ():
-            if not model.profile.told_by:
+            if not model.profile.identified_by:
                 continue
-            if await _has(bus, unit, model, model.profile.told_by):
+            if await _has(bus, unit, model, model.profile.identified_by):
                 return model.name
             models = [other for other in models if other is not model]
     except Cancelled:

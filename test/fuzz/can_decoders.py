@@ -97,7 +97,7 @@ _PLACE = (0x2013, 1)
 def _sdo(random: Random, frames: int) -> None:
     mutator = Mutator(random)
     for _ in range(frames):
-        stream = list(_told(random))
+        stream = list(_reported(random))
         for at, message in enumerate(stream):
             if random.random() < 0.3:
                 stream[at] = mutator.frame(message, stream, bytes)
@@ -121,7 +121,7 @@ def _sdo(random: Random, frames: int) -> None:
         assert outcome == right, f'{outcome!r} instead of {right!r} of {stream}'
 
 
-def _told(random: Random) -> Iterable[bytes]:
+def _reported(random: Random) -> Iterable[bytes]:
     """Return what a node may tell when an object is read."""
     index, sub_index = _PLACE if random.random() < 0.9 else (0x2014, 1)
     name = struct.pack('<HB', index, sub_index)

@@ -464,7 +464,7 @@ def _judge_movitrac(request: movitrac.Request, stream: bytes, mutator: Mutator) 
 
 
 def _is_behind_a_glitch(before: bytes) -> bool:
-    """Tell whether an ACK or NACK counts: before it, whole frames and then next to nothing."""
+    """Return whether an ACK or NACK counts: before it, whole frames and then next to nothing."""
     ends = [0, *(one.end for one in judges.movitrac_frames(before))]
     junk = [before[end:] for end in ends]
     return any(

@@ -58,7 +58,7 @@ HISTORIES = (
     ),
     Mutant(
         2,
-        'in any order: a lost line does not disarm',
+        'in any order: a lost line does not end the enable',
         WATCH,
         'self._controller is not None and self._controller.lost(why)\n',
         'False\n',
@@ -76,7 +76,7 @@ HISTORIES = (
     ),
     Mutant(
         2,
-        'in any order: another control mode does not disarm',
+        'in any order: another control mode does not end the enable',
         ADVICE,
         '    if state.control_mode != control_mode:',
         '    if False:',
@@ -109,7 +109,7 @@ HISTORIES = (
     ),
     Mutant(
         2,
-        'in any order: what ends a ride leaves the run command standing',
+        'in any order: what ends a run leaves the run command standing',
         CONTROLLER,
         '            self._sequence.start(reason)\n            self._report_stop(reason)',
         '            self._control.dispatch(ControlEvent.STOP)\n'
@@ -182,7 +182,7 @@ HISTORIES = (
     ),
     Mutant(
         3,
-        'in any order: a drive that is lost is still told as connected',
+        'in any order: a drive that is lost is still reported as connected',
         WATCH,
         '        state.lost()\n        why =',
         '        why =',
@@ -190,7 +190,7 @@ HISTORIES = (
     ),
     Mutant(
         7,
-        'in any order: the status of a fault is not told',
+        'in any order: the status of a fault is not reported',
         WATCH,
         '        self._publish(status)',
         '        status.faulted or self._publish(status)',

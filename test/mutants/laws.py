@@ -48,7 +48,7 @@ LAWS = (
     ),
     Mutant(
         2,
-        'a fault does not disarm',
+        'a fault does not end the enable',
         ADVICE,
         '    if status.faulted:\n        return explain_fault',
         '    if False:\n        return explain_fault',
@@ -72,7 +72,7 @@ LAWS = (
     ),
     Mutant(
         2,
-        'a control mode that was changed does not disarm',
+        'a control mode that was changed does not end the enable',
         ADVICE,
         '    if state.control_mode != control_mode:',
         '    if False:',
@@ -80,7 +80,7 @@ LAWS = (
     ),
     Mutant(
         2,
-        'a fault that a refused set-point shows first is not told',
+        'a fault that a refused set-point shows first is not reported',
         CONTROLLER,
         '        if status.faulted:\n            reason = explain_fault',
         '        if False:\n            reason = explain_fault',
@@ -104,7 +104,7 @@ LAWS = (
     ),
     Mutant(
         2,
-        'a lost line does not disarm',
+        'a lost line does not end the enable',
         WATCH,
         'self._controller is not None and self._controller.lost(why)\n',
         'False\n',
@@ -446,7 +446,7 @@ LAWS = (
     ),
     Mutant(
         8,
-        'a value that a MOVITRAC tells twice is believed twice',
+        'a value that a MOVITRAC repeats is believed twice',
         'nfo_sinus_driver/link/movitrac.py',
         'if not (self._again or foreign)',
         'if not foreign',
@@ -494,7 +494,7 @@ LAWS = (
     ),
     Mutant(
         8,
-        'an answer that a CANopen node tells twice is believed twice',
+        'an answer that a CANopen node repeats is believed twice',
         'nfo_sinus_driver/link/canopen_link.py',
         '        if self._late.repeated is not None and now < sent + soonest:',
         '        if False:',
@@ -502,7 +502,7 @@ LAWS = (
     ),
     Mutant(
         8,
-        'a segment that is told twice is taken twice',
+        'a segment that is repeated is taken twice',
         'nfo_sinus_driver/link/sdo.py',
         '            if message[0] & _TOGGLE != self._toggle:',
         '            if False:',

@@ -24,6 +24,7 @@ import warnings
 
 from ament_index_python.packages import get_package_prefix
 from builtin_interfaces.msg import Time
+from connections import UNFRAMED, Connection
 from diagnostic_msgs.msg import DiagnosticArray
 import forks
 from lifecycle_msgs.msg import Transition
@@ -46,7 +47,6 @@ from std_srvs.srv import SetBool, Trigger
 from support import telegram_laws, trace_laws
 from support.drives import Drives
 from support.terminal import Terminal
-from ways import UNFRAMED, Way
 
 from nfo_sinus_driver.link import LineSettings
 from nfo_sinus_driver.simulator.control import Client as Simulated
@@ -154,7 +154,7 @@ class Process:
         before = len(self.text)
         self._process.send_signal(forks.TELL_STACKS)
         deadline = time.monotonic() + _STACKS_PATIENCE
-        # the one that got the signal, which is told last, is called the current one
+        # the one that got the signal, which is named last, is called the current one
         while 'Current thread' not in self.text[before:] and time.monotonic() < deadline:
             time.sleep(0.1)
         return self.text[before:]
@@ -209,13 +209,13 @@ _views: list[Terminal] = []
 class Bench(contextlib.ExitStack):
     """A simulated line, drivers on it and a client, all in one ROS domain."""
 
-    def __init__(self, domain: int, folder: Path, way: Way) -> None:
+    def __init__(self, domain: int, folder: Path, connection: Connection) -> None:
         super().__init__()
         self.folder = folder
-        self.way = way
-        #: What `Simulator` is told of the line, by the names of its arguments.
-        self.line: dict[str, Any] = {**way.simulator, 'control': str(folder / 'control')}
-        if way.protocol == 'modbus_tcp':
+        self.connection = connection
+        #: What `Simulator` is given of the line, by the names of its arguments.
+        self.line: dict[str, Any] = {**connection.simulator, 'control': str(folder / 'control')}
+        if connection.protocol == 'modbus_tcp':
             number = self.enter_context(_reserved())
             self.port = f'127.0.0.1:{number}'
             self.line['tcp'] = number
@@ -223,25 +223,27 @@ class Bench(contextlib.ExitStack):
             self.port = self.line['link'] = str(folder / 'line')
         self.trace = folder / 'trace.jsonl'
         self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
-        if way.method == 'telegram1':
+        if connection.method == 'telegram1':
             self._environment[forks.PLC_TIME] = str(_PLC_TIME)
         self.domain = domain
         self._drivers: list[Process] = []
 
     @property
     def drives(self) -> Drives:
-        """What a test over every way knows of its drives."""
-        return self.way.drives
+        """What a test over every connection knows of its drives."""
+        return self.connection.drives
 
     def simulator(self, *arguments: str, paced: bool = True) -> Simulated:
         """Start a simulated line, as slow as a real one if paced; return what looks into it."""
         command = [_executable('simulator'), '--trace', str(self.trace)]
         command += [word for name, value in self.line.items() for word in (f'--{name}', str(value))]
-        if self.way.method == 'telegram1':
+        if self.connection.method == 'telegram1':
             command += ['--ros-time', str(_PLC_TIME), '--drive-time', str(_PLC_TIME)]
             # each drive at the same place of another unit
             units = [n for word, n in itertools.pairwise(arguments) if word == '--address'] or ['1']
-            command += [word for unit in units for word in ('--block', f'{unit}:{self.way.block}')]
+            command += [
+                word for unit in units for word in ('--block', f'{unit}:{self.connection.block}')
+            ]
         command += [*(['--paced'] if paced else []), *arguments]
         log = self.folder / 'simulator.log'
         process = Process(command, self._environment, log, forks.start)
@@ -256,7 +258,7 @@ class Bench(contextlib.ExitStack):
 
         It polls at a modest rate unless they say otherwise: tests share the processors.
         """
-        given = {'port': self.port, **self.way.driver}
+        given = {'port': self.port, **self.connection.driver}
         if not any('poll_rate' in argument for argument in arguments):
             given['poll_rate'] = POLL_RATE
         settings = [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
@@ -302,21 +304,23 @@ class Bench(contextlib.ExitStack):
 
     def violations(self) -> list[str]:
         """Return what breaks the laws of the house in the trace."""
-        way, frames = self.way, self.frames()
-        if way.method == 'telegram1':
+        connection, frames = self.connection, self.frames()
+        if connection.method == 'telegram1':
             units = {bytes.fromhex(frame['hex'])[6] for frame in frames}
             return [
                 complaint
                 for unit in sorted(units)
-                for complaint in telegram_laws.violations(frames, way.model, unit, way.block)
+                for complaint in telegram_laws.violations(
+                    frames, connection.model, unit, connection.block
+                )
             ]
-        gap = LineSettings(way.baud_rate).frame_gap
-        return trace_laws.violations(frames, gap, way.model, way.protocol)
+        gap = LineSettings(connection.baud_rate).frame_gap
+        return trace_laws.violations(frames, gap, connection.model, connection.protocol)
 
     def requests(self) -> list[str]:
         """Return what Modbus requests arrived so far: unit and PDU in hexadecimal."""
         arrived = [frame['hex'] for frame in self.frames() if frame['direction'] == 'request']
-        return [UNFRAMED[self.way.protocol](bytes.fromhex(hex_)).hex() for hex_ in arrived]
+        return [UNFRAMED[self.connection.protocol](bytes.fromhex(hex_)).hex() for hex_ in arrived]
 
 
 class Client(contextlib.ExitStack):
@@ -450,7 +454,7 @@ class Client(contextlib.ExitStack):
         """
         Call a service of the node and return its response.
 
-        A client is told that it is matched before the server knows of it, and then Fast DDS can
+        A client is notified that it is matched before the server knows of it, and then Fast DDS can
         lose its first request (Fast-DDS issues 2641 and 3009). So that is made anew when it is
         not answered for long, and the run says so; every other one has to be answered.
         """

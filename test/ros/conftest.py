@@ -10,8 +10,8 @@ import os
 from pathlib import Path
 
 from bench import Bench
+from connections import CONNECTIONS, DEFAULT, EACH_KIND, USUAL, Connection, reason_to_skip
 import pytest
-from ways import DEFAULT, EACH_KIND, USUAL, WAYS, Way, why_not
 
 from nfo_sinus_driver.demo.bench import own_domain
 
@@ -23,56 +23,60 @@ os.environ['FASTDDS_BUILTIN_TRANSPORTS'] = 'UDPv4'
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
 
-#: What ``--way`` takes for all of them.
+#: What ``--connection`` takes for all of them.
 _ALL = 'all'
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
-        '--way', default=DEFAULT, choices=[*WAYS, _ALL],
+        '--connection', default=DEFAULT, choices=[*CONNECTIONS, _ALL],
         help='into the drive, for the tests of test/ros',
     )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line('markers', 'needs(*features): of the way in, see ways.py')
-    config.addinivalue_line('markers', 'every_way: whichever way was asked for')
-    config.addinivalue_line('markers', 'each_kind: over a way of each kind, see ways.py')
-    config.addinivalue_line('markers', 'shared: of every_way, each case over some ways in turn')
+    config.addinivalue_line('markers', 'needs(*features): of the connection, see connections.py')
+    config.addinivalue_line('markers', 'every_connection: whichever connection was requested')
+    config.addinivalue_line(
+        'markers', 'each_kind: over a connection of each kind, see connections.py'
+    )
+    config.addinivalue_line(
+        'markers', 'shared: of every_connection, each case over some connections in turn'
+    )
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Have a test that goes into a drive once for every way that was asked for."""
-    if 'way' in metafunc.fixturenames:
+    """Have a test that goes into a drive once for every connection that was requested."""
+    if 'connection' in metafunc.fixturenames:
         # the option is not there where the folder above is given
-        asked = metafunc.config.getoption('--way', DEFAULT)
+        asked = metafunc.config.getoption('--connection', DEFAULT)
         marked = metafunc.definition.get_closest_marker
         if asked == _ALL:
-            ways = [*WAYS]
-        elif marked('every_way'):
-            ways = [*dict.fromkeys((*USUAL, asked))]
+            connections = [*CONNECTIONS]
+        elif marked('every_connection'):
+            connections = [*dict.fromkeys((*USUAL, asked))]
         else:
-            ways = [*EACH_KIND] if marked('each_kind') else [asked]
-        metafunc.parametrize('way', ways, indirect=True, scope='module')
+            connections = [*EACH_KIND] if marked('each_kind') else [asked]
+        metafunc.parametrize('connection', connections, indirect=True, scope='module')
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Skip a test that its way has nothing for, and share out those that are shared."""
+    """Skip a test that its connection has nothing for, and share out those that are shared."""
     shared: dict[str, list[pytest.Item]] = {}
     for item in items:
         callspec = getattr(item, 'callspec', None)
-        if callspec is None or 'way' not in callspec.params:
+        if callspec is None or 'connection' not in callspec.params:
             continue
         missing = [
             reason
             for marker in item.iter_markers('needs')
-            if (reason := why_not(WAYS[callspec.params['way']], marker.args))
+            if (reason := reason_to_skip(CONNECTIONS[callspec.params['connection']], marker.args))
         ]
         for reason in missing:
             item.add_marker(pytest.mark.skip(reason=reason))
         if not missing and item.get_closest_marker('shared'):
             shared.setdefault(item.nodeid.split('[')[0], []).append(item)
-    if config.getoption('--way', DEFAULT) == _ALL:
+    if config.getoption('--connection', DEFAULT) == _ALL:
         return
     left_out = [item for tests in shared.values() for item in _left_out(tests)]
     config.hook.pytest_deselected(items=left_out)
@@ -80,30 +84,30 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _left_out(tests: list[pytest.Item]) -> list[pytest.Item]:
-    """Return which cases of a test to leave out: each has some ways left, each way some cases."""
-    ways = list(dict.fromkeys(_way_of(test) for test in tests))
+    """Return which cases of a test to leave out; each keeps some connections, each of them some."""
+    connections = list(dict.fromkeys(_connection_of(test) for test in tests))
     cases = list(dict.fromkeys(_case_of(test) for test in tests))
-    turns = min(len(ways), len(cases))
+    turns = min(len(connections), len(cases))
     return [
         test
         for test in tests
-        if (ways.index(_way_of(test)) - cases.index(_case_of(test))) % turns
+        if (connections.index(_connection_of(test)) - cases.index(_case_of(test))) % turns
     ]
 
 
-def _way_of(test: pytest.Item) -> str:
-    return test.callspec.params['way']
+def _connection_of(test: pytest.Item) -> str:
+    return test.callspec.params['connection']
 
 
 def _case_of(test: pytest.Item) -> str:
-    """Return the name of a test without that of its way."""
-    return test.nodeid.replace(_way_of(test), '', 1)
+    """Return the name of a test without that of its connection."""
+    return test.nodeid.replace(_connection_of(test), '', 1)
 
 
 @pytest.fixture(scope='module')
-def way(request: pytest.FixtureRequest) -> Way:
-    """Return the way in that a test is run over."""
-    return WAYS[request.param]
+def connection(request: pytest.FixtureRequest) -> Connection:
+    """Return the connection that a test is run over."""
+    return CONNECTIONS[request.param]
 
 
 @pytest.fixture
@@ -114,7 +118,7 @@ def domain() -> Iterator[int]:
 
 
 @pytest.fixture
-def bench(domain: int, tmp_path: Path, way: Way) -> Iterator[Bench]:
+def bench(domain: int, tmp_path: Path, connection: Connection) -> Iterator[Bench]:
     """Return a bench on which nothing runs yet."""
-    with Bench(domain, tmp_path, way) as bench:
+    with Bench(domain, tmp_path, connection) as bench:
         yield bench

@@ -16,13 +16,13 @@ import re
 from typing import Any, TypeAlias
 
 from bench import Bench, Client, Process, wait_until
+from connections import UNFRAMED, Connection
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 from support.classic_ends import OTHER_ON_CLASSIC, on_classic
 from support.parameter_ends import ENDS, Ends
 from support.variants import hardest
 from support.wire import understand
-from ways import UNFRAMED, Way
 
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.simulator import Simulator
@@ -81,11 +81,11 @@ class Wire:
 
     def __init__(self, bench: Bench) -> None:
         self._trace = bench.trace
-        self._written = _WRITTEN[bench.way.protocol]
+        self._written = _WRITTEN[bench.connection.protocol]
         #: Older firmware takes settings under bus control alone: MODE and a stop go along [C100].
-        #: One that is in bus mode when it is found is told to stop.
-        told = bench.way.dialect == '5.0' or 'local' not in bench.way.features
-        self._aside = _HARMLESS if told else frozenset()
+        #: One that is in bus mode when it is found is commanded to stop.
+        stopped = bench.connection.dialect == '5.0' or 'local' not in bench.connection.features
+        self._aside = _HARMLESS if stopped else frozenset()
         self._read = 0
 
     def writes(self) -> list[Write]:
@@ -97,7 +97,7 @@ class Wire:
         ]
 
     def written(self) -> list[Write]:
-        """Return the same, once what a drive was told again that had not answered in time."""
+        """Return the same, once what was written to a drive again that had not answered in time."""
         return [write for write, _ in itertools.groupby(self.writes())]
 
     def every_write(self) -> list[Write]:
@@ -166,16 +166,16 @@ _WRITTEN: Mapping[str, Callable[[bytes], Write | None]] = {
 
 
 @functools.cache
-def settings(way: Way) -> dict[str, Ends]:
-    """Return every setting that a way reaches, by its ROS parameter, with the ends it has there."""
-    if 'parameters' not in way.features:
+def settings(connection: Connection) -> dict[str, Ends]:
+    """Return every setting that a connection reaches, by its ROS parameter, with its ends there."""
+    if 'parameters' not in connection.features:
         return {}
     found = {
-        name: on_classic(ends, way.dialect) if way.protocol == 'classic' else ends
+        name: on_classic(ends, connection.dialect) if connection.protocol == 'classic' else ends
         for name, ends in _ENDS.items()
-        if name not in way.beyond
+        if name not in connection.beyond
     }
-    if way.protocol == 'canopen':
+    if connection.protocol == 'canopen':
         # a greater one could not be asked again [C10]
         address = found['serial.address']
         found['serial.address'] = dataclasses.replace(
@@ -247,10 +247,10 @@ class Stubborn(contextlib.ExitStack):
 
     def __init__(self, bench: Bench) -> None:
         super().__init__()
-        #: What can be set the way that the bench goes.
-        self.names = tuple(settings(bench.way))
+        #: What can be set over the connection of the bench.
+        self.names = tuple(settings(bench.connection))
         self.simulator = Simulator(
-            **bench.line, trace=str(bench.trace), **hardest(bench.way.model)
+            **bench.line, trace=str(bench.trace), **hardest(bench.connection.model)
         )
         self.drive: SimulatedDrive = self.simulator.drives[1]
 

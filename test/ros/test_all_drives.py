@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from bench import PATIENCE, Bench, wait_until
+from connections import needs
 import pytest
-from ways import needs
 
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 
@@ -75,7 +75,7 @@ def test_one_that_cannot_be_reached_is_named_and_the_others_stop(bench: Bench) -
     assert 'left: enabled' in answer.message
 
 
-@pytest.mark.every_way
+@pytest.mark.every_connection
 @needs('classic')
 @pytest.mark.parametrize('watched', [False, True], ids=['all_ours', 'one_is_only_watched'])
 def test_a_stop_for_all_where_it_may_be(bench: Bench, watched: bool) -> None:

@@ -15,9 +15,9 @@ import random
 from typing import Any
 
 from bench import PATIENCE, Bench, Client, wait_until
+from connections import needs
 import pytest
 from support.drives import Drives
-from ways import needs
 
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
@@ -85,7 +85,7 @@ class Walk(contextlib.ExitStack):
         self._sending.close()
         self._sends = False
 
-    def ride(self) -> None:
+    def run_motor(self) -> None:
         """Put right what is in the way, enable it and send set-points."""
         self._drive.inject('run', True)
         self.fault_ack()
@@ -128,7 +128,7 @@ class Walk(contextlib.ExitStack):
         self.enabled = False
 
     def _noticed(self) -> None:
-        self._client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+        self._client.wait_for('status', lambda status: not status.enabled, 'it is disabled')
 
     def power_cycle(self) -> None:
         self._drive.inject('power-cycle')
@@ -173,6 +173,6 @@ def test_any_order(bench: Bench, method: str, seed: int) -> None:
     with Walk(bench.drives, drive, bench.client().connected()) as walk:
         for event in history.sample(ENDS + OTHERS, len(ENDS + OTHERS)):
             if event in ENDS:
-                walk.ride()
+                walk.run_motor()
             event(walk)
             walk.judge()

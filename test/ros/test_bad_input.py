@@ -16,9 +16,9 @@ import sys
 import time
 
 from bench import A_WHILE, EXECUTED, PATIENCE, Bench, Client, Process, holds_for, wait_until
+from connections import SILENCE, Connection, needs
 from parameter_bench import refused, set_one
 import pytest
-from ways import SILENCE, Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
@@ -48,7 +48,7 @@ def _untouched(drive: Simulated) -> None:
 
 def test_an_absent_port_is_waited_for(bench: Bench) -> None:
     driver = bench.driver()
-    _says(driver, bench.port, *bench.way.absent, 'retrying')
+    _says(driver, bench.port, *bench.connection.absent, 'retrying')
     bench.simulator()
     bench.client().connected()
 
@@ -131,8 +131,8 @@ def _checks_in_order(driver: Process, *words: str) -> None:
 def test_no_drive_at_the_address_names_what_to_check_in_order(bench: Bench) -> None:
     drive = bench.simulator('--address', '3')
     driver = bench.driver('-p', 'address:=4')
-    _says(driver, bench.way.no_answer[0], '4', 'retrying')
-    _checks_in_order(driver, *bench.way.no_answer)
+    _says(driver, bench.connection.no_answer[0], '4', 'retrying')
+    _checks_in_order(driver, *bench.connection.no_answer)
     client = bench.client()
     assert 'has not answered yet' in client.enable().message
     _untouched(drive)
@@ -157,8 +157,8 @@ def test_garbage_is_distinguished_from_silence(bench: Bench) -> None:
     drive = bench.simulator()
     drive.inject('damage', 1000000)
     driver = bench.driver()
-    _says(driver, *bench.way.noise)
-    _checks_in_order(driver, *bench.way.noise)
+    _says(driver, *bench.connection.noise)
+    _checks_in_order(driver, *bench.connection.noise)
     _untouched(drive)
     drive.inject('heal')
     bench.client().connected()
@@ -264,10 +264,10 @@ def test_enable_in_another_control_mode_than_expected_is_refused(bench: Bench) -
 
 @pytest.fixture(scope='module')
 def untouched(
-    tmp_path_factory: pytest.TempPathFactory, way: Way
+    tmp_path_factory: pytest.TempPathFactory, connection: Connection
 ) -> Iterator[tuple[Bench, Simulated]]:
     """One drive for all drivers that do not start."""
-    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), way) as bench:
+    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), connection) as bench:
         yield bench, bench.simulator()
 
 
@@ -351,7 +351,7 @@ def test_a_wrong_setting_at_the_start_ends_it_with_one_line(
 
 def test_a_character_format_needs_no_quotes(bench: Bench) -> None:
     formats = {'modbus_ascii': '7E1', 'classic': '7E1', 'movitrac': '8N1'}
-    text = formats.get(bench.way.protocol, '8E1')
+    text = formats.get(bench.connection.protocol, '8E1')
     bench.simulator()
     bench.driver('-p', f'char_format:={text}')
     assert bench.client('/nfo_sinus_bus').parameter('char_format') == text
@@ -416,13 +416,14 @@ def test_parameters_under_the_name_of_the_whole_process_reach_the_bus_node_too(
     bench: Bench, section: str, renames: list[str], namespace: str
 ) -> None:
     drive = bench.simulator('--address', '3')
-    baud_rate, protocol = bench.way.baud_rate, bench.way.protocol
+    baud_rate, protocol = bench.connection.baud_rate, bench.connection.protocol
     parameters = bench.folder / 'named.yaml'
     parameters.write_text(
         '/**: {ros__parameters: {port: /dev/of_all, retries: 1}}\n'
         '/**/nfo_sinus_bus: {ros__parameters: {retries: 4, response_timeout: 0.3}}\n'
         f'{section}: {{ros__parameters: {{port: "{bench.port}", baud_rate: {baud_rate}, '
-        f'protocol: {protocol}, model: {bench.way.model}, address: 3, response_timeout: 0.5}}}}\n'
+        f'protocol: {protocol}, model: {bench.connection.model}, address: 3, '
+        'response_timeout: 0.5}}\n'
     )
     driver = bench.bare_driver(*renames, '--params-file', str(parameters))
     client = bench.client(f'{namespace}/belt').connected()

@@ -89,11 +89,11 @@ def test_what_one_writes_the_other_reads(
 
 
 def test_both_say_the_same_of_it(modules: dict[str, ModuleType], tmp_path: Path) -> None:
-    told = []
+    found = []
     for name, module in modules.items():
         described = bags.metadata(written(module, tmp_path / name))
         assert dict(described['custom_data']) == {'drive': 'simulated'}
-        told.append(
+        found.append(
             {
                 (one['topic_metadata']['name'], one['topic_metadata']['type'],
                  one['topic_metadata']['type_description_hash'],
@@ -103,7 +103,7 @@ def test_both_say_the_same_of_it(modules: dict[str, ModuleType], tmp_path: Path)
                 for one in described['topics_with_message_count']
             }
         )
-    assert all(one == told[0] for one in told) and len(told[0]) == len(MESSAGES)
+    assert all(one == found[0] for one in found) and len(found[0]) == len(MESSAGES)
 
 
 def test_what_cannot_be_written_is_an_error_of_the_system(

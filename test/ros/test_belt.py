@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bench import Bench, wait_until
+from connections import needs
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 from std_msgs.msg import Float32
-from ways import needs
 
 _BELT = ('-p', 'scale:=0.02', '-p', 'unit:=m/s')
 
@@ -28,7 +28,7 @@ def test_a_belt_is_commanded_and_reported_in_its_own_unit(bench: Bench, sign: in
         wait_until(lambda: abs(simulator.state()['frequency'] + sign * 20.0) < 0.2, '20 Hz')
         status = wait_until(
             lambda: abs((one := client.messages['status'][-1]).actual + 0.4) < 0.005 and one,
-            'it is told',
+            'it is reported',
         )
         # another topic may arrive later, although it was published with this status
         client.wait_for(
@@ -37,7 +37,7 @@ def test_a_belt_is_commanded_and_reported_in_its_own_unit(bench: Bench, sign: in
     assert status.unit == 'm/s'
     assert status.setpoint == pytest.approx(-0.4, abs=0.001)
     if status.valid & DriveStatus.VALID_REVERSE:
-        assert status.reverse == (sign > 0), 'what the motor does is told as it is'
+        assert status.reverse == (sign > 0), 'what the motor does is reported as it is'
 
 
 @needs('reverse')
@@ -49,7 +49,7 @@ def test_the_limit_is_in_the_unit_of_the_drive(bench: Bench) -> None:
     with client.setpoints(1.0):
         wait_until(lambda: simulator.state()['frequency'] > 14.8, 'it is at the limit')
         status = wait_until(
-            lambda: (one := client.messages['status'][-1]).setpoint_clamped and one, 'it is told'
+            lambda: (one := client.messages['status'][-1]).setpoint_clamped and one, 'it says so'
         )
         assert status.setpoint == pytest.approx(0.3, abs=0.001)
     assert simulator.state()['frequency'] < 15.2
@@ -81,7 +81,7 @@ def test_a_scale_that_is_none_is_refused_at_the_start(bench: Bench) -> None:
     assert 'scale 0' in driver.text and 'never 0' in driver.text
 
 
-@pytest.mark.every_way
+@pytest.mark.every_connection
 @pytest.mark.shared
 @needs('direct')
 def test_one_set_point_for_all_is_in_the_unit_of_each_drive(bench: Bench) -> None:

@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from bench import Bench, wait_until
+from connections import needs
 from std_srvs.srv import SetBool, Trigger
-from ways import needs
 
 _TRIGGERS = (
     'stop', 'quick_stop', 'rapid_stop', 'fault_ack', 'refresh_parameters', 'erase_error_log',

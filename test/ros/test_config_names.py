@@ -14,12 +14,12 @@ from typing import Any
 from xml.etree import ElementTree
 
 from bench import Bench, Client, wait_until
+from connections import Connection
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 from support.aggregator import Aggregator
 from support.places import MSG_DEFS
 from support.sros2_policy import Policy, allowed
-from ways import Way
 import yaml
 
 from nfo_sinus_driver.demo.bench import own_domain
@@ -35,9 +35,12 @@ Names = dict[str, str]
 
 
 @pytest.fixture(scope='module')
-def client(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Client]:
+def client(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> Iterator[Client]:
     """A client of a driver and its drive, which no client commands."""
-    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('names'), way) as bench:
+    with (
+        own_domain() as domain,
+        Bench(domain, tmp_path_factory.mktemp('names'), connection) as bench,
+    ):
         bench.simulator()
         bench.driver()
         client = bench.client().connected()
@@ -190,7 +193,7 @@ def test_driver_may_do_what_it_does_and_nothing_else(
 ) -> None:
     driver = policy[_DRIVER]
     assert driver['publish'] == set(_of_nodes(client, 'publisher'))
-    # only a driver that was told to takes the simulated time
+    # only a driver that is set to takes the simulated time
     assert driver['subscribe'] - {'/clock'} == set(_of_nodes(client, 'subscriber'))
     assert driver['reply'] == set(services)
     assert driver['execute'] == actions == {'/nfo_sinus/tune'}
@@ -209,7 +212,7 @@ def test_all_may_read_and_only_one_may_command(policy: Policy, services: Names) 
     driver = policy[_DRIVER]
     for enclave, rules in policy.items():
         if enclave != _DRIVER:
-            # all that it says, and what it is told to do
+            # all that it says, and what it should do
             assert driver['publish'] | driver['subscribe'] <= rules['subscribe'] | {'/clock'}
         if enclave in (_DRIVER, _COMMANDER):
             continue

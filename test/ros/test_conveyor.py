@@ -11,11 +11,11 @@ import sys
 import time
 
 from bench import A_WHILE, PATIENCE, Bench, holds_for, wait_until
+from connections import needs
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 from std_msgs.msg import Float32
-from ways import needs
 
 #: By address.
 NAMES = {address: f'conveyor_{address:02}' for address in range(1, 33)}
@@ -174,5 +174,5 @@ def test_a_conveyor_from_its_start_to_its_end(bench: Bench) -> None:
     assert not conveyor.turning()
     requests = bench.requests()[before:]
     stops = {address: requests.index(f'{address:02x}{_STOP}') for address in NAMES}
-    told = requests[min(stops.values()) : max(stops.values())]
-    assert not [request for request in told if request[2:4] == _READ], 'one was asked before all'
+    meanwhile = requests[min(stops.values()) : max(stops.values())]
+    assert not [one for one in meanwhile if one[2:4] == _READ], 'one was asked before all'

@@ -18,8 +18,8 @@ import time
 from typing import Any
 
 from bench import Bench
+from connections import needs
 import pytest
-from ways import needs
 import yaml
 
 # who reads the bag, besides the driver's own; they come with `make setup`
@@ -173,7 +173,7 @@ def _check_times(bag: Bag, began: float, ended: float) -> None:
         stamps = [stamp(message) for message in bag.messages[topic]]
         assert all(a <= b for a, b in itertools.pairwise(stamps)), topic
         lags = [a - b for a, b in zip(bag.times[topic], stamps, strict=True)]
-        assert min(lags) > -0.001, f'{topic} was heard before it was told'
+        assert min(lags) > -0.001, f'{topic} was received before it was sent'
         assert statistics.median(lags) < _LAG, topic
         assert max(lags) < _WORST_LAG, topic
 
@@ -231,9 +231,9 @@ def _check_calls(bag: Bag) -> None:
     for service, beginnings in answers.items():
         events = bag.drive(f'{service}/_service_event')
         asked = [one.request[0] for one in events if one.request]
-        told = [one.response[0] for one in events if one.response]
-        assert len(asked) == len(told) == len(beginnings), service
-        for response, beginning in zip(told, beginnings, strict=True):
+        answered = [one.response[0] for one in events if one.response]
+        assert len(asked) == len(answered) == len(beginnings), service
+        for response, beginning in zip(answered, beginnings, strict=True):
             assert response.success
             assert response.message.startswith(beginning)
 
@@ -248,11 +248,11 @@ def _check_metadata(folder: Path, bag: Bag) -> None:
     assert 'simulated' in information['custom_data']['drive']
     offered = {}
     for topic in information['topics_with_message_count']:
-        told = topic['topic_metadata']
-        assert told['type_description_hash'].startswith('RIHS01_')
-        assert topic['message_count'] == len(bag.messages.get(told['name'], ()))
-        offered[told['name']] = [
-            (qos['reliability'], qos['durability']) for qos in told['offered_qos_profiles']
+        metadata = topic['topic_metadata']
+        assert metadata['type_description_hash'].startswith('RIHS01_')
+        assert topic['message_count'] == len(bag.messages.get(metadata['name'], ()))
+        offered[metadata['name']] = [
+            (qos['reliability'], qos['durability']) for qos in metadata['offered_qos_profiles']
         ]
     assert offered['/nfo_sinus/status'] == [('reliable', 'volatile')]
     assert offered['/nfo_sinus/inv_st'] == [('reliable', 'transient_local')]

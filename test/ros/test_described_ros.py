@@ -13,11 +13,11 @@ import subprocess
 import termios
 
 from bench import Bench, holds_for
+from connections import needs
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 from rcl_interfaces.srv import DescribeParameters
 from support.described import SHIPPED
-from ways import needs
 
 pytestmark = needs('own')
 
@@ -66,7 +66,7 @@ def test_a_run(bench: Bench, file: Path, family: str) -> None:
         client.wait_for('status', lambda status: abs(status.actual + 15) < 0.5, 'reverse')
         assert client.newest('status').reverse
         drive.inject('fault', 1)
-        fault = client.wait_for('inv_st', lambda told: told.code == 1, 'the fault')
+        fault = client.wait_for('inv_st', lambda one: one.code == 1, 'the fault')
         assert (fault.text, fault.remedy[:11]) == ('oc', 'Check motor')
         client.wait_for('status', lambda status: not status.enabled, 'it is not enabled any more')
         assert client.call('fault_ack').success

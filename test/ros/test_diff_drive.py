@@ -11,9 +11,9 @@ from types import SimpleNamespace
 from typing import Any
 
 from bench import A_WHILE, Bench, holds_for, wait_until
+from connections import needs
 import pytest
 from topic_hardware import Component, Hardware, components
-from ways import needs
 import yaml
 
 from nfo_sinus_driver.catalog import load_family
@@ -155,7 +155,7 @@ def start(bench: Bench, *arguments: str) -> tuple:
 
 
 def _line(bench: Bench) -> tuple[str, ...]:
-    """Return what the file says of the line otherwise, which the bus node is told by its name."""
+    """Return what the file says of the line otherwise, which the bus node gets by its name."""
     return '-p', f'nfo_sinus_bus:port:={bench.port}'
 
 
@@ -171,7 +171,7 @@ def command(parts: list[Component], speed: float) -> None:
 
 
 def reached(parts: list[Component], speed: float) -> bool:
-    """Tell whether the states of all wheels say a speed, rad/s, but for the last digit."""
+    """Return whether the states of all wheels say a speed, rad/s, but for the last digit."""
     velocities = [velocity for part in parts for velocity in part.velocity.values()]
     return all(abs(velocity - speed) < 0.01 for velocity in velocities)
 
@@ -190,13 +190,13 @@ def test_wheels_follow_the_controller_and_stop_when_it_is_gone(bench: Bench) -> 
         for part, was in zip(parts, before, strict=True):
             for joint, position in part.position.items():
                 assert position - was[joint] > _SPEED, 'both get on'
-        told = bench.log.count(_RUNS_DRY)
-        assert not told or hardware.longest_gap > _TIMEOUT / 2
+        warned = bench.log.count(_RUNS_DRY)
+        assert not warned or hardware.longest_gap > _TIMEOUT / 2
     # the controller is gone
     for address in (1, 2):
         wait_until(lambda a=address: abs(turns(simulator, a)) < 1, 'it ramps to a stop')
-    wait_until(lambda: bench.log.count(_RUNS_DRY) >= told + 2, 'the log says so of each')
-    assert bench.log.count(_RUNS_DRY) == told + 2
+    wait_until(lambda: bench.log.count(_RUNS_DRY) >= warned + 2, 'the log says so of each')
+    assert bench.log.count(_RUNS_DRY) == warned + 2
     assert client.newest('status').enabled
     # it is back
     parts = components(_FOLDER / 'robot.urdf')

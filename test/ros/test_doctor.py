@@ -15,8 +15,8 @@ import sys
 from typing import Any
 
 from bench import Bench
+from connections import needs
 from support.places import ROOT
-from ways import needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bench import PATIENCE, Bench, wait_until
+from connections import CONNECTIONS
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
-from ways import WAYS
 
 from nfo_sinus_driver.demo.bench import own_domain
 
@@ -21,7 +21,7 @@ RAMPS = ('--set', 'control.accel=0.5', '--set', 'control.retard=0.5')
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator[Bench]:
-    with own_domain() as domain, Bench(domain, tmp_path, WAYS['canopen']) as made:
+    with own_domain() as domain, Bench(domain, tmp_path, CONNECTIONS['canopen']) as made:
         yield made
         assert made.violations() == []
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from bench import A_WHILE, Bench, Client, holds_for, wait_until
-from ways import needs
+from connections import needs
 
 pytestmark = needs('direct')
 
@@ -42,7 +42,7 @@ class Machine:
         return [self.simulator.state(address)['turning'] for address in _DRIVES]
 
     def start(self) -> None:
-        """Enable both, and see them turn as they are told."""
+        """Enable both, and see them turn as commanded."""
         answer = self.bus.call('enable_all')
         assert answer.success, answer.message
         for drive in self.drives:
@@ -59,7 +59,7 @@ def test_emergency_stop_and_arming_again(bench: Bench) -> None:
         machine.start()
         machine.relay(closed=False)
         for drive in machine.drives:
-            drive.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+            drive.wait_for('status', lambda status: not status.enabled, 'it is disabled')
         machine.wait_until_still()
         # while it is open nothing can be enabled, and the answer says why
         for drive in machine.drives:
@@ -77,7 +77,7 @@ def test_one_drive_that_stops_does_not_stop_the_other(bench: Bench) -> None:
     with left.setpoints(20.0), right.setpoints(-20.0):
         machine.start()
         machine.simulator.inject('fault', bench.drives.overload.code, address=1)
-        left.wait_for('status', lambda status: not status.enabled, 'the left one is disarmed')
+        left.wait_for('status', lambda status: not status.enabled, 'the left one is disabled')
         wait_until(lambda: machine.turning == [False, True], 'the right one turns on')
         assert machine.bus.call('stop_all').success
         machine.wait_until_still()

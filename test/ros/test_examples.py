@@ -23,9 +23,9 @@ from typing import Any
 from xml.etree import ElementTree
 
 from bench import PATIENCE, Bench, Client, Process, wait_until
+from connections import needs
 from geometry_msgs.msg import Twist
 import pytest
-from ways import needs
 
 _FOLDER = Path(__file__).parents[2] / 'examples'
 _CPP = _FOLDER / 'cpp_client'
@@ -86,7 +86,7 @@ def stands(drive: Any, address: int | None = None) -> dict[str, Any]:
 
 
 def _tells(fault: Any) -> Callable[[Any], bool]:
-    return lambda inv_st: inv_st.code == (fault.told or fault.code)
+    return lambda inv_st: inv_st.code == (fault.reported or fault.code)
 
 
 def runs(process: Process, drive: Any, frequency: float, address: int | None = None) -> None:
@@ -160,23 +160,23 @@ def test_a_fault_is_reported_and_acknowledged_only_where_that_is_wanted(bench: B
     drive.inject('fault', overload.code)
     assert process.wait() == 1, process.text
     shown = bench.client().wait_for('inv_st', _tells(overload), 'fault')
-    told = f'{overload}: {shown.description}. {shown.remedy}'
-    assert shown.remedy and told in process.text
+    sentence = f'{overload}: {shown.description}. {shown.remedy}'
+    assert shown.remedy and sentence in process.text
     assert '--acknowledge' in process.text
     assert drive.state()['fault'] == overload.code
     # without the flag nothing begins
     process = ride(bench)
     assert process.wait() == 1
-    assert told in process.text and 'stop: ' not in process.text
+    assert sentence in process.text and 'stop: ' not in process.text
     assert drive.state()['fault'] == overload.code
     # with it a ride begins
     process = ride(bench, '--acknowledge')
     runs(process, drive, 20.0)
-    assert told in process.text and 'acknowledged' in process.text
+    assert sentence in process.text and 'acknowledged' in process.text
     drive.inject('fault', overload.code)
     # and another fault ends it: acknowledged, but nothing turns again
     assert process.wait() == 1
-    assert process.text.count(told) == 2
+    assert process.text.count(sentence) == 2
     assert drive.state()['fault'] == 0
     assert not bench.drives.commanded(drive.state())
     assert not drive.state()['driven']
@@ -196,13 +196,13 @@ def test_a_conveyor_stops_all_when_one_drops_out(bench: Bench) -> None:
     drives = two(bench)
     right = bench.client('/right')
 
-    def dropped_out(happens: Callable[[], object], told: str) -> Process:
+    def dropped_out(happens: Callable[[], object], message: str) -> Process:
         process = start(bench, 'conveyor', '--drives', *_NAMES, *_PATIENT)
         for address in (1, 2):
             runs(process, drives, 20.0, address)
         happens()
         assert process.wait() == 1, process.text
-        assert told in process.text
+        assert message in process.text
         assert not bench.drives.commanded(drives.state(1))
         stands(drives, 1)
         return process

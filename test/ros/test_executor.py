@@ -96,7 +96,7 @@ def test_a_client_that_cannot_be_answered_delays_no_other(
     assert client.call('call').success
     assert served.calls == 2
     assert not lost.done()
-    wait_until(lambda: ' /served/call was dropped' in caplog.text, 'it is told')
+    wait_until(lambda: ' /served/call was dropped' in caplog.text, 'it is reported')
 
 
 def test_another_error_is_not_taken_for_a_dropped_answer(
@@ -107,7 +107,7 @@ def test_another_error_is_not_taken_for_a_dropped_answer(
 
     served.service.send_response = other
     client.call_async('call', Trigger)
-    wait_until(lambda: 'something else' in caplog.text, 'it is told')
+    wait_until(lambda: 'something else' in caplog.text, 'it is reported')
     assert served.calls == 1
 
 

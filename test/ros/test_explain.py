@@ -59,18 +59,18 @@ def statuses() -> Iterator[tuple[float, DriveStatus]]:
         enabled_at = 10.0 * number + 1.0
         yield enabled_at, status(enabled_at, enabled=True)
         reason = getattr(DriveStatus, f'REASON_{name}')
-        # who requested it may be told a moment later
+        # who requested it may be reported a moment later
         yield enabled_at + 4.0, status(enabled_at + 4.0, reason, 'a client')
         yield enabled_at + 5.0, status(enabled_at + 5.0, reason, text)
 
 
-def write(bag: Path, told: list[tuple[str, float, Any]]) -> None:
+def write(bag: Path, messages: list[tuple[str, float, Any]]) -> None:
     """Write messages: topic, when (s) and what."""
     writer = bags.create(bag, {})
-    told.sort(key=lambda one: one[1])
-    for topic, type_ in {topic: type(message) for topic, _, message in told}.items():
+    messages.sort(key=lambda one: one[1])
+    for topic, type_ in {topic: type(message) for topic, _, message in messages}.items():
         writer.add_topic(topic, type_, RELIABLE)
-    for topic, at, message in told:
+    for topic, at, message in messages:
         writer.write(topic, int((_BEGAN + at) * 1e9), serialize_message(message))
     writer.close()
 
@@ -78,7 +78,7 @@ def write(bag: Path, told: list[tuple[str, float, Any]]) -> None:
 @pytest.fixture
 def bag(tmp_path: Path) -> Path:
     """A bag of two drives on two lines; one was enabled by a call."""
-    folder = tmp_path / 'ride'
+    folder = tmp_path / 'run'
     event = SetBool.Event(request=[SetBool.Request(data=True)])
     event.info.stamp, event.info.event_type = stamp(0.9), event.info.REQUEST_RECEIVED
     answer = SetBool.Event(response=[SetBool.Response(success=True, message='enabled')])
@@ -95,9 +95,9 @@ def test_the_bag_alone_explains_each_stop(
     bag: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert plot([str(bag), '--drive', _DRIVE, '--explain']) == 0
-    told = capsys.readouterr().out
-    assert re.search(r'^ +0\.90  enable: enabled$', told, re.MULTILINE), told
-    stops = re.findall(r'^ +([\d.]+)  (?:STOPPED|SET TO 0), ([\w ]+): (.*)$', told, re.MULTILINE)
+    text = capsys.readouterr().out
+    assert re.search(r'^ +0\.90  enable: enabled$', text, re.MULTILINE), text
+    stops = re.findall(r'^ +([\d.]+)  (?:STOPPED|SET TO 0), ([\w ]+): (.*)$', text, re.MULTILINE)
     assert stops == [
         (f'{10 * number + 5}.00', name.lower().replace('_', ' '), text)
         for number, (name, text) in enumerate(_STOPS.items())
@@ -116,12 +116,12 @@ def test_each_line_has_a_picture_with_its_stops(bag: Path) -> None:
 
 
 def test_a_bag_that_begins_after_a_stop_explains_none(tmp_path: Path) -> None:
-    told = [
+    messages = [
         (f'{_DRIVE}/status', at, status(at, DriveStatus.REASON_FAULT, 'fault 5'))
         for at in (0.0, 1.0)
     ]
-    write(tmp_path / 'ride', told)
-    [run] = read(tmp_path / 'ride', [_DRIVE])
+    write(tmp_path / 'run', messages)
+    [run] = read(tmp_path / 'run', [_DRIVE])
     assert run.stops == []
 
 
@@ -129,12 +129,12 @@ def test_a_better_reason_for_the_same_stop_is_no_other_stop(tmp_path: Path) -> N
     reasons = (
         DriveStatus.REASON_NONE, DriveStatus.REASON_DRIVE_LOST, DriveStatus.REASON_POWER_CYCLE
     )
-    told = [
+    messages = [
         (f'{_DRIVE}/status', at, status(at, reason, 'why'))
         for at, reason in enumerate(reasons)
     ]
-    write(tmp_path / 'ride', told)
-    [run] = read(tmp_path / 'ride', [_DRIVE])
+    write(tmp_path / 'run', messages)
+    [run] = read(tmp_path / 'run', [_DRIVE])
     assert [(stop.time, stop.reason) for stop in run.stops] == [(1.0, 'power cycle')]
 
 

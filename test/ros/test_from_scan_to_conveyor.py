@@ -13,11 +13,11 @@ import sys
 import threading
 
 from bench import A_WHILE, PATIENCE, Bench, Client, holds_for, wait_until
+from connections import needs
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 import pytest
 from std_msgs.msg import Float32
-from ways import needs
 
 _COMMAND = (sys.executable, '-c', 'from nfo_sinus_driver.cli.main import main; exit(main())')
 _ADDRESSES = ('--address', '1', '--address', '2', '--address', '3')
@@ -69,7 +69,7 @@ def setpoints_for_all(client: Client, value: float) -> Iterator[None]:
         thread.join()
 
 
-@pytest.mark.every_way
+@pytest.mark.every_connection
 @pytest.mark.shared
 @needs('direct')
 def test_one_message_moves_all_drives_that_are_enabled_and_none_that_is_watched(
@@ -93,8 +93,9 @@ def test_one_message_moves_all_drives_that_are_enabled_and_none_that_is_watched(
 def test_the_driver_starts_with_what_a_scan_has_written(bench: Bench) -> None:
     simulator = bench.simulator(*_ADDRESSES, *bench.drives.ramps(1))
     file = bench.folder / 'found.yaml'
-    way = bench.way
-    line = ('--protocol', way.protocol, '--model', way.model, '--baud-rate', str(way.baud_rate))
+    connection = bench.connection
+    line = ('--protocol', connection.protocol, '--model', connection.model)
+    line += ('--baud-rate', str(connection.baud_rate))
     done = subprocess.run(
         [*_COMMAND, 'scan', '--port', bench.port, *line, '--addresses', '1-4',
          '--response-timeout', '2.0', '--params', str(file)],
@@ -132,7 +133,7 @@ def test_the_file_for_32_drives_starts_as_many(bench: Bench) -> None:
     assert 'nobody knows' not in bench.log and 'is no parameter' not in bench.log
 
 
-@pytest.mark.every_way
+@pytest.mark.every_connection
 @needs('rtu')
 def test_drives_are_taken_away_and_added_while_the_others_follow(bench: Bench) -> None:
     simulator, (infeed, middle, outfeed) = start(bench, rate='2.0', setpoint_timeout='20.0')

@@ -9,10 +9,10 @@ import re
 import signal
 
 from bench import Bench, Client, wait_until
+from connections import needs
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 import pytest
-from ways import needs
 
 pytestmark = needs('identity', 'modbus')
 

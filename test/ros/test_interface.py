@@ -10,13 +10,13 @@ import itertools
 import math
 
 from bench import FULL_RATE, PATIENCE, TOPICS, Bench, Client, seconds, wait_until
+from connections import Connection, needs
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from nfo_sinus_msgs.msg import BusStatistics, DriveStatus, InvSt
 from parameter_bench import Wire
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from ways import Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 
@@ -44,9 +44,12 @@ _SETTINGS = {
 
 
 @pytest.fixture(scope='module')
-def idle(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Bench]:
+def idle(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> Iterator[Bench]:
     """A drive at rest and its driver, for the tests that leave both as they are."""
-    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('idle'), way) as bench:
+    with (
+        own_domain() as domain,
+        Bench(domain, tmp_path_factory.mktemp('idle'), connection) as bench,
+    ):
         bench.simulator()
         bench.driver(*FULL_RATE)
         bench.client().connected()
@@ -65,7 +68,7 @@ def test_every_topic_says_what_the_drive_does(bench: Bench) -> None:
     bench.driver(*FULL_RATE, '-p', 'frame_id:=drive', '-p', 'telemetry_rate:=10.0')
     client = bench.client().connected()
     with client.run_at(25.0):
-        reached = 'setpoint_reached' not in bench.way.untold
+        reached = 'setpoint_reached' not in bench.connection.unreported
         status = client.wait_for(
             'status',
             lambda status: abs(status.actual - 25) < 0.1 and status.setpoint_reached == reached,
@@ -81,17 +84,18 @@ def test_every_topic_says_what_the_drive_does(bench: Bench) -> None:
         assert not status.setpoint_clamped
         assert status.actual == pytest.approx(25.0, abs=0.5)
         for name in _RUNNING:
-            told = name not in bench.way.untold
-            assert bool(status.valid & getattr(DriveStatus, f'VALID_{name.upper()}')) == told, name
-            assert getattr(status, name) == told, name
-        word = 'ready' not in bench.way.untold
+            reported = name not in bench.connection.unreported
+            valid = getattr(DriveStatus, f'VALID_{name.upper()}')
+            assert bool(status.valid & valid) == reported, name
+            assert getattr(status, name) == reported, name
+        word = 'ready' not in bench.connection.unreported
         assert status.state == (DriveStatus.OPERATION_ENABLED if word else DriveStatus.UNKNOWN)
         assert not status.reverse and not status.fault
         assert status.valid & DriveStatus.VALID_FAULT
-        told = bench.way.model == 'sinus_optimal'
-        assert bool(status.valid & DriveStatus.VALID_RUN_INPUT_MISSING) == told
+        reported = bench.connection.model == 'sinus_optimal'
+        assert bool(status.valid & DriveStatus.VALID_RUN_INPUT_MISSING) == reported
         assert _stamps_increase(client, 'status')
-        text = 'Sio Run' if bench.way.dialect == '5.0' else bench.drives.running
+        text = 'Sio Run' if bench.connection.dialect == '5.0' else bench.drives.running
         inv_st = client.wait_for('inv_st', lambda m: m.text == text, 'it runs')
         assert inv_st.kind == InvSt.STATUS
         client.wait_for('actual_frequency', lambda m: abs(m.data - 25) < 0.5, 'frequency')
@@ -101,19 +105,19 @@ def test_every_topic_says_what_the_drive_does(bench: Bench) -> None:
         telemetry = client.wait_for(
             'telemetry',
             lambda m: abs(m.frequency - 25) < 0.5
-            and (m.output_current > 1 or 'output_current' in bench.way.unmeasured)
-            and (m.output_voltage > 100 or 'output_voltage' in bench.way.unmeasured),
+            and (m.output_current > 1 or 'output_current' in bench.connection.unmeasured)
+            and (m.output_voltage > 100 or 'output_voltage' in bench.connection.unmeasured),
             'telemetry',
         )
         values = {name: getattr(telemetry, name) for name in telemetry.get_fields_and_field_types()}
         del values['header']
         unknown = {name for name, value in values.items() if math.isnan(value)}
-        assert unknown == bench.way.unmeasured
-        if 'dc_link_voltage' not in bench.way.unmeasured:
+        assert unknown == bench.connection.unmeasured
+        if 'dc_link_voltage' not in bench.connection.unmeasured:
             assert telemetry.dc_link_voltage == pytest.approx(565, abs=40)
     with client.setpoints(-10.0):
         client.wait_for('status', lambda status: status.actual < -9, 'reverse')
-        assert client.newest('status').reverse == ('reverse' not in bench.way.untold)
+        assert client.newest('status').reverse == ('reverse' not in bench.connection.unreported)
 
 
 def test_bus_statistics_and_diagnostics_flow_before_any_drive_answers(bench: Bench) -> None:
@@ -125,7 +129,7 @@ def test_bus_statistics_and_diagnostics_flow_before_any_drive_answers(bench: Ben
     assert math.isnan(client.newest('status').actual)
     wait_until(lambda: _diagnosis(client, 'nfo_sinus: drive'), 'diagnostics of the drive')
     wait_until(lambda: _diagnosis(client, 'nfo_sinus_bus: line'), 'diagnostics of the line')
-    first, *others = bench.way.no_answer
+    first, *others = bench.connection.no_answer
     wait_until(lambda: first in driver.text, 'advice in the log')
     advice = driver.text[driver.text.index(first) :]
     order = [advice.index(word) for word in others]
@@ -147,7 +151,7 @@ def test_diagnostics_of_an_address_without_a_drive_are_steady(bench: Bench) -> N
     bench.simulator('--address', '7')
     driver = bench.driver(*FULL_RATE)
     client = bench.client()
-    first, *others = bench.way.no_answer
+    first, *others = bench.connection.no_answer
 
     def shown() -> bool:
         status = _diagnosis(client, 'nfo_sinus: drive')
@@ -159,14 +163,14 @@ def test_diagnostics_of_an_address_without_a_drive_are_steady(bench: Bench) -> N
     before = client.newest('statistics').transactions
     # over several tries of autostart, each with a rest
     client.wait_for('statistics', lambda message: message.transactions >= before + 3, 'more tries')
-    told = {
+    reported = {
         (status.name, status.level, status.message)
         for message in client.messages['diagnostics'][seen:]
         for status in message.status
     }
-    assert {name for name, *_ in told} == {'nfo_sinus: drive', 'nfo_sinus_bus: line'}
-    assert len(told) == 2, told
-    for _, level, message in told:
+    assert {name for name, *_ in reported} == {'nfo_sinus: drive', 'nfo_sinus_bus: line'}
+    assert len(reported) == 2, reported
+    for _, level, message in reported:
         assert level == DiagnosticStatus.ERROR
         assert all(word in message for word in others)
     assert driver.text.count(first) == 1
@@ -242,7 +246,7 @@ def test_quality_of_service(idle: Bench) -> None:
 def test_the_settings_have_their_defaults_and_descriptions(idle: Bench) -> None:
     client = idle.client().connected()
     names = client.parameter_names()
-    for name, default in {**_SETTINGS, 'model': idle.way.model}.items():
+    for name, default in {**_SETTINGS, 'model': idle.connection.model}.items():
         assert name in names
         assert client.parameter(name) == default
         assert client.descriptor(name).description
@@ -288,7 +292,7 @@ def test_settings_take_effect_at_once_and_integers_are_taken_for_doubles(bench: 
         status = client.wait_for('status', lambda status: status.setpoint_clamped, 'clamped')
         # a telegram counts in steps
         assert status.setpoint == pytest.approx(10.0, abs=0.01)
-    if not bench.way.tells or bench.way.method == 'telegram1':
+    if not bench.connection.tells or bench.connection.method == 'telegram1':
         # nothing is set at the drive
         return
     assert client.set_parameters(drive_timeout=2).successful
@@ -437,7 +441,7 @@ def test_each_drive_publishes_its_own_statistics(bench: Bench) -> None:
     assert own.silent_drives == []
     assert own.timeouts == own.damaged == own.reconnects == 0
     # what an option card is needed for is refused
-    assert not own.refused or bench.way.bus == 'movitrac'
+    assert not own.refused or bench.connection.bus == 'movitrac'
     assert 0 < own.round_trip_min <= own.round_trip_median <= own.round_trip_p99
     assert own.round_trip_p99 <= own.round_trip_max
     line = left.wait_for('statistics', lambda m: m.transactions > own.transactions, 'the line')

@@ -10,11 +10,11 @@ import threading
 from types import SimpleNamespace
 
 from bench import Bench, Client, wait_until
+from connections import needs
 from nfo_sinus_msgs.msg import Setpoint
 import pytest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
-from ways import needs
 
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.node.messages import Joint
@@ -61,7 +61,7 @@ def start(bench: Bench, *arguments: str, mode: str = 'Freque') -> tuple:
 @pytest.mark.parametrize('ratio', [1.0, -5.0])
 def test_joint_command_turns_the_shaft_and_its_state_says_so(bench: Bench, ratio: float) -> None:
     # where the motor's poles are not known, Hz are no speed
-    mode = 'Freque' if bench.way.tells else 'Speed'
+    mode = 'Freque' if bench.connection.tells else 'Speed'
     simulator, client = start(
         bench, '-p', f'gear_ratio:={ratio}', '-p', 'joint_name:=belt', mode=mode
     )
@@ -74,7 +74,7 @@ def test_joint_command_turns_the_shaft_and_its_state_says_so(bench: Bench, ratio
         state = client.wait_for(
             'joint_states',
             lambda message: message.velocity[0] == pytest.approx(velocity, rel=0.1),
-            'the shaft turns as it was told',
+            'the shaft turns as commanded',
         )
         assert list(state.name) == ['belt']
         before = client.newest('joint_states').position[0]
@@ -165,7 +165,7 @@ def test_newest_valid_set_point_counts_whichever_topic_it_came_from(bench: Bench
         ('/nfo_sinus/joint_command', JointState(name=['belt']), 'it has no velocity'),
     ):
         with Publisher(client, topic, message):
-            wait_until(lambda said=reason: said in bench.log, 'it is told')
+            wait_until(lambda said=reason: said in bench.log, 'it is reported')
     assert abs(simulator.state()['frequency'] + 5.0) < 0.1
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import time
 
 from bench import A_WHILE, Bench, Client, holds_for, wait_until
+from connections import needs
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import GetState
 import pytest
-from ways import needs
 import yaml
 
 _CONFIG = Path(__file__).parents[2] / 'config'

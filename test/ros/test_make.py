@@ -13,8 +13,8 @@ import subprocess
 import sys
 
 from bench import Bench, Process, _executable, wait_until
+from connections import needs
 import pytest
-from ways import needs
 
 _DEMO_TIME = 300.0
 #: As a shell starts its background jobs.
@@ -52,10 +52,10 @@ def test_ctrl_c_ends_the_demo(bench: Bench) -> None:
         [*command, '--output', str(folder)], dict(os.environ), bench.folder / 'demo.log'
     )
     bench.callback(process.end)
-    wait_until(lambda: 'enable: enabled' in process.text, 'it rides')
+    wait_until(lambda: 'enable: enabled' in process.text, 'it runs')
     process.signal(signal.SIGINT)
     assert process.wait() == 130, process.text
-    assert 'ended before the ride was done' in process.text
+    assert 'ended before the run was done' in process.text
     assert 'Traceback' not in process.text
     assert not (folder / 'ride.png').exists()
 

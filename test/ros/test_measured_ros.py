@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bench import Bench, Client
+from connections import CONNECTIONS
 from nfo_sinus_msgs.msg import Measured
 from parameter_bench import refused, set_one, values
 import pytest
-from ways import WAYS
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.demo.bench import own_domain
@@ -21,7 +21,7 @@ from nfo_sinus_driver.node.qos import RELIABLE
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator[Bench]:
-    with own_domain() as domain, Bench(domain, tmp_path, WAYS['movitrac']) as bench:
+    with own_domain() as domain, Bench(domain, tmp_path, CONNECTIONS['movitrac']) as bench:
         yield bench
 
 

@@ -10,8 +10,8 @@ import subprocess
 import sys
 
 from bench import PATIENCE, Bench, wait_until
+from connections import needs
 import pytest
-from ways import needs
 
 _TWO = """
 /**/nfo_sinus_bus: {ros__parameters: {drives: [drive_2, drive_10]}}

@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from bench import Bench, wait_until
+from connections import CONNECTIONS
 from parameter_bench import set_one
-from ways import WAYS
 
 from nfo_sinus_driver.demo.bench import own_domain
 
@@ -19,7 +19,7 @@ LEAST = 'frequency.f_min_1'
 def test_a_least_frequency_keeps_no_motor_turning_that_is_given_no_set_points(
     tmp_path: Path,
 ) -> None:
-    with own_domain() as domain, Bench(domain, tmp_path, WAYS['movitrac']) as bench:
+    with own_domain() as domain, Bench(domain, tmp_path, CONNECTIONS['movitrac']) as bench:
         drive = bench.simulator()
         bench.driver()
         client = bench.client().connected()
@@ -29,5 +29,5 @@ def test_a_least_frequency_keeps_no_motor_turning_that_is_given_no_set_points(
             assert 'the motor is enabled' in result.reason
             # the keypad is not kept from it
             drive.inject('set', LEAST, 30.0)
-        wait_until(lambda: 'does not slow down at set-point 0' in bench.log, 'the reason is told')
+        wait_until(lambda: 'does not slow down at set-point 0' in bench.log, 'the reason')
         wait_until(lambda: not drive.state()['turning'], 'the motor stands')

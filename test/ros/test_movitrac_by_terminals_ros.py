@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from bench import Bench, wait_until
+from connections import CONNECTIONS
 from nfo_sinus_msgs.msg import DriveStatus
-from ways import WAYS
 
 from nfo_sinus_driver.demo.bench import own_domain
 
@@ -17,7 +17,7 @@ from nfo_sinus_driver.demo.bench import own_domain
 def test_the_terminals_start_the_motor_and_the_set_point_topic_gives_its_frequency(
     tmp_path: Path,
 ) -> None:
-    with own_domain() as domain, Bench(domain, tmp_path, WAYS['movitrac']) as bench:
+    with own_domain() as domain, Bench(domain, tmp_path, CONNECTIONS['movitrac']) as bench:
         drive = bench.simulator('--set', 'serial.control_mode=Remote setpoint')
         bench.driver('-p', 'control_method:=remote_setpoint')
         client = bench.client().connected()

@@ -12,11 +12,11 @@ import subprocess
 import sys
 
 from bench import PATIENCE, Bench, Client
+from connections import CONNECTIONS
 from parameter_bench import COUNTED, refused, set_one, values
 import pytest
 from rcl_interfaces.srv import DescribeParameters
 from support.movitrac_ends import ENDS, Value
-from ways import WAYS
 
 from nfo_sinus_driver.demo.bench import own_domain
 
@@ -78,7 +78,7 @@ def select(index: int, raw: str) -> str:
 @pytest.fixture(scope='module')
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     folder = tmp_path_factory.mktemp('ends')
-    with own_domain() as domain, Bench(domain, folder, WAYS['movitrac']) as bench:
+    with own_domain() as domain, Bench(domain, folder, CONNECTIONS['movitrac']) as bench:
         yield Rig(bench)
 
 
@@ -137,7 +137,7 @@ def test_the_user_menu_is_switched_off_and_no_more_on(rig: Rig) -> None:
 
 def test_the_telegrams_of_the_manual(tmp_path: Path) -> None:
     """Reading the heat sink temperature, and setting t11 to 3.7 s [M4 §2.4.3, §2.4.4]."""
-    with own_domain() as domain, Bench(domain, tmp_path, WAYS['movitrac']) as bench:
+    with own_domain() as domain, Bench(domain, tmp_path, CONNECTIONS['movitrac']) as bench:
         bench.simulator('--address', '0', paced=False)
         _read_the_temperature(bench)
         _set_the_ramp(bench)

@@ -12,23 +12,23 @@ import sys
 import time
 
 from bench import PATIENCE, Bench, Client, Process, wait_until
+from connections import needs
 from lifecycle_msgs.msg import Transition
+from line_commands import stop_sequence
 import pytest
 from std_srvs.srv import SetBool, Trigger
 from support.wire import understand
-from told import stop_sequence
-from ways import needs
 
 from nfo_sinus_driver.node import executor
 from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 
 _REFUSING = ('--stop-in-tuning', 'refused')
 #: How a person, a manager of lifecycles or a script stops a drive.
-_WAYS = ('stop', 'disable', 'stop_all', 'deactivate', 'shutdown signal')
+_STOPS = ('stop', 'disable', 'stop_all', 'deactivate', 'shutdown signal')
 
 
 def _succeeds(client: Client, driver: Process, out: str) -> bool:
-    """Stop the drive one way; tell whether that is said to have succeeded."""
+    """Stop the drive one way; return whether that is said to have succeeded."""
     if out == 'deactivate':
         return client.change_state(Transition.TRANSITION_DEACTIVATE)
     if out == 'shutdown signal':
@@ -40,7 +40,7 @@ def _succeeds(client: Client, driver: Process, out: str) -> bool:
 
 
 @needs('scmd')
-@pytest.mark.parametrize('out', _WAYS)
+@pytest.mark.parametrize('out', _STOPS)
 def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
     bench: Bench, out: str
 ) -> None:
@@ -105,10 +105,10 @@ def test_an_enable_that_waits_behind_a_stop_is_refused_when_its_turn_comes(bench
         assert client.enable().success, 'asked for after the stop it is carried out'
 
 
-@pytest.mark.parametrize('told', [0, 5_000_000_000, 4_000_000_000_000_000_000])
-def test_a_time_of_reception_that_cannot_be_one_is_the_present(told: int) -> None:
+@pytest.mark.parametrize('received', [0, 5_000_000_000, 4_000_000_000_000_000_000])
+def test_a_time_of_reception_that_cannot_be_one_is_the_present(received: int) -> None:
     now = time.monotonic()
-    assert executor._received_at(told) >= now
+    assert executor._received_at(received) >= now
 
 
 def test_a_time_of_reception_counts() -> None:
@@ -199,8 +199,10 @@ def test_callers_of_a_drive_that_is_gone_do_not_delay_the_stop_of_its_neighbour(
         wait_until(lambda: all(call.done() for call in calls), 'everybody is answered')
         assert not any(call.result().success for call in calls)
     requests = [frame for frame in bench.frames()[asked:] if frame['direction'] == 'request']
-    asked_of = [understand(bytes.fromhex(frame['hex']), bench.way.protocol) for frame in requests]
-    stop = asked_of.index(stop_sequence(bench.way)[0])
+    asked_of = [
+        understand(bytes.fromhex(frame['hex']), bench.connection.protocol) for frame in requests
+    ]
+    stop = asked_of.index(stop_sequence(bench.connection)[0])
     waits = [request for request in asked_of[:stop] if request and request.unit == 2]
     # each of them keeps the line for a time-out: one on its way, one while the call came in
     assert len(waits) <= 2, asked_of[: stop + 1]

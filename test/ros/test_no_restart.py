@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import signal
 
 from bench import A_WHILE, PATIENCE, Bench, Client, Process, wait_until
+from connections import Connection, needs
 import pytest
 from support.variants import hardest
-from ways import Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
@@ -25,14 +25,14 @@ Rig = tuple[Bench, Simulated, Client]
 
 def _hardest(bench: Bench) -> tuple[str, ...]:
     """Return the options of the drive that makes it hardest, such as [C98]."""
-    variant = hardest(bench.way.model)
+    variant = hardest(bench.connection.model)
     options = (f'--{name.replace("_", "-")}={value}' for name, value in variant.items())
     return (*bench.drives.ramps(1), '--boot-time', '0.5', *options)
 
 
 @pytest.fixture(scope='module')
-def rig(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Rig]:
-    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), way) as bench:
+def rig(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> Iterator[Rig]:
+    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), connection) as bench:
         drive = bench.simulator(*_hardest(bench))
         bench.driver(*_MODEST)
         yield bench, drive, bench.client().connected()
@@ -80,21 +80,21 @@ def _fault_that_stands(bench: Bench, drive: Simulated, client: Client) -> None:
 
 def _run_input_lost_and_back(bench: Bench, drive: Simulated, client: Client) -> None:
     drive.inject('run', False)
-    client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+    client.wait_for('status', lambda status: not status.enabled, 'it is disabled')
     drive.inject('run', True)
 
 
 def _keypad_stop(bench: Bench, drive: Simulated, client: Client) -> None:
     bench.drives.stop_at_keypad(
         drive,
-        lambda: client.wait_for('status', lambda status: not status.enabled, 'it is disarmed'),
+        lambda: client.wait_for('status', lambda status: not status.enabled, 'it is disabled'),
     )
 
 
 def _power_cycle(bench: Bench, drive: Simulated, client: Client) -> None:
     # a MOVITRAC that forgets nothing, and is back soon, does not tell (docs/drives/movitrac31.md)
-    drive.inject('power-cycle', *([3.0] if bench.way.model == 'movitrac31' else []))
-    client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+    drive.inject('power-cycle', *([3.0] if bench.connection.model == 'movitrac31' else []))
+    client.wait_for('status', lambda status: not status.enabled, 'it is disabled')
     client.wait_for('status', lambda status: status.connected, 'it is back')
 
 
@@ -108,13 +108,13 @@ def _line_gone_for_five_seconds(bench: Bench, drive: Simulated, client: Client) 
 
 def _adapter_unplugged(bench: Bench, drive: Simulated, client: Client) -> None:
     drive.inject('hangup')
-    client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+    client.wait_for('status', lambda status: not status.enabled, 'it is disabled')
     client.wait_for('status', lambda status: status.connected, 'the port is back')
 
 
 def _mode_changed_by_somebody(bench: Bench, drive: Simulated, client: Client) -> None:
     bench.drives.run_by_terminals(drive)
-    client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+    client.wait_for('status', lambda status: not status.enabled, 'it is disabled')
     bench.drives.end_run_by_terminals(drive)
 
 

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bench import PATIENCE, Bench, Client, wait_until
+from connections import CONNECTIONS
 from parameter_bench import refused, set_one
 import pytest
-from ways import WAYS
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
@@ -22,7 +22,7 @@ _QUICK = ('--set', 'control.accel=0.3', '--set', 'control.retard=0.3', '--boot-t
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator[Bench]:
-    with own_domain() as domain, Bench(domain, tmp_path, WAYS['classic_v5']) as bench:
+    with own_domain() as domain, Bench(domain, tmp_path, CONNECTIONS['classic_v5']) as bench:
         yield bench
 
 

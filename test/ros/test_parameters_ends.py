@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bench import Bench, Client
+from connections import Connection, needs
 from parameter_bench import (
     ANY_BUS,
     COUNTED,
@@ -20,7 +21,6 @@ from parameter_bench import (
     written,
 )
 import pytest
-from ways import Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 
@@ -38,7 +38,7 @@ class Rig:
     """One drive and its driver for all tests here: every test leaves the drive as it was."""
 
     def __init__(self, bench: Bench) -> None:
-        self.way = bench.way
+        self.connection = bench.connection
         self.drive = bench.simulator(paced=False)
         bench.driver(*COUNTED, '-p', 'allow_communication_changes:=true')
         self.client: Client = bench.client().connected()
@@ -54,16 +54,19 @@ class Rig:
 
 
 @pytest.fixture(scope='module')
-def rig(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Rig]:
-    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('ends'), way) as bench:
+def rig(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> Iterator[Rig]:
+    with (
+        own_domain() as domain,
+        Bench(domain, tmp_path_factory.mktemp('ends'), connection) as bench,
+    ):
         yield Rig(bench)
 
 
 def test_both_ends_and_labels_arrive_and_nothing_beyond_them(rig: Rig) -> None:
-    classic = rig.way.protocol == 'classic'
-    there = settings(rig.way)
+    classic = rig.connection.protocol == 'classic'
+    there = settings(rig.connection)
     # on older firmware these count at once, and the line is gone [C7]
-    guarded = () if 'later' in rig.way.features else ('serial.address',)
+    guarded = () if 'later' in rig.connection.features else ('serial.address',)
     for ends in (there[name] for name in _ONE_OF_EACH if name in there and name not in guarded):
         name = ends.name
         factory = present = values(rig.client, name)[name]

@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import Any
 
 from bench import A_WHILE, Bench, Client, holds_for, wait_until
+from connections import needs
 from parameter_bench import COUNTED, Stubborn, Wire, refused, says_once, set_one, settings, values
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
-from ways import needs
 
 pytestmark = needs('parameters')
 
@@ -62,15 +62,15 @@ def test_refresh_answers_what_has_changed(bench: Bench) -> None:
     wire = Wire(bench)
     unchanged = client.call('refresh_parameters')
     assert unchanged.success
-    count = len(settings(bench.way))
+    count = len(settings(bench.connection))
     assert unchanged.message == f'{count} parameters read, changed: none'
     drive.inject('set', 'freque.f_fix7', 44.5)
     drive.inject('set', 'control.auto_start', True)
     answer = client.call('refresh_parameters')
     assert answer.success
     # unless the watch came first: it reads one of 119 every 70 ms
-    told = set(answer.message.partition('changed: ')[2].split(', ')) - {'none'}
-    assert told <= {'freque.f_fix7', 'control.auto_start'}
+    changed = set(answer.message.partition('changed: ')[2].split(', ')) - {'none'}
+    assert changed <= {'freque.f_fix7', 'control.auto_start'}
     wait_until(
         lambda: values(client, 'freque.f_fix7', 'control.auto_start')
         == {'freque.f_fix7': 44.5, 'control.auto_start': True},
@@ -87,7 +87,7 @@ def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
     stubborn = bench.enter_context(Stubborn(bench))
     memory = stubborn.drive.memory
     # the most that the type carries
-    raw, most = (0x7FFF, 3276.7) if bench.way.protocol == 'classic' else (0xFFFF, 6553.5)
+    raw, most = (0x7FFF, 3276.7) if bench.connection.protocol == 'classic' else (0xFFFF, 6553.5)
     # 200 Hz, 0 s, and a code that has no label
     memory.put('freque.f_fix1', 2000)
     memory.put('control.accel', 0)
@@ -135,7 +135,7 @@ def test_a_code_without_any_meaning_is_reported_and_does_no_harm(bench: Bench) -
     stubborn.drive.memory.put('pi_reg.reg_amp', 3)
     assert client.call('refresh_parameters').success
     text = 'pi_reg.reg_amp: the drive has code 3'
-    wait_until(lambda: text in driver.text, 'it is told')
+    wait_until(lambda: text in driver.text, 'it is reported')
     assert client.parameter('pi_reg.reg_amp') == 1
     assert set_one(client, 'pi_reg.reg_amp', -1).successful
     assert stubborn.drive.memory.raw('pi_reg.reg_amp') == -1

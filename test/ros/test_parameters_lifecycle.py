@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from bench import Bench, Client, wait_until
+from connections import needs
 from lifecycle_msgs.msg import Transition
 from parameter_bench import QUIET, Wire, refused, set_each, set_one, settings, values, written
-from ways import needs
 
 pytestmark = needs('parameters')
 
@@ -24,15 +24,15 @@ def test_monitor_writes_nothing_whatever_is_called(bench: Bench) -> None:
         '-p', 'drive_timeout:=3.0',
     )
     client = bench.client().connected()
-    assert set(settings(bench.way)) <= client.parameter_names()
+    assert set(settings(bench.connection)) <= client.parameter_names()
     assert client.parameter('control.accel') == 5.0
     wait_until(lambda: 'control_method is monitor' in driver.text, 'it says why not')
-    for name, ends in settings(bench.way).items():
+    for name, ends in settings(bench.connection).items():
         if ends.low == ends.high:
             continue
         other = ends.high if client.parameter(name) == ends.low else ends.low
         refused(set_one(client, name, other), name, 'monitor')
-    has = values(client, *settings(bench.way))
+    has = values(client, *settings(bench.connection))
     assert all(result.successful for result in set_each(client, *has.items()))
     refused(client.set_parameters(**{'control.accel': 6.0, 'poll_rate': 5.0}), 'monitor')
     assert not client.set_parameters(drive_timeout=4.0).successful
@@ -55,7 +55,7 @@ def test_parameters_go_with_cleanup_and_come_back_as_they_are(bench: Bench) -> N
     bench.driver(*QUIET)
     client = bench.client().connected()
     everything = client.parameter_names()
-    own = everything - set(settings(bench.way))
+    own = everything - set(settings(bench.connection))
     assert client.change_state(Transition.TRANSITION_DEACTIVATE)
     assert client.parameter_names() == everything, 'inactive, the drive is still there'
     assert set_one(client, 'control.accel', 6.0).successful
@@ -105,12 +105,12 @@ def test_a_dump_loads_again_after_a_reset_and_into_another_driver(bench: Bench) 
     # on CANopen the drive watches over the driver by what is no setting
     key, value, words = (
         ('serial.auto_stop', True, (1,))
-        if bench.way.protocol == 'canopen'
+        if bench.connection.protocol == 'canopen'
         else ('serial.sio_tot', 12.5, (125,))
     )
     wait_until(lambda: client.parameter(key) == value, 'what drive_timeout set')
     dump = _dump(client)
-    assert set(settings(bench.way)) < set(dump)
+    assert set(settings(bench.connection)) < set(dump)
     assert {'autostart', 'address', 'control_method', 'apply_parameters'} < set(dump)
     wire = Wire(bench)
     wire.writes()
@@ -139,7 +139,7 @@ def test_a_dump_loads_again_after_a_reset_and_into_another_driver(bench: Bench) 
     wire.writes()
     _load(other, dump)
     # where control stays with the bus, a clean end has put back what drive_timeout had set
-    put_back = [written(key, words)] if bench.way.protocol == 'canopen' else []
+    put_back = [written(key, words)] if bench.connection.protocol == 'canopen' else []
     assert sorted(wire.written()) == sorted([written('control.accel', (6500, 0)), *put_back])
     assert _dump(other) == dump
 
@@ -177,7 +177,7 @@ def test_two_drives_have_parameters_of_their_own(bench: Bench) -> None:
         (5.0, 60.0, 7.0, 'Brake', 3),
     ]
     for client in clients:
-        assert set(settings(bench.way)) <= client.parameter_names()
+        assert set(settings(bench.connection)) <= client.parameter_names()
     # one that is silent keeps the other from nothing
     left.inject('silence', 3600.0, address=2)
     clients[1].wait_for('status', lambda status: not status.connected, 'it is lost')

@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from typing import Any
 
 from bench import Bench, Client
+from connections import needs
 from parameter_bench import QUIET, Wire, says_once, settings, values
 import pytest
 from rcl_interfaces.srv import DescribeParameters
 from setting_names import SETTINGS
 from support.parameter_ends import Ends
-from ways import needs
 
 pytestmark = needs('parameters')
 
@@ -51,8 +51,8 @@ def test_every_setting_that_can_be_reached_is_there_and_described(bench: Bench) 
     client = bench.client().connected()
     wire = Wire(bench)
     assert len(MANUAL) == 120
-    reached = settings(bench.way)
-    assert _listed(client) == set(reached) == set(MANUAL) - bench.way.beyond
+    reached = settings(bench.connection)
+    assert _listed(client) == set(reached) == set(MANUAL) - bench.connection.beyond
     wrong = {name: value for name, value in values(client, *reached).items()
              if type(value) is not TYPES[name]}
     assert wrong == {}

@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from bench import Bench, wait_until
+from connections import needs
 from parameter_bench import QUIET, Wire, refused, set_each, set_one, values
 from support.parameter_ends import ENDS
-from ways import needs
 
 pytestmark = needs('bare')
 

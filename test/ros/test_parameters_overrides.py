@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import Any
 
 from bench import A_WHILE, Bench, Client, Process, holds_for, wait_until
+from connections import needs
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from parameter_bench import COUNTED, Wire, register, says_once, set_one, values, written
 import pytest
-from ways import needs
 
 pytestmark = needs('parameters')
 
@@ -137,7 +137,7 @@ def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
     driver = bench.driver(*COUNTED, *_given(bench, 'control.accel: 6', 'motor.u_nom: 230'))
     client = bench.client().connected()
     text = 'not applied from the parameter file: motor.u_nom: only while the motor is stopped'
-    if bench.way.dialect == '5.0':
+    if bench.connection.dialect == '5.0':
         # it takes nothing at all while its terminals have control [C100]
         assert wire.writes() == []
         says_once(driver, 'not applied from the parameter file: control.accel: ')
@@ -153,7 +153,7 @@ def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
 
 def test_a_drive_that_comes_later_is_brought_into_the_state_then(bench: Bench) -> None:
     driver = bench.driver(*COUNTED, '-p', 'control.accel:=6', '-p', 'control.acel:=7.0')
-    wait_until(lambda: bench.way.absent[0] in driver.text, 'no drive answers yet')
+    wait_until(lambda: bench.connection.absent[0] in driver.text, 'no drive answers yet')
     bench.simulator(paced=False)
     client = bench.client().connected()
     assert Wire(bench).writes() == [written('control.accel', (6000, 0))]

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from bench import Bench, Client
+from connections import Connection, needs
 from parameter_bench import (
     ANY_BUS,
     COUNTED,
@@ -23,7 +24,6 @@ from parameter_bench import (
     written,
 )
 import pytest
-from ways import Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 
@@ -38,7 +38,7 @@ class Rig:
     """One drive and its driver for all tests here."""
 
     def __init__(self, bench: Bench) -> None:
-        self.names = tuple(settings(bench.way))
+        self.names = tuple(settings(bench.connection))
         self.drive = bench.simulator(paced=False)
         self.driver = bench.driver(*COUNTED)
         self.client: Client = bench.client().connected()
@@ -64,8 +64,8 @@ class Rig:
 
 
 @pytest.fixture(scope='module')
-def the_rig(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Rig]:
-    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('set'), way) as bench:
+def the_rig(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> Iterator[Rig]:
+    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('set'), connection) as bench:
         yield Rig(bench)
 
 

@@ -10,6 +10,7 @@ import itertools
 import time
 
 from bench import PATIENCE, Bench, Client, wait_until
+from connections import needs
 from parameter_bench import (
     QUIET,
     Stubborn,
@@ -24,7 +25,6 @@ from parameter_bench import (
 )
 import pytest
 from std_srvs.srv import Trigger
-from ways import needs
 
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 

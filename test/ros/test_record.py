@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""``record`` and ``plot``: the ride of any drive goes to a bag and to a picture."""
+"""``record`` and ``plot``: the run of any drive goes to a bag and to a picture."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import sys
 from types import SimpleNamespace
 
 from bench import Bench, Process, wait_until
-from ways import needs
+from connections import needs
 
 from nfo_sinus_driver.demo.recorded import drives_in, identity, read
 from nfo_sinus_driver.demo.recording import topics_of
@@ -75,7 +75,7 @@ def test_the_run_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     # and the recorder, too, has heard it
     known = len(client.messages['status'])
     wait_until(lambda: len(client.messages['status']) > known + 5, 'it still stands')
-    # suspended meanwhile, it is told to end before it hears the last set-point
+    # suspended meanwhile, it gets the signal to end before it receives the last set-point
     recorder.signal(signal.SIGSTOP)
     client.publish(7.0)
     recorder.signal(signal.SIGINT, thread=recorder.pid)
@@ -94,10 +94,10 @@ def test_the_run_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     assert {excluded.group(1)} == recorded & {name for name, _ in obeyed}
     assert 'another ROS_DOMAIN_ID' in recorder.text
 
-    [ride] = read(bag, drives_in(bag))
-    assert max(ride.actual.values) > 19 and abs(ride.actual.values[-1]) < 0.1
-    assert set(ride.setpoint.values) == {20.0, 7.0} and ride.unit == 'Hz'
-    assert len(ride.enabled) == 1 and 'running' in {span.what for span in ride.phases}
+    [run] = read(bag, drives_in(bag))
+    assert max(run.actual.values) > 19 and abs(run.actual.values[-1]) < 0.1
+    assert set(run.setpoint.values) == {20.0, 7.0} and run.unit == 'Hz'
+    assert len(run.enabled) == 1 and 'running' in {span.what for span in run.phases}
 
     # and again, by itself
     done = _run(*_PLOT, str(bag), '--output', str(folder / 'again.png'))
@@ -133,7 +133,7 @@ def test_all_drives_are_recorded_and_it_is_explained_why_they_stopped(bench: Ben
     outfeed.wait_for('status', lambda one: one.stop_reason == one.REASON_STOP_ALL, 'the stop')
     known = len(outfeed.messages['status'])
     # the name of who called is there within a second
-    wait_until(lambda: len(outfeed.messages['status']) > known + 80, 'it is told who stopped it')
+    wait_until(lambda: len(outfeed.messages['status']) > known + 80, 'it says who stopped it')
     recorder.signal(signal.SIGINT)
     assert recorder.wait() == 0, recorder.text
     assert _is_png(folder / 'ride.png') and 'infeed/setpoint /line1/outfeed/' in recorder.text
@@ -182,11 +182,11 @@ def test_a_recorder_refuses_what_cannot_be() -> None:
 
 
 def test_the_identity_of_a_drive_comes_from_its_own_diagnostics() -> None:
-    def told(name: str, serial: str) -> SimpleNamespace:
+    def diagnostics(name: str, serial: str) -> SimpleNamespace:
         values = {'firmware': '4.38', 'serial number': serial}
         pairs = [SimpleNamespace(key=key, value=value) for key, value in values.items()]
         return SimpleNamespace(status=[SimpleNamespace(name=name, values=pairs)])
 
-    arrays = [told('line1/outfeed: drive', 'A1'), told('line1/infeed: drive', 'B2')]
+    arrays = [diagnostics('line1/outfeed: drive', 'A1'), diagnostics('line1/infeed: drive', 'B2')]
     assert identity(arrays, _DRIVE) == ['serial B2', 'firmware 4.38']
     assert identity(arrays, '/infeed') == []

@@ -46,8 +46,8 @@ def test_every_shipped_control_method_has_its_constant() -> None:
 def test_every_reason_of_a_stop_has_its_constant_and_every_constant_its_reason() -> None:
     constants = {name: getattr(DriveStatus, name) for name in dir(DriveStatus)}
     prefix = 'REASON_'
-    told = {name: value for name, value in constants.items() if name.startswith(prefix)}
-    assert told == {f'{prefix}{reason.name}': reason for reason in StopReason}
+    declared = {name: value for name, value in constants.items() if name.startswith(prefix)}
+    assert declared == {f'{prefix}{reason.name}': reason for reason in StopReason}
     for reason in StopReason:
         assert status_of('monitor', reason).stop_reason == reason
 

@@ -12,13 +12,13 @@ import time
 from typing import NamedTuple
 
 from bench import A_WHILE, Bench, Client, Process, holds_for, wait_until
+from connections import needs
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 from std_srvs.srv import Trigger
-from ways import needs
 
 from nfo_sinus_driver.node.other_lines import PERIOD
 from nfo_sinus_driver.simulator.control import Client as Simulated
@@ -99,7 +99,7 @@ def lines(bench: Bench) -> Iterator[tuple[Line, Line]]:
     """Two lines whose drives name each other, ``/drive`` and ``/line2/drive``."""
     folder = bench.folder / 'second'
     folder.mkdir()
-    with Bench(bench.domain, folder, bench.way) as second:
+    with Bench(bench.domain, folder, bench.connection) as second:
         yield _line(bench, '', 'line2/drive'), _line(second, '/line2', '/drive')
 
 

@@ -16,9 +16,9 @@ import signal
 from typing import Any
 
 from bench import A_WHILE, PATIENCE, Bench, Client, wait_until
+from connections import TELEGRAM1, Connection
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
-from ways import TELEGRAM1, Way
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
@@ -37,20 +37,20 @@ RUNS = {'sinus_optimal': 0x0001, 'sinus_h': 0x0008, 'sinus_g2': 0x0001}
 
 
 @pytest.fixture
-def behind(request: pytest.FixtureRequest) -> Way:
-    """Return a way through a PLC, whichever is asked for of the others."""
+def behind(request: pytest.FixtureRequest) -> Connection:
+    """Return a connection through a PLC, whichever is asked for of the others."""
     return TELEGRAM1[request.param]
 
 
 @pytest.fixture
-def bench(tmp_path: Path, behind: Way) -> Iterator[Bench]:
+def bench(tmp_path: Path, behind: Connection) -> Iterator[Bench]:
     with own_domain() as domain, Bench(domain, tmp_path, behind) as made:
         yield made
         assert made.violations() == []
 
 
 def start(bench: Bench, *plc: str, settings: tuple[str, ...] = PATIENT) -> tuple[Simulated, Client]:
-    drive = bench.simulator(*RAMPS[bench.way.model], *plc, paced=False)
+    drive = bench.simulator(*RAMPS[bench.connection.model], *plc, paced=False)
     bench.driver(*settings)
     client = bench.client()
     wait_until(lambda: client.state() == 'active', 'it is active')
@@ -77,7 +77,7 @@ def stays(bench: Bench, drive: Simulated) -> None:
         lambda state: state['driven'] or state['time'] > began + A_WHILE, timeout=PATIENCE
     )
     assert not state['driven'] and not state['turning'], state
-    assert not state['plc']['stw1'] & RUNS[bench.way.model]
+    assert not state['plc']['stw1'] & RUNS[bench.connection.model]
 
 
 def turns(client: Client, value: float) -> None:
@@ -87,7 +87,7 @@ def turns(client: Client, value: float) -> None:
 @pytest.mark.parametrize('behind', TELEGRAM1, indirect=True)
 def test_a_run_and_what_ends_it(bench: Bench) -> None:
     drive, client = start(bench)
-    model = bench.way.model
+    model = bench.connection.model
     enable(client)
     with client.setpoints(20.0):
         turns(client, 20.0)
@@ -197,8 +197,8 @@ def test_a_link_that_is_cut(bench: Bench, link: str) -> None:
     with client.setpoints(20.0):
         turns(client, 20.0)
         drive.inject(link, *(() if link == 'hangup' else (4.0,)))
-        client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
-        wait_until(lambda: 'lost: ' in bench.log, 'the loss is told')
+        client.wait_for('status', lambda status: not status.enabled, 'it is disabled')
+        wait_until(lambda: 'lost: ' in bench.log, 'the loss is reported')
         client.wait_for('status', lambda status: status.connected, 'it is back')
         stays(bench, drive)
         enable(client)
@@ -224,6 +224,6 @@ def test_a_drive_that_is_not_released(bench: Bench) -> None:
     with client.setpoints(15.0):
         turns(client, 15.0)
         drive.inject('release', 'off')
-        client.wait_for('status', lambda status: not status.enabled, 'it is disarmed')
+        client.wait_for('status', lambda status: not status.enabled, 'it is disabled')
         drive.inject('release', 'on')
         stays(bench, drive)

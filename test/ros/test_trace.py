@@ -8,11 +8,11 @@ from __future__ import annotations
 import signal
 
 from bench import FULL_RATE, Bench
+from connections import needs
 from lifecycle_msgs.msg import Transition
+from line_commands import run_commands
 from support.trace_laws import violations
 from support.wire import Request, understand
-from told import run_commands
-from ways import needs
 
 from nfo_sinus_driver.link import LineSettings
 
@@ -22,7 +22,7 @@ pytestmark = needs('states')
 def _requests(bench: Bench) -> list[Request]:
     """Return what was asked for on the line, but for who the drive is."""
     asked = [
-        understand(bytes.fromhex(frame['hex']), bench.way.protocol)
+        understand(bytes.fromhex(frame['hex']), bench.connection.protocol)
         for frame in bench.frames()
         if frame['direction'] == 'request'
     ]
@@ -30,7 +30,7 @@ def _requests(bench: Bench) -> list[Request]:
 
 
 def test_a_run_breaks_no_law_on_the_wire(bench: Bench) -> None:
-    way = bench.way
+    connection = bench.connection
     drive = bench.simulator(*bench.drives.ramps(1))
     driver = bench.driver(*FULL_RATE, '-p', 'drive_timeout:=16.0')
     client = bench.client().connected()
@@ -54,9 +54,9 @@ def test_a_run_breaks_no_law_on_the_wire(bench: Bench) -> None:
     driver.signal(signal.SIGTERM)
     assert driver.wait() == 0, driver.text
     # the fifth is that of the enable that was refused, where it is not known before
-    assert run_commands(way, _requests(bench)) == 4 + (not bench.drives.tells_run_input)
-    gap = LineSettings(way.baud_rate).frame_gap
-    assert violations(bench.frames(), gap, way.model, way.protocol) == []
+    assert run_commands(connection, _requests(bench)) == 4 + (not bench.drives.tells_run_input)
+    gap = LineSettings(connection.baud_rate).frame_gap
+    assert violations(bench.frames(), gap, connection.model, connection.protocol) == []
     state = drive.state()
     assert not state.get('ack_reads') and not state.get('mode_ext_writes')
     assert state['fault'] == 0

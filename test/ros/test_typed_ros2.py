@@ -22,10 +22,10 @@ import subprocess
 from typing import Any
 
 from bench import PATIENCE, Bench, wait_until
+from connections import needs
 import pytest
 from rosidl_parser.definition import AbstractNestedType, NamespacedType
 from support.typed import ROOT, Typed, typed
-from ways import needs
 import yaml
 
 _ALL = typed('ros2')

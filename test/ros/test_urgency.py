@@ -8,11 +8,11 @@ from __future__ import annotations
 import time
 
 from bench import FULL_RATE, Bench, wait_until
+from connections import needs
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from line_commands import run_command, stop_sequence
 from support.wire import Request, understand
-from told import run_command, stop_sequence
-from ways import needs
 
 pytestmark = needs('states')
 
@@ -24,15 +24,15 @@ _TRIES = 15
 def _asked(bench: Bench) -> list[tuple[float, Request | None]]:
     """Return the requests on the line, and when each began."""
     return [
-        (frame['first'], understand(bytes.fromhex(frame['hex']), bench.way.protocol))
+        (frame['first'], understand(bytes.fromhex(frame['hex']), bench.connection.protocol))
         for frame in bench.frames()
         if frame['direction'] == 'request'
     ]
 
 
 def _stops(bench: Bench) -> list[float]:
-    """Return when the good drive was told to stop."""
-    stop = stop_sequence(bench.way)[0]
+    """Return when the good drive was commanded to stop."""
+    stop = stop_sequence(bench.connection)[0]
     return [at for at, request in _asked(bench) if request == stop]
 
 
@@ -50,7 +50,7 @@ def test_a_stop_overtakes_a_hanging_configure_and_a_slow_parameter(bench: Bench)
     silent = bench.client('/silent')
     assert silent.state() == 'unconfigured'
     # the longest transaction there is: a request without a response, and that has to leave first
-    transaction = _RESPONSE_TIMEOUT + 30 * 10 / bench.way.baud_rate
+    transaction = _RESPONSE_TIMEOUT + 30 * 10 / bench.connection.baud_rate
     timeouts = iter(range(2, 2 + 2 * _TRIES))
     delays = []
     for _ in range(_TRIES):
@@ -91,7 +91,7 @@ def test_nothing_is_sent_between_a_stop_and_its_confirmation_but_its_own(bench: 
     with one.run_at(10.0), two.run_at(10.0):
         assert one.call('stop').success
     requests = [request for _, request in _asked(bench)]
-    run, sequence = run_command(bench.way), stop_sequence(bench.way)
+    run, sequence = run_command(bench.connection), stop_sequence(bench.connection)
     last_run = max(number for number, request in enumerate(requests) if request == run)
     stop = requests.index(sequence[0], last_run)
     assert requests[stop : stop + len(sequence)] == sequence

@@ -12,17 +12,17 @@ import signal
 import subprocess
 
 from bench import A_WHILE, EXECUTED, PATIENCE, Bench, wait_until
+from connections import needs
 from lifecycle_msgs.msg import Transition
 import pytest
 from std_srvs.srv import SetBool
-from ways import needs
 
 #: Its inverter status in the start delay.
 _START_DELAY = {'sinus_g2': 25, 'sinus_optimal': 54}
 
 
 def _stops(bench: Bench, state: dict) -> bool:
-    """Tell whether the motor stands or is on its way: the drive drives it to a stop or not."""
+    """Return whether the motor stands or is on its way: the drive drives it to a stop or not."""
     return not state['turning'] or bench.drives.stopping(state)
 
 
@@ -170,7 +170,9 @@ def test_without_a_drive_timeout_the_driver_warns_once(bench: Bench) -> None:
     bench.simulator()
     driver = bench.driver()
     bench.client().connected()
-    warning = 'set drive_timeout' if bench.way.tells else 'the motor runs on; use the RUN input'
+    warning = (
+        'set drive_timeout' if bench.connection.tells else 'the motor runs on; use the RUN input'
+    )
     wait_until(lambda: warning in driver.text, 'the warning')
     assert driver.text.count(warning) == 1
 
@@ -220,7 +222,9 @@ def test_disable_does_not_wait_for_an_enable_in_its_start_delay(bench: Bench) ->
     bench.driver()
     client = bench.client().connected()
     enable = client.call_async('enable', SetBool, data=True)
-    drive.wait_for(lambda state: state['inv_st'] == _START_DELAY[bench.way.model], timeout=PATIENCE)
+    drive.wait_for(
+        lambda state: state['inv_st'] == _START_DELAY[bench.connection.model], timeout=PATIENCE
+    )
     other = bench.client()
     assert other.enable(False).success
     wait_until(enable.done, 'enable answers')

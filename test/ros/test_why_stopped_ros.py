@@ -6,10 +6,10 @@
 from __future__ import annotations
 
 from bench import Bench, Client
+from connections import needs
 from lifecycle_msgs.msg import Transition
 from nfo_sinus_msgs.msg import DriveStatus
 from std_srvs.srv import SetBool, Trigger
-from ways import needs
 
 
 def shown(client: Client, reason: int, text: str) -> None:

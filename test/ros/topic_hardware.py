@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState
 
 @dataclass
 class Component:
-    """One ``ros2_control`` tag: what it is told, and what it does in a cycle."""
+    """One ``ros2_control`` tag: its commands, and what it does in a cycle."""
 
     name: str
     plugin: str

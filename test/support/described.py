@@ -10,7 +10,7 @@ from typing import Any
 
 from nfo_sinus_driver import families
 from nfo_sinus_driver.catalog.declared import SUFFIX, read
-from support.rig import Rig, Way
+from support.rig import Connection, Rig
 
 #: The files that are shipped, by name.
 SHIPPED = {
@@ -28,7 +28,7 @@ class DescribedRig(Rig):
 
     def __init__(self, path: Path, protocol: str = 'modbus_rtu', **more: Any) -> None:
         self.file = read(path)
-        super().__init__(Way(protocol, str(path), 'custom'), **more)
+        super().__init__(Connection(protocol, str(path), 'custom'), **more)
 
     def unit(self, frequency: float) -> float:
         """Return the set-point for a frequency."""

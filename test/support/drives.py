@@ -19,16 +19,16 @@ class Fault(NamedTuple):
     """
     A fault by its code, what it is called, and words of what is said of it.
 
-    :ivar told: the code that the driver tells, where it is not told which fault it is.
+    :ivar reported: the code that the driver reports, where the drive does not say which it is.
     """
 
     code: int
     text: str
     explained: tuple[str, ...] = ()
-    told: int = 0
+    reported: int = 0
 
     def __str__(self) -> str:
-        return f'{self.told or self.code} {self.text}'
+        return f'{self.reported or self.code} {self.text}'
 
 
 @dataclass(frozen=True)
@@ -74,19 +74,19 @@ class Drives(abc.ABC):
 
     @abc.abstractmethod
     def commanded(self, state: State) -> bool:
-        """Tell whether a run command of the bus stands."""
+        """Return whether a run command of the bus stands."""
 
     @abc.abstractmethod
     def taken(self, state: State) -> bool:
-        """Tell whether the bus has control."""
+        """Return whether the bus has control."""
 
     @abc.abstractmethod
     def left(self, state: State) -> bool:
-        """Tell whether a driver that has ended left the drive as it should."""
+        """Return whether a driver that has ended left the drive as it should."""
 
     @abc.abstractmethod
     def stopping(self, state: State) -> bool:
-        """Tell whether the drive drives its motor to a stop, or not at all."""
+        """Return whether the drive drives its motor to a stop, or not at all."""
 
     @abc.abstractmethod
     def timeout(self, seconds: float) -> tuple[str, ...]:
@@ -94,7 +94,7 @@ class Drives(abc.ABC):
 
     @abc.abstractmethod
     def has_timeout(self, state: State, seconds: float) -> bool:
-        """Tell whether its own time-out is set so, and stops the motor."""
+        """Return whether its own time-out is set so, and stops the motor."""
 
     @abc.abstractmethod
     def stop_at_keypad(self, drive: Simulated, noticed: Callable[[], object]) -> None:
@@ -269,7 +269,7 @@ _G2 = {
     'nominal': 50.0,
 }
 #: Whatever it is, the telegram tells that there is one.
-_SOME_FAULT = {'text': 'Fault', 'told': 191}
+_SOME_FAULT = {'text': 'Fault', 'reported': 191}
 _PLC = {
     **_SINUS,
     'control_method': 'telegram1',

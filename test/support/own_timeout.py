@@ -9,24 +9,24 @@ from typing import Any
 
 from nfo_sinus_driver.catalog import Role, load_family
 from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 from support.variants import stopping_at_timeout
 
 #: Where the drive has a time-out of its own that is counted in frames of the driver.
 TIMED = [
-    name for name, way in WAYS.items()
-    if way.protocol not in ('telegram1', 'canopen')
-    and way.model not in ('sinus_optimal', 'acme')
+    name for name, connection in CONNECTIONS.items()
+    if connection.protocol not in ('telegram1', 'canopen')
+    and connection.model not in ('sinus_optimal', 'acme')
 ]
 
 
-def by_default(way: str, found: float | None = None, **more: Any) -> Rig:
+def by_default(connection: str, found: float | None = None, **more: Any) -> Rig:
     """Return a rig with the default of ``drive_timeout``, and a drive that may stop by itself."""
-    model, method = WAYS[way].model, WAYS[way].method
+    model, method = CONNECTIONS[connection].model, CONNECTIONS[connection].method
     parameters = {**stopping_at_timeout(model, method), **more.pop('parameters', {})}
     if found is not None:
         parameters[load_family(model, method).key(Role.COMMUNICATION_TIMEOUT)] = found
-    return Rig(way, parameters=parameters, drive_timeout=AS_THE_DRIVE_CAN, **more)
+    return Rig(connection, parameters=parameters, drive_timeout=AS_THE_DRIVE_CAN, **more)
 
 
 def own_timeout(rig: Rig) -> float:

@@ -48,9 +48,9 @@ _TURN = 0.005
 
 
 @dataclass(frozen=True)
-class Way:
+class Connection:
     """
-    One way to command a drive.
+    One connection to a drive, and the way it is commanded.
 
     :ivar protocol: of the line, as the simulator calls it; ``telegram1`` goes through a PLC.
     :ivar options: of the simulated drive; :ivar driver: other settings of the driver.
@@ -82,43 +82,43 @@ _SPEED: Mapping[str, Any] = {
 }
 _ABSENT = {'canopen_state_machine': 'absent'}
 _ALONE = {**_ABSENT, 'canopen_ramp': 'ready', 'canopen_bus_mode': 'free'}
-#: A law that is new is tested over all of them, and a way that is new with every law.
-WAYS: Mapping[str, Way] = {
-    'rtu': Way('modbus_rtu'),
-    'ascii': Way('modbus_ascii'),
-    'tcp': Way('modbus_tcp'),
-    'classic': Way('classic'),
-    'classic v5.0': Way('classic', options={'dialect': '5.0'}, driver=_OLD),
-    'canopen': Way('canopen'),
-    'canopen, no DriveStatus': Way('canopen', options=_ABSENT),
-    'rtu, control word': Way('modbus_rtu', method='drive_control'),
-    'classic, control word': Way('classic', method='drive_control'),
-    'canopen, control word': Way('canopen', method='drive_control'),
-    'canopen, ds402': Way('canopen', method='ds402', hertz=30.0),
-    'canopen, ds402 alone': Way('canopen', method='ds402', options=_ALONE, hertz=30.0),
-    'optimal': Way('modbus_rtu', 'sinus_optimal'),
-    'optimal ascii': Way('modbus_ascii', 'sinus_optimal'),
-    'optimal, control word': Way('modbus_rtu', 'sinus_optimal', 'drive_control', 'terminal'),
-    'movitrac': Way('movitrac', 'movitrac31', 'function_bits'),
-    'movitrac, by terminals': Way(
+#: A law that is new is tested over all of them, and a connection that is new with every law.
+CONNECTIONS: Mapping[str, Connection] = {
+    'rtu': Connection('modbus_rtu'),
+    'ascii': Connection('modbus_ascii'),
+    'tcp': Connection('modbus_tcp'),
+    'classic': Connection('classic'),
+    'classic v5.0': Connection('classic', options={'dialect': '5.0'}, driver=_OLD),
+    'canopen': Connection('canopen'),
+    'canopen, no DriveStatus': Connection('canopen', options=_ABSENT),
+    'rtu, control word': Connection('modbus_rtu', method='drive_control'),
+    'classic, control word': Connection('classic', method='drive_control'),
+    'canopen, control word': Connection('canopen', method='drive_control'),
+    'canopen, ds402': Connection('canopen', method='ds402', hertz=30.0),
+    'canopen, ds402 alone': Connection('canopen', method='ds402', options=_ALONE, hertz=30.0),
+    'optimal': Connection('modbus_rtu', 'sinus_optimal'),
+    'optimal ascii': Connection('modbus_ascii', 'sinus_optimal'),
+    'optimal, control word': Connection('modbus_rtu', 'sinus_optimal', 'drive_control', 'terminal'),
+    'movitrac': Connection('movitrac', 'movitrac31', 'function_bits'),
+    'movitrac, by terminals': Connection(
         'movitrac', 'movitrac31', 'remote_setpoint', closed=(41,),
         parameters={'serial.control_mode': 'Remote setpoint'},
     ),
-    'made up': Way('modbus_rtu', 'acme', 'drive_control'),
+    'made up': Connection('modbus_rtu', 'acme', 'drive_control'),
     # drives that files describe: a direction word; a state machine; nothing tells who has control
-    'described': Way('modbus_rtu', shipped('delta_vfd_el'), 'custom'),
-    'described, by states': Way('modbus_rtu', shipped('abb_acs355'), 'custom'),
-    'described, untold': Way('modbus_rtu', shipped('toshiba_vf_s11'), 'custom'),
-    'telegram1 g2': Way('telegram1', method='telegram1'),
-    'telegram1 optimal': Way('telegram1', 'sinus_optimal', 'telegram1'),
-    'telegram1 g2, speed': Way('telegram1', method='telegram1', **_SPEED),
-    'telegram1 optimal, speed': Way('telegram1', 'sinus_optimal', 'telegram1', **_SPEED),
-    'telegram1 g2, drivecontrol': Way(
+    'described': Connection('modbus_rtu', shipped('delta_vfd_el'), 'custom'),
+    'described, by states': Connection('modbus_rtu', shipped('abb_acs355'), 'custom'),
+    'described, no holder': Connection('modbus_rtu', shipped('toshiba_vf_s11'), 'custom'),
+    'telegram1 g2': Connection('telegram1', method='telegram1'),
+    'telegram1 optimal': Connection('telegram1', 'sinus_optimal', 'telegram1'),
+    'telegram1 g2, speed': Connection('telegram1', method='telegram1', **_SPEED),
+    'telegram1 optimal, speed': Connection('telegram1', 'sinus_optimal', 'telegram1', **_SPEED),
+    'telegram1 g2, drivecontrol': Connection(
         'telegram1', method='telegram1', options=_DRIVECONTROL, driver=_DRIVECONTROL
     ),
-    'telegram1 sinus_h': Way('telegram1', 'sinus_h', 'telegram1'),
-    'telegram1 g2, mailbox': Way('telegram1', method='telegram1', plc={'layout': 2}),
-    'telegram1 sinus_h, mailbox': Way(
+    'telegram1 sinus_h': Connection('telegram1', 'sinus_h', 'telegram1'),
+    'telegram1 g2, mailbox': Connection('telegram1', method='telegram1', plc={'layout': 2}),
+    'telegram1 sinus_h, mailbox': Connection(
         'telegram1',
         'sinus_h',
         'telegram1',
@@ -168,7 +168,7 @@ class Notes:
         self.events.append(Noted(self._clock.now, event.severity, said(event)))
 
     def said(self, what: str | Cause, severity: Severity | None = None) -> bool:
-        """Tell whether an event says this."""
+        """Return whether an event says this."""
         return any(
             says(one.text, what) for one in self.events if severity in (None, one.severity)
         )
@@ -180,7 +180,7 @@ class Rig:
 
     A test that has a set-point given again and again, as programs do, calls :meth:`send`.
 
-    :param way: one of :data:`WAYS`.
+    :param connection: one of :data:`CONNECTIONS`.
     :param drives: how many, at the addresses from 1 on.
     :param parameters: of the simulated drives, other than factory; their ramps are short.
     :param options: of the simulated drives, beside those that make it hardest for the driver.
@@ -202,7 +202,7 @@ class Rig:
 
     def __init__(
         self,
-        way: str | Way = 'rtu',
+        connection: str | Connection = 'rtu',
         *,
         drives: int = 1,
         parameters: Mapping[str, Any] | None = None,
@@ -211,31 +211,38 @@ class Rig:
         own: Mapping[int, Mapping[str, Any]] | None = None,
         **settings: Any,
     ) -> None:
-        self.way = way = WAYS[way] if isinstance(way, str) else way
+        self.connection = connection = (
+            CONNECTIONS[connection] if isinstance(connection, str) else connection
+        )
         self.clock = Clock()
-        quick = ramps(way.model, 0.3, 0.3)
+        quick = ramps(connection.model, 0.3, 0.3)
         line = dict(line or {})
-        if way.plc:
-            line['plc'] = {**way.plc, **line.get('plc', {})}
-        if way.protocol == 'canopen':
+        if connection.plc:
+            line['plc'] = {**connection.plc, **line.get('plc', {})}
+        if connection.protocol == 'canopen':
             settings = {'setpoint_timeout': 0.0, **settings}
         self.line = Line(
-            way.protocol,
-            way.model,
+            connection.protocol,
+            connection.model,
             self.clock,
             range(1, drives + 1),
-            settings={**quick, **way.parameters, **(parameters or {})},
-            options={**hardest(way.model), **way.options, **(options or {})},
+            settings={**quick, **connection.parameters, **(parameters or {})},
+            options={**hardest(connection.model), **connection.options, **(options or {})},
             **line,
         )
         self.line.passed = self._passed
         self.fars = self.line.drives
         for far in self.fars.values():
-            for terminal in way.closed:
+            for terminal in connection.closed:
                 far.control_unit.switch(terminal, True)
         usual = {
-            'model': way.model, 'control_method': way.method, 'reference': way.reference,
-            'poll_rate': 20.0, 'drive_timeout': 0.0, **way.driver, **settings,
+            'model': connection.model,
+            'control_method': connection.method,
+            'reference': connection.reference,
+            'poll_rate': 20.0,
+            'drive_timeout': 0.0,
+            **connection.driver,
+            **settings,
         }
         self._settings = {
             address: DriveSettings(**{**usual, 'address': address, **(own or {}).get(address, {})})
@@ -296,14 +303,18 @@ class Rig:
 
     def violations(self) -> list[str]:
         """Return what breaks the laws of the house in the frames so far."""
-        if self.way.protocol == 'telegram1':
-            words = self.way.options.get('telegram_words', self.way.model)
+        if self.connection.protocol == 'telegram1':
+            words = self.connection.options.get('telegram_words', self.connection.model)
             return telegram_laws.violations(self.line.frames, words)
-        if is_described(self.way.model):
+        if is_described(self.connection.model):
             # those laws are about registers of one family
             return []
         return trace_laws.violations(
-            self.line.frames, -math.inf, self.way.model, self.way.protocol, self.way.method
+            self.line.frames,
+            -math.inf,
+            self.connection.model,
+            self.connection.protocol,
+            self.connection.method,
         )
 
     # --- the first drive ---
@@ -322,7 +333,7 @@ class Rig:
 
     @property
     def a_fault(self) -> int:
-        """The code of the first fault that a drive of this way can have."""
+        """The code of the first fault that a drive of this connection can have."""
         codes = self.far.memory.model.status_codes.values()
         return next(code.code for code in codes if code.kind is Kind.FAULT and code.requires_ack)
 
@@ -371,7 +382,7 @@ class Rig:
 
         def give() -> None:
             for address in chosen if value is not None else ():
-                self.drives[address].set_setpoint(self.way.hertz * value)
+                self.drives[address].set_setpoint(self.connection.hertz * value)
 
         self.keep(give)
 
@@ -469,7 +480,7 @@ class Rig:
 
     def number(self, data: bytes) -> int:
         """Return what is written as one number, the first word in front as on Modbus."""
-        if self.way.protocol == 'canopen':
+        if self.connection.protocol == 'canopen':
             data = b''.join(data[at : at + 2][::-1] for at in range(0, len(data), 2))
         return int.from_bytes(data, 'big')
 

@@ -18,9 +18,9 @@ from nfo_sinus_driver.catalog.status import State
 REFUSED = Refusal('it does not want to')
 
 
-def status(**told: Any) -> SimpleNamespace:
-    """A status, of which only something is told."""
-    return SimpleNamespace(**{'word': None, 'state': State.UNKNOWN, 'from_bus': False, **told})
+def status(**known: Any) -> SimpleNamespace:
+    """A status, of which only something is known."""
+    return SimpleNamespace(**{'word': None, 'state': State.UNKNOWN, 'from_bus': False, **known})
 
 
 class Wait:

@@ -63,10 +63,10 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
             if written is not None:
                 yield written
             if reads:
-                told, _, _, told_flags, version = struct.unpack_from('>5H', data, 9)
+                received, _, _, received_flags, version = struct.unpack_from('>5H', data, 9)
                 # a PLC that has just started shows nothing yet
                 if version:
-                    zsw1, flags = told, told_flags
+                    zsw1, flags = received, received_flags
 
 
 #: The registers of the mailbox in a block.
@@ -79,7 +79,7 @@ COMMANDS = frozenset((1034, 1035, 1018, 1017, 1003, 1020, 1124, 1127, 1129))
 
 
 def _of_mailbox(frame: Mapping[str, Any], data: bytes, start: int) -> bool:
-    """Tell whether a request is to the mailbox alone; its answer is asked for by nothing else."""
+    """Return whether a request is to the mailbox alone; its answer is asked for by nothing else."""
     if frame['direction'] != 'request' or data[7] not in (3, 16, 23):
         return False
     return struct.unpack_from('>H', data, 8)[0] - start in _MAILBOX

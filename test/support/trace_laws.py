@@ -92,7 +92,7 @@ def _wrong_gap(frames: list[Frame], number: int, frame_gap: float) -> Iterator[s
 
 
 def _behind_a_late_answer(frames: list[Frame], number: int) -> bool:
-    """Tell whether a request was given up just before: who comes late keeps no gap to the next."""
+    """Return whether a request was given up just before: a late one keeps no gap to the next."""
     near = frames[max(0, number - _NEAR) : number]
     return any(
         one['direction'] == 'request' and other['first'] - one['last'] >= _GIVEN_UP
@@ -191,7 +191,7 @@ def _wrong_control_word(word: int) -> Iterator[str]:
 
 
 def _runs(request: Request, places: _Places) -> bool:
-    """Tell whether a write makes the motor follow the set-point of the bus."""
+    """Return whether a write makes the motor follow the set-point of the bus."""
     assert request.words is not None
     if request.place == places.control:
         wanted = Control.SWITCH_ON | Control.NET_REF

@@ -51,7 +51,7 @@ NEVER_SHOWN = {
     'catalog/codec.py': 'a table of a drive is wrong: found when it is loaded, by every test',
     'catalog/family.py': 'the same',
     'catalog/table.py': 'the same',
-    'catalog/declared/places.py': 'the file of a drive is wrong: told with its line',
+    'catalog/declared/places.py': 'the file of a drive is wrong: reported with its line',
     'catalog/declared/yaml_file.py': 'the same',
     'link/lawicel.py': 'a frame that no request makes; the rate was checked before',
     'link/classic.py': 'a frame that no request makes; the address was checked before, and nothing '
@@ -94,7 +94,7 @@ class Sentence:
         return re.compile('(?:…+|[^…]*)'.join(map(re.escape, self.parts)))
 
     def is_in(self, entry: str) -> bool:
-        """Tell whether an entry is one for it."""
+        """Return whether an entry is one for it."""
         return all(part in entry for part in self.parts) and bool(self.pattern.fullmatch(entry))
 
     def __str__(self) -> str:
@@ -289,7 +289,7 @@ class Code:
 
 
 def informs(node: ast.AST) -> bool:
-    """Tell whether a node tells something as information."""
+    """Return whether a node tells something as information."""
     if isinstance(node, ast.Call) and name_of(node.func) == 'notify':
         return ast.unparse(node.args[0]) == 'Severity.INFO'
     value = node.value if isinstance(node, ast.Yield) else None
@@ -297,7 +297,7 @@ def informs(node: ast.AST) -> bool:
 
 
 def refuses(node: ast.AST) -> bool:
-    """Tell whether a node tells something graver, or raises it."""
+    """Return whether a node tells something graver, or raises it."""
     name = name_of(node.func) if isinstance(node, ast.Call) else ''
     return name == 'DriveError' or (name == 'notify' and not informs(node))
 

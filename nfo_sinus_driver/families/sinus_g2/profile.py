@@ -496,7 +496,7 @@ PROFILE = Profile(
     broadcast_stop=Write(MODE, Mode.STOP),
     # functions 43, 17 and 23 ([M0 §6.2.3], [C57])
     names_itself=True,
-    told_by='fieldbus.sw_ver',
+    identified_by='fieldbus.sw_ver',
     writes_and_reads=True,
     releases='Release',
     # the v5.0 dialect [M2]; from 4.28 on [M0] describes the protocol [C3]. There an unknown

@@ -42,7 +42,7 @@ class Done(NamedTuple):
 
 class FakeLink:
     """
-    A link that notes what it is asked and does as it is told.
+    A link that notes what it is asked and does as the test says.
 
     :ivar done: every transaction, in order.
     :ivar answer: called with each; returns the bytes, or raises.

@@ -100,7 +100,7 @@ def test_slot_that_raises_while_the_port_is_lost(bus: Bus, link: FakeLink) -> No
         writer.want(7)
 
     bus.call(want_both)
-    # the other one is told all the same
+    # the other one is notified all the same
     wait_until(lambda: writer.outcomes)
     assert str(writer.outcomes[0][1]) == 'gone'
     assert not broken.pending

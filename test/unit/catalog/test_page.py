@@ -101,10 +101,10 @@ def test_everything_that_a_drive_keeps_or_measures_is_read_by_the_tool_and_by_ro
         family = load_family(name)
         rows = [row for row in family.values() if row.access is Access.READ]
         # the driver itself reads the words of the bus
-        told = {row.key for row in rows if row.group != 'Fieldbus'}
-        assert told <= readable(family).keys()
+        listed = {row.key for row in rows if row.group != 'Fieldbus'}
+        assert listed <= readable(family).keys()
         as_text = {row.key for row in rows if row.kind in (str, bool)}
-        assert told - as_text <= {one.key for one in (*family.kept, *family.measured)}
+        assert listed - as_text <= {one.key for one in (*family.kept, *family.measured)}
     only_read = [one for one in load_family('movitrac31').kept if not one.is_setting]
     part = page().split('### Only read\n')[1].split('### ')[0]
     assert part.count('\n| ') == 2 + len(only_read) == 21

@@ -363,8 +363,8 @@ FACTS = {
     'NETWORK_CONTROL SETPOINT_REACHED LIMIT_ACTIVE SLEEPING|OPERATION_ENABLED STOP_MODE_BRAKE '
     'REVERSE STOPPING',
 }
-#: And what is never told.
-NOT_TOLD = {
+#: And what is never reported.
+NOT_REPORTED = {
     'sinus_g2': Fact.SLEEPING | Fact.STOP_MODE_BRAKE | Fact.RUN_INPUT_MISSING,
     'sinus_optimal': Fact.VOLTAGE_ENABLED | Fact.QUICK_STOP_ACTIVE | Fact.SWITCH_ON_DISABLED
     | Fact.NETWORK_REFERENCE,
@@ -381,7 +381,7 @@ def facts_of(text: str) -> Fact:
 @pytest.mark.parametrize('name', FACTS)
 def test_facts_of_each_bit(name: str) -> None:
     tells = load_family(name).profile.status_word
-    assert Fact(0x1FFFF) & ~tells.valid == NOT_TOLD[name]
+    assert Fact(0x1FFFF) & ~tells.valid == NOT_REPORTED[name]
     expected = [facts_of(text) for text in FACTS[name].split()]
     for kind in Kind if name == 'sinus_optimal' else (Kind.STATUS,):
         assert [tells.facts(1 << bit, kind) for bit in range(16)] == expected

@@ -102,7 +102,7 @@ class Bench:
         return not state['driven'] and not state['turning'] and state['source'] == 'stop'
 
     def run_by_bus(self, hertz: float = 10.0) -> None:
-        """Let the motor run as if another master had told it."""
+        """Let the motor run as if another master had commanded it."""
         with self.simulator.lock:
             drive = self.drive()
             drive.write_raw('fieldbus.mode', _BUS)
@@ -196,7 +196,7 @@ class Bench:
                 stream.close()
 
     @contextlib.contextmanager
-    def riding(self, *arguments: object) -> Iterator[subprocess.Popen[str]]:
+    def running(self, *arguments: object) -> Iterator[subprocess.Popen[str]]:
         """The motor turns by the command, at 10 Hz."""
         with self.begun('run', 10, *arguments) as process:
             wait_until(lambda: process.poll() is not None or self.state()['frequency'])

@@ -22,7 +22,7 @@ Nfo = Callable[..., Done]
 OVERLOAD, SIO_FAIL = 5, 14
 HASTY = ('--response-timeout', 0.1, '--retries', 0)
 OPTIMAL = {'model': 'sinus_optimal', 'serial_numbers': []}
-WAYS: dict[str, dict[str, Any]] = {
+CONNECTIONS: dict[str, dict[str, Any]] = {
     'modbus_rtu': {},
     'modbus_ascii': {'protocol': 'modbus_ascii'},
     'modbus_tcp': {'protocol': 'modbus_tcp'},
@@ -30,7 +30,9 @@ WAYS: dict[str, dict[str, Any]] = {
     'optimal': OPTIMAL,
 }
 #: Those of a drive that tunes and has an error log.
-WAYS_OF_THE_G2 = {name: options for name, options in WAYS.items() if name != 'optimal'}
+CONNECTIONS_OF_THE_G2 = {
+    name: options for name, options in CONNECTIONS.items() if name != 'optimal'
+}
 
 
 @pytest.fixture
@@ -42,9 +44,9 @@ def bench(make_bench: MakeBench) -> Bench:
 # --- stop -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', WAYS)
-def test_stop(make_bench: MakeBench, way: str) -> None:
-    bench = make_bench(settings=QUICK, **WAYS[way])
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_stop(make_bench: MakeBench, connection: str) -> None:
+    bench = make_bench(settings=QUICK, **CONNECTIONS[connection])
     bench.run_by_bus()
     done = bench.run('stop')
     assert done.status == 0, done.err
@@ -78,9 +80,9 @@ STEPS = {
 }
 
 
-@pytest.mark.parametrize('way', ['modbus_rtu', 'classic', 'optimal'])
-def test_stop_of_what_the_control_word_runs(make_bench: MakeBench, way: str) -> None:
-    bench = make_bench(settings=QUICK, **WAYS[way])
+@pytest.mark.parametrize('connection', ['modbus_rtu', 'classic', 'optimal'])
+def test_stop_of_what_the_control_word_runs(make_bench: MakeBench, connection: str) -> None:
+    bench = make_bench(settings=QUICK, **CONNECTIONS[connection])
     drive = bench.drive()
     with bench.simulator.lock:
         drive.memory.set(drive.control_unit.setpoint_key, 20.0)
@@ -105,9 +107,11 @@ def test_stop_that_coasts(make_bench: MakeBench) -> None:
     assert 'stopp' in done.err
 
 
-@pytest.mark.parametrize('way', ['modbus_rtu', 'classic'])
-def test_quick_stop(make_bench: MakeBench, way: str) -> None:
-    bench = make_bench(settings={'control.retard': 500, 'control.accel': 0.2}, **WAYS[way])
+@pytest.mark.parametrize('connection', ['modbus_rtu', 'classic'])
+def test_quick_stop(make_bench: MakeBench, connection: str) -> None:
+    bench = make_bench(
+        settings={'control.retard': 500, 'control.accel': 0.2}, **CONNECTIONS[connection]
+    )
     bench.run_by_bus()
     done = bench.run('stop', '--quick')
     assert done.status == 0, done.err
@@ -184,9 +188,9 @@ def test_stop_of_a_drive_that_is_silent(bench: Bench) -> None:
 # --- ack ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', WAYS)
-def test_ack(make_bench: MakeBench, way: str) -> None:
-    bench = make_bench(**WAYS[way])
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_ack(make_bench: MakeBench, connection: str) -> None:
+    bench = make_bench(**CONNECTIONS[connection])
     bench.simulator.inject('fault', OVERLOAD, address=1)
     code = bench.state()['inv_st']
     done = bench.run('ack')
@@ -196,11 +200,11 @@ def test_ack(make_bench: MakeBench, way: str) -> None:
     assert bench.state()['fault'] == 0
 
 
-@pytest.mark.parametrize('way', WAYS)
+@pytest.mark.parametrize('connection', CONNECTIONS)
 def test_ack_under_a_run_command_that_stands_starts_nothing(
-    make_bench: MakeBench, way: str
+    make_bench: MakeBench, connection: str
 ) -> None:
-    bench = make_bench(settings=QUICK, **WAYS[way])
+    bench = make_bench(settings=QUICK, **CONNECTIONS[connection])
     bench.run_by_bus()
     bench.simulator.inject('fault', OVERLOAD, address=1)
     done = bench.run('ack')
@@ -266,9 +270,9 @@ def test_tune(bench: Bench, procedure: str) -> None:
     assert bench.state()['source'] == 'stop'
 
 
-@pytest.mark.parametrize('way', WAYS_OF_THE_G2)
-def test_tune_every_way(make_bench: MakeBench, way: str) -> None:
-    bench = make_bench(**WAYS[way])
+@pytest.mark.parametrize('connection', CONNECTIONS_OF_THE_G2)
+def test_tune_over_every_connection(make_bench: MakeBench, connection: str) -> None:
+    bench = make_bench(**CONNECTIONS[connection])
     done = bench.run('tune', 'rs', '--yes', '--json')
     assert done.status == 0, done.err
     facts = json.loads(done.out)
@@ -355,9 +359,9 @@ def test_a_motor_that_runs_is_left_alone(bench: Bench, nfo: Nfo, by: str, verb: 
 # --- errors --erase -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', WAYS_OF_THE_G2)
-def test_erase(make_bench: MakeBench, way: str) -> None:
-    bench = make_bench(**WAYS[way])
+@pytest.mark.parametrize('connection', CONNECTIONS_OF_THE_G2)
+def test_erase(make_bench: MakeBench, connection: str) -> None:
+    bench = make_bench(**CONNECTIONS[connection])
     for code in (5, 12):
         bench.simulator.inject('fault', code, address=1)
     assert bench.run('ack').status == 0

@@ -25,7 +25,7 @@ Nfo = Callable[..., Done]
 RUN = (0x02, 0x98)
 OPTIMAL = {'model': 'sinus_optimal', 'serial_numbers': []}
 #: Every protocol, model and control method.
-WAYS: dict[str, tuple[dict[str, Any], tuple[object, ...]]] = {
+CONNECTIONS: dict[str, tuple[dict[str, Any], tuple[object, ...]]] = {
     'modbus_rtu': ({}, ()),
     'modbus_ascii': ({'protocol': 'modbus_ascii'}, ()),
     'modbus_tcp': ({'protocol': 'modbus_tcp'}, ()),
@@ -60,9 +60,9 @@ def nothing_commanded(bench: Bench) -> bool:
 # --- the run -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', WAYS)
-def test_it_runs_for_a_while_and_stops(make_bench: MakeBench, way: str) -> None:
-    options, arguments = WAYS[way]
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_it_runs_for_a_while_and_stops(make_bench: MakeBench, connection: str) -> None:
+    options, arguments = CONNECTIONS[connection]
     bench = make_bench(settings=QUICK, **options)
     process = bench.begin('run', 10, '--for', 2, *arguments)
     wait_until(lambda: bench.state()['frequency'] == pytest.approx(10, abs=0.2))
@@ -111,7 +111,7 @@ def test_a_reference_of_its_own(bench: Bench) -> None:
 def test_the_set_point_stays_fresh(bench: Bench) -> None:
     # the driver gives one up after 2.5 s, and so does a drive of its own accord
     arguments = ('--for', 12, '--drive-timeout', 6)
-    with bench.riding(*arguments) as process:
+    with bench.running(*arguments) as process:
         out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, err
     assert 'no set-point' not in err and 'time-out' not in err
@@ -146,7 +146,7 @@ def test_by_default_a_time_out_that_may_stop_the_motor_is_set_for_the_run(
     make_bench: MakeBench,
 ) -> None:
     bench = make_bench(settings={**QUICK, 'serial.auto_stop': True})
-    with bench.riding('--for', 1) as process:
+    with bench.running('--for', 1) as process:
         wait_until(lambda: bench.value('serial.sio_tot') == 2.0)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0 and 'time-out' not in err
@@ -156,9 +156,9 @@ def test_by_default_a_time_out_that_may_stop_the_motor_is_set_for_the_run(
 def test_json(bench: Bench) -> None:
     done = bench.run('run', 10, '--for', 1, '--json', '--period', 0.1)
     assert done.status == 0
-    *rides, end = [json.loads(line) for line in done.out.splitlines()]
-    assert {row['enabled'] for row in rides} == {True, False}
-    last = [row for row in rides if row['enabled']][-1]
+    *rows, end = [json.loads(line) for line in done.out.splitlines()]
+    assert {row['enabled'] for row in rows} == {True, False}
+    last = [row for row in rows if row['enabled']][-1]
     assert last['setpoint'] == 10.0 and last['unit'] == 'Hz' and last['kind'] == 'status'
     assert last['frequency'] == pytest.approx(10, abs=0.2)
     assert end['ended'] == '1 s are over' and end['stop_confirmed'] is True
@@ -185,7 +185,7 @@ SIGNALS = {
 
 @pytest.mark.parametrize('number', SIGNALS)
 def test_a_signal_stops_the_motor(bench: Bench, number: signal.Signals) -> None:
-    with bench.riding() as process:
+    with bench.running() as process:
         process.send_signal(number)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == SIGNALS[number]
@@ -195,14 +195,14 @@ def test_a_signal_stops_the_motor(bench: Bench, number: signal.Signals) -> None:
     assert 'ramps down' in err and 'control released' in err
 
 
-@pytest.mark.parametrize('way', ['classic', 'optimal', 'drive_control'])
+@pytest.mark.parametrize('connection', ['classic', 'optimal', 'drive_control'])
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_stops_the_motor_every_way(
-    make_bench: MakeBench, way: str, number: signal.Signals
+def test_a_signal_stops_the_motor_over_every_connection(
+    make_bench: MakeBench, connection: str, number: signal.Signals
 ) -> None:
-    options, arguments = WAYS[way]
+    options, arguments = CONNECTIONS[connection]
     bench = make_bench(settings=QUICK, **options)
-    with bench.riding(*arguments) as process:
+    with bench.running(*arguments) as process:
         process.send_signal(number)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == SIGNALS[number], err
@@ -210,7 +210,7 @@ def test_a_signal_stops_the_motor_every_way(
 
 
 def test_it_takes_no_signal_for_granted_when_it_was_suspended(bench: Bench) -> None:
-    with bench.riding() as process:
+    with bench.running() as process:
         process.send_signal(signal.SIGSTOP)
         suspended = time.monotonic()
         # longer than it ever waits for a signal
@@ -225,7 +225,7 @@ def test_it_takes_no_signal_for_granted_when_it_was_suspended(bench: Bench) -> N
 
 
 def test_ctrl_c_before_the_time_is_over(bench: Bench) -> None:
-    with bench.riding('--for', 1000) as process:
+    with bench.running('--for', 1000) as process:
         process.send_signal(signal.SIGINT)
         assert process.wait(PATIENCE) == 130
     assert bench.stopped
@@ -242,7 +242,7 @@ def test_ctrl_c_while_it_waits_for_the_start(make_bench: MakeBench) -> None:
 
 
 def test_output_whose_reader_has_ended(bench: Bench) -> None:
-    with bench.riding('--period', 0.05) as process:
+    with bench.running('--period', 0.05) as process:
         assert process.stdout is not None and process.stderr is not None
         process.stdout.close()
         assert process.wait(PATIENCE) == 1
@@ -251,7 +251,7 @@ def test_output_whose_reader_has_ended(bench: Bench) -> None:
 
 
 def test_output_that_is_not_read_keeps_nothing_waiting(bench: Bench) -> None:
-    with bench.riding('--period', 0.01, '--json') as process:
+    with bench.running('--period', 0.01, '--json') as process:
         assert process.stdout
         fcntl.fcntl(process.stdout, fcntl.F_SETPIPE_SZ, 4096)
         wait_until(lambda: is_full(process) and bench.state()['frequency'] > 5)
@@ -341,7 +341,7 @@ def test_a_terminal_that_stands_still(bench: Bench) -> None:
 
 
 def test_a_fault(bench: Bench) -> None:
-    with bench.riding() as process:
+    with bench.running() as process:
         bench.simulator.inject('fault', 5, address=1)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
@@ -363,7 +363,7 @@ def test_a_fault(bench: Bench) -> None:
     ],
 )
 def test_what_else_stops_it(bench: Bench, what: str, value: object, said: str) -> None:
-    with bench.riding() as process:
+    with bench.running() as process:
         bench.simulator.inject(what, value, address=1)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1, err
@@ -372,7 +372,7 @@ def test_what_else_stops_it(bench: Bench, what: str, value: object, said: str) -
 
 
 def test_a_fault_as_json(bench: Bench) -> None:
-    with bench.riding('--json') as process:
+    with bench.running('--json') as process:
         bench.simulator.inject('fault', 5, address=1)
         out, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
@@ -383,7 +383,7 @@ def test_a_fault_as_json(bench: Bench) -> None:
 
 
 def test_a_cut_line_is_not_called_a_stop(bench: Bench) -> None:
-    with bench.riding() as process:
+    with bench.running() as process:
         bench.simulator.inject('line-dead', 600)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
@@ -393,7 +393,7 @@ def test_a_cut_line_is_not_called_a_stop(bench: Bench) -> None:
 
 
 def test_a_line_that_comes_back_carries_the_stop(bench: Bench) -> None:
-    with bench.riding() as process:
+    with bench.running() as process:
         bench.simulator.inject('line-dead', 600)
         assert process.stderr is not None
         read_until(process.stderr, 'the stop is NOT confirmed')
@@ -406,7 +406,7 @@ def test_a_line_that_comes_back_carries_the_stop(bench: Bench) -> None:
 
 
 def test_a_second_ctrl_c_says_that_the_motor_may_run(bench: Bench) -> None:
-    with bench.riding() as process:
+    with bench.running() as process:
         bench.simulator.inject('line-dead', 600)
         process.send_signal(signal.SIGINT)
         assert process.stderr is not None
@@ -431,7 +431,7 @@ def test_a_second_ctrl_c_ends_the_wait_for_a_ramp(
     make_bench: MakeBench, settings: dict[str, Any], said: str
 ) -> None:
     bench = make_bench(settings={'control.accel': 0.2, 'control.retard': 500, **settings})
-    with bench.riding() as process:
+    with bench.running() as process:
         process.send_signal(signal.SIGINT)
         assert process.stderr is not None
         read_until(process.stderr, 'ramps down')
@@ -447,7 +447,7 @@ def test_a_second_ctrl_c_ends_the_wait_for_a_ramp(
 
 def test_sigterm_does_not_wait_for_a_long_ramp(make_bench: MakeBench) -> None:
     bench = make_bench(settings={'control.accel': 0.2, 'control.retard': 500})
-    with bench.riding() as process:
+    with bench.running() as process:
         process.send_signal(signal.SIGTERM)
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
@@ -559,7 +559,7 @@ def test_no_drive_answers(nfo: Nfo) -> None:
 
 
 def test_a_busy_port_names_its_holder(nfo: Nfo, bench: Bench) -> None:
-    with bench.riding() as process:
+    with bench.running() as process:
         for arguments in (['run', 10], ['stop'], ['ack'], ['tune', 'rs', '--yes']):
             done = nfo(*arguments)
             assert done.status == 1 and f'(pid {process.pid})' in done.err

@@ -361,11 +361,11 @@ def test_monitor_of_several_drives_shows_each_and_the_line(nfo: Nfo, bench: Benc
     requests = [int(row.split()[-5]) for row in (line, first, second)]
     assert requests[0] == requests[1] + requests[2] and min(requests) > 20
     done = nfo('monitor', '--addresses', '1,2', '--count', 2, '--period', 0.05, '--json')
-    told = [json.loads(text) for text in done.out.splitlines()]
-    assert [one['address'] for one in told] == [1, 2] * 2
-    assert told[0]['statistics']['cycle_time'] is None
-    assert told[2]['statistics']['cycle_time'] > 0.0
-    assert told[2]['statistics']['round_trip_median'] > 0.0
+    rows = [json.loads(text) for text in done.out.splitlines()]
+    assert [one['address'] for one in rows] == [1, 2] * 2
+    assert rows[0]['statistics']['cycle_time'] is None
+    assert rows[2]['statistics']['cycle_time'] > 0.0
+    assert rows[2]['statistics']['round_trip_median'] > 0.0
     assert done.err == ''
 
 
@@ -376,11 +376,11 @@ def test_monitor_reports_which_of_several_drives_is_missing(nfo: Nfo, bench: Ben
         '--json',
     )  # fmt: skip
     assert done.status == 1
-    told = [json.loads(text) for text in done.out.splitlines()]
-    assert [(one['address'], one['connected']) for one in told] == [(1, True), (2, False)] * 2
-    assert told[1]['statistics']['timeouts'] == 3
-    assert told[1]['statistics']['retries'] == 2
-    assert told[1]['statistics']['round_trip_min'] is None
+    rows = [json.loads(text) for text in done.out.splitlines()]
+    assert [(one['address'], one['connected']) for one in rows] == [(1, True), (2, False)] * 2
+    assert rows[1]['statistics']['timeouts'] == 3
+    assert rows[1]['statistics']['retries'] == 2
+    assert rows[1]['statistics']['round_trip_min'] is None
 
 
 def test_monitor_does_not_acknowledge(nfo: Nfo, bench: Bench) -> None:

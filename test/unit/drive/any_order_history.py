@@ -131,7 +131,7 @@ class History:
             self.watched = False
 
     def _may_be_confirmed(self, stop: Command) -> bool:
-        """Tell whether the status was read since a stop was written that has no answer yet."""
+        """Return whether the status was read since a stop was written that has no answer yet."""
         sent = ((key, data) for _, key, data in self._rig.asked[stop.asked :])
         after = itertools.dropwhile(lambda request: request[1] is None, sent)
         return any(map(self.shown.reads_status, after))
@@ -200,7 +200,7 @@ class History:
         return self.pending('enable') or self.enabled_at is not None
 
     def pending(self, name: str) -> bool:
-        """Tell whether a command of this name is on its way."""
+        """Return whether a command of this name is on its way."""
         return any(command.name == name for command in self._commands)
 
     @property
@@ -299,7 +299,7 @@ class History:
         unmoved = not given or ended == [False, False, True, False]
         if any(ended) and not (unmoved and self.pending('enable')):
             self._taken_away = len(self._rig.asked) if ended[1] and sum(ended) == 1 else -1
-            self.lose(self.noticed + (self.times.control_told if ended[1] else 0.0))
+            self.lose(self.noticed + (self.times.control_reported if ended[1] else 0.0))
         if ended[0]:
             self._faulted_at = self.now
             by_itself = all(map(self.shown.has_tries, self._far.faults.codes))

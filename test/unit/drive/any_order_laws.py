@@ -37,10 +37,10 @@ class Broken(AssertionError):
 
 @dataclass
 class Compared:
-    """What was true and what was told, what of it differed, and when it was looked at last."""
+    """What was true and what was reported, what of it differed, and when it was looked at last."""
 
     truth: dict[str, Any]
-    told: dict[str, Any]
+    reported: dict[str, Any]
     differing: list[str]
     at: float = -math.inf
 
@@ -56,13 +56,13 @@ class Laws(History):
         self._looked_at = self.now
         self._truth: dict[str, tuple[Any, float]] = {}
         self._seen: dict[str, Any] = {}
-        #: When what is told of a fact was right last, if it is wrong now.
+        #: When what is reported of a fact was right last, if it is wrong now.
         self._agreed_at: dict[str, float] = {}
         self._compared = Compared({}, {}, [])
         self._last: Snapshot | None = None
         #: When it was last shown as not enabled.
         self._not_enabled_at = -math.inf
-        self._last_told: dict[str, Any] = {}
+        self._last_reported: dict[str, Any] = {}
         #: How much had been asked when an acknowledgement let the motor go.
         self._turned_from: int | None = None
 
@@ -260,10 +260,10 @@ class Laws(History):
         if before > self.shown.lead:
             raise Broken(f'{before} transactions went ahead of a stop')
 
-    # --- what is told -----------------------------------------------------------------------------
+    # --- what is reported -------------------------------------------------------------------------
 
     @staticmethod
-    def _told(snapshot: Snapshot) -> dict[str, Any]:
+    def _reported(snapshot: Snapshot) -> dict[str, Any]:
         """Return what the driver says of it."""
         seen = snapshot.status
         if seen is None:
@@ -294,33 +294,34 @@ class Laws(History):
         if not snapshot.connected:
             return
         if snapshot is not self._last:
-            self._last, self._last_told = snapshot, self._told(snapshot)
+            self._last, self._last_reported = snapshot, self._reported(snapshot)
         known_since = max(self.settled_since, self._active_at)
         if self.shown.polls_wait:
             known_since = max(known_since, self._commanded_at)
-        for name in self._differing(truth, self._last_told):
+        for name in self._differing(truth, self._last_reported):
             value, since = self._truth[name]
             patience = self.noticed + self.shown.patience(name)
             agreed_at = self._agreed_at.get(name, known_since)
             if self.now - max(since, known_since, agreed_at) > patience:
-                raise Broken(f'{name} is told as {self._last_told[name]}, and it is {value}')
+                reported = self._last_reported[name]
+                raise Broken(f'{name} is reported as {reported}, and it is {value}')
         if not snapshot.enabled:
             self._not_enabled_at = self.now
         running, since = self._truth['running']
         late = self.noticed + self.shown.patience('running')
         long_since = self.now - max(since, known_since, self._not_enabled_at) > late
         if snapshot.enabled and running is False and long_since:
-            raise Broken('it is told as enabled, and it does not run')
+            raise Broken('it is reported as enabled, and it does not run')
 
-    def _differing(self, truth: dict[str, Any], told: dict[str, Any]) -> list[str]:
-        """Return what is told otherwise than it is; note until when the rest was told right."""
+    def _differing(self, truth: dict[str, Any], reported: dict[str, Any]) -> list[str]:
+        """Return what is reported otherwise than it is; note until when the rest was right."""
         before = self._compared
-        if before.truth != truth or before.told is not told:
+        if before.truth != truth or before.reported is not reported:
             for name in before.truth:
                 if name not in before.differing:
                     self._agreed_at[name] = before.at
-            differing = [name for name, value in truth.items() if not _agree(told[name], value)]
-            self._compared = before = Compared(truth, told, differing)
+            differing = [name for name, value in truth.items() if not _agree(reported[name], value)]
+            self._compared = before = Compared(truth, reported, differing)
         before.at = self.now
         return before.differing
 
@@ -331,23 +332,23 @@ class Laws(History):
             # commands without a response go before the polls
             since = max(self._broken_since, self._commanded_at)
             if self.now - since > lost and not self._rig.line.losses:
-                raise Broken('it is told as connected, and it is not')
+                raise Broken('it is reported as connected, and it is not')
         if self._whole_since is None or snapshot.connected:
             return
         if self.now - max(self._whole_since, self._watched_at) > self.times.found:
-            raise Broken('it is told as not connected, and it is there')
+            raise Broken('it is reported as not connected, and it is there')
 
 
 def _has(seen: Any, name: str) -> bool:
-    """Tell whether a status has a fact."""
+    """Return whether a status has a fact."""
     return bool(seen.facts & type(seen.facts)[name])
 
 
-def _agree(told: Any, value: Any) -> bool:
-    """Tell whether what is shown is true; of what is not known, ``None``, all is."""
+def _agree(reported: Any, value: Any) -> bool:
+    """Return whether what is shown is true; of what is not known, ``None``, all is."""
     if value is None:
         return True
     if isinstance(value, float):
-        return bool(abs(told - value) < 0.3)
-    return bool(told == value)
+        return bool(abs(reported - value) < 0.3)
+    return bool(reported == value)
 

@@ -14,7 +14,7 @@ from any_order_laws import Laws
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 import pytest
-from support.rig import Rig, Way
+from support.rig import Connection, Rig
 
 from nfo_sinus_driver.simulator.memory import Refused as Refusal
 
@@ -66,7 +66,7 @@ class AnyOrder(RuleBasedStateMachine):
     ) -> None:
         """Begin with a drive in which something stands, and with these settings of the driver."""
         self.rig = Rig(
-            Way(self.protocol, self.model, self.method, self.reference, driver=self.driver),
+            Connection(self.protocol, self.model, self.method, self.reference, driver=self.driver),
             parameters=parameters,
             options=options,
             line=self.line,
@@ -146,7 +146,7 @@ class AnyOrder(RuleBasedStateMachine):
         self.send(value, wait)
 
     @rule(value=SETPOINTS, wait=WAITS)
-    def ride(self, value: float = 20.0, wait: float = 1.0) -> None:
+    def run_motor(self, value: float = 20.0, wait: float = 1.0) -> None:
         """Put right what is in the way, enable it and send set-points."""
         rig, far = self.rig, self.rig.far
         rig.send(None)
@@ -169,12 +169,12 @@ class AnyOrder(RuleBasedStateMachine):
         self.send(value, wait)
 
     @rule(value=SETPOINTS, wait=WAITS)
-    def another_ride(self, value: float, wait: float) -> None:
-        self.ride(value, wait)
+    def another_run(self, value: float, wait: float) -> None:
+        self.run_motor(value, wait)
 
     @rule(value=st.sampled_from((20.0, -50.0)), wait=st.sampled_from((0.4, 1.0)))
-    def good_ride(self, value: float, wait: float) -> None:
-        self.ride(value, wait)
+    def good_run(self, value: float, wait: float) -> None:
+        self.run_motor(value, wait)
 
     def _answered(self, name: str) -> None:
         if self.method != 'monitor':
@@ -197,7 +197,7 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(wait=WAITS)
     def stop_while_reading(self, wait: float = 0.4) -> None:
         """Stop a run while all the parameters are read, which keeps the line busy."""
-        self.ride()
+        self.run_motor()
         reading = self.rig.drive.parameters.read()
         self.let(0.05)
         self.give('stop', wait)
@@ -282,11 +282,11 @@ class AnyOrder(RuleBasedStateMachine):
 
     @DRIVEN
     @rule(code=FAULTS, between=st.sampled_from((0.0, 0.1, 0.4)), wait=WAITS)
-    def fault_in_a_ride_acknowledged(
+    def fault_in_a_run_acknowledged(
         self, code: int, between: float = 0.4, wait: float = 1.0
     ) -> None:
         """Acknowledge a fault that has ended a run, with the run command standing perhaps."""
-        self.ride()
+        self.run_motor()
         self.fault(code, wait=between)
         if self.laws.watched:
             self.give('acknowledge', wait)
@@ -377,9 +377,9 @@ class AnyOrder(RuleBasedStateMachine):
         after=st.sampled_from((0.2, 0.2, 1.0)),
         wait=st.sampled_from((1.0, 2.5)),
     )
-    def end_ride(self, event: str, after: float = 1.0, wait: float = 1.0) -> None:
+    def end_run(self, event: str, after: float = 1.0, wait: float = 1.0) -> None:
         """Let something that ends a run happen in one."""
-        self.ride(wait=after)
+        self.run_motor(wait=after)
         getattr(self, event)(wait=wait)
 
     def first_fault(self, wait: float) -> None:
@@ -406,7 +406,7 @@ class AnyOrder(RuleBasedStateMachine):
     )
     def lose_line(self, state: str, give: str, seconds: float, wait: float = 2.5) -> None:
         """Lose the line in a run for so long that the drive is lost; stop it meanwhile."""
-        self.ride()
+        self.run_motor()
         self.break_line(state, wait=0.02)
         if give and self.laws.watched:
             self.give(give, 0.0)
@@ -441,8 +441,8 @@ class AnyOrder(RuleBasedStateMachine):
         seed=st.integers(0, 999),
         give=st.sampled_from(('stop', 'quick_stop', 'deactivate', 'enable')),
     )
-    def ride_in_noise(self, share: float, seed: int, give: str) -> None:
-        self.ride()
+    def run_in_noise(self, share: float, seed: int, give: str) -> None:
+        self.run_motor()
         self.noise(share, seed, 2.5)
         if self.laws.watched:
             self.give(give, 1.0)

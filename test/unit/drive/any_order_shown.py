@@ -71,7 +71,7 @@ class Times:
 
     noticed: float = 0.5
     noticed_idle: float = 1.2
-    control_told: float = 0.0
+    control_reported: float = 0.0
     carried_out: float = 0.06
     lost: float = 3.0
     lost_idle: float = 4.0
@@ -85,7 +85,7 @@ class Times:
         return Times(
             noticed=self.noticed + 2 * poll,
             noticed_idle=self.noticed_idle + 2 * poll,
-            control_told=self.control_told + poll,
+            control_reported=self.control_reported + poll,
             carried_out=self.carried_out + poll,
             lost=self.lost + 3 * poll,
             lost_idle=self.lost_idle + 3 * poll,
@@ -155,7 +155,7 @@ class Shown(abc.ABC):
         return False
 
     def has_tries(self, code: int) -> bool:
-        """Tell whether a fault may end by itself."""
+        """Return whether a fault may end by itself."""
         return False
 
     @abc.abstractmethod
@@ -163,12 +163,12 @@ class Shown(abc.ABC):
         """Return what is true of the drive now; ``None``: what it says is not known."""
 
     def patience(self, name: str) -> float:
-        """Return how much later than others a fact may be told, s."""
+        """Return how much later than others a fact may be reported, s."""
         return 0.0
 
     @abc.abstractmethod
     def reads_status(self, request: Request) -> bool:
-        """Tell whether a request is the one that every status is read with."""
+        """Return whether a request is the one that every status is read with."""
 
     @abc.abstractmethod
     def wrong(self, key: str, number: int) -> Complaints:
@@ -176,7 +176,7 @@ class Shown(abc.ABC):
 
     @abc.abstractmethod
     def stops(self, key: str, number: int) -> bool:
-        """Tell whether a write stops the motor."""
+        """Return whether a write stops the motor."""
 
 
 class ShownSinus(Shown):
@@ -185,9 +185,11 @@ class ShownSinus(Shown):
     def __init__(self, rig: Rig) -> None:
         super().__init__(rig)
         # by Classic all is refused [M0 §6.1.5]
-        refused = self._unit.variant.refuses_in_fault if rig.way.protocol != 'classic' else 'all'
+        refused = (
+            self._unit.variant.refuses_in_fault if rig.connection.protocol != 'classic' else 'all'
+        )
         # and what a command reads there comes word by word
-        self.polls_wait = rig.way.protocol == 'classic'
+        self.polls_wait = rig.connection.protocol == 'classic'
         self.powered_by_acknowledgement = refused == 'all'
         self.refuses_stop = refused != 'nothing' and self._method == 'mode_scmd'
 
@@ -319,7 +321,7 @@ class ShownOptimal(ShownSinus):
 _MOVITRAC = Times(
     noticed=0.8,
     noticed_idle=1.8,
-    control_told=1.2,
+    control_reported=1.2,
     carried_out=0.2,
     lost=3.5,
     lost_idle=5.0,
@@ -387,7 +389,7 @@ class ShownMovitrac(Shown):
         }
 
     def patience(self, name: str) -> float:
-        return self.times.control_told if name in ('by bus', 'running') else 0.0
+        return self.times.control_reported if name in ('by bus', 'running') else 0.0
 
     def reads_status(self, request: Request) -> bool:
         return request == ('fieldbus.inverter_status', None)

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The made-up family, where it is the way of a test: its two folders are all there is of it."""
+"""The made-up family, where a test connects to it: its two folders are all there is of it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nfo_sinus_driver import families, simulator
 @pytest.fixture(autouse=True)
 def _made_up_family(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     callspec = getattr(request.node, 'callspec', None)
-    if callspec is None or callspec.params.get('way') != 'made up':
+    if callspec is None or callspec.params.get('connection') != 'made up':
         return
     here = Path(__file__).parent
     for package, room in ((families, here), (simulator, here.parent / 'simulator')):

@@ -49,7 +49,7 @@ def switched(
     switch: Mapping[str, str],
     parameters: Mapping[str, Any] | None = None,
     options: Mapping[str, str] | None = None,
-    way: str = 'movitrac',
+    connection: str = 'movitrac',
     **more: Any,
 ) -> Rig:
     """Return a rig with these switches turned, and no others."""
@@ -57,7 +57,7 @@ def switched(
         parameters = {**REMOTE, **(parameters or {})}
     plain = {option.name: option.choices[0] for option in _OPTIONS}
     options = {**plain, **switch, **(options or {})}
-    return Rig(way, options=options, parameters=parameters, **more)
+    return Rig(connection, options=options, parameters=parameters, **more)
 
 
 def bits(rig: Rig) -> int:
@@ -65,7 +65,7 @@ def bits(rig: Rig) -> int:
 
 
 def succeeded(rig: Rig, future: Future[Any]) -> bool:
-    """Wait for an answer; tell whether it is a success."""
+    """Wait for an answer; return whether it is a success."""
     rig.wait_until(future.done)
     error = future.exception()
     assert error is None or isinstance(error, DriveError), repr(error)

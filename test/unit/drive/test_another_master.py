@@ -37,17 +37,17 @@ ENCODE: dict[str, Callable[[int, Any], bytes]] = {
 LONGEST_BREAK = {'rtu': 1.0, 'ascii': 1.0}
 
 
-def another_master(rig: Rig, way: str, unit: int, *keys: str) -> None:
+def another_master(rig: Rig, connection: str, unit: int, *keys: str) -> None:
     """Let another master ask one drive for parameters in turn, one every 0.1 s."""
     for number, key in enumerate(keys):
-        frame = ENCODE[way](unit, rig.drive.params.address(key))
+        frame = ENCODE[connection](unit, rig.drive.params.address(key))
         rig.line.later(
             rig.clock.now + 0.1 * number,
             lambda frame=frame: rig.line.another_asks(frame, 0.1 * len(keys)),
         )
 
 
-def require_truth(rig: Rig, way: str) -> None:
+def require_truth(rig: Rig, connection: str) -> None:
     """See to it that nothing is published but a motor that runs at 20 Hz, without a long break."""
     published: list[tuple[float, Snapshot]] = []
     rig.notes.on_snapshot = (  # type: ignore[method-assign]
@@ -59,7 +59,7 @@ def require_truth(rig: Rig, way: str) -> None:
         assert abs(shown.actual - 20) < 0.3, shown
         assert shown.enabled and shown.text == published[0][1].text, shown
     times = [at for at, _ in published] + [rig.clock.now]
-    assert max(after - at for at, after in pairwise(times)) < LONGEST_BREAK.get(way, 3.0)
+    assert max(after - at for at, after in pairwise(times)) < LONGEST_BREAK.get(connection, 3.0)
     assert not rig.notes.said(Cause.LOST_IN_USE)
     (remark,) = rig.bus.remarks
     assert 'another' in remark and 'master' in remark and 'disconnect it' in remark
@@ -67,58 +67,62 @@ def require_truth(rig: Rig, way: str) -> None:
 
 
 @pytest.mark.parametrize('poll_rate', [50.0, 5.0])
-@pytest.mark.parametrize('way', ENCODE)
-def test_nothing_false_is_published_and_the_drive_is_not_lost(way: str, poll_rate: float) -> None:
-    with Rig(way, poll_rate=poll_rate) as rig:
+@pytest.mark.parametrize('connection', ENCODE)
+def test_nothing_false_is_published_and_the_drive_is_not_lost(
+    connection: str, poll_rate: float
+) -> None:
+    with Rig(connection, poll_rate=poll_rate) as rig:
         rig.turn()
         assert rig.bus.remarks == ()
-        key = 'status.dc_link_voltage' if way == 'movitrac' else 'status.dc_link'
-        another_master(rig, way, 1, key)
-        require_truth(rig, way)
+        key = 'status.dc_link_voltage' if connection == 'movitrac' else 'status.dc_link'
+        another_master(rig, connection, 1, key)
+        require_truth(rig, connection)
 
 
 @pytest.mark.parametrize('request_', [ReportSlaveId(1), ReadDevice(1)])
-@pytest.mark.parametrize('way', ['rtu', 'ascii'])
-def test_a_master_that_asks_what_the_drive_is_is_another_master(way: str, request_: Any) -> None:
-    with Rig(way, poll_rate=5.0) as rig:
+@pytest.mark.parametrize('connection', ['rtu', 'ascii'])
+def test_a_master_that_asks_what_the_drive_is_is_another_master(
+    connection: str, request_: Any
+) -> None:
+    with Rig(connection, poll_rate=5.0) as rig:
         rig.turn()
-        encode = rtu.encode if way == 'rtu' else modbus_ascii.encode
+        encode = rtu.encode if connection == 'rtu' else modbus_ascii.encode
         rig.line.another_asks(encode(request_), 0.5)
-        require_truth(rig, way)
+        require_truth(rig, connection)
 
 
-@pytest.mark.parametrize('way', ['rtu', 'ascii'])
-def test_an_echo_and_another_master_from_the_first_request_are_no_loss(way: str) -> None:
-    with Rig(way, line={'echo': True}, poll_rate=5.0) as rig:
-        another_master(rig, way, 1, 'status.dc_link')
+@pytest.mark.parametrize('connection', ['rtu', 'ascii'])
+def test_an_echo_and_another_master_from_the_first_request_are_no_loss(connection: str) -> None:
+    with Rig(connection, line={'echo': True}, poll_rate=5.0) as rig:
+        another_master(rig, connection, 1, 'status.dc_link')
         rig.connect()
         # a write that meets a request of the other on the line is lost: enable is called again
         assert any('enabled' in rig.answer(rig.drive.enable()) for _ in range(5))
         rig.send(20.0)
         rig.pass_time(3.0)
         rig.notes.events.clear()
-        require_truth(rig, way)
+        require_truth(rig, connection)
 
 
-@pytest.mark.parametrize('way', ['classic', 'movitrac'])
-def test_what_another_drive_says_to_another_master_is_not_taken_for_ours(way: str) -> None:
+@pytest.mark.parametrize('connection', ['classic', 'movitrac'])
+def test_what_another_drive_says_to_another_master_is_not_taken_for_ours(connection: str) -> None:
     keys = (
-        ('status.frequency', 'fieldbus.inverter_status') if way == 'movitrac'
+        ('status.frequency', 'fieldbus.inverter_status') if connection == 'movitrac'
         else ('status.frq_act', 'fieldbus.inv_st')
     )
-    with Rig(way, drives=2, poll_rate=5.0) as rig:
+    with Rig(connection, drives=2, poll_rate=5.0) as rig:
         rig.connect()
         rig.enable()
         # the other drive stands
         rig.send(20.0, 1)
         rig.pass_time(2.0)
-        another_master(rig, way, 2, *keys)
-        require_truth(rig, way)
+        another_master(rig, connection, 2, *keys)
+        require_truth(rig, connection)
 
 
-@pytest.mark.parametrize('way', ENCODE)
-def test_no_other_master_is_reported_where_there_is_only_noise_or_an_echo(way: str) -> None:
-    with Rig(way, line={'echo': True}) as rig:
+@pytest.mark.parametrize('connection', ENCODE)
+def test_no_other_master_is_reported_where_there_is_only_noise_or_an_echo(connection: str) -> None:
+    with Rig(connection, line={'echo': True}) as rig:
         rig.turn()
         random = Random(34)
         for number in range(100):

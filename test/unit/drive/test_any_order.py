@@ -51,7 +51,7 @@ def test_each_event_ends_a_run(machine: type[AnyOrder]) -> None:
     state.begin_for_each_event()
     try:
         for event in dict.fromkeys(machine.enders):
-            state.end_ride(event, after=0.2, wait=1.0)
+            state.end_run(event, after=0.2, wait=1.0)
             if state.rig.far.faults:
                 state.end_fault(wait=1.0)
             if not state.rig.far.control_unit.run_input:
@@ -60,7 +60,7 @@ def test_each_event_ends_a_run(machine: type[AnyOrder]) -> None:
         for give in ('', 'stop', 'deactivate'):
             state.lose_line('silent', give, 9.0, wait=2.5)
         state.put_right()
-        state.ride(wait=1.0)
+        state.run_motor(wait=1.0)
         # the next driver finds the motor running
         state.kill(wait=2.5)
     finally:
@@ -94,7 +94,7 @@ def test_a_fault_that_ends_by_itself_ends_the_run(machine: type[AnyOrder]) -> No
     state.begin(restart_after=1)
     try:
         for wait in (0.6, 1.0):
-            state.ride(wait=wait)
+            state.run_motor(wait=wait)
             state.fault(5, standing=True, wait=wait)
             state.end_cause(wait=0.9)
             assert state.rig.far.faults and not state.rig.far.motor.driven

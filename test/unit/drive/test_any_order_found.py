@@ -120,9 +120,9 @@ def test_nothing_runs_without_the_time_out_that_could_not_be_set() -> None:
         rig.enable()
 
 
-@pytest.mark.parametrize('way', ['rtu', 'rtu, control word'])
-def test_a_poll_that_a_quick_stop_overtakes_complains_of_no_other_master(way: str) -> None:
-    with Rig(way, poll_rate=1000.0) as rig:
+@pytest.mark.parametrize('connection', ['rtu', 'rtu, control word'])
+def test_a_poll_that_a_quick_stop_overtakes_complains_of_no_other_master(connection: str) -> None:
+    with Rig(connection, poll_rate=1000.0) as rig:
         rig.connect()
         for moment in range(12):
             rig.enable()
@@ -175,7 +175,7 @@ def test_an_enable_that_comes_with_a_quick_stop_is_refused(machine: type[AnyOrde
     state = machine()
     state.begin()
     try:
-        state.ride()
+        state.run_motor()
         # what comes with it, and what comes while it is on its way
         quick_stop, enable = state.rig.drive.quick_stop(), state.rig.drive.enable()
         state.rig.pass_time(0.004)
@@ -192,8 +192,8 @@ def test_a_clean_up_while_a_fault_is_being_acknowledged_stops_first() -> None:
     state = G2DriveControl()
     state.begin(keeps=True, refuses='scmd')
     try:
-        # the acknowledgement has disarmed, and waits until the reaction to the fault is over
-        state.fault_in_a_ride_acknowledged(between=0.0, code=5, wait=0.02)
+        # the acknowledgement has ended the enable, and waits until the reaction to the fault ends
+        state.fault_in_a_run_acknowledged(between=0.0, code=5, wait=0.02)
         asked = len(state.rig.asked)
         state.rig.drive.disconnect(1.0)
         state.rig.pass_time(0.05)
@@ -213,7 +213,7 @@ def test_a_stop_waits_for_no_look_whether_the_motor_has_to_be_stopped() -> None:
         state.factory_setting(wait=0.0)
         state.factory_setting(wait=0.0)
         state.activate(wait=0.0)
-        state.ride(value=20.0, wait=0.4)
+        state.run_motor(value=20.0, wait=0.4)
         state.activate(wait=0.0)
         # a look begins: who has control, and then whether keypad or terminals command
         state.close_terminal(terminal=42, wait=0.1)
@@ -222,9 +222,11 @@ def test_a_stop_waits_for_no_look_whether_the_motor_has_to_be_stopped() -> None:
         state.rig.close()
 
 
-@pytest.mark.parametrize('way', ['rtu', 'classic', 'movitrac'])
-def test_a_drive_that_is_silent_is_lost_in_time_although_its_own_time_out_is_near(way: str) -> None:
-    with Rig(way, drive_timeout=2.0) as rig:
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'movitrac'])
+def test_a_drive_that_is_silent_is_lost_in_time_although_its_own_time_out_is_near(
+    connection: str,
+) -> None:
+    with Rig(connection, drive_timeout=2.0) as rig:
         rig.turn()
         rig.line.state = 'silent'
         rig.drive.stop()

@@ -82,11 +82,11 @@ def test_a_stop_is_tried_on() -> None:
 
 
 @pytest.mark.parametrize(
-    ('way', 'key'),
+    ('connection', 'key'),
     [('rtu', MODE), ('rtu, control word', 'fieldbus.drv_ctrl_write_mask')],
 )
-def test_a_quick_stop_stays_one(way: str, key: str) -> None:
-    with Rig(way, parameters={'control.retard': 10.0}).turn() as rig:
+def test_a_quick_stop_stays_one(connection: str, key: str) -> None:
+    with Rig(connection, parameters={'control.retard': 10.0}).turn() as rig:
         busy = Busy(rig, 1, key)
         assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
         assert busy.said == 1 and not rig.far.motor.driven

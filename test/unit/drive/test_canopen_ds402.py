@@ -18,7 +18,7 @@ NO_VOLTAGE, FAULT_RESET = '2b40600000000000', '2b40600080000000'
 TO_NOBODY = '2b22200001000000'
 CONTROL_WORD, MODE = 'fieldbus.control_word', 'fieldbus.mode'
 SHAPES = ['canopen, ds402', 'canopen, ds402 alone']
-every_shape = pytest.mark.parametrize('way', SHAPES)
+every_shape = pytest.mark.parametrize('connection', SHAPES)
 OVERVOLTAGE, SIO_FAIL = 8, 14
 
 
@@ -34,12 +34,12 @@ def written(rig: Rig, begun: int = 0) -> list[str]:
 
 
 @every_shape
-def test_the_messages_of_a_run(way: str) -> None:
-    with Rig(way) as rig:
+def test_the_messages_of_a_run(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         begun = len(rig.line.frames)
         rig.enable()
-        handed_over = ['2b22200003000000'] if way == SHAPES[1] else []
+        handed_over = ['2b22200003000000'] if connection == SHAPES[1] else []
         assert written(rig, begun) == [
             ZERO, *handed_over, SHUTDOWN, ZERO, SWITCH_ON, ENABLE
         ]
@@ -65,9 +65,9 @@ def test_the_messages_of_a_run(way: str) -> None:
 
 @every_shape
 def test_a_fault_is_acknowledged_by_an_edge_without_voltage_and_its_error_code_is_said(
-    way: str,
+    connection: str,
 ) -> None:
-    with Rig(way) as rig:
+    with Rig(connection) as rig:
         rig.turn()
         rig.far.trip(OVERVOLTAGE)
         rig.pass_time(2.0)
@@ -104,8 +104,8 @@ def test_a_serial_fault_is_acknowledged_by_mode_stop() -> None:
 
 
 @every_shape
-def test_a_stop_down_a_long_ramp_is_confirmed_and_is_not_forced(way: str) -> None:
-    with Rig(way, parameters={'control.retard': 8.0}) as rig:
+def test_a_stop_down_a_long_ramp_is_confirmed_and_is_not_forced(connection: str) -> None:
+    with Rig(connection, parameters={'control.retard': 8.0}) as rig:
         rig.turn(25.0)
         begun = len(rig.line.frames)
         assert 'stop' in rig.answer(rig.drive.stop(), 2.0)
@@ -116,8 +116,8 @@ def test_a_stop_down_a_long_ramp_is_confirmed_and_is_not_forced(way: str) -> Non
 
 
 @every_shape
-def test_it_is_enabled_again_while_it_ramps_to_a_stop(way: str) -> None:
-    with Rig(way, parameters={'control.retard': 8.0}) as rig:
+def test_it_is_enabled_again_while_it_ramps_to_a_stop(connection: str) -> None:
+    with Rig(connection, parameters={'control.retard': 8.0}) as rig:
         rig.turn(25.0)
         rig.send(None)
         rig.answer(rig.drive.stop(), 2.0)
@@ -132,8 +132,8 @@ def test_it_is_enabled_again_while_it_ramps_to_a_stop(way: str) -> None:
 
 
 @every_shape
-def test_reverse_is_the_sign(way: str) -> None:
-    with Rig(way) as rig:
+def test_reverse_is_the_sign(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         rig.enable()
         rig.send(-20.0)
@@ -143,8 +143,8 @@ def test_reverse_is_the_sign(way: str) -> None:
 
 
 @every_shape
-def test_torque_is_a_mode_of_operation_and_the_process_is_none(way: str) -> None:
-    with Rig(way, parameters={'control.mode': 'Torque'}) as rig:
+def test_torque_is_a_mode_of_operation_and_the_process_is_none(connection: str) -> None:
+    with Rig(connection, parameters={'control.mode': 'Torque'}) as rig:
         rig.connect()
         rig.enable()
         rig.keep(lambda: rig.drive.set_setpoint(40.0))
@@ -153,7 +153,7 @@ def test_torque_is_a_mode_of_operation_and_the_process_is_none(way: str) -> None
         # target torque of 400 per mille
         assert '2b71600090010000' in written(rig)
         assert rig.far.motor.torque == pytest.approx(0.4, abs=0.05)
-    with Rig(way, parameters={'control.mode': 'PI-Reg'}) as rig:
+    with Rig(connection, parameters={'control.mode': 'PI-Reg'}) as rig:
         rig.connect()
         answer = rig.answer(rig.drive.enable())
         assert 'its mode of operation (object 6061h) is 0' in answer
@@ -191,9 +191,9 @@ def test_a_module_without_mode_is_commanded_all_the_same() -> None:
 
 
 @every_shape
-def test_control_that_goes_ends_the_run(way: str) -> None:
+def test_control_that_goes_ends_the_run(connection: str) -> None:
     for key in ('stop', 'ext'):
-        with Rig(way) as rig:
+        with Rig(connection) as rig:
             rig.turn()
             rig.far.control_unit.press(key)
             rig.wait_until(lambda: not rig.drive.following, 2.0)

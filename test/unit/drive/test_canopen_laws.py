@@ -36,9 +36,9 @@ MASTER_LOST = ([14], [15])
 SIO_TOT, AUTO_STOP = 'serial.sio_tot', 'serial.auto_stop'
 
 
-def shaped(shape: str, way: str = 'canopen', **more: Any) -> Rig:
+def shaped(shape: str, connection: str = 'canopen', **more: Any) -> Rig:
     """Return a rig whose node has this shape."""
-    rig = Rig(way, options=SHAPES[shape], **more)
+    rig = Rig(connection, options=SHAPES[shape], **more)
     if SHAPES[shape].get('canopen_sub_indices') == 'from_zero':
         # the judge counts from one, where the status that acknowledges stands first
         rig.acknowledged = 1000
@@ -58,11 +58,11 @@ def be_gone(rig: Rig, seconds: float) -> None:
 
 
 @pytest.mark.parametrize('shape', SHAPES)
-@pytest.mark.parametrize('way', ['canopen', 'canopen, control word', 'canopen, ds402'])
+@pytest.mark.parametrize('connection', ['canopen', 'canopen, control word', 'canopen, ds402'])
 def test_every_shape_of_the_node_is_commanded_and_left_as_it_was_found(
-    way: str, shape: str
+    connection: str, shape: str
 ) -> None:
-    with shaped(shape, way, drive_timeout=4.0) as rig:
+    with shaped(shape, connection, drive_timeout=4.0) as rig:
         rig.connect()
         rig.enable()
         assert not rig.notes.said(Cause.OWN_TIMEOUT_NOT_TAKEN)
@@ -88,11 +88,11 @@ def test_every_shape_of_the_node_is_commanded_and_left_as_it_was_found(
 
 @pytest.mark.parametrize('shape', ['full', 'guarded', 'wide'])
 @pytest.mark.parametrize('turns', [True, False])
-@pytest.mark.parametrize('way', ['canopen', 'canopen, ds402'])
+@pytest.mark.parametrize('connection', ['canopen', 'canopen, ds402'])
 def test_the_drive_stops_when_the_driver_is_gone_also_before_the_motor_starts(
-    way: str, shape: str, turns: bool
+    connection: str, shape: str, turns: bool
 ) -> None:
-    with shaped(shape, way, drive_timeout=4.0) as rig:
+    with shaped(shape, connection, drive_timeout=4.0) as rig:
         rig.connect()
         rig.enable()
         rig.send(20.0 if turns else None)
@@ -233,11 +233,13 @@ def test_another_sdo_client_is_reported_and_nothing_of_it_is_published() -> None
 # --- objects that a module need not have ----------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', ['canopen, control word', 'canopen'])
-def test_without_drive_control_what_needs_it_is_refused_and_names_the_others(way: str) -> None:
-    rig = Rig(way, options={'canopen_state_machine': 'absent'})
+@pytest.mark.parametrize('connection', ['canopen, control word', 'canopen'])
+def test_without_drive_control_what_needs_it_is_refused_and_names_the_others(
+    connection: str,
+) -> None:
+    rig = Rig(connection, options={'canopen_state_machine': 'absent'})
     answer = rig.answer(rig.drive.connect(retry=False))
-    if way == 'canopen':
+    if connection == 'canopen':
         assert rig.drive.identity is not None and rig.drive.identity.firmware == 4.38
     else:
         assert 'this drive has no DriveControl and DriveStatus' in answer

@@ -25,7 +25,7 @@ from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 
 
 class Noted:
-    """ParameterAccess that note what is asked of them, and answer as they are told."""
+    """ParameterAccess that note what is asked of them, and answer as the test says."""
 
     def __init__(self, *answers: Any) -> None:
         self.asked: list[tuple[Any, ...]] = []

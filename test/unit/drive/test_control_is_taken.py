@@ -17,7 +17,7 @@ _COMMANDS = {'rtu': 'fieldbus.scmd', 'optimal': 'fieldbus.smode'}
 _SETPOINTS = {'rtu': 'status.frq_set', 'optimal': 'fieldbus.input_freq_setpoint'}
 #: For so long may a motor have current by a command that is removed with the next frame, s.
 _LONGEST = 0.02
-every_way = pytest.mark.parametrize('way', _COMMANDS)
+every_connection = pytest.mark.parametrize('connection', _COMMANDS)
 
 
 class Left:
@@ -31,9 +31,9 @@ class Left:
     :ivar turned: it has turned.
     """
 
-    def __init__(self, rig: Rig, way: str) -> None:
+    def __init__(self, rig: Rig, connection: str) -> None:
         self._rig = rig
-        self.command, self.setpoint = _COMMANDS[way], _SETPOINTS[way]
+        self.command, self.setpoint = _COMMANDS[connection], _SETPOINTS[connection]
         unit = rig.far.control_unit
         self._hand_over = unit.take
         unit.take = self._keep_command
@@ -73,11 +73,11 @@ def follow(rig: Rig) -> None:
     assert abs(rig.far.motor.frequency - 20.0) < 0.2
 
 
-@every_way
-def test_what_an_earlier_session_has_left_does_not_turn_the_motor(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_what_an_earlier_session_has_left_does_not_turn_the_motor(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
-        left = Left(rig, way)
+        left = Left(rig, connection)
         rig.enable()
         # to stop it as soon as control is there, and never at an old set-point
         assert left.written()[:3] == [(left.setpoint, 0), (MODE, Mode.BUS), (left.command, 0)]
@@ -86,11 +86,13 @@ def test_what_an_earlier_session_has_left_does_not_turn_the_motor(way: str) -> N
         follow(rig)
 
 
-@every_way
-def test_a_drive_that_refuses_set_points_until_it_is_controlled_is_stopped_first(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_a_drive_that_refuses_set_points_until_it_is_controlled_is_stopped_first(
+    connection: str,
+) -> None:
+    with Rig(connection) as rig:
         rig.connect()
-        left = Left(rig, way)
+        left = Left(rig, connection)
         driven = []
 
         def refuse(key: str, data: bytes | None) -> str | None:

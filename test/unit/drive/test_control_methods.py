@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from support.rig import Rig, Way
+from support.rig import Connection, Rig
 from support.said import raises
 
 from nfo_sinus_driver.bus import Priority
@@ -17,7 +17,7 @@ from nfo_sinus_driver.simulator.sinus_optimal import control_unit
 
 #: Bits of the Optimal's Drive Status [M1].
 ENABLED, FROM_BUS = 1 << 2, 1 << 9
-OPTIMAL_WORD = Way('modbus_rtu', 'sinus_optimal', 'drive_control', 'terminal')
+OPTIMAL_WORD = Connection('modbus_rtu', 'sinus_optimal', 'drive_control', 'terminal')
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ OPTIMAL_WORD = Way('modbus_rtu', 'sinus_optimal', 'drive_control', 'terminal')
 def test_a_drive_follows_its_own_reference_and_no_set_point(
     model: str, method: str, reference: str
 ) -> None:
-    with Rig(Way('modbus_rtu', model, method, reference)) as rig:
+    with Rig(Connection('modbus_rtu', model, method, reference)) as rig:
         for stop in (rig.drive.stop, rig.drive.quick_stop):
             rig.connect()
             rig.enable()
@@ -74,11 +74,11 @@ def test_an_old_set_point_of_a_mode_that_is_not_known_does_not_turn_the_motor(
         assert rig.far.motor.at_zero
 
 
-@pytest.mark.parametrize('way', ['rtu', 'rtu, control word'])
+@pytest.mark.parametrize('connection', ['rtu', 'rtu, control word'])
 def test_a_stop_is_confirmed_in_a_control_mode_that_no_manual_lists(
-    way: str, monkeypatch: pytest.MonkeyPatch
+    connection: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with Rig(way) as rig:
+    with Rig(connection) as rig:
         rig.connect()
         rig.enable()
         inverter = rig.drive.state
@@ -145,9 +145,11 @@ def test_an_optimal_that_stays_under_bus_control_says_so() -> None:
 # --- another method -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', [Way('modbus_rtu'), Way('modbus_rtu', 'sinus_optimal')])
-def test_another_method_waits_until_the_motor_stands(way: Way) -> None:
-    with Rig(way, parameters={'control.retard': 60.0}) as rig:
+@pytest.mark.parametrize(
+    'connection', [Connection('modbus_rtu'), Connection('modbus_rtu', 'sinus_optimal')]
+)
+def test_another_method_waits_until_the_motor_stands(connection: Connection) -> None:
+    with Rig(connection, parameters={'control.retard': 60.0}) as rig:
         rig.turn()
         assert 'left to its ramp' in rig.answer(rig.drive.disconnect(0.1))
         answer = rig.answer(rig.drive.require_standing())

@@ -121,14 +121,14 @@ def test_every_row_is_visited(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(control_state, 'TRANSITIONS', visited)
     with history() as state:
         # a whole day's work, and its end with the motor running
-        state.ride(wait=1.0)
+        state.run_motor(wait=1.0)
         state.stop(wait=2.5)
         state.fault(5, standing=False, wait=1.0)
         state.enable(wait=1.0)
         state.acknowledge(wait=1.0)
         state.enable_without_run_input(wait=2.5)
         state.run_input_on(wait=1.0)
-        state.ride(wait=1.0)
+        state.run_motor(wait=1.0)
         state.shut_down(wait=1.0)
         # the line lost: standing, running, and while the driver ends
         state.lose_line('silent', '', 9.0, wait=2.5)
@@ -143,7 +143,7 @@ def test_every_row_is_visited(monkeypatch: pytest.MonkeyPatch) -> None:
         state.shut_down(wait=1.0)
         state.enable(wait=0.004)
         state.shut_down(wait=1.0)
-        state.ride(wait=1.0)
+        state.run_motor(wait=1.0)
         state.stop(wait=0.0)
         state.shut_down(wait=1.0)
     with history(delay=1) as state:
@@ -160,7 +160,7 @@ def test_every_row_is_visited(monkeypatch: pytest.MonkeyPatch) -> None:
         # stop was tried or right behind
         soon = [('shut down', 0.05 * number) for number in range(1, 8)]
         for end, wait in (('', 1.0), ('lost', 1.0), *soon):
-            state.ride(wait=1.0)
+            state.run_motor(wait=1.0)
             state.fault(5, standing=True, wait=wait)
             if end == 'lost':
                 state.break_line('silent', wait=9.0)

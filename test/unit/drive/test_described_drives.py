@@ -17,11 +17,11 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.simulator._declared.control_unit import DeclaredControlUnit
 
 #: Whole runs, each over both lines of Modbus.
-RIDES = list(itertools.product(SHIPPED, ('modbus_rtu', 'modbus_tcp')))
+RUNS = list(itertools.product(SHIPPED, ('modbus_rtu', 'modbus_tcp')))
 
 
 def reverses(rig: DescribedRig) -> bool:
-    """Tell whether the drive turns in reverse, by its file."""
+    """Return whether the drive turns in reverse, by its file."""
     place = rig.file.setpoint
     return place.signed or place.direction is not None
 
@@ -41,7 +41,7 @@ def test_ten_files_have_all_that_a_run_needs() -> None:
     assert [file.name for file in files if not file.accel] == ['lenze_i500']
 
 
-@pytest.mark.parametrize(('name', 'protocol'), RIDES)
+@pytest.mark.parametrize(('name', 'protocol'), RUNS)
 def test_a_run(name: str, protocol: str) -> None:
     with DescribedRig(SHIPPED[name], protocol) as rig:
         rig.connect(parameters=True)

@@ -104,11 +104,13 @@ def test_two_at_a_time_cannot_enable_and_a_start_delay_of_the_drive_is_waited_fo
         assert rig.far.motor.driven
 
 
-@pytest.mark.parametrize('way', ['rtu', 'classic v5.0', 'rtu, control word', 'canopen'])
+@pytest.mark.parametrize('connection', ['rtu', 'classic v5.0', 'rtu, control word', 'canopen'])
 @pytest.mark.parametrize('delay', [0, 3])
-def test_dc_braking_before_a_start_is_waited_for(way: str, delay: int) -> None:
+def test_dc_braking_before_a_start_is_waited_for(connection: str, delay: int) -> None:
     brakes = {'control.run_dly': delay, 'control.dc_brk': 6}
-    with Rig(way, parameters=brakes, options={'shown_in_dc_brk': 'standby'}).connect() as rig:
+    with Rig(
+        connection, parameters=brakes, options={'shown_in_dc_brk': 'standby'}
+    ).connect() as rig:
         begun = rig.clock.now
         rig.enable()
         assert rig.far.motor.driven and rig.clock.now - begun > delay + 5.0
@@ -169,20 +171,20 @@ def test_drive_that_refuses_the_run_command() -> None:
 
 SIO_FAIL = 14
 every_serial = pytest.mark.parametrize(
-    'way', ['rtu', 'rtu, control word', 'classic', 'classic, control word', 'classic v5.0']
+    'connection', ['rtu', 'rtu, control word', 'classic', 'classic, control word', 'classic v5.0']
 )
 
 
 @every_serial
 @pytest.mark.parametrize('strict', [False, True])
 def test_acknowledge_a_fault_that_ended_a_run(
-    way: str, strict: bool, monkeypatch: pytest.MonkeyPatch
+    connection: str, strict: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if strict:
         refuse_control_words(monkeypatch)
     # those of the serial line, too, although it is the line that works
     for code, text in ((OVERLOAD, 'Overload'), (SIO_FAIL, 'Sio Fail'), (15, 'Bus Fail')):
-        with Rig(way).turn() as rig:
+        with Rig(connection).turn() as rig:
             rig.far.trip(code)
             rig.pass_time(1.0)
             assert not rig.drive.following
@@ -208,12 +210,12 @@ def refuse_control_words(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(G2ControlUnit, '_write_control', refuse)
 
 
-@pytest.mark.parametrize('way', ['classic', 'classic, control word'])
+@pytest.mark.parametrize('connection', ['classic', 'classic, control word'])
 def test_a_fault_whose_cause_lasts_is_named_where_nothing_is_taken(
-    way: str, monkeypatch: pytest.MonkeyPatch
+    connection: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     refuse_control_words(monkeypatch)
-    with Rig(way).turn() as rig:
+    with Rig(connection).turn() as rig:
         rig.far.trip(OVERLOAD, cause_present=True)
         rig.pass_time(1.0)
         rig.acknowledged = 1
@@ -221,14 +223,14 @@ def test_a_fault_whose_cause_lasts_is_named_where_nothing_is_taken(
 
 
 @every_serial
-def test_a_serial_fault_is_acknowledged_and_the_terminals_keep_control(way: str) -> None:
-    with Rig(way).connect() as rig:
+def test_a_serial_fault_is_acknowledged_and_the_terminals_keep_control(connection: str) -> None:
+    with Rig(connection).connect() as rig:
         rig.far.set_run_input(False)
         rig.far.trip(SIO_FAIL)
         rig.far.control_unit.press('ext')
         rig.acknowledged = 1
         answer = rig.answer(rig.drive.acknowledge())
-        if rig.way.protocol == 'modbus_rtu':
+        if rig.connection.protocol == 'modbus_rtu':
             # the one way that is left would take it from them
             assert 'keypad or terminals have control' in answer
             assert rig.far.faults
@@ -239,14 +241,14 @@ def test_a_serial_fault_is_acknowledged_and_the_terminals_keep_control(way: str)
 
 
 @every_serial
-def test_the_reason_of_a_serial_fault_is_said(way: str) -> None:
-    with Rig(way).turn() as rig:
+def test_the_reason_of_a_serial_fault_is_said(connection: str) -> None:
+    with Rig(connection).turn() as rig:
         rig.far.control_unit.serial_error(LineError.TIMEOUT)
         rig.pass_time(1.0)
         assert not rig.drive.following
         rig.acknowledged = 1
         # there is no SioErr over Modbus, and MODE = Stop clears it where it is obeyed [C9], [C99]
-        reason = ' (time-out of the serial communication)' if way == 'classic v5.0' else ''
+        reason = ' (time-out of the serial communication)' if connection == 'classic v5.0' else ''
         assert rig.answer(rig.drive.acknowledge()) == f'acknowledged 14 Sio Fail{reason}'
 
 
@@ -273,13 +275,13 @@ def test_monitor_writes_nothing_at_all() -> None:
         assert rig.far.control_unit.ack_reads == 0
 
 
-@pytest.mark.parametrize('way', ['rtu', 'rtu, control word', 'classic', 'movitrac'])
-def test_a_fault_that_was_acknowledged_is_not_published_any_more(way: str) -> None:
-    with Rig(way) as rig:
+@pytest.mark.parametrize('connection', ['rtu', 'rtu, control word', 'classic', 'movitrac'])
+def test_a_fault_that_was_acknowledged_is_not_published_any_more(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         rig.enable()
         for phase in range(8):
-            rig.far.trip(101 if way == 'movitrac' else 5)
+            rig.far.trip(101 if connection == 'movitrac' else 5)
             rig.pass_time(0.5 + phase / 200.0)
             rig.acknowledged += 1
             assert 'acknowledged' in rig.answer(rig.drive.acknowledge())

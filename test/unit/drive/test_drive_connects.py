@@ -82,12 +82,12 @@ def test_rubbish_at_this_address() -> None:
 SLOWEST = {'rtu': 1200, 'ascii': 1200, 'optimal ascii': 1200, 'classic': 1200, 'movitrac': 9600}
 
 
-@pytest.mark.parametrize('way', SLOWEST)
-def test_a_drive_on_the_slowest_line_is_identified_and_turns(way: str) -> None:
-    with Rig(way, line={'baud': SLOWEST[way]}) as rig:
+@pytest.mark.parametrize('connection', SLOWEST)
+def test_a_drive_on_the_slowest_line_is_identified_and_turns(connection: str) -> None:
+    with Rig(connection, line={'baud': SLOWEST[connection]}) as rig:
         rig.turn()
         assert rig.drive.identity is not None
-        assert rig.drive.identity.serial or way not in ('rtu', 'ascii')
+        assert rig.drive.identity.serial or connection not in ('rtu', 'ascii')
         rig.pass_time(10.0)
         assert abs(rig.far.motor.frequency - 20) < 0.2
         assert not rig.notes.said(Cause.LOST_IN_USE)
@@ -136,9 +136,9 @@ def test_telemetry_of_older_firmware() -> None:
         )} & asked
 
 
-@pytest.mark.parametrize('way', ['rtu', 'optimal'])
-def test_clean_exit(way: str) -> None:
-    with Rig(way, drive_timeout=20.0 if way == 'rtu' else 0.0).turn() as rig:
+@pytest.mark.parametrize('connection', ['rtu', 'optimal'])
+def test_clean_exit(connection: str) -> None:
+    with Rig(connection, drive_timeout=20.0 if connection == 'rtu' else 0.0).turn() as rig:
         rig.send(None)
         answer = rig.answer(rig.drive.disconnect(4.0))
         assert answer == 'stopping: it ramps down; control released'

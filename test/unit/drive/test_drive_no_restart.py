@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Nothing turns by itself: what the laws of test_laws.py do not show of every way."""
+"""Nothing turns by itself: what the laws of test_laws.py do not show of every connection."""
 
 from __future__ import annotations
 

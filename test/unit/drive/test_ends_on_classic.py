@@ -14,11 +14,11 @@ from support.rig import Rig
 from nfo_sinus_driver.catalog import Value
 
 
-@pytest.mark.parametrize(('way', 'dialect'), [('classic', '2.03'), ('classic v5.0', '5.0')])
+@pytest.mark.parametrize(('connection', 'dialect'), [('classic', '2.03'), ('classic v5.0', '5.0')])
 def test_the_ends_of_every_setting_go_there_and_back_and_nothing_beyond(
-    way: str, dialect: str
+    connection: str, dialect: str
 ) -> None:
-    with Rig(way) as rig:
+    with Rig(connection) as rig:
         registers = rig.connect().drive.params
         has = rig.drive.state.nameplate.has
     wrong: list[tuple[str, object]] = []

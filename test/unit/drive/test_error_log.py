@@ -10,7 +10,7 @@ import math
 
 import pytest
 from support.addresses import packed
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 
 from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.sinus_g2.words import Mode
@@ -23,7 +23,11 @@ LOG = ''
 HOURS = 1234.5
 #: How long it may take until an entry is found that no fault announced, s.
 SEEN = 31.0
-G2 = [name for name, way in WAYS.items() if (way.model, way.method) == ('sinus_g2', 'mode_scmd')]
+G2 = [
+    name
+    for name, one in CONNECTIONS.items()
+    if (one.model, one.method) == ('sinus_g2', 'mode_scmd')
+]
 #: A drive that is looked at without a hurry: the tests are about minutes.
 RARELY = {'poll_rate': 2.0, 'telemetry_rate': 0.0}
 
@@ -53,9 +57,9 @@ def is_written(rig: Rig) -> bool:
 # --- read and erased ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', G2)
-def test_newest_first_with_text_and_age(way: str) -> None:
-    with Rig(way).connect() as rig:
+@pytest.mark.parametrize('connection', G2)
+def test_newest_first_with_text_and_age(connection: str) -> None:
+    with Rig(connection).connect() as rig:
         assert rig.result(rig.drive.error_log()) == ()
         for count in (3, 130):
             fill(rig, count)
@@ -69,7 +73,7 @@ def test_newest_first_with_text_and_age(way: str) -> None:
             assert ages == pytest.approx([0.5 + n for n in range(length)], abs=0.1)
         assert len(rig.result(rig.drive.error_log(4))) == 4
         # only the older firmware has more of them [C4]
-        most = 128 if way == 'classic v5.0' else 32
+        most = 128 if connection == 'classic v5.0' else 32
         assert len(rig.result(rig.drive.error_log(1000))) == most
         assert rig.answer(rig.drive.erase_error_log()) == 'the error log is erased'
         assert rig.far.faults.log == [] and not rig.far.faults
@@ -143,12 +147,12 @@ def test_a_log_that_is_not_empty_after_all() -> None:
         assert 'not empty' in rig.answer(rig.drive.erase_error_log())
 
 
-@pytest.mark.parametrize('way', G2)
-def test_the_energy_counter(way: str) -> None:
-    with Rig(way).connect() as rig:
+@pytest.mark.parametrize('connection', G2)
+def test_the_energy_counter(connection: str) -> None:
+    with Rig(connection).connect() as rig:
         total, energy = rig.far.counters.total_energy, rig.far.counters.energy
         answer = rig.answer(rig.drive.reset_energy())
-        if way == 'classic v5.0':
+        if connection == 'classic v5.0':
             assert 'came with firmware 4.38; this drive has an older one' in answer
             assert rig.far.counters.energy == energy > 1
         else:
@@ -157,7 +161,7 @@ def test_the_energy_counter(way: str) -> None:
             assert 0x900 in rig.written('fieldbus.scmd')
         assert rig.far.counters.total_energy == total
         assert rig.far.control_unit.mode == (
-            Mode.BUS if way.startswith('canopen') else Mode.STOP
+            Mode.BUS if connection.startswith('canopen') else Mode.STOP
         )
         assert rig.far.control_unit.mode_ext_writes == 0 and not rig.far.faults
 
@@ -193,10 +197,10 @@ def test_an_optimal_has_none_that_is_documented() -> None:
 # --- watched --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', [*G2, 'rtu, control word', 'monitor'])
-def test_the_entry_of_a_fault_is_reported(way: str) -> None:
-    monitor = {'control_method': 'monitor'} if way == 'monitor' else {}
-    with Rig('rtu' if monitor else way, poll_rate=10.0, **monitor).connect() as rig:
+@pytest.mark.parametrize('connection', [*G2, 'rtu, control word', 'monitor'])
+def test_the_entry_of_a_fault_is_reported(connection: str) -> None:
+    monitor = {'control_method': 'monitor'} if connection == 'monitor' else {}
+    with Rig('rtu' if monitor else connection, poll_rate=10.0, **monitor).connect() as rig:
         rig.pass_time(2.0)
         began = rig.clock.now
         rig.far.trip(5)
@@ -219,9 +223,9 @@ def test_an_entry_has_the_local_time_of_its_moment() -> None:
         (entry,) = rig.notes.entries
         ago = timedelta(seconds=rig.clock.now - entry.at)
         before = datetime.now() - ago
-        told = entry.wall_time
+        shown = entry.wall_time
         after = datetime.now() - ago
-        assert told in {one.isoformat(' ', 'minutes') for one in (before, after)}
+        assert shown in {one.isoformat(' ', 'minutes') for one in (before, after)}
 
 
 def test_the_motor_is_stopped_first() -> None:

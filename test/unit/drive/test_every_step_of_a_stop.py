@@ -11,7 +11,7 @@ import contextlib
 from typing import Any
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Cause, Drive
@@ -38,31 +38,31 @@ _NO_OTHER_WAY = {
     'made up': 'bus.word',
     'described': 'line.r2000',
     'described, by states': 'line.r0000',
-    'described, untold': 'line.rfa00',
+    'described, no holder': 'line.rfa00',
 }
 
 
-def steps_of(way: str, stop: str) -> set[tuple[str, bool]]:
-    """Return what a stop by this way asks, parameters and whether they are written."""
-    with Rig(way, line=QUICK) as rig:
+def steps_of(connection: str, stop: str) -> set[tuple[str, bool]]:
+    """Return what a stop over this connection asks, parameters and whether they are written."""
+    with Rig(connection, line=QUICK) as rig:
         rig.turn()
         asked: set[tuple[str, bool]] = set()
         rig.meet = lambda key, data: asked.add((key, data is not None))  # type: ignore[func-returns-value]
         rig.answer(STOPS[stop](rig.drive))
-        told = {rig.drive.model.key(role) for role in _TELLS}
-    return {one for one in asked if one[1] or one[0] not in told}
+        status = {rig.drive.model.key(role) for role in _TELLS}
+    return {one for one in asked if one[1] or one[0] not in status}
 
 
-def goes_wrong(way: str, stop: str, step: tuple[str, bool], how: str) -> str:
+def goes_wrong(connection: str, stop: str, step: tuple[str, bool], how: str) -> str:
     """Return what is wrong with a stop of which one step always goes wrong; ``''``: nothing."""
-    rig = Rig(way, line=QUICK, poll_rate=5.0)
+    rig = Rig(connection, line=QUICK, poll_rate=5.0)
     # what is only said to be carried out, or always refused, bends the order of commands
     with contextlib.closing(rig.bus):
         rig.turn()
         rig.meet = lambda key, data: how if (key, data is not None) == step else None
         future = STOPS[stop](rig.drive)
         rig.answer(future)
-        held = step == (_NO_OTHER_WAY.get(way), True)
+        held = step == (_NO_OTHER_WAY.get(connection), True)
         end = rig.clock.now + 8.0
         while rig.clock.now < end and (held or rig.turns or rig.drive.stop_unconfirmed):
             rig.pass_time(0.5)
@@ -81,28 +81,28 @@ def goes_wrong(way: str, stop: str, step: tuple[str, bool], how: str) -> str:
     return '; '.join(wrong)
 
 
-@pytest.mark.parametrize('way', WAYS)
-def test_no_step_of_a_stop_ends_it(way: str) -> None:
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_no_step_of_a_stop_ends_it(connection: str) -> None:
     rows = [
         (stop, step, how)
         for stop in STOPS
-        for step in sorted(steps_of(way, stop))
+        for step in sorted(steps_of(connection, stop))
         for how in ('refused', 'busy', 'unheard', 'drop', *(('ignored',) if step[1] else ()))
         # by a drive that takes nothing else, and says that it does, nothing can be found out
-        if how != 'ignored' or step[0] != _NO_OTHER_WAY.get(way)
+        if how != 'ignored' or step[0] != _NO_OTHER_WAY.get(connection)
     ]
-    wrong = {row: found for row in rows if (found := goes_wrong(way, *row))}
+    wrong = {row: found for row in rows if (found := goes_wrong(connection, *row))}
     assert rows and not wrong, '\n'.join(f'{row}: {found}' for row, found in wrong.items())
 
 
-@pytest.mark.parametrize('way', WAYS)
-def test_a_refused_stop_of_a_motor_that_stands_is_no_alarm_until_it_turns(way: str) -> None:
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_a_refused_stop_of_a_motor_that_stands_is_no_alarm_until_it_turns(connection: str) -> None:
     # one that shows a run command after a stop does not show that it stands
-    options = {'stop_status': 'no_enable'} if way.startswith('movitrac') else {}
-    with Rig(way, line=QUICK, options=options) as rig:
+    options = {'stop_status': 'no_enable'} if connection.startswith('movitrac') else {}
+    with Rig(connection, line=QUICK, options=options) as rig:
         rig.turn()
         assert rig.answer(rig.drive.stop())
-        for terminal in rig.way.closed:
+        for terminal in rig.connection.closed:
             rig.far.control_unit.switch(terminal, False)
         rig.pass_time(6.0)
         rig.meet = lambda key, data: None if data is None else 'refused'

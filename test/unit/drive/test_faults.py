@@ -17,8 +17,8 @@ from nfo_sinus_driver.simulator.sinus_g2.state_machine import TRIES
 
 OVERLOAD, OVERHEATED, SIO_FAIL = 5, 3, 14
 MODE, WORD, MASK = (f'fieldbus.{key}' for key in ('mode', 'drive_control', 'drv_ctrl_write_mask'))
-WAYS = ('rtu', 'rtu, control word', 'optimal', 'optimal, control word')
-every_way = pytest.mark.parametrize('way', WAYS)
+CONNECTIONS = ('rtu', 'rtu, control word', 'optimal', 'optimal, control word')
+every_connection = pytest.mark.parametrize('connection', CONNECTIONS)
 
 
 def codes(model: Family, kind: Kind) -> list[int]:
@@ -30,11 +30,11 @@ def show(rig: Rig, code: int) -> None:
     rig.wait_until(lambda: rig.notes.snapshot.status.code == code, 5.0)
 
 
-@every_way
-def test_every_fault_is_shown_reported_and_acknowledged(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_every_fault_is_shown_reported_and_acknowledged(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
-        known, by_word = load_family(rig.way.model), 'word' in way
+        known, by_word = load_family(rig.connection.model), 'word' in connection
         for code in codes(known, Kind.FAULT):
             listed = known.status_code(code)
             rig.notes.events.clear()
@@ -54,7 +54,7 @@ def test_every_fault_is_shown_reported_and_acknowledged(way: str) -> None:
             ]
             assert f'fault {code} {listed.text} is active' in rig.answer(rig.drive.enable())
             # a serial fault of a G2 is acknowledged by MODE = Stop alone [C99]
-            by_mode = way == 'rtu' and code == SIO_FAIL
+            by_mode = connection == 'rtu' and code == SIO_FAIL
             rig.acknowledged += not by_word and not by_mode
             assert rig.answer(rig.drive.acknowledge()) == f'acknowledged {code} {listed.text}'
             assert rig.far.faults.codes == []
@@ -65,9 +65,11 @@ def test_every_fault_is_shown_reported_and_acknowledged(way: str) -> None:
         rig.enable()
 
 
-@pytest.mark.parametrize('way', ['optimal', 'optimal, control word'])
-def test_every_alarm_of_the_optimal_is_shown_and_reported_and_stops_nothing(way: str) -> None:
-    with Rig(way, parameters={'control.accel': 1.0}) as rig:
+@pytest.mark.parametrize('connection', ['optimal', 'optimal, control word'])
+def test_every_alarm_of_the_optimal_is_shown_and_reported_and_stops_nothing(
+    connection: str,
+) -> None:
+    with Rig(connection, parameters={'control.accel': 1.0}) as rig:
         rig.turn(25.0)
         known = load_family('sinus_optimal')
         (limit,) = known.codes(Meaning.CURRENT_LIMIT)
@@ -92,9 +94,9 @@ def test_every_alarm_of_the_optimal_is_shown_and_reported_and_stops_nothing(way:
             rig.wait_until(lambda: rig.notes.snapshot.kind is Kind.STATUS, 5.0)
 
 
-@every_way
-def test_what_was_acknowledged_and_what_still_stands(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_what_was_acknowledged_and_what_still_stands(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         rig.far.trip(OVERLOAD)
         rig.far.trip(OVERHEATED, cause_present=True)
@@ -122,14 +124,14 @@ def test_reading_the_status_with_ack_acknowledges_once_and_writes_nothing() -> N
 
 
 def test_the_reset_bit_rises_once() -> None:
-    for way in ('rtu, control word', 'optimal, control word'):
-        with Rig(way) as rig:
+    for connection in ('rtu, control word', 'optimal, control word'):
+        with Rig(connection) as rig:
             rig.connect()
             rig.far.trip(OVERLOAD)
             rig.pass_time(0.3)
             rig.asked.clear()
             rig.answer(rig.drive.acknowledge())
-            if way == 'rtu, control word':
+            if connection == 'rtu, control word':
                 # by the mask: what another master has in its word stays, and nothing is read first
                 masks = [data for _, key, data in rig.asked if key == MASK and data is not None]
                 assert [one[2:].hex() for one in masks] == ['0000', '0080', '0000']

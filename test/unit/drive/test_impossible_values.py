@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Severity, Snapshot
@@ -21,11 +21,13 @@ IMPOSSIBLE = {
 }  # fmt: skip
 #: The bits of a telegram mean something each, and what a file describes knows few ends; what is
 #: read does not depend on how it is commanded.
-every_way = pytest.mark.parametrize(
-    'way',
+every_connection = pytest.mark.parametrize(
+    'connection',
     [
-        way for way in WAYS
-        if not way.startswith(('telegram1', 'described')) and 'control word' not in way
+        connection
+        for connection in CONNECTIONS
+        if not connection.startswith(('telegram1', 'described'))
+        and 'control word' not in connection
     ],
 )
 
@@ -56,9 +58,9 @@ def shown(snapshot: Snapshot) -> tuple[object, ...]:
     return snapshot.connected, snapshot.control_mode, status.code, status.word, status.driven
 
 
-@every_way
-def test_one_impossible_value_stops_nothing_and_is_not_published(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_one_impossible_value_stops_nothing_and_is_not_published(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         rig.asked.clear()
         rig.pass_time(1.0)
@@ -80,9 +82,9 @@ def test_one_impossible_value_stops_nothing_and_is_not_published(way: str) -> No
         assert all(abs(one.speed) < 3000 for one in found if tells_speed)
 
 
-@every_way
-def test_measured_values_that_stay_impossible_are_nan_and_reported_once(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_measured_values_that_stay_impossible_are_nan_and_reported_once(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         measured = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
         spoilers = [Spoiler(rig, role, 0x66) for role in measured if rig.drive.model.key(role)]

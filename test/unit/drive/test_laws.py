@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The laws of the house, each over every way to command a drive, in virtual time.
+The laws of the house, each over every connection to a drive, in virtual time.
 
 Laws 1, 4, 5 and 6 are judged besides in every test that has a rig, by all frames on its line; law 9
-stands in test_own_timeout.py, too. A new way is one line in :data:`support.rig.WAYS`; a new law is
-one test here.
+stands in test_own_timeout.py, too. A new connection is one line in
+:data:`support.rig.CONNECTIONS`; a new law is one test here.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 from support.own_timeout import TIMED, by_default
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 from support.variants import ramps
 
 from nfo_sinus_driver.catalog import Fact, Kind, is_described
@@ -41,11 +41,11 @@ STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
     'disconnect': lambda drive: drive.disconnect(4.0),
     'exit': lambda drive: drive.stop_for_good(4.0),
 }
-every_way = pytest.mark.parametrize('way', WAYS)
+every_connection = pytest.mark.parametrize('connection', CONNECTIONS)
 every_stop = pytest.mark.parametrize('stop', STOPS)
 #: Where the motor follows set-points of the bus.
 following = pytest.mark.parametrize(
-    'way', [name for name, way in WAYS.items() if way.reference == 'fieldbus']
+    'connection', [name for name, one in CONNECTIONS.items() if one.reference == 'fieldbus']
 )
 
 
@@ -58,7 +58,7 @@ def acknowledge(rig: Rig) -> None:
     """Have a fault acknowledged; at the keypad, where the drive ignores the line for that."""
     rig.acknowledged += 1
     answer = rig.answer(rig.drive.acknowledge())
-    if rig.way.closed:
+    if rig.connection.closed:
         assert 'reset it at the keypad or by a terminal' in answer
         rig.far.control_unit.press('reset')
         rig.pass_time(1.0)
@@ -79,11 +79,11 @@ def assert_only_enable_helps(rig: Rig) -> None:
 # --- 1: what only looks writes nothing ------------------------------------------------------------
 
 
-@every_way
-def test_1_polling_writes_nothing(way: str) -> None:
-    with by_default(way) as rig:
+@every_connection
+def test_1_polling_writes_nothing(connection: str) -> None:
+    with by_default(connection) as rig:
         rig.connect(parameters=True)
-        # what holds a drive in the mode of the bus is told to stop as soon as it is found
+        # what holds a drive in the mode of the bus is commanded to stop as soon as it is found
         rig.asked.clear()
         rig.pass_time(3.0)
         assert [key for _, key, data in rig.asked if data is not None] == []
@@ -94,8 +94,8 @@ def test_1_polling_writes_nothing(way: str) -> None:
 
 
 @following
-def test_2_a_set_point_from_before_enable_is_not_taken_over(way: str) -> None:
-    with Rig(way) as rig:
+def test_2_a_set_point_from_before_enable_is_not_taken_over(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         rig.drive.set_setpoint(_SPEED)
         rig.enable()
@@ -105,8 +105,8 @@ def test_2_a_set_point_from_before_enable_is_not_taken_over(way: str) -> None:
 
 
 @following
-def test_2_without_enable_set_points_turn_nothing(way: str) -> None:
-    with Rig(way) as rig:
+def test_2_without_enable_set_points_turn_nothing(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         rig.send(_SPEED)
         rig.pass_time(2.0)
@@ -114,8 +114,8 @@ def test_2_without_enable_set_points_turn_nothing(way: str) -> None:
 
 
 @following
-def test_2_the_motor_turns_as_its_set_points_say(way: str) -> None:
-    with Rig(way) as rig:
+def test_2_the_motor_turns_as_its_set_points_say(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         rig.enable()
         for wanted in (_SPEED, -_SPEED, 0.0, -10.0, 10.0, 0.0, 10.0):
@@ -127,12 +127,13 @@ def test_2_the_motor_turns_as_its_set_points_say(way: str) -> None:
             turns = 0.0 if wanted < 0 and forward_only else wanted
             # a speed and a frequency differ by the slip
             assert rig.far.motor.frequency == pytest.approx(turns, abs=0.5)
-            told = rig.drive.snapshot
-            assert told.setpoint == pytest.approx(turns * rig.way.hertz, rel=1e-3)
+            snapshot = rig.drive.snapshot
+            assert snapshot.setpoint == pytest.approx(turns * rig.connection.hertz, rel=1e-3)
             # by frequency it has its slip
-            slip = 0.5 * rig.way.hertz
-            assert told.actual == pytest.approx(turns * rig.way.hertz, rel=0.02, abs=slip)
-            status = told.status
+            slip = 0.5 * rig.connection.hertz
+            turning = pytest.approx(turns * rig.connection.hertz, rel=0.02, abs=slip)
+            assert snapshot.actual == turning
+            status = snapshot.status
             assert status is not None and status.runs
             if Fact.REVERSE in status.valid and turns:
                 assert (Fact.REVERSE in status.facts) == (turns < 0)
@@ -140,9 +141,9 @@ def test_2_the_motor_turns_as_its_set_points_say(way: str) -> None:
 
 
 @following
-def test_2_a_set_point_that_is_written_again_gives_no_run_command_again(way: str) -> None:
+def test_2_a_set_point_that_is_written_again_gives_no_run_command_again(connection: str) -> None:
     # which could let a motor run that a fault or another master has stopped meanwhile
-    with Rig(way) as rig:
+    with Rig(connection) as rig:
         rig.turn()
         begun = len(rig.asked)
         rig.pass_time(6.0)
@@ -168,7 +169,7 @@ def lose_power(rig: Rig) -> None:
 
 def blink(rig: Rig) -> None:
     """Take the mains away for less than lost_after; a brake holds the motor, the ramp is slow."""
-    rig.far.set_from_keypad(next(iter(ramps(rig.way.model, 0.3, 0.3))), 5.0)
+    rig.far.set_from_keypad(next(iter(ramps(rig.connection.model, 0.3, 0.3))), 5.0)
     rig.far.power_cycle(boot_time=0.5)
     rig.far.motor.rotor = 0.0
     rig.pass_time(1.5)
@@ -219,15 +220,15 @@ LOSSES = {
 
 
 @pytest.mark.parametrize(
-    ('way', 'loss'),
+    ('connection', 'loss'),
     [
-        (way, loss) for way, loss in itertools.product(WAYS, LOSSES)
+        (connection, loss) for connection, loss in itertools.product(CONNECTIONS, LOSSES)
         # there the PLC, or the bit of the bus, enables in place of an input
-        if loss != 'run input' or not way.startswith(('telegram1 sinus_h', 'movitrac'))
+        if loss != 'run input' or not connection.startswith(('telegram1 sinus_h', 'movitrac'))
     ],
 )
-def test_2_after_a_loss_nothing_turns_until_it_is_enabled_again(way: str, loss: str) -> None:
-    with Rig(way) as rig:
+def test_2_after_a_loss_nothing_turns_until_it_is_enabled_again(connection: str, loss: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         LOSSES[loss](rig)
         rig.wait_until(
@@ -236,9 +237,9 @@ def test_2_after_a_loss_nothing_turns_until_it_is_enabled_again(way: str, loss: 
         assert_only_enable_helps(rig)
 
 
-@every_way
-def test_2_after_a_fault_and_its_acknowledgement_nothing_turns(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_2_after_a_fault_and_its_acknowledgement_nothing_turns(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         rig.far.trip(rig.a_fault)
         rig.pass_time(1.0)
@@ -248,10 +249,10 @@ def test_2_after_a_fault_and_its_acknowledgement_nothing_turns(way: str) -> None
         assert_only_enable_helps(rig)
 
 
-@every_way
+@every_connection
 @every_stop
-def test_2_a_stop_ends_an_enable_that_was_requested_before(way: str, stop: str) -> None:
-    with Rig(way) as rig:
+def test_2_a_stop_ends_an_enable_that_was_requested_before(connection: str, stop: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         enable = rig.drive.enable()
         stopped = STOPS[stop](rig.drive)
@@ -263,9 +264,9 @@ def test_2_a_stop_ends_an_enable_that_was_requested_before(way: str, stop: str) 
         assert not rig.turns and not rig.drive.following
 
 
-@every_way
-def test_2_a_stop_at_any_moment_of_an_enable_ends_it(way: str) -> None:
-    with Rig(way, poll_rate=2.0, telemetry_rate=0.0) as rig:
+@every_connection
+def test_2_a_stop_at_any_moment_of_an_enable_ends_it(connection: str) -> None:
+    with Rig(connection, poll_rate=2.0, telemetry_rate=0.0) as rig:
         rig.connect()
         give_setpoints(rig)
         kinds = ('stop', 'quick stop', 'deactivate')
@@ -291,9 +292,9 @@ def test_2_a_stop_at_any_moment_of_an_enable_ends_it(way: str) -> None:
         assert rig.drive.following
 
 
-@every_way
-def test_2_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_2_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         requested_at = rig.clock.now
         stops, enable = rig.drive.stop(), rig.drive.enable()
@@ -307,10 +308,10 @@ def test_2_an_enable_that_comes_while_a_stop_is_on_its_way_is_refused(way: str) 
 # --- 3: every way out stops the motor, and no success is reported that was not confirmed ----------
 
 
-@every_way
+@every_connection
 @every_stop
-def test_3_every_way_out_stops_the_motor(way: str, stop: str) -> None:
-    with Rig(way) as rig:
+def test_3_every_way_out_stops_the_motor(connection: str, stop: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         begun = len(rig.asked)
         future = STOPS[stop](rig.drive)
@@ -322,12 +323,12 @@ def test_3_every_way_out_stops_the_motor(way: str, stop: str) -> None:
         assert not rig.turns
 
 
-@every_way
+@every_connection
 @every_stop
 def test_3_a_stop_on_a_dead_line_is_said_and_carried_out_when_it_is_back(
-    way: str, stop: str
+    connection: str, stop: str
 ) -> None:
-    with Rig(way) as rig:
+    with Rig(connection) as rig:
         rig.turn()
         rig.line.state = 'silent'
         answer = rig.answer(STOPS[stop](rig.drive))
@@ -342,8 +343,8 @@ def test_3_a_stop_on_a_dead_line_is_said_and_carried_out_when_it_is_back(
 
 
 @following
-def test_3_without_fresh_set_points_it_stops(way: str) -> None:
-    with Rig(way, setpoint_timeout=1.0) as rig:
+def test_3_without_fresh_set_points_it_stops(connection: str) -> None:
+    with Rig(connection, setpoint_timeout=1.0) as rig:
         rig.turn()
         rig.send(None)
         rig.pass_time(3.0)
@@ -354,9 +355,9 @@ def test_3_without_fresh_set_points_it_stops(way: str) -> None:
 # --- 4 to 6: settings are written on change alone, and one control method commands a drive --------
 
 
-@every_way
-def test_4_a_run_writes_no_setting_but_what_control_needs(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_4_a_run_writes_no_setting_but_what_control_needs(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         rig.result(rig.drive.disconnect(4.0))
         first = dict(rig.far.writes)
@@ -369,9 +370,9 @@ def test_4_a_run_writes_no_setting_but_what_control_needs(way: str) -> None:
         assert len(first) <= 1
 
 
-@every_way
-def test_4_what_the_driver_writes_is_no_change_at_the_drive(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_4_what_the_driver_writes_is_no_change_at_the_drive(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect(parameters=True)
         rig.enable()
         rig.pass_time(_ROUND)
@@ -381,9 +382,9 @@ def test_4_what_the_driver_writes_is_no_change_at_the_drive(way: str) -> None:
         assert not rig.notes.said(Cause.CHANGED_AT_DRIVE), rig.notes.events
 
 
-@every_way
-def test_6_the_control_method_of_a_session_never_changes(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_6_the_control_method_of_a_session_never_changes(connection: str) -> None:
+    with Rig(connection) as rig:
         for changed in ({'control_method': 'monitor', 'telegram_words': ''}, {'address': 2}):
             with pytest.raises(ValueError, match='cannot change within a session'):
                 rig.drive.settings = dataclasses.replace(rig.drive.settings, **changed)
@@ -392,9 +393,9 @@ def test_6_the_control_method_of_a_session_never_changes(way: str) -> None:
 # --- 7 and 8: what is reported is true ------------------------------------------------------------
 
 
-@every_way
-def test_7_what_is_not_known_any_more_is_shown_as_such(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_7_what_is_not_known_any_more_is_shown_as_such(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         assert rig.notes.snapshot.connected and not math.isnan(rig.notes.snapshot.actual)
         rig.line.state = 'silent'
@@ -404,10 +405,10 @@ def test_7_what_is_not_known_any_more_is_shown_as_such(way: str) -> None:
         assert math.isnan(lost.frequency) and math.isnan(lost.speed)
 
 
-@every_way
+@every_connection
 @pytest.mark.parametrize('trouble', ['noise', 'late', 'double'])
-def test_8_a_bad_line_makes_no_false_reading(way: str, trouble: str) -> None:
-    with Rig(way) as rig:
+def test_8_a_bad_line_makes_no_false_reading(connection: str, trouble: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         before = len(rig.notes.snapshots)
         frequency = rig.far.motor.frequency
@@ -418,7 +419,7 @@ def test_8_a_bad_line_makes_no_false_reading(way: str, trouble: str) -> None:
             for _ in range(8):
                 rig.line.spoil({'late': 'delay'}.get(trouble, trouble))
                 # a MOVITRAC is listened to for long after an answer that is late
-                rig.pass_time(2.0 if way.startswith('movitrac') else 0.5)
+                rig.pass_time(2.0 if connection.startswith('movitrac') else 0.5)
         found = [one.frequency for one in rig.notes.snapshots[before:]]
         assert len(found) > 10
         assert [one for one in found if abs(one - frequency) > 1.0] == []
@@ -428,16 +429,18 @@ def test_8_a_bad_line_makes_no_false_reading(way: str, trouble: str) -> None:
 # --- 9 and 10: a dead line; a motor is not stopped without a reason ------------------------------
 
 
-@pytest.mark.parametrize('way', TIMED)
-def test_9_on_a_dead_line_the_drive_stops_by_itself_and_wants_acknowledging(way: str) -> None:
-    with Rig(way, drive_timeout=2.0) as rig:
+@pytest.mark.parametrize('connection', TIMED)
+def test_9_on_a_dead_line_the_drive_stops_by_itself_and_wants_acknowledging(
+    connection: str,
+) -> None:
+    with Rig(connection, drive_timeout=2.0) as rig:
         rig.turn()
         rig.line.state = 'silent'
         rig.pass_time(4.0)
         assert not rig.turns
         # of some drives no manual tells which fault that leaves
         faulted = bool(rig.far.faults)
-        assert faulted or is_described(rig.way.model)
+        assert faulted or is_described(rig.connection.model)
         rig.line.mend()
         rig.wait_until(lambda: rig.drive.snapshot.connected)
         if faulted:
@@ -445,9 +448,9 @@ def test_9_on_a_dead_line_the_drive_stops_by_itself_and_wants_acknowledging(way:
         assert_only_enable_helps(rig)
 
 
-@every_way
-def test_10_a_few_lost_answers_stop_nothing_and_a_silence_does(way: str) -> None:
-    with Rig(way) as rig:
+@every_connection
+def test_10_a_few_lost_answers_stop_nothing_and_a_silence_does(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         for what in ('unheard', 'drop', 'damage', 'double'):
             rig.line.spoil(what)

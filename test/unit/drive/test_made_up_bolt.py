@@ -27,7 +27,7 @@ from nfo_sinus_driver.drive import Cause, DriveSettings
 from nfo_sinus_driver.drive.settings import AUTO
 
 MADE_UP = Path(__file__).parent / 'made_up'
-PATIENT, SOURCE, BITS, SIZE, TOLD, INPUTS, HERTZ, TURNS = 11, 12, 100, 102, 400, 402, 403, 404
+PATIENT, SOURCE, BITS, SIZE, STATUS, INPUTS, HERTZ, TURNS = 11, 12, 100, 102, 400, 402, 403, 404
 RUN, RESET = 1 << 0, 1 << 3
 RUNNING, TRIPPED, BACKWARDS = 1 << 0, 1 << 1, 1 << 3
 
@@ -36,7 +36,7 @@ class Bolt(FarEnd):
     """A Bolt; its ramp goes on by a step whenever its frequency is read."""
 
     def __init__(self) -> None:
-        super().__init__(dict.fromkeys((10, PATIENT, SOURCE, BITS, SIZE, *range(TOLD, 405)), 0))
+        super().__init__(dict.fromkeys((10, PATIENT, SOURCE, BITS, SIZE, *range(STATUS, 405)), 0))
         self.registers[10] = 50
         #: By how much the frequency changes each time, 0.01 Hz; which fault is active.
         self.step = 100
@@ -61,9 +61,9 @@ class Bolt(FarEnd):
             self.wobble = -self.wobble
             registers[HERTZ] = has + self.wobble + max(-self.step, min(self.step, wanted - has))
         runs = (registers[BITS] & RUN or registers[HERTZ]) and not self.fault
-        registers[TOLD] = self.fault or (2 if runs else 1)
+        registers[STATUS] = self.fault or (2 if runs else 1)
         facts = RUNNING * bool(runs) | TRIPPED * bool(self.fault)
-        registers[TOLD + 1] = facts | BACKWARDS * self.backwards
+        registers[STATUS + 1] = facts | BACKWARDS * self.backwards
 
     def was_written(self, before: dict[int, int]) -> None:
         if self.registers[BITS] & RESET and not before[BITS] & RESET:
@@ -120,11 +120,11 @@ def test_a_status_is_one_read_and_the_frequency_comes_with_it() -> None:
         assert (snapshot.frequency, snapshot.actual) == (40.0, 40.0)
         rig.bolt.reads.clear()
         rig.pass_time(2.0)
-        reads = [number for number in rig.bolt.reads if number in (TOLD, HERTZ)]
+        reads = [number for number in rig.bolt.reads if number in (STATUS, HERTZ)]
         # it may be in the midst of one when it is begun to be counted
-        reads = reads[reads.index(TOLD) :]
+        reads = reads[reads.index(STATUS) :]
         assert len(reads) > 40
-        assert reads[: len(reads) // 2 * 2] == [TOLD, HERTZ] * (len(reads) // 2)
+        assert reads[: len(reads) // 2 * 2] == [STATUS, HERTZ] * (len(reads) // 2)
 
 
 def test_the_word_has_the_sign_of_what_is_measured() -> None:
@@ -146,7 +146,7 @@ def test_who_has_control_is_asked_now_and_then() -> None:
         rig.turn_at_40()
         rig.bolt.reads.clear()
         rig.wait_until(lambda: rig.bolt.reads.count(SOURCE) > 1)
-        asked = [number for number in rig.bolt.reads if number in (TOLD, SOURCE)]
+        asked = [number for number in rig.bolt.reads if number in (STATUS, SOURCE)]
         first = asked.index(SOURCE)
         # not with every status
         assert asked.index(SOURCE, first + 1) - first > 10
@@ -236,7 +236,7 @@ def test_what_a_drive_cannot_measure_is_its_familys() -> None:
     assert bolt.can_be('status.hertz', 119.0) and not bolt.can_be('status.hertz', -121.0)
     assert acme.can_be('status.hertz', 400.0)
     # neither a word whose code the manual lacks
-    assert bolt.can_be('bus.told', 145 << 16) and not bolt.can_be('bus.told', 7 << 16)
+    assert bolt.can_be('bus.status', 145 << 16) and not bolt.can_be('bus.status', 7 << 16)
 
 
 @pytest.mark.parametrize('role', ['status_word', 'actual_frequency'])

@@ -27,7 +27,7 @@ from nfo_sinus_driver.catalog import CatalogError, load_family
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.link import NoAnswer, Refused
 
-RAMP, WORD, TURN, SIZE, TOLD, CODE, HERTZ, KIND = 10, 100, 101, 102, 200, 201, 202, 300
+RAMP, WORD, TURN, SIZE, STATUS, CODE, HERTZ, KIND = 10, 100, 101, 102, 200, 201, 202, 300
 RESET, RUN, REMOTE = 1 << 3, 1 << 12, 1 << 15
 RUNNING, TRIPPED, HAS_REMOTE = 1 << 5, 1 << 9, 1 << 13
 
@@ -47,9 +47,9 @@ class Acme(FarEnd):
         """Let a fault happen, or end: 0."""
         word = self.registers[WORD]
         runs = word & RUN and word & REMOTE and not code
-        told = HAS_REMOTE * bool(word & REMOTE) | RUNNING * bool(runs) | TRIPPED * bool(code)
+        status = HAS_REMOTE * bool(word & REMOTE) | RUNNING * bool(runs) | TRIPPED * bool(code)
         usual = (3 if runs else 2) if word & REMOTE else 1
-        self.registers.update({TOLD: told, CODE: code or usual})
+        self.registers.update({STATUS: status, CODE: code or usual})
         size = int(f'{self.registers[SIZE]:04X}{self.registers[SIZE + 1]:04X}')
         hertz = (-size if self.registers[TURN] else size) if runs else 0
         high, low = struct.unpack('>2H', struct.pack('>i', hertz))
@@ -64,7 +64,7 @@ class Acme(FarEnd):
     @property
     def fault(self) -> int:
         """The code of the fault that stands."""
-        return self.registers[CODE] if self.registers[TOLD] & TRIPPED else 0
+        return self.registers[CODE] if self.registers[STATUS] & TRIPPED else 0
 
     def was_written(self, before: dict[int, int]) -> None:
         """Reset a fault on the edge, and go on as the control word says."""
@@ -111,7 +111,7 @@ def test_one_without_an_identity_is_the_model_without_one() -> None:
 
 
 def test_of_two_without_an_identity_the_user_has_to_choose(monkeypatch: pytest.MonkeyPatch) -> None:
-    silent = dataclasses.replace(load_family('acme').profile, told_by='')
+    silent = dataclasses.replace(load_family('acme').profile, identified_by='')
     monkeypatch.setitem(load_family('acme').__dict__, 'profile', silent)
     with Bench() as rig, raises(Cause.SEVERAL_MODELS):
         _ = rig.found
@@ -128,7 +128,7 @@ def test_a_run() -> None:
         runs = acme.writes.index((WORD, REMOTE | RUN))
         # with control and set-point 0, and only then
         assert {(WORD, REMOTE), (TURN, 0), (SIZE, 0), (SIZE + 1, 0)} <= {*acme.writes[:runs]}
-        assert acme.registers[TOLD] == HAS_REMOTE | RUNNING
+        assert acme.registers[STATUS] == HAS_REMOTE | RUNNING
 
         rig.turn_at(20.0)
         begun = len(acme.writes)
@@ -229,7 +229,7 @@ def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     folder = tmp_path / f'bare_{tmp_path.name}'
     shutil.copytree(Path(__file__).parent / 'made_up' / 'acme', folder)
     (folder / 'roles.csv').write_text(
-        'role,parameter\nstatus_word,bus.told\nstatus_code,bus.code\n', encoding='utf-8'
+        'role,parameter\nstatus_word,bus.status\nstatus_code,bus.code\n', encoding='utf-8'
     )
     monkeypatch.setattr(families, '__path__', [*families.__path__, str(tmp_path)])
     return folder.name
@@ -248,7 +248,7 @@ def test_a_role_that_is_missing_is_a_feature_that_it_lacks(bare: str) -> None:
 
 def test_a_family_without_a_status_code_is_none(bare: str, tmp_path: Path) -> None:
     roles = tmp_path / bare / 'roles.csv'
-    roles.write_text('role,parameter\nstatus_word,bus.told\n', encoding='utf-8')
+    roles.write_text('role,parameter\nstatus_word,bus.status\n', encoding='utf-8')
     with pytest.raises(CatalogError, match='status_code'):
         load_family(bare)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 from support.said import says
 
 from nfo_sinus_driver.catalog import families, load_family, load_profile
@@ -21,9 +21,9 @@ OWN_SETPOINT = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize('way', WAYS)
-def test_what_matters_of_a_model_is_measured_without_being_named(way: str) -> None:
-    with Rig(way).turn() as rig:
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_what_matters_of_a_model_is_measured_without_being_named(connection: str) -> None:
+    with Rig(connection).turn() as rig:
         rig.pass_time(4.0)
         values = rig.notes.telemetry[-1].measured
         model = rig.drive.model
@@ -31,8 +31,8 @@ def test_what_matters_of_a_model_is_measured_without_being_named(way: str) -> No
         assert list(values) == usual
         lacking = {key for key in usual if not rig.drive.state.nameplate.has(key)}
         assert {key for key, value in values.items() if math.isnan(value)} == lacking
-        if way in OWN_SETPOINT:
-            assert values[OWN_SETPOINT[way]] == pytest.approx(20.0, abs=0.11)
+        if connection in OWN_SETPOINT:
+            assert values[OWN_SETPOINT[connection]] == pytest.approx(20.0, abs=0.11)
 
 
 def test_the_manuals_own_example_of_a_safety_value_is_there() -> None:
@@ -74,9 +74,9 @@ def test_the_usual_ones_of_every_model_are_measured_values_of_it(model: str) -> 
         assert {*family.profile.measured} <= {parameter.key for parameter in family.measured}
 
 
-@pytest.mark.parametrize('way', ['rtu', 'optimal'])
-def test_a_monitored_drive_reports_the_setpoint_of_another_master(way: str) -> None:
-    with Rig(way, control_method='monitor').connect() as rig:
+@pytest.mark.parametrize('connection', ['rtu', 'optimal'])
+def test_a_monitored_drive_reports_the_setpoint_of_another_master(connection: str) -> None:
+    with Rig(connection, control_method='monitor').connect() as rig:
         target = rig.drive.model.profile.setpoints['Freque'].key
         rig.far.memory.set(target, 12.5)
         rig.pass_time(1.5)

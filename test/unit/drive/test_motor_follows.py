@@ -8,15 +8,15 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 from support.variants import ramps
 
 from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.movitrac31.words import Bits
 
-FOLLOWING = [name for name, way in WAYS.items() if way.reference == 'fieldbus']
+FOLLOWING = [name for name, one in CONNECTIONS.items() if one.reference == 'fieldbus']
 BITS, SIZE = 'fieldbus.function_bits', 'fieldbus.remote_setpoint'
-FORWARD, REVERSE = (int(Bits.ENABLE | way) for way in (Bits.CLOCKWISE, Bits.COUNTER_CLOCKWISE))
+FORWARD, REVERSE = (int(Bits.ENABLE | one) for one in (Bits.CLOCKWISE, Bits.COUNTER_CLOCKWISE))
 
 
 def is_setpoint(rig: Rig, key: str) -> bool:
@@ -25,21 +25,21 @@ def is_setpoint(rig: Rig, key: str) -> bool:
     )
 
 
-#: Ways whose status word, if there is any, shows a ramp to a stop as a run.
-UNTOLD = ('classic v5.0', 'canopen, no DriveStatus', 'canopen, ds402')
+#: Connections whose status word, if there is any, shows a ramp to a stop as a run.
+UNREPORTED = ('classic v5.0', 'canopen, no DriveStatus', 'canopen, ds402')
 
 
 # --- a drive that stops by itself ---
 
 
-@pytest.mark.parametrize('way', UNTOLD)
+@pytest.mark.parametrize('connection', UNREPORTED)
 @pytest.mark.parametrize('value', [20.0, -20.0])
 @pytest.mark.parametrize('retard', [10.0, 80.0])
 def test_a_run_input_that_is_back_before_the_motor_stands_does_not_start_it(
-    way: str, value: float, retard: float
+    connection: str, value: float, retard: float
 ) -> None:
     parameters = {'control.accel': 0.3, 'control.retard': retard}
-    with Rig(way, parameters=parameters, poll_rate=50.0) as rig:
+    with Rig(connection, parameters=parameters, poll_rate=50.0) as rig:
         rig.turn(value)
         rig.pass_time(5.0)
         assert rig.far.motor.frequency == pytest.approx(value, abs=0.5)
@@ -56,10 +56,12 @@ def test_a_run_input_that_is_back_before_the_motor_stands_does_not_start_it(
         assert not rig.turns and not rig.drive.following
 
 
-@pytest.mark.parametrize('way', UNTOLD)
+@pytest.mark.parametrize('connection', UNREPORTED)
 @pytest.mark.parametrize('retard', [8.0, 20.0])
-def test_a_loaded_motor_that_ramps_down_does_not_stop_by_itself(way: str, retard: float) -> None:
-    with Rig(way, parameters={'control.accel': 0.3, 'control.retard': retard}) as rig:
+def test_a_loaded_motor_that_ramps_down_does_not_stop_by_itself(
+    connection: str, retard: float
+) -> None:
+    with Rig(connection, parameters={'control.accel': 0.3, 'control.retard': retard}) as rig:
         rig.turn()
         rig.far.motor.load = 1.0
         for value in (50.0, 45.0, 30.0, 20.0):
@@ -68,9 +70,9 @@ def test_a_loaded_motor_that_ramps_down_does_not_stop_by_itself(way: str, retard
             assert rig.drive.following
 
 
-@pytest.mark.parametrize('way', UNTOLD)
-def test_a_motor_that_ramps_to_other_set_points_does_not_stop_by_itself(way: str) -> None:
-    with Rig(way, parameters={'control.accel': 1.5, 'control.retard': 4.0}) as rig:
+@pytest.mark.parametrize('connection', UNREPORTED)
+def test_a_motor_that_ramps_to_other_set_points_does_not_stop_by_itself(connection: str) -> None:
+    with Rig(connection, parameters={'control.accel': 1.5, 'control.retard': 4.0}) as rig:
         rig.turn()
         for value in (5.0, 20.0, -20.0, 12.0, 20.0, 3.0, -8.0, -20.0, 20.0):
             rig.send(value)
@@ -84,9 +86,9 @@ def test_a_motor_that_ramps_to_other_set_points_does_not_stop_by_itself(way: str
 # --- after a set-point time-out -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', FOLLOWING)
-def test_a_motor_that_does_not_slow_down_after_a_time_out_is_stopped(way: str) -> None:
-    with Rig(way, setpoint_timeout=2.5) as rig:
+@pytest.mark.parametrize('connection', FOLLOWING)
+def test_a_motor_that_does_not_slow_down_after_a_time_out_is_stopped(connection: str) -> None:
+    with Rig(connection, setpoint_timeout=2.5) as rig:
         rig.turn()
         # the drive takes set-point 0, and does not follow it
         rig.meet = lambda key, data: 'ignored' if is_setpoint(rig, key) and data else None
@@ -103,9 +105,9 @@ def test_a_motor_that_does_not_slow_down_after_a_time_out_is_stopped(way: str) -
         assert not rig.turns
 
 
-@pytest.mark.parametrize('way', FOLLOWING)
-def test_a_motor_that_slows_down_after_a_time_out_is_not_stopped(way: str) -> None:
-    with Rig(way, setpoint_timeout=2.5) as rig:
+@pytest.mark.parametrize('connection', FOLLOWING)
+def test_a_motor_that_slows_down_after_a_time_out_is_not_stopped(connection: str) -> None:
+    with Rig(connection, setpoint_timeout=2.5) as rig:
         rig.turn()
         rig.send(None)
         rig.pass_time(15.0)
@@ -142,8 +144,8 @@ def test_what_a_start_depends_on_does_not_change_while_the_motor_is_enabled() ->
         before = {key: rig.far.memory.raw(key) for key in profile.start_settings}
         for moment in ('it turns', 'it stands'):
             for key in rig.drive.parameters.values.keys() & profile.start_settings:
-                told = rig.answer(rig.drive.parameters.change({key: other(rig, key)}))
-                assert 'the motor is enabled' in told, (moment, key, told)
+                answer = rig.answer(rig.drive.parameters.change({key: other(rig, key)}))
+                assert 'the motor is enabled' in answer, (moment, key, answer)
             rig.send(0.0)
             rig.pass_time(2.0)
         assert before == {key: rig.far.memory.raw(key) for key in profile.start_settings}
@@ -178,9 +180,9 @@ def test_a_motor_that_another_master_reverses_is_stopped_and_its_direction_shown
         assert not rig.turns
 
 
-@pytest.mark.parametrize('way', ['rtu', 'optimal', 'movitrac'])
-def test_a_motor_that_another_master_speeds_up_is_reported_and_set_back(way: str) -> None:
-    with Rig(way) as rig:
+@pytest.mark.parametrize('connection', ['rtu', 'optimal', 'movitrac'])
+def test_a_motor_that_another_master_speeds_up_is_reported_and_set_back(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         key = rig.drive.model.profile.setpoints['Freque'].key
         rig.far.memory.set(key, 45.0)
@@ -191,10 +193,10 @@ def test_a_motor_that_another_master_speeds_up_is_reported_and_set_back(way: str
         assert rig.drive.following
 
 
-@pytest.mark.parametrize('way', FOLLOWING)
-def test_no_change_of_a_set_point_is_taken_for_another_master(way: str) -> None:
-    forward_only = WAYS[way].model == 'sinus_h'
-    with Rig(way) as rig:
+@pytest.mark.parametrize('connection', FOLLOWING)
+def test_no_change_of_a_set_point_is_taken_for_another_master(connection: str) -> None:
+    forward_only = CONNECTIONS[connection].model == 'sinus_h'
+    with Rig(connection) as rig:
         rig.turn()
         for value in (40.0, -40.0, 10.0, 0.0, -5.0, 5.0, -30.0, 50.0, 1.0, -1.0, 20.0):
             for pause in (0.3, 2.5):

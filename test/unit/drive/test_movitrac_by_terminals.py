@@ -10,20 +10,20 @@ from typing import Any
 import movitrac
 from movitrac import SWITCHES, succeeded
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 
 from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE, SETPOINT
 from nfo_sinus_driver.simulator.movitrac31.parameters import Mode
 
-WAY = 'movitrac, by terminals'
+CONNECTION = 'movitrac, by terminals'
 each_switch = pytest.mark.parametrize(
     'switch', [name for name in SWITCHES if 'settings_need' not in name]
 )
 
 
 def make(switch: str = 'as the manual says', **more: Any) -> Rig:
-    return movitrac.make(switch, way=WAY, **more)
+    return movitrac.make(switch, connection=CONNECTION, **more)
 
 
 @each_switch
@@ -37,12 +37,12 @@ def test_the_motor_follows_sizes_in_the_direction_of_its_terminal(
         unit.switch(terminal, True)
         rig.connect()
         rig.enable()
-        way = 1 if terminal == 41 else -1
+        sign = 1 if terminal == 41 else -1
         for value in (20.0, 35.0, 0.0, 10.0):
             rig.send(value)
             rig.pass_time(2.0)
-            assert rig.far.motor.frequency == pytest.approx(way * value, abs=0.1)
-            assert rig.drive.snapshot.frequency == pytest.approx(way * value, abs=0.1)
+            assert rig.far.motor.frequency == pytest.approx(sign * value, abs=0.1)
+            assert rig.drive.snapshot.frequency == pytest.approx(sign * value, abs=0.1)
             assert rig.drive.following
         rig.send(-20.0)
         rig.pass_time(1.0)
@@ -133,7 +133,7 @@ def test_what_function_bits_of_an_earlier_session_turn_is_stopped() -> None:
         rig.turn()
         rig.kill()
         rig.reset(control_method='remote_setpoint')
-        rig.way = WAYS[WAY]
+        rig.connection = CONNECTIONS[CONNECTION]
         rig.begin()
         rig.connect()
         rig.pass_time(2.0)

@@ -84,7 +84,7 @@ def test_one_that_was_exchanged_while_it_was_lost_is_not_connected_again() -> No
         rig.far.memory.put(TYPE, 500000)
         rig.line.mend()
         rig.pass_time(10.0)
-        # what may have followed this driver was told to stop, whatever it is
+        # what may have followed this driver was commanded to stop, whatever it is
         assert not rig.turns and not rig.drive.snapshot.connected
         assert 'MOVIDYN 5000' in rig.answer(rig.drive.enable()) or not rig.drive.following
 

@@ -4,7 +4,7 @@
 """
 What the laws ask of a MOVITRAC 31 alone: with each switch of the simulated one, turned alone.
 
-With all of them as hard as can be it is one of the ways of test_laws.py.
+With all of them as hard as can be it is one of the connections of test_laws.py.
 """
 
 from __future__ import annotations

@@ -23,9 +23,9 @@ _START = 1.2
 _SLOW = {'baud': 19200}
 
 
-def made(drives: int, way: str = 'rtu', *, line: Any = _SLOW, **settings: Any) -> Rig:
+def made(drives: int, connection: str = 'rtu', *, line: Any = _SLOW, **settings: Any) -> Rig:
     """Return a rig whose drives are polled as fast as the line allows."""
-    return Rig(way, drives=drives, line=line, **{'poll_rate': 50.0, **settings})
+    return Rig(connection, drives=drives, line=line, **{'poll_rate': 50.0, **settings})
 
 
 def polls(rig: Rig, seconds: float) -> Counter[int]:
@@ -65,28 +65,30 @@ def start(rig: Rig, *addresses: int) -> float:
     return rig.clock.now - began
 
 
-def rate_alone(drives: int, way: str, *, ride: bool) -> float:
+def rate_alone(drives: int, connection: str, *, runs: bool) -> float:
     """Return how often a second the status of each comes when they are alone on the line."""
-    with made(drives, way) as rig:
-        begin(rig, ride=ride)
+    with made(drives, connection) as rig:
+        begin(rig, runs=runs)
         return sum(polls(rig, 5.0).values()) / 5.0 / drives
 
 
-def begin(rig: Rig, *, ride: bool) -> None:
+def begin(rig: Rig, *, runs: bool) -> None:
     rig.connect()
-    if ride:
+    if runs:
         rig.enable()
         rig.send(20.0)
         rig.pass_time(2.0)
 
 
-@pytest.mark.parametrize(('way', 'ride'), [('rtu', False), ('classic', False), ('rtu', True)])
+@pytest.mark.parametrize(
+    ('connection', 'runs'), [('rtu', False), ('classic', False), ('rtu', True)]
+)
 def test_neighbours_keep_their_rate_with_a_quarter_of_the_drives_unplugged(
-    way: str, ride: bool
+    connection: str, runs: bool
 ) -> None:
-    kept = rate_alone(6, way, ride=ride)
-    with made(8, way) as rig:
-        begin(rig, ride=ride)
+    kept = rate_alone(6, connection, runs=runs)
+    with made(8, connection) as rig:
+        begin(rig, runs=runs)
         rig.line.unplug(7, 8)
         rig.pass_time(_SETTLED)
         seen = polls(rig, 10.0)
@@ -94,8 +96,8 @@ def test_neighbours_keep_their_rate_with_a_quarter_of_the_drives_unplugged(
         assert not seen[7] and not seen[8]
         # their stops are not confirmed, and tried on: those that come back are stopped
         for address, drive in rig.drives.items():
-            assert drive.following == (ride and address < 7)
-            assert drive.stop_unconfirmed == (ride and address >= 7)
+            assert drive.following == (runs and address < 7)
+            assert drive.stop_unconfirmed == (runs and address >= 7)
         # and each of them is found again
         rig.line.unplug()
         rig.pass_time(10.0)
@@ -140,11 +142,11 @@ def test_a_drive_alone_on_its_line_is_asked_every_four_seconds_when_it_is_gone()
         assert len(rig.asked) - asked >= 4
 
 
-@pytest.mark.parametrize('way', ['rtu', 'classic', 'movitrac'])
-def test_many_drives_start_in_the_time_of_their_reads(way: str) -> None:
-    with made(1, way, line={}) as rig:
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'movitrac'])
+def test_many_drives_start_in_the_time_of_their_reads(connection: str) -> None:
+    with made(1, connection, line={}) as rig:
         alone = start(rig)
-    with made(8, way, line={}) as rig:
+    with made(8, connection, line={}) as rig:
         assert start(rig) <= _START * 8 * alone
 
 

@@ -108,10 +108,10 @@ def fallen_still(rig: Rig) -> Poller:
 
 
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize('way', ['rtu', 'rtu, control word'])
+@pytest.mark.parametrize('connection', ['rtu', 'rtu, control word'])
 @pytest.mark.parametrize('kind', KINDS)
-def test_no_turn_at_an_acknowledgement(kind: Mapping[str, str], way: str) -> None:
-    with Rig(way, options=kind, drive_timeout=0.0) as rig:
+def test_no_turn_at_an_acknowledgement(kind: Mapping[str, str], connection: str) -> None:
+    with Rig(connection, options=kind, drive_timeout=0.0) as rig:
         rig.connect()
         watch = Poller(rig)
         watch.watching = False

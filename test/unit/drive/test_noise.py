@@ -10,7 +10,7 @@ import random
 from typing import Any
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 from support.variants import stopping_at_timeout
 
 from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
@@ -30,8 +30,8 @@ _each_line = pytest.mark.parametrize('line', LINES)
 
 
 def made(line: str = 'rtu', **settings: Any) -> Rig:
-    way, options = LINES[line]
-    return Rig(way, line=options, **settings)
+    connection, options = LINES[line]
+    return Rig(connection, line=options, **settings)
 
 
 def ends(rig: Rig) -> list[str]:
@@ -81,8 +81,8 @@ def test_damaged_answers_stop_nothing(line: str, share: float, most: int) -> Non
 def test_a_burst_shorter_than_lost_after_stops_nothing(
     line: str, length: float, timeout: float
 ) -> None:
-    way = WAYS[LINES[line][0]]
-    stops = stopping_at_timeout(way.model, way.method)
+    connection = CONNECTIONS[LINES[line][0]]
+    stops = stopping_at_timeout(connection.model, connection.method)
     with made(line, drive_timeout=timeout, parameters=stops) as rig:
         rig.turn()
         assert rig.drive.state.timeout.seconds == (2.0 if timeout < 0 else timeout)

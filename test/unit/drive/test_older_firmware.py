@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from support.rig import Rig, Way
+from support.rig import Connection, Rig
 from support.said import raises, said
 
 from nfo_sinus_driver.catalog import Fact, Kind, Role
@@ -40,8 +40,8 @@ class Older(Rig):
     :ivar energised: the motor was, at any time.
     """
 
-    def __init__(self, way: str | Way = 'classic v5.0', **settings: Any) -> None:
-        super().__init__(way, setpoint_timeout=0.0, **settings)
+    def __init__(self, connection: str | Connection = 'classic v5.0', **settings: Any) -> None:
+        super().__init__(connection, setpoint_timeout=0.0, **settings)
         self.flags = LineError(0)
         self.energised = False
         unit, motor = self.far.control_unit, self.far.motor
@@ -79,7 +79,7 @@ class Older(Rig):
         wanted = {f'control.{name}': value for name, value in values.items()}
         self.result(self.drive.parameters.change(wanted))
 
-    def why_not(self) -> str:
+    def refusal(self) -> str:
         """Return why parameters are not changed; nothing may have been written."""
         before = (dict(self.far.writes), self.modes, self.far.motor.driven)
         with pytest.raises(DriveError) as error:
@@ -126,10 +126,10 @@ def test_under_bus_control_settings_are_just_written(rig: Older, turning: bool) 
 def test_what_else_has_control_keeps_it(rig: Older) -> None:
     rig.far.set_run_input(False)
     rig.far.control_unit.press('ext')
-    assert 'giving it back to them could start the motor: press STOP' in rig.why_not()
+    assert 'giving it back to them could start the motor: press STOP' in rig.refusal()
     rig.far.set_run_input(True)
     rig.pass_time(0.2)
-    assert 'the motor runs' in rig.why_not()
+    assert 'the motor runs' in rig.refusal()
     rig.far.control_unit.press('stop')
     rig.pass_time(1.0)
     rig.change(accel=6.0)
@@ -141,13 +141,13 @@ def test_not_while_a_fault_is_active_or_others_tune_it(
 ) -> None:
     rig.far.trip(5)
     rig.pass_time(0.2)
-    why = rig.why_not()
+    why = rig.refusal()
     assert '5 Overload' in why and '~/fault_ack' in why
     rig.acknowledged += 1
     rig.result(rig.drive.acknowledge())
     rig.change(accel=5.0)
     monkeypatch.setattr(type(rig.far.control_unit), 'mode', property(lambda _: 0))
-    assert 'MODE is Inhibit' in rig.why_not()
+    assert 'MODE is Inhibit' in rig.refusal()
 
 
 @pytest.mark.parametrize('refused', [False, True])
@@ -261,7 +261,7 @@ def test_a_driver_that_is_begun_while_the_motor_turns(rig: Older, method: str) -
 def test_the_firmware_is_asked_for_while_the_bus_has_no_control(
     dialect: str, firmware: str
 ) -> None:
-    with Older(Way('classic', options={'dialect': dialect})) as rig:
+    with Older(Connection('classic', options={'dialect': dialect})) as rig:
         rig.connect()
         assert rig.drive.identity is not None and rig.drive.snapshot.status is not None
         assert firmware in str(rig.drive.identity)
@@ -358,11 +358,11 @@ def test_stop_down_a_long_ramp_is_confirmed_and_said_once() -> None:
 def test_torque_has_the_decimals_of_its_firmware() -> None:
     # one decimal on firmware of the v5.0 dialect, none on others [C115]
     older = 'classic v5.0'
-    for way, chosen in ((older, 'v5.0'), (older, ''), ('classic', 'v2.03'), ('classic', '')):
-        with Rig(way, classic_dialect=chosen) as rig:
+    for connection, chosen in ((older, 'v5.0'), (older, ''), ('classic', 'v2.03'), ('classic', '')):
+        with Rig(connection, classic_dialect=chosen) as rig:
             rig.far.motor.torque = 0.6
             rig.result(rig.drive.connect())
-            assert rig.result(rig.drive.measure('status.trq_act')) == 60.0, (way, chosen)
+            assert rig.result(rig.drive.measure('status.trq_act')) == 60.0, (connection, chosen)
 
 
 # --- who controls, where only the inverter status tells -------------------------------------------

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from support.own_timeout import TIMED, by_default, own_timeout
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 from support.said import says
 from support.variants import ramps
 
@@ -21,12 +21,12 @@ from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 
 #: How soon after its time-out a motor has to stand, s.
 _SOON = 1.5
-timed = pytest.mark.parametrize('way', TIMED)
+timed = pytest.mark.parametrize('connection', TIMED)
 
 
 @timed
-def test_9_a_drive_that_is_polled_seldom_gets_a_request_in_time(way: str) -> None:
-    with by_default(way, poll_rate=0.05, telemetry_rate=0.0) as rig:
+def test_9_a_drive_that_is_polled_seldom_gets_a_request_in_time(connection: str) -> None:
+    with by_default(connection, poll_rate=0.05, telemetry_rate=0.0) as rig:
         rig.connect()
         rig.enable()
         assert own_timeout(rig) == 2.0
@@ -48,12 +48,14 @@ def test_9_a_drive_that_is_polled_seldom_gets_a_request_in_time(way: str) -> Non
         assert not rig.far.faults
 
 
-@pytest.mark.parametrize('way', WAYS)
-def test_9_by_default_a_motor_stands_soon_after_its_driver_was_killed(way: str) -> None:
-    with by_default(way) as rig:
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_9_by_default_a_motor_stands_soon_after_its_driver_was_killed(connection: str) -> None:
+    with by_default(connection) as rig:
         rig.connect()
         has_none = rig.notes.said(Cause.NO_OWN_TIMEOUT, Severity.WARNING)
-        assert has_none == (WAYS[way].model in ('acme', 'sinus_optimal') and not rig.line.plc)
+        assert has_none == (
+            CONNECTIONS[connection].model in ('acme', 'sinus_optimal') and not rig.line.plc
+        )
         rig.turn()
         rig.kill()
         rig.line.go_to(rig.clock.now + 2.0 + _SOON)
@@ -62,9 +64,9 @@ def test_9_by_default_a_motor_stands_soon_after_its_driver_was_killed(way: str) 
 
 @timed
 def test_9_a_driver_that_was_suspended_for_too_long_starts_nothing_when_it_is_back(
-    way: str
+    connection: str
 ) -> None:
-    with Rig(way, drive_timeout=2.0, setpoint_timeout=0.0) as rig:
+    with Rig(connection, drive_timeout=2.0, setpoint_timeout=0.0) as rig:
         rig.turn()
         rig.line.go_to(rig.clock.now + 5.0)
         for _ in range(200):
@@ -73,12 +75,14 @@ def test_9_a_driver_that_was_suspended_for_too_long_starts_nothing_when_it_is_ba
         assert rig.drive.snapshot.stop_reason is StopReason.DRIVE_TIMEOUT
 
 
-@pytest.mark.parametrize(('way', 'drives', 'baud'), [('rtu', 32, 19200), ('classic', 16, 9600)])
+@pytest.mark.parametrize(
+    ('connection', 'drives', 'baud'), [('rtu', 32, 19200), ('classic', 16, 9600)]
+)
 def test_9_a_drive_gets_a_request_in_time_while_all_others_are_enabled(
-    way: str, drives: int, baud: int
+    connection: str, drives: int, baud: int
 ) -> None:
     # so many that its polls wait for seconds
-    with by_default(way, drives=drives, line={'baud': baud}) as rig:
+    with by_default(connection, drives=drives, line={'baud': baud}) as rig:
         rig.connect()
         rig.enable(1, 2)
         rig.enable(*range(3, drives + 1))
@@ -88,8 +92,10 @@ def test_9_a_drive_gets_a_request_in_time_while_all_others_are_enabled(
 
 @timed
 @pytest.mark.parametrize('found', [0.0, 1.0, 6.0])
-def test_9_the_end_leaves_the_time_out_of_a_drive_as_it_was_found(way: str, found: float) -> None:
-    with by_default(way, found) as rig:
+def test_9_the_end_leaves_the_time_out_of_a_drive_as_it_was_found(
+    connection: str, found: float
+) -> None:
+    with by_default(connection, found) as rig:
         rig.turn()
         # what is shorter was decided by others
         assert own_timeout(rig) == (found if found == 1.0 else 2.0)
@@ -101,9 +107,11 @@ def test_9_the_end_leaves_the_time_out_of_a_drive_as_it_was_found(way: str, foun
         )
 
 
-@pytest.mark.parametrize('way', ['rtu', 'movitrac'])
-def test_9_a_time_out_that_was_changed_meanwhile_is_set_again_by_the_next_enable(way: str) -> None:
-    with by_default(way, 0.0) as rig:
+@pytest.mark.parametrize('connection', ['rtu', 'movitrac'])
+def test_9_a_time_out_that_was_changed_meanwhile_is_set_again_by_the_next_enable(
+    connection: str,
+) -> None:
+    with by_default(connection, 0.0) as rig:
         rig.connect(parameters=True)
         rig.enable()
         assert own_timeout(rig) == 2.0
@@ -114,10 +122,10 @@ def test_9_a_time_out_that_was_changed_meanwhile_is_set_again_by_the_next_enable
         assert own_timeout(rig) == 2.0
 
 
-@pytest.mark.parametrize('way', ['rtu', 'classic'])
-def test_9_an_end_with_a_fault_leaves_the_time_out_and_says_so(way: str) -> None:
+@pytest.mark.parametrize('connection', ['rtu', 'classic'])
+def test_9_an_end_with_a_fault_leaves_the_time_out_and_says_so(connection: str) -> None:
     # a run command may stand in the drive
-    with by_default(way, 0.0) as rig:
+    with by_default(connection, 0.0) as rig:
         rig.turn()
         rig.far.trip(rig.a_fault)
         rig.pass_time(1.0)
@@ -127,9 +135,11 @@ def test_9_an_end_with_a_fault_leaves_the_time_out_and_says_so(way: str) -> None
         assert rig.notes.said(Cause.OWN_TIMEOUT_NOT_PUT_BACK)
 
 
-@pytest.mark.parametrize('way', ['rtu', 'classic'])
-def test_9_an_end_without_a_confirmed_stop_leaves_the_drive_to_stop_by_itself(way: str) -> None:
-    with by_default(way, 0.0) as rig:
+@pytest.mark.parametrize('connection', ['rtu', 'classic'])
+def test_9_an_end_without_a_confirmed_stop_leaves_the_drive_to_stop_by_itself(
+    connection: str,
+) -> None:
+    with by_default(connection, 0.0) as rig:
         rig.turn()
         key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
         rig.meet = lambda asked, data: 'ignored' if data is not None and asked != key else None
@@ -142,11 +152,11 @@ def test_9_an_end_without_a_confirmed_stop_leaves_the_drive_to_stop_by_itself(wa
 
 
 @timed
-def test_9_by_default_a_time_out_that_may_not_stop_the_motor_is_left_alone(way: str) -> None:
-    model = load_family(WAYS[way].model, WAYS[way].method)
+def test_9_by_default_a_time_out_that_may_not_stop_the_motor_is_left_alone(connection: str) -> None:
+    model = load_family(CONNECTIONS[connection].model, CONNECTIONS[connection].method)
     if not model.key(Role.STOP_AT_TIMEOUT):
         pytest.skip('it always stops the motor')
-    with Rig(way, drive_timeout=AS_THE_DRIVE_CAN) as rig:
+    with Rig(connection, drive_timeout=AS_THE_DRIVE_CAN) as rig:
         rig.connect()
         assert rig.notes.said(Cause.OWN_TIMEOUT_STOPS_NOTHING, Severity.WARNING)
         before = own_timeout(rig)
@@ -159,9 +169,9 @@ def test_9_by_default_a_time_out_that_may_not_stop_the_motor_is_left_alone(way: 
 @timed
 @pytest.mark.parametrize('what', ['refused', 'unheard', 'ignored'])
 def test_9_a_default_that_the_drive_does_not_take_keeps_no_motor_from_running(
-    way: str, what: str
+    connection: str, what: str
 ) -> None:
-    with by_default(way, 0.0) as rig:
+    with by_default(connection, 0.0) as rig:
         rig.connect()
         key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
         rig.spoil(what, key, 1000)
@@ -174,8 +184,10 @@ def test_9_a_default_that_the_drive_does_not_take_keeps_no_motor_from_running(
 
 
 @timed
-def test_9_by_default_a_clean_end_leaves_a_slow_motor_to_its_ramp(way: str) -> None:
-    with by_default(way, 0.0, parameters=ramps(WAYS[way].model, 0.3, 30.0)) as rig:
+def test_9_by_default_a_clean_end_leaves_a_slow_motor_to_its_ramp(connection: str) -> None:
+    with by_default(
+        connection, 0.0, parameters=ramps(CONNECTIONS[connection].model, 0.3, 30.0)
+    ) as rig:
         rig.turn()
         assert 'left to its ramp' in rig.answer(rig.drive.disconnect(0.2))
         assert own_timeout(rig) == 0.0
@@ -185,8 +197,10 @@ def test_9_by_default_a_clean_end_leaves_a_slow_motor_to_its_ramp(way: str) -> N
 
 
 @timed
-def test_9_a_stop_that_comes_while_the_time_out_is_set_is_no_later_and_undoes_it(way: str) -> None:
-    with by_default(way, 0.0) as rig:
+def test_9_a_stop_that_comes_while_the_time_out_is_set_is_no_later_and_undoes_it(
+    connection: str,
+) -> None:
+    with by_default(connection, 0.0) as rig:
         rig.connect()
         key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
         stops: list[Future[Any]] = []

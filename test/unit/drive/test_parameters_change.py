@@ -11,7 +11,7 @@ import struct
 from typing import Any
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 from support.said import Said, raises, said
 from support.variants import ramps
 
@@ -75,12 +75,14 @@ def fails(rig: Rig, future: Future[Any], *left: str) -> Said:
 # --- what is written ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', WITH_SETTINGS)
-def test_a_change_is_written_once_and_read_back_and_what_is_the_same_is_not(way: str) -> None:
-    with Rig(way) as rig:
+@pytest.mark.parametrize('connection', WITH_SETTINGS)
+def test_a_change_is_written_once_and_read_back_and_what_is_the_same_is_not(
+    connection: str,
+) -> None:
+    with Rig(connection) as rig:
         rig.connect(parameters=True)
         parameters = rig.drive.parameters
-        up, down = ramps(WAYS[way].model, 0.0, 0.0)
+        up, down = ramps(CONNECTIONS[connection].model, 0.0, 0.0)
         rig.pass_time(0.3)
         rig.asked.clear()
         (change,) = rig.result(parameters.change({up: 7.5, down: 0.3}))
@@ -467,8 +469,8 @@ def test_a_line_that_is_silent_from_the_beginning_changes_nothing(
         answer = fails(rig, parameters.change({key: value}))
         assert answer.startswith(f'{key}: unit 1 did not answer')
     rig.result(parameters.apply({MAGN: 2, ACCEL: 7}, write=True))
-    told = [one for one in rig.notes.events if one.text.startswith('not applied from')]
-    assert len(told) == 2
+    reports = [one for one in rig.notes.events if one.text.startswith('not applied from')]
+    assert len(reports) == 2
     assert len(parameters.drift) == 2
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Any changes over any way, whatever a drive and a line make of it: all new, all old, or named."""
+"""Any changes over any connection, whatever drive and line make of it: all, none, or named."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Moody:
     """Has requests for some settings meet their fates, one for each; then the drive obeys."""
 
     def __init__(self, rig: Rig) -> None:
-        self.values = VALUES[rig.way.model]
+        self.values = VALUES[rig.connection.model]
         self.fates: list[str] = []
         self._rig = rig
         rig.meet = self.meet
@@ -94,10 +94,12 @@ class Moody:
 
 
 @pytest.mark.parametrize('moods', [TWO, MANY], ids=['two', 'many'])
-@pytest.mark.parametrize('way', ['rtu', 'tcp', 'classic', 'classic v5.0', 'canopen', 'movitrac'])
-def test_all_new_or_all_old_or_named(way: str, moods: st.SearchStrategy[list[str]]) -> None:
+@pytest.mark.parametrize(
+    'connection', ['rtu', 'tcp', 'classic', 'classic v5.0', 'canopen', 'movitrac']
+)
+def test_all_new_or_all_old_or_named(connection: str, moods: st.SearchStrategy[list[str]]) -> None:
     ends = dict.fromkeys(('done', 'undone', 'left'), 0)
-    with Rig(way, poll_rate=5.0) as rig:
+    with Rig(connection, poll_rate=5.0) as rig:
         rig.connect()
         moody, parameters = Moody(rig), rig.drive.parameters
         keys = list(moody.values)

@@ -11,7 +11,7 @@ import itertools
 from typing import Any
 
 import pytest
-from support.rig import WAYS, Rig, Way
+from support.rig import CONNECTIONS, Connection, Rig
 from support.said import raises
 from support.variants import ramps
 
@@ -69,22 +69,22 @@ def refuse(rig: Rig, key: str, code: int = Refused.ILLEGAL_ADDRESS) -> list[str]
 # --- the first reading ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', READ)
-def test_all_are_read_and_watched_and_nothing_is_written(way: str) -> None:
-    with Rig(way, poll_rate=2.0) as rig:
+@pytest.mark.parametrize('connection', READ)
+def test_all_are_read_and_watched_and_nothing_is_written(connection: str) -> None:
+    with Rig(connection, poll_rate=2.0) as rig:
         parameters = rig.drive.parameters
         assert parameters.progress == 'not read'
         rig.connect(parameters=True)
-        assert len(parameters.values) == READ[way]
-        assert parameters.progress == f'{READ[way]} read'
+        assert len(parameters.values) == READ[connection]
+        assert parameters.progress == f'{READ[connection]} read'
         assert list(parameters.values.values()) == far(rig, *parameters.values)
         assert set(rig.notes.parameters) == set(parameters.values)
-        assert rig.notes.said(f'parameters: {READ[way]} read in ', Severity.INFO)
+        assert rig.notes.said(f'parameters: {READ[connection]} read in ', Severity.INFO)
         rig.asked.clear()
         answer = rig.answer(parameters.refresh())
-        assert answer == f'{READ[way]} parameters read, changed: none'
+        assert answer == f'{READ[connection]} parameters read, changed: none'
         rig.notes.parameters.clear()
-        up, down = ramps(WAYS[way].model, 0.0, 0.0)
+        up, down = ramps(CONNECTIONS[connection].model, 0.0, 0.0)
         rig.far.set_from_keypad(up, 9.0)
         rig.pass_time(ROUND + 1.0)
         assert texts(rig, Cause.CHANGED_AT_DRIVE) == [f'changed at the drive: {up}: 0.3 -> 9 s']
@@ -92,7 +92,7 @@ def test_all_are_read_and_watched_and_nothing_is_written(way: str) -> None:
         rig.far.set_from_keypad(up, 8.0)
         rig.far.set_from_keypad(down, 8.0)
         answer = rig.answer(parameters.refresh())
-        assert answer == f'{READ[way]} parameters read, changed: {up}, {down}'
+        assert answer == f'{READ[connection]} parameters read, changed: {up}, {down}'
         assert parameters.values[down] == 8.0
         assert not [key for _, key, data in rig.asked if data is not None]
         assert not rig.far.writes
@@ -299,8 +299,10 @@ def test_a_wanted_state_is_written_where_it_differs_or_only_reported(
 
 
 def test_a_monitor_writes_nothing() -> None:
-    way = Way('modbus_rtu', method='monitor', driver={'allow_communication_changes': True})
-    with Rig(way) as rig:
+    connection = Connection(
+        'modbus_rtu', method='monitor', driver={'allow_communication_changes': True}
+    )
+    with Rig(connection) as rig:
         rig.connect(parameters=True)
         parameters = rig.drive.parameters
         for key, value in ((ACCEL, 7), ('serial.sio_tot', 7)):

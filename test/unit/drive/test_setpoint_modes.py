@@ -41,18 +41,18 @@ MODES = {
     'PI-Reg': Quantity('bar', 10, 150, 40),
 }
 BOTH = ['rtu', 'rtu, control word']
-both_methods = pytest.mark.parametrize('way', BOTH)
+both_methods = pytest.mark.parametrize('connection', BOTH)
 every_mode = pytest.mark.parametrize(
-    ('way', 'mode'),
-    [*((way, mode) for way in BOTH for mode in MODES), ('optimal', 'Freque'), ('optimal', 'Speed')],
+    ('connection', 'mode'),
+    [*((one, mode) for one in BOTH for mode in MODES), ('optimal', 'Freque'), ('optimal', 'Speed')],
 )
 
 
-def enabled(way: str, mode: str, **settings: float) -> Rig:
+def enabled(connection: str, mode: str, **settings: float) -> Rig:
     """An enabled drive in a control mode; of an Optimal the driver has to be given it."""
-    unit = {} if way == 'optimal' else {'pi_reg.unit': 'bar'}
+    unit = {} if connection == 'optimal' else {'pi_reg.unit': 'bar'}
     parameters = {'control.mode': mode, **unit}
-    rig = Rig(way, expected_control_mode=mode, parameters=parameters, **settings)
+    rig = Rig(connection, expected_control_mode=mode, parameters=parameters, **settings)
     rig.connect()
     rig.enable()
     return rig
@@ -61,7 +61,7 @@ def enabled(way: str, mode: str, **settings: float) -> Rig:
 def in_drive(rig: Rig, mode: str) -> float:
     """What stands in the drive, in the unit of the mode; its sign may be a direction."""
     control = rig.far.control_unit
-    directed = rig.way.method == 'drive_control' and mode != 'PI-Reg'
+    directed = rig.connection.method == 'drive_control' and mode != 'PI-Reg'
     sign = control.machine.direction if directed else 1
     return sign * rig.far.memory.raw(control.setpoint_key) / MODES[mode].steps
 
@@ -72,8 +72,8 @@ def facts(rig: Rig) -> Fact:
 
 
 @every_mode
-def test_unit_sign_and_reached(way: str, mode: str) -> None:
-    with enabled(way, mode) as rig:
+def test_unit_sign_and_reached(connection: str, mode: str) -> None:
+    with enabled(connection, mode) as rig:
         for value in (MODES[mode].value, -MODES[mode].value):
             # so slow that it is seen on its way
             rig.far.memory.set('control.accel', 20.0)
@@ -89,10 +89,10 @@ def test_unit_sign_and_reached(way: str, mode: str) -> None:
             assert turns * value > 0
             # the actual value has the unit of the set-point; the simulated process has no sign
             actual = abs(value) if mode == 'PI-Reg' else value
-            told = rig.drive.snapshot
-            assert told.actual == pytest.approx(actual, rel=0.07, abs=1.0)
-            assert (told.control_mode, told.unit) == (mode, MODES[mode].unit)
-            assert not told.setpoint_clamped
+            snapshot = rig.drive.snapshot
+            assert snapshot.actual == pytest.approx(actual, rel=0.07, abs=1.0)
+            assert (snapshot.control_mode, snapshot.unit) == (mode, MODES[mode].unit)
+            assert not snapshot.setpoint_clamped
 
 
 def test_a_set_point_is_rounded_to_a_step_of_the_drive() -> None:
@@ -130,13 +130,13 @@ def test_a_process_set_point_lies_between_setmin_and_setmax(ends: tuple[float, f
 
 
 @every_mode
-def test_limits(way: str, mode: str) -> None:
+def test_limits(connection: str, mode: str) -> None:
     quantity = MODES[mode]
     # an Optimal tells no nominal value, and no process has any; 400 Hz may have been meant as rpm
-    nominal = quantity.nominal if way != 'optimal' and quantity.nominal else quantity.most
+    nominal = quantity.nominal if connection != 'optimal' and quantity.nominal else quantity.most
     less = quantity.value / 2
     for most, limit in ((0.0, nominal), (less, less), (2 * quantity.most, quantity.most)):
-        with enabled(way, mode, setpoint_max=most) as rig:
+        with enabled(connection, mode, setpoint_max=most) as rig:
             for wanted in (1e6, -1e30):
                 rig.send(wanted)
                 rig.pass_time(0.4)
@@ -174,19 +174,21 @@ def test_the_newest_set_point_counts_and_what_is_no_number_is_none() -> None:
     [('Freque', 'Speed'), ('Speed', 'Torque'), ('Torque', 'PI-Reg'), ('PI-Reg', 'Freque')],
     ids='-'.join,
 )
-def test_mode_that_is_changed_at_the_keypad_disarms(way: str, before: str, after: str) -> None:
-    with enabled(way, before) as rig:
+def test_mode_that_is_changed_at_the_keypad_ends_the_enable(
+    connection: str, before: str, after: str
+) -> None:
+    with enabled(connection, before) as rig:
         rig.send(MODES[before].value)
         rig.pass_time(1.0)
         rig.far.set_from_keypad('control.mode', after)
         first = len(rig.notes.snapshots)
         rig.pass_time(8.0)
         assert not rig.far.motor.driven
-        told = [one for one in rig.notes.snapshots[first:] if one.control_mode == after]
+        snapshots = [one for one in rig.notes.snapshots[first:] if one.control_mode == after]
         # everywhere at once: no set-point of the one mode ever has the unit of the other
-        assert {one.unit for one in told} == {MODES[after].unit}
-        assert not any(one.enabled for one in told)
-        assert all(math.isnan(one.setpoint) for one in told)
+        assert {one.unit for one in snapshots} == {MODES[after].unit}
+        assert not any(one.enabled for one in snapshots)
+        assert all(math.isnan(one.setpoint) for one in snapshots)
         (text,) = [one.text for one in rig.notes.events if 'control mode' in one.text]
         assert f'the control mode was changed to {after} at the drive' in text
         assert f'set-points are in {MODES[after].unit} now: check what sends them' in text
@@ -197,8 +199,8 @@ def test_mode_that_is_changed_at_the_keypad_disarms(way: str, before: str, after
 
 
 @both_methods
-def test_mode_that_we_change_has_its_unit_at_once(way: str) -> None:
-    with Rig(way).connect(parameters=True) as rig:
+def test_mode_that_we_change_has_its_unit_at_once(connection: str) -> None:
+    with Rig(connection).connect(parameters=True) as rig:
         rig.enable()
         # a motor that is enabled is driven, and a drive changes its mode at standstill only
         change = {'control.mode': 'Speed'}
@@ -218,8 +220,8 @@ def test_mode_that_we_change_has_its_unit_at_once(way: str) -> None:
 
 
 @both_methods
-def test_mode_that_was_changed_at_a_standstill_is_found_by_enable(way: str) -> None:
-    with Rig(way).turn() as rig:
+def test_mode_that_was_changed_at_a_standstill_is_found_by_enable(connection: str) -> None:
+    with Rig(connection).turn() as rig:
         rig.answer(rig.drive.stop())
         rig.send(None)
         rig.pass_time(1.0)

@@ -6,38 +6,38 @@
 from __future__ import annotations
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 
 from nfo_sinus_driver.drive import Cause
 
 #: The manual of firmware before 4.28 has no SpdScl, and the telegram carries no speed.
-SCALED_WAYS = [
-    name for name, way in WAYS.items()
-    if way.model == 'sinus_g2' and way.protocol != 'telegram1' and 'v5.0' not in name
+SCALED_CONNECTIONS = [
+    name for name, connection in CONNECTIONS.items()
+    if connection.model == 'sinus_g2' and connection.protocol != 'telegram1' and 'v5.0' not in name
 ]
 SCALES = [(2, 1), (1, 1), (0, 1), (1, 0), (-1, 10)]
 
 
-def scaled(way: str, numerator: int, denominator: int, **settings: float) -> Rig:
+def scaled(connection: str, numerator: int, denominator: int, **settings: float) -> Rig:
     """Return a rig whose drive scales speeds, and takes them."""
     parameters = {
         'control.mode': 'Speed',
         'fieldbus.spd_scl_numerator': numerator,
         'fieldbus.spd_scl_denominator': denominator,
     }
-    return Rig(way, parameters=parameters, **settings)
+    return Rig(connection, parameters=parameters, **settings)
 
 
 @pytest.mark.parametrize(
-    ('way', 'scale'),
-    [*((way, (1, 10)) for way in SCALED_WAYS), *(('rtu', scale) for scale in SCALES)],
+    ('connection', 'scale'),
+    [*((one, (1, 10)) for one in SCALED_CONNECTIONS), *(('rtu', scale) for scale in SCALES)],
 )
-def test_speeds_are_in_rpm_whatever_the_scale(way: str, scale: tuple[int, int]) -> None:
-    with scaled(way, *scale) as rig:
+def test_speeds_are_in_rpm_whatever_the_scale(connection: str, scale: tuple[int, int]) -> None:
+    with scaled(connection, *scale) as rig:
         rig.connect()
         rig.enable()
         for speed in (300.0, -300.0):
-            rig.send(speed / rig.way.hertz)
+            rig.send(speed / rig.connection.hertz)
             rig.pass_time(1.5)
             shown = rig.drive.snapshot
             assert [rig.far.motor.speed, shown.speed, shown.actual, shown.setpoint] == (
@@ -75,10 +75,10 @@ def test_a_speed_that_the_scale_cannot_carry_is_clamped() -> None:
         assert rig.drive.snapshot.setpoint_clamped
 
 
-@pytest.mark.parametrize('way', ['rtu', 'classic', 'canopen'])
-def test_scales_that_cannot_be_read_are_chosen(way: str) -> None:
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'canopen'])
+def test_scales_that_cannot_be_read_are_chosen(connection: str) -> None:
     # FrqScl 1/100: a set-point of 20 Hz is 2000 counts, and 200 counts are 2 Hz
-    with Rig(way, frequency_scale=0.01) as rig:
+    with Rig(connection, frequency_scale=0.01) as rig:
         registers, key = rig.drive.params, 'status.frq_set'
         codec = registers.model[key].at(registers.protocol).codec
         assert codec.decode(registers.encode(key, 20.0)) == 2000

@@ -41,10 +41,10 @@ def until(rig: Rig, condition: Callable[[], object]) -> None:
     raise AssertionError('it never came true')
 
 
-def full_line(way: str, key: str) -> Rig:
+def full_line(connection: str, key: str) -> Rig:
     """Return a motor that turns on a line that is full, polled as fast as it allows."""
-    options = {'refuses_in_fault': 'nothing'} if way == 'rtu' else {}
-    rig = Rig(way, options=options, poll_rate=0.0, telemetry_rate=0.0)
+    options = {'refuses_in_fault': 'nothing'} if connection == 'rtu' else {}
+    rig = Rig(connection, options=options, poll_rate=0.0, telemetry_rate=0.0)
     rig.turn()
     rig.send(None)
     for _ in range(NEIGHBOURS):

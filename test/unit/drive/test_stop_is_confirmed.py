@@ -46,7 +46,7 @@ def tuning(word: Status = WORDS[0]) -> Iterator[tuple[Rig, Future[Any]]]:
 
 
 def succeeds(rig: Rig, future: Future[Any]) -> bool:
-    """Wait for an answer; tell whether it is a success."""
+    """Wait for an answer; return whether it is a success."""
     rig.answer(future)
     error = future.exception()
     assert error is None or isinstance(error, DriveError)
@@ -54,11 +54,11 @@ def succeeds(rig: Rig, future: Future[Any]) -> bool:
 
 
 @every_word
-@pytest.mark.parametrize('way', STOPS)
-def test_a_stop_of_a_tuning_that_is_refused_is_no_success(way: str, word: Status) -> None:
+@pytest.mark.parametrize('how', STOPS)
+def test_a_stop_of_a_tuning_that_is_refused_is_no_success(how: str, word: Status) -> None:
     with tuning(word) as (rig, tuned):
         unit = rig.far.control_unit
-        stop = rig.drive.stop_for_good(1.0) if way == 'exit' else STOPS[way](rig.drive)
+        stop = rig.drive.stop_for_good(1.0) if how == 'exit' else STOPS[how](rig.drive)
         assert not succeeds(rig, stop) and unit.tuning is not None
         assert 'NOT confirmed' in said(stop.exception()) and '28 Tuning' in said(stop.exception())
         rig.wait_until(lambda: unit.tuning is None)
@@ -227,8 +227,8 @@ def test_many_callers_share_one_stop() -> None:
         assert Mode.EXT not in rig.written(MODE)
 
 
-@pytest.mark.parametrize('way', [*STOPS, 'keypad'])
-def test_a_drive_that_shows_as_not_enabled_shows_its_unconfirmed_stop(way: str) -> None:
+@pytest.mark.parametrize('how', [*STOPS, 'keypad'])
+def test_a_drive_that_shows_as_not_enabled_shows_its_unconfirmed_stop(how: str) -> None:
     # other threads look at any moment, and take "not armed, no stop pending" for the end of a stop
     with Rig() as rig:
         rig.turn()
@@ -240,11 +240,11 @@ def test_a_drive_that_shows_as_not_enabled_shows_its_unconfirmed_stop(way: str) 
             seen.append(rig.drive.stop_unconfirmed)
 
         with mock.patch.object(rig.drive.setpoint, 'stop_following', note):
-            if way == 'keypad':
+            if how == 'keypad':
                 rig.far.control_unit.press('stop')
                 rig.pass_time(1.0)
             else:
-                succeeds(rig, STOPS[way](rig.drive))
+                succeeds(rig, STOPS[how](rig.drive))
         assert seen == [True]
         rig.pass_time(1.0)
         assert not rig.drive.stop_unconfirmed

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 
 from nfo_sinus_driver.drive import Cause, Report, StopReason
 
@@ -26,7 +26,7 @@ def couple(rig: Rig, first: int, second: int) -> None:
 
 
 #: Those on which the rig has several drives.
-SEVERAL = [name for name, way in WAYS.items() if way.protocol != 'telegram1']
+SEVERAL = [name for name, connection in CONNECTIONS.items() if connection.protocol != 'telegram1']
 STOPS: dict[str, Callable[[Rig], object]] = {
     'stop': lambda rig: rig.drive.stop(),
     'quick stop': lambda rig: rig.drive.quick_stop(),
@@ -35,10 +35,10 @@ STOPS: dict[str, Callable[[Rig], object]] = {
 }
 
 
-@pytest.mark.parametrize('way', SEVERAL)
+@pytest.mark.parametrize('connection', SEVERAL)
 @pytest.mark.parametrize('stop', STOPS)
-def test_whatever_stops_a_drive_stops_what_stops_with_it(way: str, stop: str) -> None:
-    with Rig(way, drives=3) as rig:
+def test_whatever_stops_a_drive_stops_what_stops_with_it(connection: str, stop: str) -> None:
+    with Rig(connection, drives=3) as rig:
         couple(rig, 1, 2)
         rig.turn()
         STOPS[stop](rig)
@@ -52,9 +52,9 @@ def test_whatever_stops_a_drive_stops_what_stops_with_it(way: str, stop: str) ->
         assert rig.drives[2].following
 
 
-@pytest.mark.parametrize('way', SEVERAL)
-def test_it_is_sent_the_stop_right_after_the_other(way: str) -> None:
-    with Rig(way, drives=2) as rig:
+@pytest.mark.parametrize('connection', SEVERAL)
+def test_it_is_sent_the_stop_right_after_the_other(connection: str) -> None:
+    with Rig(connection, drives=2) as rig:
         couple(rig, 1, 2)
         rig.turn()
         begun = len(rig.asked)

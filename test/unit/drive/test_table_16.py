@@ -24,7 +24,7 @@ from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions, Phase, StateMachine
 
 OVERLOAD = 5
-WAY = 'rtu, control word'
+CONNECTION = 'rtu, control word'
 CONTROL, MASK = 'fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'
 POWER = Control.NET_CTRL | Control.NET_REF | Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP
 RAMP = Control.ENABLE_RFG | Control.UNLOCK_RFG | Control.USE_REF_FOR_RFG
@@ -197,7 +197,7 @@ LED: dict[str, tuple[str, Callable[[Rig], object]]] = {
 @pytest.mark.parametrize('led', LED)
 def test_table_16_led(exits: Exits, led: str) -> None:
     wanted, lead = LED[led]
-    with Rig(WAY).connect() as rig:
+    with Rig(CONNECTION).connect() as rig:
         lead(rig)
         require_stopped(rig)
         assert set(wanted.split()) <= set(exits)
@@ -207,7 +207,7 @@ def test_table_16_led(exits: Exits, led: str) -> None:
 
 @pytest.mark.parametrize(('reference', 'net_ref'), [('fieldbus', 0x8000), ('terminal', 0)])
 def test_words_of_table_14(reference: str, net_ref: int) -> None:
-    with Rig(WAY, reference=reference).connect() as rig:
+    with Rig(CONNECTION, reference=reference).connect() as rig:
         rig.enable()
         # NetCtrl, power, no quick stop, ramp; bit 0 low first, then SwitchOn, then the direction
         assert rig.written(CONTROL) == [net_ref | 0x4076, net_ref | 0x4077, net_ref | 0x407F]
@@ -225,7 +225,7 @@ def test_words_of_table_14(reference: str, net_ref: int) -> None:
 @pytest.mark.parametrize('mode', ['Freque', 'Speed', 'Torque'])
 def test_reverse_is_bit_13_beside_a_size(mode: str, sign: str) -> None:
     options, parameters = {'sign_in_drive_control': sign}, {'control.mode': mode}
-    with Rig(WAY, options=options, parameters=parameters).connect() as rig:
+    with Rig(CONNECTION, options=options, parameters=parameters).connect() as rig:
         rig.enable()
         key = unit(rig).setpoint_key
         for value in (20.0, -20.0, 0.0, -10.0, 10.0):
@@ -250,7 +250,7 @@ def test_reverse_is_bit_13_beside_a_size(mode: str, sign: str) -> None:
 
 def test_the_sign_of_a_process_value_is_no_direction() -> None:
     process = {'control.mode': 'PI-Reg', 'pi_reg.setmin': -50.0, 'pi_reg.setmax': 50.0}
-    with Rig(WAY, parameters=process).connect() as rig:
+    with Rig(CONNECTION, parameters=process).connect() as rig:
         rig.enable()
         rig.send(-20.0)
         rig.pass_time(1.0)
@@ -259,7 +259,7 @@ def test_the_sign_of_a_process_value_is_no_direction() -> None:
 
 
 def test_a_reverse_gives_no_run_command_that_another_master_has_taken_back() -> None:
-    with Rig(WAY).connect() as rig:
+    with Rig(CONNECTION).connect() as rig:
         turn(rig, 20.0)
         rig.spoil('drop', MASK)
         command(rig, POWER | RAMP)
@@ -295,7 +295,7 @@ MISLED: list[tuple[str, list[Control], str]] = [
 
 
 def test_table_16_misled(exits: Exits) -> None:
-    with Rig(WAY, telemetry_rate=0.0).connect() as rig:
+    with Rig(CONNECTION, telemetry_rate=0.0).connect() as rig:
 
         def check(wanted: str, words: list[Control], cause: str) -> None:
             turn(rig, 20.0)
@@ -332,7 +332,7 @@ IDLE: list[tuple[str, list[Control], str]] = [
 
 
 def test_table_16_idle(exits: Exits) -> None:
-    with Rig(WAY, telemetry_rate=0.0).connect() as rig:
+    with Rig(CONNECTION, telemetry_rate=0.0).connect() as rig:
 
         def check(wanted: str, words: list[Control], cause: str) -> None:
             # whatever another master left behind, the first word of an enable ends
@@ -365,7 +365,7 @@ TO_A_FAULT = [
 
 
 def test_table_16_fault(exits: Exits) -> None:
-    with Rig(WAY, telemetry_rate=0.0).connect() as rig:
+    with Rig(CONNECTION, telemetry_rate=0.0).connect() as rig:
 
         def check(state: Phase, word: Control, wait: float) -> None:
             turn(rig)
@@ -387,7 +387,7 @@ def test_table_16_fault(exits: Exits) -> None:
 
 def test_table_16_fault_reaction_active_leaves_when_the_voltage_is_off(exits: Exits) -> None:
     # an acknowledgement that comes before would have no effect
-    with Rig(WAY).turn() as rig:
+    with Rig(CONNECTION).turn() as rig:
         rig.far.trip(OVERLOAD)
         rig.far.motor._voltage_left = 0.5
         rig.pass_time(0.2)

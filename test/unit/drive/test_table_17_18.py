@@ -44,15 +44,15 @@ RUNS = {
 }
 OPTIMAL_RUNS = {'fieldbus': RUNS['fieldbus'], 'terminal': RUNS['terminal']}
 TUNES = {0x201, 0x301, 0x401, 0x501}
-both_models = pytest.mark.parametrize('way', ['rtu', 'optimal'])
+both_models = pytest.mark.parametrize('connection', ['rtu', 'optimal'])
 
 
 @both_models
-def test_run_commands(way: str) -> None:
+def test_run_commands(connection: str) -> None:
     wrong = {}
-    for reference, (code, frequency) in (RUNS if way == 'rtu' else OPTIMAL_RUNS).items():
-        with Rig(way, reference=reference, poll_rate=5.0, telemetry_rate=0.0) as rig:
-            command = SCMD if way == 'rtu' else 'fieldbus.smode'
+    for reference, (code, frequency) in (RUNS if connection == 'rtu' else OPTIMAL_RUNS).items():
+        with Rig(connection, reference=reference, poll_rate=5.0, telemetry_rate=0.0) as rig:
+            command = SCMD if connection == 'rtu' else 'fieldbus.smode'
             rig.connect()
             rig.far.memory.put(rig.far.control_unit.setpoint_key, 333)
             rig.enable()

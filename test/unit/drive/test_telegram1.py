@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Telegram 1: what an Optimal, a Sinus H and a G2 behind a PLC do that no other way does."""
+"""Telegram 1: what an Optimal, a Sinus H and a G2 behind a PLC do that no other connection does."""
 
 from __future__ import annotations
 
@@ -30,46 +30,46 @@ ENABLING = {
 STOPPED = {OPTIMAL: 0x0408, SINUS_H: 0x0477, G2: 0x047E, BY_DRIVECONTROL: 0xC076}
 #: What a motor that stands is left with.
 LEFT = {OPTIMAL: 0x0400, SINUS_H: 0x0476, G2: 0x0476}
-every_family = pytest.mark.parametrize('way', (OPTIMAL, SINUS_H, G2))
+every_family = pytest.mark.parametrize('connection', (OPTIMAL, SINUS_H, G2))
 
 
-def plc(way: str, **setting: Any) -> Rig:
+def plc(connection: str, **setting: Any) -> Rig:
     """Return a drive behind a PLC that is programmed so."""
-    return Rig(way, line={'plc': setting, 'response_timeout': 1.0})
+    return Rig(connection, line={'plc': setting, 'response_timeout': 1.0})
 
 
 # --- the words, and what they mean ----------------------------------------------------------------
 
 
-@pytest.mark.parametrize('way', ENABLING)
-def test_a_motor_is_enabled_and_stopped_by_the_words_of_the_manual(way: str) -> None:
-    with Rig(way) as rig:
+@pytest.mark.parametrize('connection', ENABLING)
+def test_a_motor_is_enabled_and_stopped_by_the_words_of_the_manual(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         said = words(rig.line.frames)
-        assert said[-len(ENABLING[way]) :] == ENABLING[way]
+        assert said[-len(ENABLING[connection]) :] == ENABLING[connection]
         rig.answer(rig.drive.stop())
         rig.pass_time(1.0)
-        assert words(rig.line.frames)[-1] == STOPPED[way]
+        assert words(rig.line.frames)[-1] == STOPPED[connection]
 
 
 @every_family
-def test_an_exit_leaves_the_word_of_a_motor_that_stands(way: str) -> None:
-    with Rig(way) as rig:
+def test_an_exit_leaves_the_word_of_a_motor_that_stands(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         rig.answer(rig.drive.stop_for_good(4.0))
-        assert not rig.far.motor.driven and words(rig.line.frames)[-1] == LEFT[way]
+        assert not rig.far.motor.driven and words(rig.line.frames)[-1] == LEFT[connection]
 
 
 @every_family
-def test_status_and_direction_are_those_of_the_motor(way: str) -> None:
-    with Rig(way) as rig:
+def test_status_and_direction_are_those_of_the_motor(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         rig.enable()
         for wanted in (0.0, 15.0, -15.0, 10.0):
             rig.send(wanted)
             rig.pass_time(1.5)
             # a Sinus H takes no reverse by its telegram
-            turns = 0.0 if wanted < 0 and way == SINUS_H else wanted
+            turns = 0.0 if wanted < 0 and connection == SINUS_H else wanted
             assert rig.far.motor.frequency == pytest.approx(turns, abs=0.2)
             assert rig.drive.snapshot.frequency == pytest.approx(turns, abs=0.2)
             assert rig.drive.snapshot.actual == pytest.approx(turns, abs=0.5)
@@ -79,9 +79,9 @@ def test_status_and_direction_are_those_of_the_motor(way: str) -> None:
             assert Fact.OPERATION_ENABLED in status.valid & status.facts
             if Fact.REVERSE in status.valid and turns:
                 assert (Fact.REVERSE in status.facts) == (turns < 0)
-        assert rig.notes.said('set-point -15 is limited to 0') == (way == SINUS_H)
+        assert rig.notes.said('set-point -15 is limited to 0') == (connection == SINUS_H)
         assert math.isnan(rig.drive.snapshot.speed)
-        lacks = 'not documented' if way == OPTIMAL else 'layout 1, which has no mailbox'
+        lacks = 'not documented' if connection == OPTIMAL else 'layout 1, which has no mailbox'
         assert lacks in rig.answer(rig.drive.error_log())
 
 
@@ -89,22 +89,23 @@ def test_status_and_direction_are_those_of_the_motor(way: str) -> None:
 BLOCK_AT_750 = {'telegram1 optimal, speed': 4096, 'telegram1 g2, speed': 750}
 
 
-@pytest.mark.parametrize('way', BLOCK_AT_750)
-def test_in_speed_mode_the_telegram_has_speeds(way: str) -> None:
-    with Rig(way) as rig:
+@pytest.mark.parametrize('connection', BLOCK_AT_750)
+def test_in_speed_mode_the_telegram_has_speeds(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         rig.enable()
         for rpm in (750, -750):
             rig.send(rpm / 30)
             rig.pass_time(1.5)
             last = list(telegram_laws.exchanges(rig.line.frames, 1))[-1].setpoint
-            assert last == math.copysign(BLOCK_AT_750[way], rpm) % 0x10000
+            assert last == math.copysign(BLOCK_AT_750[connection], rpm) % 0x10000
             assert rig.far.motor.speed == pytest.approx(rpm, abs=3)
-            told = rig.drive.snapshot
-            assert (told.control_mode, told.unit, told.setpoint) == ('Speed', 'rpm', rpm)
-            assert told.actual == told.speed == pytest.approx(rpm, abs=3)
+            snapshot = rig.drive.snapshot
+            assert (snapshot.control_mode, snapshot.unit) == ('Speed', 'rpm')
+            assert snapshot.setpoint == rpm
+            assert snapshot.actual == snapshot.speed == pytest.approx(rpm, abs=3)
             # nothing tells how many Hz they are
-            assert math.isnan(told.frequency)
+            assert math.isnan(snapshot.frequency)
         rig.send(60.0)
         rig.pass_time(1.0)
         assert rig.notes.said('set-point 1800 is limited to 1500 rpm, which is nominal')
@@ -120,8 +121,8 @@ def test_speed_mode_of_a_telegram_needs_the_nominal_speed(model: str) -> None:
     with pytest.raises(ValueError, match='set nominal_speed first, in rpm, such as 1500'):
         DriveSettings(**chosen)
     settings = DriveSettings(nominal_speed=1500.0, **chosen)
-    way = f'telegram1 {model.removeprefix("sinus_")}'
-    with Rig(way) as rig, pytest.raises(ValueError, match='cannot change within a session'):
+    connection = f'telegram1 {model.removeprefix("sinus_")}'
+    with Rig(connection) as rig, pytest.raises(ValueError, match='cannot change within a session'):
         rig.drive.state.use(settings)
     # over Modbus both read it, and a Sinus H has no such mode
     DriveSettings(model=model, expected_control_mode='Speed')
@@ -130,20 +131,20 @@ def test_speed_mode_of_a_telegram_needs_the_nominal_speed(model: str) -> None:
 
 
 @every_family
-def test_a_drive_without_nominal_values_has_its_own_limit(way: str) -> None:
-    with Rig(way) as rig:
+def test_a_drive_without_nominal_values_has_its_own_limit(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.connect()
         rig.enable()
         rig.send(1000.0)
         rig.pass_time(0.5)
-        most = 327.67 if way == SINUS_H else 150
+        most = 327.67 if connection == SINUS_H else 150
         assert rig.notes.said(f'set-point 1000 is limited to {most:g} (setpoint_max, or')
         assert rig.turns
 
 
 @every_family
-def test_each_word_stands_until_the_drive_has_had_it(way: str) -> None:
-    with plc(way, exchange=0.1) as rig:
+def test_each_word_stands_until_the_drive_has_had_it(connection: str) -> None:
+    with plc(connection, exchange=0.1) as rig:
         rig.connect()
         channel = rig.line.plc.channels[1]
         given: set[int] = set()
@@ -172,8 +173,8 @@ def test_each_word_stands_until_the_drive_has_had_it(way: str) -> None:
 
 
 @every_family
-def test_a_stop_is_confirmed_by_the_first_status_after_it(way: str) -> None:
-    with Rig(way) as rig:
+def test_a_stop_is_confirmed_by_the_first_status_after_it(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         rig.answer(rig.drive.stop())
         rig.pass_time(1.0)
@@ -186,8 +187,8 @@ def test_a_stop_is_confirmed_by_the_first_status_after_it(way: str) -> None:
 
 @every_family
 @pytest.mark.parametrize('command', ['stop', 'quick_stop'])
-def test_what_a_plc_goes_on_showing_confirms_no_stop(way: str, command: str) -> None:
-    with Rig(way, lost_after=10.0) as rig:
+def test_what_a_plc_goes_on_showing_confirms_no_stop(connection: str, command: str) -> None:
+    with Rig(connection, lost_after=10.0) as rig:
         rig.turn()
         rig.answer(rig.drive.stop())
         rig.pass_time(1.0)
@@ -237,10 +238,10 @@ def test_a_sinus_h_that_ignores_its_stops_is_released() -> None:
 
 
 @every_family
-def test_a_stop_is_the_next_word_in_the_block(way: str) -> None:
-    run = telegram_laws.JUDGES[Rig(way).way.model].run
+def test_a_stop_is_the_next_word_in_the_block(connection: str) -> None:
+    run = telegram_laws.JUDGES[Rig(connection).connection.model].run
     # more is always waiting for its turn
-    with Rig(way, telemetry_rate=50.0, line={'plc': {'answer_time': (0.05, 0.05)}}) as rig:
+    with Rig(connection, telemetry_rate=50.0, line={'plc': {'answer_time': (0.05, 0.05)}}) as rig:
         rig.connect()
         rig.pass_time(1.0)
         for moment in range(5):

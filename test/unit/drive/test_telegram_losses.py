@@ -15,7 +15,7 @@ import itertools
 
 import pytest
 from support.examples import FULL
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 from support.telegram_laws import words
 from support.variants import ramps
 
@@ -30,7 +30,7 @@ LEVELS = {
     'telegram1 g2': {'commands': 'levels'},
 }
 SINUS_H = 'telegram1 sinus_h'
-every_family = pytest.mark.parametrize('way', LEVELS)
+every_family = pytest.mark.parametrize('connection', LEVELS)
 #: From one telegram with the drive to the next, s, and whether a drive takes levels.
 SPEEDS = [(0.004, True), (0.1, True), (0.1, False)]
 ALL_SPEEDS = list(itertools.product((0.004, 0.02, 0.1), (False, True)))
@@ -121,12 +121,12 @@ NAMED = {
 }
 
 
-def complaint(way: str, exchange: float, levels: bool, loss: str) -> str:
+def complaint(connection: str, exchange: float, levels: bool, loss: str) -> str:
     """Return what is wrong after a loss; ``''`` if nothing is."""
-    options = LEVELS[way] if levels else {}
-    slow = ramps(WAYS[way].model, 2.0, 2.0)
+    options = LEVELS[connection] if levels else {}
+    slow = ramps(CONNECTIONS[connection].model, 2.0, 2.0)
     line = {'plc': {'exchange': exchange}}
-    with Rig(way, options=options, parameters=slow, line=line) as rig:
+    with Rig(connection, options=options, parameters=slow, line=line) as rig:
         rig.turn()
         LOSSES[loss](rig)
         # programs go on sending set-points
@@ -154,17 +154,17 @@ def complaint(way: str, exchange: float, levels: bool, loss: str) -> str:
 
 @every_family
 @pytest.mark.parametrize('loss', LOSSES)
-def test_after_a_loss_it_stands_until_it_is_enabled(way: str, loss: str) -> None:
-    if way == SINUS_H and loss == 'RUN input':
+def test_after_a_loss_it_stands_until_it_is_enabled(connection: str, loss: str) -> None:
+    if connection == SINUS_H and loss == 'RUN input':
         pytest.skip('it has none of this kind')
     rows = ALL_SPEEDS if FULL else SPEEDS
-    wrong = {row: found for row in rows if (found := complaint(way, *row, loss))}
+    wrong = {row: found for row in rows if (found := complaint(connection, *row, loss))}
     assert not wrong, '\n'.join(f'{row}: {found}' for row, found in wrong.items())
 
 
 @every_family
-def test_the_first_answer_without_valid_data_ends_the_enable(way: str) -> None:
-    with Rig(way, line={'plc': {'drive_time': 0.05}}) as rig:
+def test_the_first_answer_without_valid_data_ends_the_enable(connection: str) -> None:
+    with Rig(connection, line={'plc': {'drive_time': 0.05}}) as rig:
         rig.turn()
         run = words(rig.line.frames)[-1]
         cut_fieldbus(rig, 0.15)
@@ -188,8 +188,8 @@ def test_a_sinus_h_whose_plc_clears_bit_0_alone_is_led_out_of_operation(echo_bit
 
 
 @every_family
-def test_nothing_is_written_after_a_reconnection_until_a_command(way: str) -> None:
-    with Rig(way) as rig:
+def test_nothing_is_written_after_a_reconnection_until_a_command(connection: str) -> None:
+    with Rig(connection) as rig:
         rig.turn()
         rig.answer(rig.drive.stop())
         rig.pass_time(1.0)
@@ -199,7 +199,7 @@ def test_nothing_is_written_after_a_reconnection_until_a_command(way: str) -> No
         rig.pass_time(5.0)
         assert rig.drive.snapshot.connected
         assert len(words(rig.line.frames)) <= before + 1 and not rig.turns
-        if WAYS[way].model == 'sinus_optimal':
+        if CONNECTIONS[connection].model == 'sinus_optimal':
             assert channel_of(rig).block.stw1 == 0
 
 
@@ -218,9 +218,11 @@ def test_a_motor_that_turns_without_an_echo_is_stopped_when_the_driver_comes() -
         assert rig.notes.said(Cause.FOUND_RUNNING)
 
 
-@pytest.mark.parametrize('way', [way for way in WAYS if way.startswith('telegram1')])
-def test_a_motor_that_is_loaded_is_not_stopped_although_it_is_looked_at_seldom(way: str) -> None:
-    with Rig(way, poll_rate=4.0) as rig:
+@pytest.mark.parametrize('connection', [one for one in CONNECTIONS if one.startswith('telegram1')])
+def test_a_motor_that_is_loaded_is_not_stopped_although_it_is_looked_at_seldom(
+    connection: str,
+) -> None:
+    with Rig(connection, poll_rate=4.0) as rig:
         rig.turn()
         advance_to = rig.far.advance_to
 
@@ -231,5 +233,5 @@ def test_a_motor_that_is_loaded_is_not_stopped_although_it_is_looked_at_seldom(w
 
         rig.far.advance_to = loaded  # type: ignore[method-assign]
         rig.pass_time(3.0)
-        assert min(one.actual for one in rig.notes.snapshots[-8:]) < 19 * rig.way.hertz
+        assert min(one.actual for one in rig.notes.snapshots[-8:]) < 19 * rig.connection.hertz
         assert rig.drive.following, rig.notes.events

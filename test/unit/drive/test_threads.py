@@ -102,7 +102,7 @@ def wait_until(condition: Callable[[], object]) -> None:
 
 
 def try_to(command: Callable[[], Any]) -> bool:
-    """Give a command; tell whether it was carried out."""
+    """Give a command; return whether it was carried out."""
     try:
         command().result(PATIENCE)
     except DriveError:

@@ -22,9 +22,9 @@ G2, SINUS_H = 'telegram1 g2, mailbox', 'telegram1 sinus_h, mailbox'
 ACCEL = 'control.accel'
 
 
-def plc(way: str = G2, **setting: Any) -> Rig:
+def plc(connection: str = G2, **setting: Any) -> Rig:
     """Return a drive behind a PLC that is programmed so."""
-    return Rig(way, line={'plc': setting, 'response_timeout': 0.2})
+    return Rig(connection, line={'plc': setting, 'response_timeout': 0.2})
 
 
 # --- settings -------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import itertools
 from typing import Any
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 from support.said import said
 
 from nfo_sinus_driver.drive import Cause, Drive, Procedure, Snapshot, Tuned
@@ -25,9 +25,13 @@ COMMANDS = {
     Procedure.STATOR_RESISTANCE: (Scmd.RS_MEASURE, 46, 'RsMeasOK'),
     Procedure.CALCULATE: (Scmd.PAR_CALC, 47, 'ParClcOK'),
 }
-every_way = pytest.mark.parametrize(
-    'way',
-    [name for name, way in WAYS.items() if (way.model, way.method) == ('sinus_g2', 'mode_scmd')],
+every_connection = pytest.mark.parametrize(
+    'connection',
+    [
+        name
+        for name, one in CONNECTIONS.items()
+        if (one.model, one.method) == ('sinus_g2', 'mode_scmd')
+    ],
 )
 
 
@@ -40,18 +44,18 @@ def begin(rig: Rig, procedure: Procedure = Procedure.FULL) -> Future[Tuned]:
 
 def mode_at_rest(rig: Rig) -> Mode:
     """Where control is when the bus has none: a CANopen module holds it."""
-    return Mode.BUS if rig.way.protocol == 'canopen' else Mode.STOP
+    return Mode.BUS if rig.connection.protocol == 'canopen' else Mode.STOP
 
 
-@every_way
-def test_each_procedure_is_done_and_what_it_changed_is_reported(way: str) -> None:
+@every_connection
+def test_each_procedure_is_done_and_what_it_changed_is_reported(connection: str) -> None:
     # the long ones once
-    for procedure in COMMANDS if way == 'rtu' else list(COMMANDS)[2:]:
+    for procedure in COMMANDS if connection == 'rtu' else list(COMMANDS)[2:]:
         command, code, text = COMMANDS[procedure]
-        with Rig(way, poll_rate=5.0).connect() as rig:
+        with Rig(connection, poll_rate=5.0).connect() as rig:
             news: list[tuple[Snapshot, float]] = []
             before = {key: rig.far.peek(key) for key in rig.far.settings}
-            future = rig.drive.tune(procedure, lambda *told, news=news: news.append(told))
+            future = rig.drive.tune(procedure, lambda *one, news=news: news.append(one))
             result = rig.result(future)
             assert result.success and f'{code} {text}' in said(result.how)
             written = rig.written(SCMD)
@@ -62,7 +66,7 @@ def test_each_procedure_is_done_and_what_it_changed_is_reported(way: str) -> Non
             assert {one.key: (one.old, one.new) for one in result.changes} == changed
             assert str(result.changes[0]) in said(result)
             # every stage, as the drive says
-            codes = list(dict.fromkeys(told.status.code for told, _ in news if told.status))
+            codes = list(dict.fromkeys(one.status.code for one, _ in news if one.status))
             assert codes[-1] == code and news[-1][0].text == text
             assert TUNING in codes or procedure is Procedure.CALCULATE
             times = [elapsed for _, elapsed in news]
@@ -145,9 +149,9 @@ def test_the_parameters_are_known_anew_and_not_changed_meanwhile() -> None:
         rig.result(rig.drive.parameters.change({'control.accel': 7.0}))
 
 
-@every_way
-def test_a_failure_is_said_in_the_words_of_the_drive(way: str) -> None:
-    with Rig(way, poll_rate=5.0).connect() as rig:
+@every_connection
+def test_a_failure_is_said_in_the_words_of_the_drive(connection: str) -> None:
+    with Rig(connection, poll_rate=5.0).connect() as rig:
         for code, text in ((16, '16 TunFailP'), (17, '17 TunFailM')):
             rig.far.control_unit.fail_tuning(code)
             result = rig.result(rig.drive.tune(Procedure.STATOR_RESISTANCE))
@@ -160,9 +164,9 @@ def test_a_failure_is_said_in_the_words_of_the_drive(way: str) -> None:
         assert rig.result(rig.drive.tune(Procedure.CALCULATE)).success
 
 
-@every_way
-def test_cancelling_stops_it(way: str) -> None:
-    with Rig(way).connect() as rig:
+@every_connection
+def test_cancelling_stops_it(connection: str) -> None:
+    with Rig(connection).connect() as rig:
         future = begin(rig)
         rig.answer(rig.drive.cancel_tuning())
         assert rig.far.control_unit.tuning is None
@@ -257,13 +261,13 @@ def test_refused() -> None:
 
 def test_refused_where_there_is_no_such_command() -> None:
     wrong = []
-    for way, settings, reason in (
+    for connection, settings, reason in (
         ('rtu', {'control_method': 'monitor'}, 'only reads'),
         ('rtu, control word', {}, 'does not mix control methods'),
         ('optimal', {}, 'is not known of this model'),
         ('movitrac', {}, 'is not known of this model'),
     ):
-        with Rig(way, **settings).connect() as rig:
+        with Rig(connection, **settings).connect() as rig:
             drive = rig.drive
             rig.asked.clear()
             for command in (
@@ -271,7 +275,7 @@ def test_refused_where_there_is_no_such_command() -> None:
             ):
                 answer = rig.answer(command)
                 if reason not in answer or any(data is not None for _, _, data in rig.asked):
-                    wrong.append((way, answer))
+                    wrong.append((connection, answer))
     assert not wrong
 
 
@@ -286,7 +290,7 @@ STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
 
 
 def tuned_until_stopped(moment: int) -> bool:
-    """Have a drive tune, and stop it at so many requests; tell whether it had begun by then."""
+    """Have a drive tune, and stop it at so many requests; return whether it had begun by then."""
     requests = itertools.count()
     stop = list(STOPS.values())[moment % len(STOPS)]
     stops: list[Future[Any]] = []

@@ -26,7 +26,7 @@ POLLS = 2
 TIMEOUT = 0.2
 
 G2, G2_WORD, OPTIMAL = 'rtu', 'rtu, control word', 'optimal'
-WAYS = (G2, G2_WORD, OPTIMAL, 'optimal, control word')
+CONNECTIONS = (G2, G2_WORD, OPTIMAL, 'optimal, control word')
 
 Act = Callable[[Rig], None]
 Tells = Callable[[Snapshot], bool]
@@ -102,20 +102,20 @@ EVENTS = {
         write('fieldbus.drive_control', 0xC076), 'or another master stopped it', 'close the input'
     ),
 }
-#: What only one way has.
+#: What only one connection has.
 ONLY = {'MODE = Bus by another master': G2, 'control word 0 by another master': G2_WORD}
 
 
 @contextlib.contextmanager
-def turning(way: str, **settings: float) -> Iterator[Rig]:
+def turning(connection: str, **settings: float) -> Iterator[Rig]:
     """A motor that turns steadily, on ramps that do not take it to its current limit."""
     ramps = {'control.accel': 0.4, 'control.retard': 0.4}
-    with Rig(way, parameters=ramps, options={'boot_time': 0.1}, **settings) as rig:
+    with Rig(connection, parameters=ramps, options={'boot_time': 0.1}, **settings) as rig:
         yield rig.turn(25.0)
 
 
 def polls_until(rig: Rig, act: Act, tells: Tells) -> int:
-    """Let something happen; return how many polls it took until a snapshot told it."""
+    """Let something happen; return how many polls it took until a snapshot reported it."""
     before = len(rig.notes.snapshots)
     act(rig)
     rig.wait_until(lambda: any(map(tells, rig.notes.snapshots[before:])), 5.0)
@@ -127,12 +127,12 @@ def warnings(rig: Rig) -> list[str]:
     return [one.text for one in rig.notes.events if one.severity is not Severity.INFO]
 
 
-@pytest.mark.parametrize('way', WAYS)
-def test_what_ends_a_run_is_shown_and_reported_once_with_a_remedy(way: str) -> None:
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_what_ends_a_run_is_shown_and_reported_once_with_a_remedy(connection: str) -> None:
     for name, event in EVENTS.items():
-        if ONLY.get(name, way) != way:
+        if ONLY.get(name, connection) != connection:
             continue
-        with turning(way) as rig:
+        with turning(connection) as rig:
 
             def shown(one: Snapshot, tells: Tells = event.tells) -> bool:
                 return tells(one) and not one.enabled
@@ -170,12 +170,12 @@ CONDITIONS = {
 }
 
 
-@pytest.mark.parametrize('way', WAYS)
-def test_what_stops_nothing_is_shown_and_reported_once(way: str) -> None:
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_what_stops_nothing_is_shown_and_reported_once(connection: str) -> None:
     for name, event in CONDITIONS.items():
-        if name != 'current limit' and not way.startswith(OPTIMAL):
+        if name != 'current limit' and not connection.startswith(OPTIMAL):
             continue
-        with turning(way) as rig:
+        with turning(connection) as rig:
             polls = polls_until(rig, event.act, event.tells)
             # the limit comes with the speed that the load takes
             assert polls <= POLLS + (name == 'current limit'), (name, polls)
@@ -191,9 +191,9 @@ def test_what_stops_nothing_is_shown_and_reported_once(way: str) -> None:
                 assert len(rig.notes.events) == 1
 
 
-@pytest.mark.parametrize('way', [G2, G2_WORD, OPTIMAL])
-def test_set_points_that_stop_coming_are_reported_and_the_next_is_followed(way: str) -> None:
-    with turning(way, setpoint_timeout=TIMEOUT) as rig:
+@pytest.mark.parametrize('connection', [G2, G2_WORD, OPTIMAL])
+def test_set_points_that_stop_coming_are_reported_and_the_next_is_followed(connection: str) -> None:
+    with turning(connection, setpoint_timeout=TIMEOUT) as rig:
         rig.send(None)
         last = rig.drive.setpoint._request[1]
         rig.wait_until(lambda: rig.notes.snapshots[-1].setpoint == 0.0, 5.0)

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One law over every way to command a drive: after a stop it is known why the motor stopped."""
+"""One law over every connection to a drive: after a stop it is known why the motor stopped."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from concurrent.futures import Future
 from typing import Any, NamedTuple
 
 import pytest
-from support.rig import WAYS, Rig
+from support.rig import CONNECTIONS, Rig
 from support.said import said
 
 from nfo_sinus_driver.drive import Cause, Drive, Procedure, Report, StopReason
@@ -19,20 +19,22 @@ from nfo_sinus_driver.drive.stop_reason import reason_of
 _SPEED = 20.0
 _BY = '/teach_pendant'
 #: Where the motor follows set-points; where the drive counts the frames of the driver itself.
-FOLLOWING = {name for name, way in WAYS.items() if way.reference == 'fieldbus'}
+FOLLOWING = {name for name, one in CONNECTIONS.items() if one.reference == 'fieldbus'}
 TIMED = {
-    name for name, way in WAYS.items()
-    if way.protocol not in ('telegram1', 'canopen')
-    and way.model not in ('sinus_optimal', 'acme')
+    name for name, connection in CONNECTIONS.items()
+    if connection.protocol not in ('telegram1', 'canopen')
+    and connection.model not in ('sinus_optimal', 'acme')
 }
 SERIAL_G2 = {
-    name for name, way in WAYS.items()
-    if way.protocol in ('modbus_rtu', 'modbus_ascii', 'classic') and way.model == 'sinus_g2'
+    name
+    for name, connection in CONNECTIONS.items()
+    if connection.protocol in ('modbus_rtu', 'modbus_ascii', 'classic')
+    and connection.model == 'sinus_g2'
 }
 #: Older firmware shows running until its set-point is 0, so that more is said of it after the stop.
 DISOBEDIENT = FOLLOWING - {'classic v5.0'}
 #: Where an input enables; else the PLC does, or the bit of the bus.
-WIRED = {name for name in WAYS if not name.startswith(('telegram1 sinus_h', 'movitrac'))}
+WIRED = {name for name in CONNECTIONS if not name.startswith(('telegram1 sinus_h', 'movitrac'))}
 
 
 def command(cause: Cause, give: Callable[[Drive, Report], Future[Any]]) -> Callable[[Rig], None]:
@@ -82,13 +84,13 @@ class Stop(NamedTuple):
     Something that stops the motor.
 
     :ivar reasons: what may be said of it: more than one where some drives do not tell them apart.
-    :ivar ways: on which it can happen.
+    :ivar connections: over which it can happen.
     :ivar seconds: after which it is known, and nothing more comes of it, s.
     """
 
     happen: Callable[[Rig], object]
     reasons: Collection[StopReason]
-    ways: Collection[str] = tuple(WAYS)
+    connections: Collection[str] = tuple(CONNECTIONS)
     seconds: float = 2.5
 
 
@@ -119,13 +121,15 @@ STOPS = {
     'sleeping driver': Stop(suspend, {_R.DRIVE_TIMEOUT}, TIMED, 5.0),
     'killed driver': Stop(restart_driver, {_R.NOT_ENABLED}, seconds=5.0),
 }
-_CASES = [(way, stop) for way in WAYS for stop, one in STOPS.items() if way in one.ways]
+_CASES = [
+    (name, stop) for name in CONNECTIONS for stop, one in STOPS.items() if name in one.connections
+]
 
 
-@pytest.mark.parametrize(('way', 'stop'), _CASES)
-def test_after_each_stop_it_is_known_why(way: str, stop: str) -> None:
+@pytest.mark.parametrize(('connection', 'stop'), _CASES)
+def test_after_each_stop_it_is_known_why(connection: str, stop: str) -> None:
     settings = {'drive_timeout': 2.0} if stop == 'sleeping driver' else {}
-    with Rig(way, setpoint_timeout=1.0, **settings) as rig:
+    with Rig(connection, setpoint_timeout=1.0, **settings) as rig:
         rig.turn()
         assert rig.drive.snapshot.stop_reason is StopReason.NONE
         STOPS[stop].happen(rig)

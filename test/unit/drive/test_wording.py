@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is told is a value where it is noticed, and has a sentence where it is shown."""
+"""What is reported is a value where it is noticed, and has a sentence where it is shown."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def texts(node: ast.AST) -> Iterator[str]:
             yield from texts(child)
 
 
-def told_by(call: ast.Call) -> ast.expr | None:
+def reported_by(call: ast.Call) -> ast.expr | None:
     """The cause that a call makes a report of."""
     place = {'Report': 0, 'report': 0, 'DriveError': 0, 'notify': 1}.get(name_of(call))
     if place is None or len(call.args) <= place or isinstance(call.args[place], ast.Call):
@@ -109,7 +109,7 @@ def test_every_sentence_is_given_what_it_needs() -> None:
     for _, tree in trees(REPORTING):
         named: set[Cause] = set()
         for call in ast.walk(tree):
-            what = told_by(call) if isinstance(call, ast.Call) else None
+            what = reported_by(call) if isinstance(call, ast.Call) else None
             if isinstance(call, ast.Call) and what is not None:
                 values = {str(keyword.arg) for keyword in call.keywords}
                 values |= {'status', 'enable_input'} if name_of(call) == 'report' else set()
@@ -173,8 +173,9 @@ def test_what_all_families_share_names_nothing_of_one() -> None:
     for path, (_, tree) in zip(SAYING, trees(SAYING), strict=True):
         for text in texts(tree):
             protocol = OF_PROTOCOL.get(path.name) or OF_PROTOCOL.get(text)
-            told = families() if protocol is None else families_on(protocol)
-            named += [(text, name) for name in told if ' ' in text and foreign_names(text, name)]
+            possible = families() if protocol is None else families_on(protocol)
+            if ' ' in text:
+                named += [(text, name) for name in possible if foreign_names(text, name)]
     assert named == []
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a drive is told that a file describes, step by step."""
+"""The requests to a drive that a file describes, step by step."""
 
 from __future__ import annotations
 
@@ -65,11 +65,11 @@ def test_who_has_control(tmp_path: Path) -> None:
     method = played(tmp_path)
     for word, holder in ((1 << 9, Holder.BUS), (0, Holder.LOCAL)):
         assert play(method.holder(), (Read(STATUS), word)) is holder
-    untold = {'status': {'register': 20, 'running': {'bit': 0}, 'fault': {'bit': 3}}}
-    assert play(played(tmp_path, **untold).holder()) is Holder.BUS
-    told = {'control': {'holder': {'parameter': 'source.command', 'bus': ['Bus']}}, **untold}
+    unknown = {'status': {'register': 20, 'running': {'bit': 0}, 'fault': {'bit': 3}}}
+    assert play(played(tmp_path, **unknown).holder()) is Holder.BUS
+    known = {'control': {'holder': {'parameter': 'source.command', 'bus': ['Bus']}}, **unknown}
     for value, holder in (('Bus', Holder.BUS), ('Keypad', Holder.LOCAL)):
-        method = played(tmp_path, **told)
+        method = played(tmp_path, **known)
         assert play(method.holder(), (Read('source.command'), value)) is holder
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a MOVITRAC 31 is told, step by step, and what it answers."""
+"""The requests to a MOVITRAC 31, step by step, and its answers."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the G2 is told, step by step, whatever it answers."""
+"""The requests to a G2, step by step, whatever it answers."""
 
 from __future__ import annotations
 
@@ -122,9 +122,9 @@ def test_a_refused_stop_is_reported_where_the_bus_may_have_control() -> None:
     first = Refusal('the first')
     refused, to_zero = (Write(SCMD, 0, retry=False), first), (zero(retry=False), None)
     for mode in (BUS, INHIBIT, REFUSED):
-        with pytest.raises(Refusal) as told:
+        with pytest.raises(Refusal) as raised:
             play(scmd().stop('Freque'), refused, (Read(MODE), mode), to_zero)
-        assert told.value is first
+        assert raised.value is first
 
 
 def test_quick_stop_gives_control_back() -> None:
@@ -363,7 +363,7 @@ def test_in_charge() -> None:
 
 def test_every_parameter_that_is_named_is_one() -> None:
     profile = G2.profile
-    assert profile.told_by in G2
+    assert profile.identified_by in G2
     assert profile.broadcast_stop == Write(MODE, STOP)
     assert {*profile.uncertain} <= {*G2}
     for target in profile.setpoints.values():

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the Optimal is told, step by step, where it differs from the G2."""
+"""The requests to an Optimal, step by step, where it differs from the G2."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ TWO = register(0x258, 2)
 
 class Unit:
     """
-    A link on a virtual line, and a unit that answers each function as it is told, in order.
+    A link on a virtual line, and a unit that answers each function as the test says, in order.
 
     :ivar late: by how much the answer to a function is late, in time-outs.
     """

@@ -69,10 +69,10 @@ class SharedBench(Bench):
         bus.arrive(bus.now, Frame(REQUESTS, request))
         if request[0] == 0x23:
             self._server.refuses[A.index, 0] = WRONG_LENGTH
-        told = self._server.answer(request)
+        reply = self._server.answer(request)
         self._server.refuses.clear()
-        if told is not None:
-            bus.answer(UNIT, told)
+        if reply is not None:
+            bus.answer(UNIT, reply)
 
 
 @pytest.mark.parametrize('before', [True, False], ids=['before', 'behind'])
@@ -81,9 +81,9 @@ class SharedBench(Bench):
 def test_what_is_read_is_the_answer_to_us(foreign: str, number: int, before: bool) -> None:
     bench = SharedBench(bytes.fromhex(FOREIGN[foreign]), number, before=before)
     for address in (A, TEXT, A, B):
-        told = bench.read(address).data
+        reply = bench.read(address).data
         asked = max(k for k, index in enumerate(bench.asked) if index == address.index)
-        assert told == bench.answer_of(asked)
+        assert reply == bench.answer_of(asked)
     assert bench.link.remarks.foreign_frames == 1
 
 

@@ -37,12 +37,12 @@ class Adapter:
     A port with an adapter behind it, and a clock that only waiting moves.
 
     :ivar says: what it answers to each command; nothing to those that are missing.
-    :ivar told: all that was written.
+    :ivar written: all that was written.
     """
 
     def __init__(self) -> None:
         self.says = {b'C\r': b'\r', b'S4\r': b'\r', b'O\r': b'\r'}
-        self.told: list[bytes] = []
+        self.written: list[bytes] = []
         self.coming = b''
         self.is_open = False
         self.now = 0.0
@@ -62,7 +62,7 @@ class Adapter:
     def write(self, data: bytes) -> None:
         if not self.is_open:
             raise PortError('closed')
-        self.told.append(data)
+        self.written.append(data)
         answer = self.says.get(data, b'')
         if self.slow and answer:
             # one after the other
@@ -89,12 +89,12 @@ def adapter() -> Adapter:
 def test_an_adapter_goes_onto_the_bus_and_off_it(adapter: Adapter) -> None:
     port = LawicelPort(adapter, 125_000, adapter.monotonic)
     port.open()
-    assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
+    assert adapter.written == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
     assert adapter.now == pytest.approx(0.1), 'it was heard out, and else nothing waited for'
     port.send(REQUEST)
-    assert adapter.told[4:] == [b't60584013200000000000\r']
+    assert adapter.written[4:] == [b't60584013200000000000\r']
     port.close()
-    assert adapter.told[5:] == [b'C\r'] and not adapter.is_open
+    assert adapter.written[5:] == [b'C\r'] and not adapter.is_open
     port.close()
 
 
@@ -111,10 +111,10 @@ def test_an_adapter_that_was_left_on_the_bus(adapter: Adapter) -> None:
 def test_late_answers_of_an_adapter_count_for_what_they_answer(adapter: Adapter) -> None:
     adapter.says |= {b'\r\r\r': b'\r\r\a', b'C\r': b'\a'}
     for adapter.slow in (0.04, 0.15):
-        adapter.told.clear()
+        adapter.written.clear()
         LawicelPort(adapter, 125_000, adapter.monotonic).open()
         # what it refused was not the bit rate
-        assert adapter.told[-4:] == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
+        assert adapter.written[-4:] == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
     adapter.slow = 0.04
     adapter.says[b'S4\r'] = b'\a'
     with pytest.raises(PortError, match='cannot do 125000 bit/s'):
@@ -130,14 +130,14 @@ def test_an_adapter_that_never_ceases_to_talk_is_used_all_the_same(
 
     monkeypatch.setattr(adapter, 'read', talk)
     LawicelPort(adapter, 125_000, adapter.monotonic).open()
-    assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
+    assert adapter.written == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
     assert adapter.now < 2.0
 
 
 def test_an_adapter_that_answers_no_command_is_used_all_the_same(adapter: Adapter) -> None:
     adapter.says.clear()
     LawicelPort(adapter, 125_000, adapter.monotonic).open()
-    assert adapter.told == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
+    assert adapter.written == [b'\r\r\r', b'C\r', b'S4\r', b'O\r']
     assert adapter.now == pytest.approx(0.3)
 
 

@@ -179,12 +179,12 @@ def test_late_answer_is_not_taken_for_that_to_the_same_question(late: float) -> 
         bench.read(A)
     for _ in range(50):
         try:
-            told = bench.read(A).data
+            reply = bench.read(A).data
         except (NoAnswer, DamagedAnswer, NotReady):
             bench.bus.now += 0.1 * TIMEOUT
             continue
         assert bench.asked[-1] == A.index
-        assert told == bench.answer_of(len(bench.asked) - 1)
+        assert reply == bench.answer_of(len(bench.asked) - 1)
         return
     raise AssertionError('never answered')
 
@@ -410,9 +410,9 @@ def test_every_answer_belongs_to_its_request(
                 assert begun[before][4] in ('answer', 'double')
                 assert bench.bus.servers[UNIT].objects[address.index, 0] == value
             else:
-                told = bench.read(address).data
+                reply = bench.read(address).data
                 assert begun[-1][1] == address.index
-                assert told == bench.answer_of(len(begun) - 1)
+                assert reply == bench.answer_of(len(begun) - 1)
         except Refused:
             refused = before if what.startswith('write') else len(begun) - 1
             assert begun[refused][1] == address.index

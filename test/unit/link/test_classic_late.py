@@ -31,12 +31,12 @@ def test_late_reply_is_not_taken_for_the_answer_to_the_same_question(late: float
         bench.read(A)
     for _ in range(50):
         try:
-            told = bench.read(A).data
+            reply = bench.read(A).data
         except (NoAnswer, DamagedAnswer, NotReady):
             bench.wire.now += 0.1 * TIMEOUT
             continue
         assert bench.asked[-1] == 0x1E
-        assert told == bench.answer_of(len(bench.asked) - 1)
+        assert reply == bench.answer_of(len(bench.asked) - 1)
         return
     raise AssertionError('never answered')
 
@@ -47,10 +47,10 @@ def test_late_reply_is_not_taken_for_the_answer_to_another_question(late: float)
     with pytest.raises(NoAnswer):
         bench.read(A)
     try:
-        told = bench.read(B).data
+        reply = bench.read(B).data
     except (NoAnswer, DamagedAnswer):
         return
-    assert told == bench.answer_of(1)
+    assert reply == bench.answer_of(1)
     # and what answered has cleared the line
     assert bench.read(A).data == bench.answer_of(2)
     assert bench.asked == [0x1E, 0xB6, 0x1E]
@@ -242,9 +242,9 @@ def test_every_answer_belongs_to_its_request(
                 assert len(requests) == before + 1
                 assert requests[before][3] in ('answer', 'double')
             else:
-                told = bench.read(address).data
+                reply = bench.read(address).data
                 assert requests[-1][1] == address.index
-                assert told == bench.answer_of(len(requests) - 1)
+                assert reply == bench.answer_of(len(requests) - 1)
         except Refused:
             refused = before if what.startswith('write') else len(requests) - 1
             assert requests[refused][1] == address.index

@@ -40,7 +40,7 @@ class PtyDrive:
     :ivar limits: the greatest value that it takes.
     :ivar serial_control: what is wrong with a request is a serial fault.
     :ivar answer: how it sends an answer; to be replaced.
-    :ivar asked: what it was asked, and what it was told.
+    :ivar asked: what was read, and what was written.
     """
 
     def __init__(self) -> None:
@@ -84,7 +84,7 @@ class PtyDrive:
         if unit not in (0, 1, 95):
             return
         if word is None:
-            answer = self._told(number)
+            answer = self._value(number)
         elif self._takes(number, word):
             self.values[number] = word
             answer = far.verdict(1, True)
@@ -96,7 +96,7 @@ class PtyDrive:
         if unit != 95:
             self.answer(answer)
 
-    def _told(self, number: int) -> bytes:
+    def _value(self, number: int) -> bytes:
         if number == far.SIO_ERR:
             word, self.flags = self.flags, 0
             self.values[far.INV_ST] = 24
@@ -229,14 +229,14 @@ def test_late_answer(drive: PtyDrive, hasty: ClassicLink, late: float) -> None:
         hasty.read(1, SPEED)
     drive.values[0x94] = 7
     deadline = time.monotonic() + PATIENT
-    told = b''
-    while not told:
+    reply = b''
+    while not reply:
         assert time.monotonic() < deadline
         try:
-            told = hasty.read(1, SPEED).data
+            reply = hasty.read(1, SPEED).data
         except LinkError as error:
             assert not isinstance(error, (PortError, Refused))
-    assert told == packed(7)
+    assert reply == packed(7)
 
 
 def test_answer_of_another(drive: PtyDrive, hasty: ClassicLink) -> None:

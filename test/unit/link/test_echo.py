@@ -181,7 +181,7 @@ def test_opening_again_forgets_the_echo() -> None:
 
 
 class SameWords(Slave):
-    """Says the same whatever it is asked, so that answers cannot be told apart."""
+    """Says the same whatever it is asked, so that answers cannot be distinguished."""
 
     @staticmethod
     def words(register: int, count: int, number: int) -> tuple[int, ...]:
@@ -217,8 +217,8 @@ def test_second_answer_is_not_taken_for_the_next_one(
     for address in (B, A, B):
         before = len(bench.asked)
         with contextlib.suppress(DamagedAnswer):
-            told = bench.read(address).data
-            assert told in answers(bench, address, before)
+            reply = bench.read(address).data
+            assert reply in answers(bench, address, before)
 
 
 def test_second_answer_is_said() -> None:
@@ -358,8 +358,8 @@ def test_every_answer_belongs_to_its_request(
             if what.startswith('write'):
                 bench.write(address, *(7,) * (address.size // 2))
             else:
-                told = bench.read(address).data
-                assert told in answers(bench, address, before)
+                reply = bench.read(address).data
+                assert reply in answers(bench, address, before)
         except Refused as refusal:
             numbers = numbers_of(bench, address, before)
             assert refusal.code in [bench.slave.code(number) for number in numbers]

@@ -64,12 +64,12 @@ class Bridge:
         self.node = canopen.LocalNode(UNIT, dictionary())
         self._heard: list[Frame] = []
         network = canopen.Network()
-        network.send_message = self._told  # type: ignore[method-assign]
+        network.send_message = self._receive  # type: ignore[method-assign]
         network.send_periodic = self._repeated  # type: ignore[method-assign]
         self._network = network
         network.add_node(self.node)
 
-    def _told(self, identifier: int, data: bytes, remote: bool = False) -> None:
+    def _receive(self, identifier: int, data: bytes, remote: bool = False) -> None:
         self._heard.append(Frame(identifier, bytes(data)))
 
     def _repeated(self, *_: object, **__: object) -> SimpleNamespace:

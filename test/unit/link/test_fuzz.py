@@ -78,7 +78,7 @@ def test_an_ack_behind_remains_is_found(monkeypatch: pytest.MonkeyPatch) -> None
 def test_what_a_can_bus_says_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lawicel, '_STAMP', 0)
     assert 'instead of' in _what('lawicel')
-    # a segment told twice is taken twice
+    # a repeated segment is taken twice
     monkeypatch.setattr(sdo, '_TOGGLE', 0)
     assert 'instead of' in _what('sdo')
 

@@ -114,10 +114,10 @@ def test_a_question_is_certain_when_each_of_its_replies_is() -> None:
     assert raised.value.until == pytest.approx(NOW + 0.1 + 3 * TIMEOUT)
 
 
-# --- told twice -----------------------------------------------------------------------------------
+# --- received twice -------------------------------------------------------------------------------
 
 
-def told(late: LateReplies[Ask, str], request: Ask, reply: bytes, now: float) -> None:
+def take(late: LateReplies[Ask, str], request: Ask, reply: bytes, now: float) -> None:
     """One transaction: a request goes out and is answered."""
     late.sent(request)
     late.note(request, reply, now, 0.0)
@@ -128,7 +128,7 @@ def told(late: LateReplies[Ask, str], request: Ask, reply: bytes, now: float) ->
     [
         (Ask('b'), b'1', 0.1, Doubt.LISTEN, Doubt.RESYNC),
         (Ask('a'), b'1', 0.1, Doubt.NONE, Doubt.ONCE_MORE),
-        # other bytes, or the same after a time-out, or those of another unit, were not told twice
+        # other bytes, or the same after a time-out, or those of another unit, are no repetition
         (Ask('b'), b'2', 0.1, Doubt.NONE, Doubt.NONE),
         (Ask('b'), b'1', 0.3, Doubt.NONE, Doubt.NONE),
         (Ask('b', 2), b'1', 0.1, Doubt.NONE, Doubt.NONE),
@@ -137,14 +137,14 @@ def told(late: LateReplies[Ask, str], request: Ask, reply: bytes, now: float) ->
 def test_doubt_about_the_same_bytes(
     second: Ask, reply: bytes, later: float, trusted: Doubt, untrusted: Doubt
 ) -> None:
-    for told_unasked, doubt in ((False, trusted), (True, untrusted)):
+    for unrequested, doubt in ((False, trusted), (True, untrusted)):
         late = make()
-        if told_unasked:
+        if unrequested:
             late.note_unrequested(NOW)
-        told(late, Ask('a'), b'1', NOW)
-        told(late, second, reply, NOW + later)
+        take(late, Ask('a'), b'1', NOW)
+        take(late, second, reply, NOW + later)
         assert late.doubt_about(second, NOW + later) is doubt
-        # what names what it is about is right, told once or twice
+        # what names what it is about is right, received once or twice
         assert late.doubt_about(second, NOW + later, names_it=True) in (Doubt.NONE, Doubt.ONCE_MORE)
 
 
@@ -153,8 +153,8 @@ def test_a_line_is_trusted_again_after_a_while() -> None:
     late.note_unrequested(NOW)
     over = NOW + SUSPECT_FOR
     for now, doubt in ((over - 1, Doubt.RESYNC), (over + 1, Doubt.LISTEN)):
-        told(late, Ask('a'), b'1', now)
-        told(late, Ask('b'), b'1', now + 0.1)
+        take(late, Ask('a'), b'1', now)
+        take(late, Ask('b'), b'1', now + 0.1)
         assert late.doubt_about(Ask('b'), now + 0.1) is doubt
     late.sent(Ask('c'))
     assert late.doubt_about(Ask('c'), NOW) is Doubt.NONE, 'that is about the one before'

@@ -58,7 +58,7 @@ class Plc:
     _left: int = 0
 
     def ask(self, request: Any) -> tuple[bytes, float]:
-        self.asked.append(told(request))
+        self.asked.append(fields_of(request))
         loss = self.loses.pop(0) if self.loses else None
         if loss and not loss[1]:
             raise loss[0]
@@ -93,7 +93,7 @@ class Plc:
             self.box[8:12] = self._seen, result, value >> 16, value & 0xFFFF
 
 
-def told(request: Any) -> tuple[Any, ...]:
+def fields_of(request: Any) -> tuple[Any, ...]:
     """Return a request as the tests name it: function, registers from +16 on, words."""
     at = request.register - START
     data = b'' if isinstance(request, Read) else request.data
@@ -274,7 +274,7 @@ def test_a_request_that_is_not_wanted_any_more_makes_room(plc: Plc, block: teleg
             block.write(ACCEL, b'\0\0\0\1')
     plc.takes = 1
     assert access(block, plc, TELEGRAM) == b'\0\5'
-    # its caller may come back yet: it is not told that this was done
+    # its caller may come back yet: it is not informed that this was done
     with pytest.raises(Unconfirmed):
         block.write(ACCEL, b'\0\0\0\1')
     # who wants it later wants another one

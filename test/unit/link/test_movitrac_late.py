@@ -29,12 +29,12 @@ def test_late_value_is_not_taken_for_the_answer_to_the_same_question(late: float
         bench.read(A)
     for _ in range(50):
         try:
-            told = bench.read(A).data
+            reply = bench.read(A).data
         except (NoAnswer, DamagedAnswer, NotReady):
             bench.wire.now += 0.1 * TIMEOUT
             continue
         assert bench.asked[-1] == A.index
-        assert told == bench.answer_of(len(bench.asked) - 1)
+        assert reply == bench.answer_of(len(bench.asked) - 1)
         return
     raise AssertionError('never answered')
 
@@ -280,9 +280,9 @@ def test_every_answer_belongs_to_its_request(
                 assert len(requests) == before + 1
                 assert requests[before][3] in ('answer', 'double')
             else:
-                told = bench.read(address).data
+                reply = bench.read(address).data
                 assert requests[-1][1] == address.index
-                assert told == bench.answer_of(len(requests) - 1)
+                assert reply == bench.answer_of(len(requests) - 1)
         except Refused:
             refused = before if what.startswith('write') else len(requests) - 1
             assert requests[refused][1] == address.index
@@ -325,9 +325,9 @@ def test_no_value_is_that_of_another_drive(
     for unit, address in steps:
         assert isinstance(address, type(A))
         try:
-            told = bench.read(address, unit).data
+            reply = bench.read(address, unit).data
         except (NoAnswer, DamagedAnswer, NotReady):
             bench.wire.now += 0.1 * TIMEOUT
             continue
         assert bench.drive.requests[-1][:2] == (unit, address.index)
-        assert told == bench.answer_of(len(bench.asked) - 1)
+        assert reply == bench.answer_of(len(bench.asked) - 1)

@@ -26,7 +26,7 @@ ABSENT = 5
 
 class Drive:
     """
-    A drive with address 1: it keeps what it is told.
+    A drive with address 1: it keeps what is written.
 
     :ivar values: its parameters.
     """

@@ -115,7 +115,7 @@ def test_a_refusal_that_may_be_an_earlier_one_is_asked_for_again() -> None:
 @hypothesis_settings(max_examples=300)
 @given(FATES, STEPS, st.sampled_from(sorted(UNITS)))
 @example(
-    # three answers told twice at once: the line has no gap for longer than a write waits
+    # three answers repeated at once: the line has no gap for longer than a write waits
     [Fate(3.0, 'double'), Fate(what='double'), Fate(what='double')],
     [('write A', 0.0), ('C', 0.0), ('write A', 0.0), ('write A', 0.0)],
     'G2',
@@ -131,9 +131,9 @@ def test_whatever_is_lost_late_doubled_or_damaged_the_line_is_used(
             if what.startswith('write'):
                 bench.write(address, *(7,) * (address.size // 2))
             else:
-                told = bench.read(address).data
+                reply = bench.read(address).data
                 assert bench.asked[-1] == address.index
-                assert told == bench.answer_of(len(bench.asked) - 1)
+                assert reply == bench.answer_of(len(bench.asked) - 1)
         except Refused as refusal:
             assert bench.asked[-1] == address.index
             assert refusal.code == bench.slave.code(len(bench.asked) - 1)
@@ -161,11 +161,11 @@ def test_no_request_waits_where_answers_are_only_lost_or_late(
     for name in names:
         before = bench.wire.now, len(bench.wire.sent)
         try:
-            told = bench.read(NAMES[name]).data
+            reply = bench.read(NAMES[name]).data
         except (NoAnswer, DamagedAnswer):
             pass
         else:
-            assert told == bench.answer_of(len(bench.asked) - 1)
+            assert reply == bench.answer_of(len(bench.asked) - 1)
         first = bench.wire.sent[before[1]][0]
         # a late answer may have to end first
         assert first - before[0] <= 2 * bench.wire.gap + 9 * SETTINGS.char_time
@@ -293,8 +293,8 @@ def test_a_write_and_read_whose_answer_would_be_in_doubt_is_a_write() -> None:
 
     def answer(frame: bytes, end: float) -> None:
         message = bytes((UNIT, 23, 2, 0, 5))
-        told = frame if frame[1] == 6 else message + opinion.crc(message)
-        bench.wire.arrive(end, told)
+        reply = frame if frame[1] == 6 else message + opinion.crc(message)
+        bench.wire.arrive(end, reply)
 
     bench.wire.far_end = answer
     before = bench.wire.now
@@ -375,7 +375,7 @@ def test_classic_no_request_waits_longer_than_a_time_out(
     bench = ClassicBench(*fates)
     for number in numbers:
         try:
-            told = bench.read(classic_id(number)).data
+            reply = bench.read(classic_id(number)).data
         except NotReady as refusal:
             assert bench.wire.now < refusal.until <= bench.wire.now + TIMEOUT + 1e-9
             bench.wire.now = refusal.until
@@ -383,4 +383,4 @@ def test_classic_no_request_waits_longer_than_a_time_out(
             pass
         else:
             index = len(bench.asked) - 1
-            assert told == packed(FarEnd.word(number, index))
+            assert reply == packed(FarEnd.word(number, index))

@@ -33,8 +33,8 @@ class Strict(Server):
         if len(value) == has:
             return super()._store(value)
         codes = {'longer': sdo.TOO_LONG, 'shorter': sdo.TOO_SHORT}
-        told = codes['longer' if len(value) > has else 'shorter']
-        return self._abort(WRONG_LENGTH if self.abort == WRONG_LENGTH else told)
+        code = codes['longer' if len(value) > has else 'shorter']
+        return self._abort(WRONG_LENGTH if self.abort == WRONG_LENGTH else code)
 
 
 def bench_with(objects: dict[tuple[int, int], bytes], server: type[Server] = Server) -> Bench:
@@ -59,10 +59,10 @@ def test_a_number_is_the_same_however_long_the_node_has_it(
     value = data.draw(numbers(min(size, length), signed=signed))
     raw = value.to_bytes(length, 'little', signed=signed)
     bench = bench_with({(MODE, 0): raw})
-    told = bench.read(number(MODE, size, signed=signed)).data
-    assert told == value.to_bytes(size, 'little', signed=signed)
+    data = bench.read(number(MODE, size, signed=signed)).data
+    assert data == value.to_bytes(size, 'little', signed=signed)
     # and it is written as long as it was read
-    bench.write(number(MODE, size, signed=signed), told)
+    bench.write(number(MODE, size, signed=signed), data)
     assert bench.bus.servers[UNIT].objects[MODE, 0] == raw
 
 

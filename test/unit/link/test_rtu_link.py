@@ -440,9 +440,9 @@ def test_every_answer_belongs_to_its_request(
             if is_write:
                 assert bench.write(address, *(7,) * (address.size // 2)).data == b''
             else:
-                told = bench.read(address).data
+                reply = bench.read(address).data
                 assert bench.asked[-1] == address.index
-                assert told == bench.answer_of(len(sent) - 1)
+                assert reply == bench.answer_of(len(sent) - 1)
         except Refused as refusal:
             assert bench.asked[-1] == address.index
             assert refusal.code == bench.slave.code(len(sent) - 1)

@@ -194,8 +194,8 @@ def test_what_is_about_another_object_changes_nothing(
 ) -> None:
     for transfer in (Upload(UNIT, index, sub_index), Download(UNIT, index, sub_index, b'\1')):
         request = transfer.request
-        told = kind(message)
-        if told is not None and told in transfer.kinds:
+        found = kind(message)
+        if found is not None and found in transfer.kinds:
             continue
         assert not transfer.take(message)
         assert transfer.request == request

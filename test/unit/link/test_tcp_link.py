@@ -183,10 +183,10 @@ def opened(gateway: Gateway, timeout: float) -> Iterator[TcpLink]:
 
 def read(link: TcpLink, address: Address, gateway: Gateway) -> None:
     """Read, and see that it is the answer to this very request."""
-    told = link.read(1, address).data
+    reply = link.read(1, address).data
     number, message = gateway.requests[-1]
     assert int.from_bytes(message[2:4], 'big') == address.index
-    assert words_of(told) == (address.index + number,) * (address.size // 2)
+    assert words_of(reply) == (address.index + number,) * (address.size // 2)
 
 
 def nothing(frame: Frame) -> bytes:

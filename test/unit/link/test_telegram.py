@@ -47,7 +47,7 @@ class Plc:
     :ivar refuses: functions that it refuses.
     """
 
-    told: list[int] = field(default_factory=lambda: [0x0207, 0x8000, 5, 3, 1])
+    reported: list[int] = field(default_factory=lambda: [0x0207, 0x8000, 5, 3, 1])
     now: float = 1000.0
     takes: float = 0.002
     loses: int = 0
@@ -65,7 +65,7 @@ class Plc:
             assert request.register == START + 8
             self.written.append((self.now, *struct.unpack('>3H', request.data)))
         self.now += self.takes
-        self.told[2] = (self.told[2] + (not self.still)) % 0x10000
+        self.reported[2] = (self.reported[2] + (not self.still)) % 0x10000
         if self.loses:
             self.loses -= 1
             raise NoAnswer('lost')
@@ -73,7 +73,7 @@ class Plc:
             return b'', self.now
         first = request.register if isinstance(request, Read) else request.source
         assert (first, request.count) == (START, 5)
-        return struct.pack('>5H', *self.told), self.now
+        return struct.pack('>5H', *self.reported), self.now
 
 
 @pytest.fixture
@@ -119,12 +119,12 @@ def test_a_status_from_before_a_word_is_dated_so(plc: Plc, block: telegram.Block
     run(block)
     written_at, plc.still = plc.now, True
     for moves in (0, 1, 2):
-        plc.told[2] += bool(moves)
+        plc.reported[2] += bool(moves)
         plc.now += 0.02
         assert (block.read(STATUS).arrived > written_at) == (moves == 2)
     # a set-point is no word
     block.write(SETPOINT, b'\x20\0')
-    plc.told[2] += 1
+    plc.reported[2] += 1
     plc.now += 0.02
     assert block.read(STATUS).arrived == plc.now
 
@@ -172,7 +172,7 @@ def test_data_are_as_old_as_the_count_of_the_plc(plc: Plc, block: telegram.Block
 
 def test_nothing_is_said_of_data_that_are_not_valid(plc: Plc, block: telegram.Block) -> None:
     run(block)
-    plc.told[3] = 2
+    plc.reported[3] = 2
     with pytest.raises(NoData, match='bit 0 of register 103 of unit 7 is 0'):
         block.read(STATUS)
     # a stop gets through all the same, and so does a set-point
@@ -182,7 +182,7 @@ def test_nothing_is_said_of_data_that_are_not_valid(plc: Plc, block: telegram.Bl
 
 
 def test_not_released_is_reported(plc: Plc, block: telegram.Block) -> None:
-    plc.told[3] = 1
+    plc.reported[3] = 1
     assert block.read(STATUS).data == command(0x0207, 1)
 
 
@@ -190,7 +190,7 @@ def test_not_released_is_reported(plc: Plc, block: telegram.Block) -> None:
 def test_nothing_is_written_to_another_layout(
     plc: Plc, block: telegram.Block, version: int
 ) -> None:
-    plc.told[4] = version
+    plc.reported[4] = version
     for action in (
         lambda: block.read(STATUS),
         lambda: block.write(BEGIN, command(READY)),

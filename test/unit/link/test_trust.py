@@ -40,7 +40,7 @@ def test_answer_sent_twice_is_not_taken_for_the_next(again: float) -> None:
     first = bench.read(A).data
     error = bench.expect(DamagedAnswer, lambda: bench.read(B))
     assert 'came twice' in str(error)
-    # from now on nothing is believed that could be told twice
+    # from now on nothing is believed that could be a repetition
     assert bench.read(B).data == bench.answer_of(len(bench.asked) - 1) != first
 
 

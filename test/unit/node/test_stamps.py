@@ -79,8 +79,8 @@ def test_no_stamp_is_before_the_last(ages: list[float], waits: list[int]) -> Non
     clocks.time = 100_000 * _MS
     clocks.waits = waits
     sequence = Sequence(clocks.stamps())
-    told = [sequence.next(clocks.time / 1e9 - age) for age in ages]
-    assert all(before <= after for before, after in itertools.pairwise(told))
+    stamps = [sequence.next(clocks.time / 1e9 - age) for age in ages]
+    assert all(before <= after for before, after in itertools.pairwise(stamps))
 
 
 def test_a_clock_that_is_set_back_takes_the_stamps_with_it() -> None:

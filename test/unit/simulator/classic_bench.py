@@ -36,7 +36,7 @@ def reply(id_, value, address=1):
 
 
 class ClassicBench:
-    """A drive that is spoken to in whole frames, and time that passes when told."""
+    """A drive that is spoken to in whole frames, and time that passes by command."""
 
     def __init__(self, dialect='2.03', **options):
         settings = {

@@ -20,7 +20,7 @@ from nfo_sinus_driver.simulator.modbus import server
 
 
 class Bench:
-    """A drive on the bench: commands by name, and time that passes when told."""
+    """A drive on the bench: commands by name, and time that passes by command."""
 
     def __init__(self, **options):
         self.drive = simulated_drive(**options)

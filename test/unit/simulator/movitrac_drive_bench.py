@@ -69,7 +69,7 @@ def bcd(value):
 
 
 class MovitracBench:
-    """A drive that is spoken to in whole frames, and time that passes when told."""
+    """A drive that is spoken to in whole frames, and time that passes by command."""
 
     def __init__(self, **options):
         self.address = options.pop('address', 0)

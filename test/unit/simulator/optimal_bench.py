@@ -41,7 +41,7 @@ STOPPING = 1 << 15
 
 
 class OptimalBench:
-    """One drive; time passes when told."""
+    """One drive; time passes by command."""
 
     def __init__(self, **options):
         self.drive = simulated_drive('sinus_optimal', **options)

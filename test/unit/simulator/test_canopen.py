@@ -333,7 +333,7 @@ def test_frames_of_others_keep_the_bus_busy():
 
 
 def there(bus, index, sub_index=0):
-    """Tell whether an object can be read."""
+    """Return whether an object can be read."""
     request = b'\x40' + index.to_bytes(2, 'little') + bytes((sub_index, 0, 0, 0, 0))
     return not bus.sdo(request.hex()).startswith('80')
 
@@ -442,7 +442,7 @@ WRITABLE = [
 
 
 def same(parameter, one, other):
-    """Tell whether two values are alike, to the coarser step of two protocols."""
+    """Return whether two values are alike, to the coarser step of two protocols."""
     if parameter.kind is not float:
         return one == other
     step = float(max(parameter.factor('modbus'), parameter.factor('canopen')))

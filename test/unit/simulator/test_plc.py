@@ -33,7 +33,7 @@ STARTS = {
 
 
 class Bench:
-    """A PLC with drives, asked by PDUs; time passes when told."""
+    """A PLC with drives, asked by PDUs; time passes by command."""
 
     def __init__(self, *models, settings=None, drive_settings=None, **options):
         self.drives = {

@@ -18,7 +18,7 @@ both = pytest.mark.parametrize('program', [RosTelegram1, StRosTelegram1])
 
 
 class Bench:
-    """A program in time that passes when it is told."""
+    """A program in time that passes by command."""
 
     def __init__(self, program, **inputs):
         self.now = 0.0

@@ -15,7 +15,7 @@ from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.simulator import Simulator
 
 HERE = Path(__file__).parent
-RAMP, WORD, TURN, SIZE, TOLD, CODE, HERTZ = 10, 100, 101, 102, 200, 201, 202
+RAMP, WORD, TURN, SIZE, STATUS, CODE, HERTZ = 10, 100, 101, 102, 200, 201, 202
 RESET, RUN, REMOTE = 1 << 3, 1 << 12, 1 << 15
 RUNNING, TRIPPED, HAS_REMOTE = 1 << 5, 1 << 9, 1 << 13
 
@@ -49,7 +49,7 @@ class Master:
 
 @pytest.fixture
 def simulator():
-    # not started: time passes when told
+    # not started: time passes by command
     simulator = Simulator(model='acme')
     yield simulator
     simulator.stop()
@@ -63,20 +63,20 @@ def master(simulator):
 def test_it_runs_reverses_and_stops(master):
     assert master.read(CODE) == 1
     master.run(0x00002550)
-    assert (master.read(TOLD), master.read(CODE)) == (HAS_REMOTE | RUNNING, 3)
+    assert (master.read(STATUS), master.read(CODE)) == (HAS_REMOTE | RUNNING, 3)
     assert master.read(HERTZ, 2) == 2550
     assert master.write(TURN, 1)
     master.drive.advance(5)
     assert master.read(HERTZ, 2) == -2550
     assert master.write(WORD, REMOTE)
     assert not master.drive.motor.driven
-    assert (master.read(TOLD), master.read(CODE)) == (HAS_REMOTE, 2)
+    assert (master.read(STATUS), master.read(CODE)) == (HAS_REMOTE, 2)
 
 
 def test_its_faults(simulator, master):
     master.run(0x00001000)
     simulator.inject('heat')
-    assert (master.read(CODE), master.read(TOLD)) == (70, HAS_REMOTE | TRIPPED)
+    assert (master.read(CODE), master.read(STATUS)) == (70, HAS_REMOTE | TRIPPED)
     assert master.write(WORD, REMOTE | RESET)
     assert (master.read(CODE), master.drive.motor.driven) == (2, False)
     simulator.inject('fault', 70, standing=True)

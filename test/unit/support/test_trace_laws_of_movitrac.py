@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The judge of traces sees what is wrong with what a MOVITRAC is told."""
+"""The judge of traces sees what is wrong with the commands to a MOVITRAC."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_a_good_run_has_nothing_to_complain_of() -> None:
         ([_RUN], 'a direction without set-point 0 before it'),
         ([_ZERO, _TWENTY, _RUN], 'a direction without set-point 0 before it'),
         ([_ZERO, _RUN, _TWENTY, _REVERSE], 'a direction without set-point 0 before it'),
-        # what another was told says nothing of this one
+        # what was written to another says nothing of this one
         (['a9 02 00df 00000000', _RUN], 'a direction without set-point 0 before it'),
         ([_ZERO, 'a9 01 0119 00000007'], 'both directions'),
         ([_ZERO, 'a9 01 0119 00000044'], 'a reset beside other bits'),

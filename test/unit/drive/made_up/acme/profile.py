@@ -24,7 +24,7 @@ from nfo_sinus_driver.catalog.profile import (
 )
 from nfo_sinus_driver.catalog.status import Fact, Role, State, StatusCode, StatusWord
 
-_WORD, _TURN, _SIZE, _TOLD = 'bus.word', 'bus.turn', 'bus.size', 'bus.told'
+_WORD, _TURN, _SIZE, _STATUS = 'bus.word', 'bus.turn', 'bus.size', 'bus.status'
 
 
 class Word(enum.IntFlag):
@@ -35,7 +35,7 @@ class Word(enum.IntFlag):
     REMOTE = 1 << 15
 
 
-class Told(enum.IntFlag):
+class StatusBit(enum.IntFlag):
     """The status word."""
 
     RUNNING = 1 << 5
@@ -74,11 +74,11 @@ class DriveControl(ControlMethod):
     references = ('fieldbus',)
 
     def in_control(self) -> Steps[bool]:
-        """Tell whether the bus has control."""
-        return bool(int((yield Read(_TOLD))) & Told.REMOTE)
+        """Return whether the bus has control."""
+        return bool(int((yield Read(_STATUS))) & StatusBit.REMOTE)
 
     def holder(self) -> Steps[Holder]:
-        """Tell who has control."""
+        """Return who has control."""
         return Holder.BUS if (yield from self.in_control()) else Holder.LOCAL
 
     def take_control(self) -> Steps[None]:
@@ -120,9 +120,9 @@ class DriveControl(ControlMethod):
 
 
 def _state(word: int) -> State:
-    if word & Told.TRIPPED:
+    if word & StatusBit.TRIPPED:
         return State.FAULTED
-    return State.OPERATION_ENABLED if word & Told.RUNNING else State.READY_TO_SWITCH_ON
+    return State.OPERATION_ENABLED if word & StatusBit.RUNNING else State.READY_TO_SWITCH_ON
 
 
 def _in_charge(status: Status | None) -> Steps[str]:
@@ -135,9 +135,9 @@ PROFILE = Profile(
     status_word=StatusWord(
         state=_state,
         by_bit={
-            Told.RUNNING: Fact.OPERATION_ENABLED,
-            Told.TRIPPED: Fact.FAULT,
-            Told.REMOTE: Fact.NETWORK_CONTROL,
+            StatusBit.RUNNING: Fact.OPERATION_ENABLED,
+            StatusBit.TRIPPED: Fact.FAULT,
+            StatusBit.REMOTE: Fact.NETWORK_CONTROL,
         },
         by_state={},
     ),
@@ -145,6 +145,6 @@ PROFILE = Profile(
     methods={'drive_control': DriveControl},
     setpoints={'Freque': _FREQUENCY},
     in_charge=_in_charge,
-    told_by='bus.kind',
+    identified_by='bus.kind',
     most={Role.ACTUAL_FREQUENCY: 480.0, Role.ACTUAL_SPEED: 24000.0},
 )

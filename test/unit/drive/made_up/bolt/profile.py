@@ -32,7 +32,7 @@ from nfo_sinus_driver.catalog.profile import (
 from nfo_sinus_driver.catalog.status import Fact, Role, State, StatusCode, StatusWord
 
 _BITS, _SIZE, _SOURCE, _INPUTS = 'bus.bits', 'bus.size', 'bus.source', 'bus.inputs'
-_TOLD = 'bus.told'
+_STATUS = 'bus.status'
 _HOLDERS: Mapping[Value, Holder] = {'terminals': Holder.LOCAL, 'line': Holder.BUS}
 
 
@@ -43,7 +43,7 @@ class Bit(enum.IntFlag):
     RESET = 1 << 3
 
 
-class Told(enum.IntFlag):
+class StatusBit(enum.IntFlag):
     """The low half of the status word; the code is in the high one."""
 
     RUNNING = 1 << 0
@@ -76,11 +76,11 @@ class FunctionBits(ControlMethod):
     control_retained = 'SOURCE is stored; set it to terminals at the keypad'
 
     def in_control(self) -> Steps[bool]:
-        """Tell whether the line has control."""
+        """Return whether the line has control."""
         return (yield from self.holder()) is Holder.BUS
 
     def holder(self) -> Steps[Holder]:
-        """Tell who has control."""
+        """Return who has control."""
         return _HOLDERS[(yield Read(_SOURCE))]
 
     def require_startable(self) -> Steps[None]:
@@ -128,9 +128,9 @@ class FunctionBits(ControlMethod):
 
 
 def _state(word: int) -> State:
-    if word & Told.TRIPPED:
+    if word & StatusBit.TRIPPED:
         return State.FAULTED
-    return State.OPERATION_ENABLED if word & Told.RUNNING else State.READY_TO_SWITCH_ON
+    return State.OPERATION_ENABLED if word & StatusBit.RUNNING else State.READY_TO_SWITCH_ON
 
 
 def _in_charge(status: Status | None) -> Steps[str]:
@@ -143,9 +143,9 @@ PROFILE = Profile(
     status_word=StatusWord(
         state=_state,
         by_bit={
-            Told.RUNNING: Fact.OPERATION_ENABLED,
-            Told.TRIPPED: Fact.FAULT,
-            Told.BACKWARDS: Fact.REVERSE,
+            StatusBit.RUNNING: Fact.OPERATION_ENABLED,
+            StatusBit.TRIPPED: Fact.FAULT,
+            StatusBit.BACKWARDS: Fact.REVERSE,
         },
         by_state={},
         code=lambda word: word >> 16,
@@ -157,6 +157,6 @@ PROFILE = Profile(
     methods={'function_bits': FunctionBits},
     setpoints={'Freque': _FREQUENCY},
     in_charge=_in_charge,
-    told_by=_TOLD,
+    identified_by=_STATUS,
     most={Role.ACTUAL_FREQUENCY: 120.0},
 )

@@ -23,7 +23,7 @@ class Word(enum.IntFlag):
     REMOTE = 1 << 15
 
 
-class Told(enum.IntFlag):
+class StatusBit(enum.IntFlag):
     """The status word."""
 
     RUNNING = 1 << 5
@@ -62,11 +62,11 @@ class AcmeControlUnit(ControlUnit):
             return int(self._word)
         if key == 'bus.code':
             return self.status_code
-        if key != 'bus.told':
+        if key != 'bus.status':
             return None
-        remote = Told.REMOTE if self._word & Word.REMOTE else Told(0)
-        running = Told.RUNNING if self.motor.driven else Told(0)
-        return int(remote | running | (Told.TRIPPED if self.faults else Told(0)))
+        remote = StatusBit.REMOTE if self._word & Word.REMOTE else StatusBit(0)
+        running = StatusBit.RUNNING if self.motor.driven else StatusBit(0)
+        return int(remote | running | (StatusBit.TRIPPED if self.faults else StatusBit(0)))
 
     @property
     def status_code(self) -> int:

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The ways into a drive: which protocol, dialect and model a test is run over."""
+"""The connections to a drive: which protocol, dialect and model a test is run over."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import pytest
 from support.drives import DRIVES, Drives
 
-#: What only some of the ways have, and why the others go without; see :func:`needs`.
+#: What only some of the connections have, and why the others go without; see :func:`needs`.
 WITHOUT = {
     'rtu': 'it reads frames of Modbus RTU to a G2 by hand',
     'eight': 'it is about the 8 data bits of Modbus RTU',
@@ -44,7 +44,7 @@ WITHOUT = {
     'keypad': 'no manual tells how STW1 has control again after STOP at the keypad of this drive',
     'reverse': 'this model turns one way by its telegram',
     'run_input': 'no manual tells whether its terminal counts beside the enable of the bus',
-    'local': 'the module holds the drive in bus mode, so it is told to stop as soon as it is found',
+    'local': 'the module holds the drive in bus mode, so that it is stopped as soon as it is found',
 }
 
 #: How unit and PDU are got out of a frame of Modbus.
@@ -61,17 +61,17 @@ _SILENCE_OF_NODES = 'no response', 'power', 'the node id', 'the bit rate', 'CAN_
 
 
 @dataclass(frozen=True)
-class Way:
+class Connection:
     """
-    One way in.
+    One connection.
 
     :ivar baud_rate: bit/s, of both ends.
     :ivar dialect: the manual that describes the Classic protocol; of the simulator.
     :ivar features: those of :data:`WITHOUT` that it has.
-    :ivar method: the control method that the driver is told, where it is not the usual one.
+    :ivar method: the control method that the driver is given, where it is not the usual one.
     :ivar block: the first register of the block, behind a PLC.
     :ivar beyond: the settings of the drive that it does not reach.
-    :ivar untold: what a running drive does not tell of itself, by the fields of `DriveStatus`.
+    :ivar unreported: what a running drive does not tell of itself, by the fields of `DriveStatus`.
     :ivar unmeasured: the same of `Telemetry`.
     """
 
@@ -84,7 +84,7 @@ class Way:
     method: str = ''
     block: int = 0
     beyond: frozenset[str] = frozenset()
-    untold: frozenset[str] = frozenset()
+    unreported: frozenset[str] = frozenset()
     unmeasured: frozenset[str] = frozenset()
 
     @property
@@ -186,29 +186,29 @@ _NOT_OF_THE_MOVITRAC = frozenset((
     'pt1000_temperature', 'operating_time', 'running_time', 'brake_time', 'energy', 'total_energy',
 ))
 
-WAYS = {
-    way.name: way
-    for way in (
-        Way(
+CONNECTIONS = {
+    connection.name: connection
+    for connection in (
+        Connection(
             'modbus_rtu', 'modbus_rtu', _G2 | _MODBUS | _RTU | {'own', 'rtu'},
             beyond=_NOT_ON_MODBUS,
         ),
-        Way('modbus_ascii', 'modbus_ascii', _G2 | _MODBUS | _ASCII, beyond=_NOT_ON_MODBUS),
-        Way('modbus_tcp', 'modbus_tcp', _G2 | _MODBUS | {'gateway'}, beyond=_NOT_ON_MODBUS),
-        Way('classic_v2', 'classic', _G2 | _CLASSIC, dialect='2.03'),
-        Way(
+        Connection('modbus_ascii', 'modbus_ascii', _G2 | _MODBUS | _ASCII, beyond=_NOT_ON_MODBUS),
+        Connection('modbus_tcp', 'modbus_tcp', _G2 | _MODBUS | {'gateway'}, beyond=_NOT_ON_MODBUS),
+        Connection('classic_v2', 'classic', _G2 | _CLASSIC, dialect='2.03'),
+        Connection(
             'classic_v5', 'classic', _OLD_G2 | _CLASSIC | {'at_once'},
             dialect='5.0', baud_rate=9600, beyond=NEWER,
-            untold=_NO_STATUS_WORD, unmeasured=frozenset(('energy', 'total_energy')),
+            unreported=_NO_STATUS_WORD, unmeasured=frozenset(('energy', 'total_energy')),
         ),
         *(
-            Way(
+            Connection(
                 f'optimal_{kind}', f'modbus_{kind}', _OPTIMAL | features, 'sinus_optimal',
-                untold=frozenset(('network_reference',)), unmeasured=_NOT_OF_THE_OPTIMAL,
+                unreported=frozenset(('network_reference',)), unmeasured=_NOT_OF_THE_OPTIMAL,
             )
             for kind, features in (('rtu', _RTU), ('ascii', _ASCII))
         ),
-        Way(
+        Connection(
             'movitrac', 'movitrac',
             frozenset(
                 (
@@ -216,14 +216,15 @@ WAYS = {
                     'serial', 'states', 'timeout', 'watched',
                 )
             ),
-            'movitrac31', baud_rate=9600, untold=_NOT_IN_INDEX_284, unmeasured=_NOT_OF_THE_MOVITRAC,
+            'movitrac31', baud_rate=9600, unreported=_NOT_IN_INDEX_284,
+            unmeasured=_NOT_OF_THE_MOVITRAC,
         ),
-        Way(
+        Connection(
             'canopen', 'canopen', _ON_CANOPEN,
             baud_rate=125_000, beyond=_NOT_ON_MODBUS,
         ),
         *(
-            Way(
+            Connection(
                 f'telegram1_{name}', 'modbus_tcp', features, model, method='telegram1', block=7,
             )
             for name, model, features in (
@@ -235,21 +236,21 @@ WAYS = {
     )
 }
 #: Through a PLC, which tells less than any line of the drives themselves, by their models.
-TELEGRAM1 = {way.model: way for way in WAYS.values() if way.method == 'telegram1'}
+TELEGRAM1 = {one.model: one for one in CONNECTIONS.values() if one.method == 'telegram1'}
 #: Those of a normal run: the others behind a PLC have their share in test_telegram1_ros.py.
-USUAL = tuple(name for name in WAYS if name not in ('telegram1_optimal', 'telegram1_g2'))
+USUAL = tuple(name for name in CONNECTIONS if name not in ('telegram1_optimal', 'telegram1_g2'))
 DEFAULT = 'modbus_rtu'
 #: One of each family of protocols and drives, where the others are the same to a test.
 EACH_KIND = ('modbus_rtu', 'classic_v5', 'optimal_ascii', 'movitrac')
 
 
 def needs(*features: str) -> pytest.MarkDecorator:
-    """Mark a test, or a module, that makes sense only over ways with all of these features."""
+    """Mark a test, or a module, that makes sense only over connections with these features."""
     assert WITHOUT.keys() >= set(features), features
     return pytest.mark.needs(*features)
 
 
-def why_not(way: Way, features: tuple[str, ...]) -> str:
-    """Return why a test with a mark is not run over a way; ``''``: it is."""
-    missing = [feature for feature in features if feature not in way.features]
-    return f'not over {way.name}: {WITHOUT[missing[0]]}' if missing else ''
+def reason_to_skip(connection: Connection, features: tuple[str, ...]) -> str:
+    """Return why a test with a mark is not run over a connection; ``''``: it is."""
+    missing = [feature for feature in features if feature not in connection.features]
+    return f'not over {connection.name}: {WITHOUT[missing[0]]}' if missing else ''

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Over every way into a drive: the same node, one whole run, and the same motor at the end.
+Over every connection to a drive: the same node, one whole run, and the same motor at the end.
 
-The laws over every way are in test/unit/drive/test_laws.py, in virtual time.
+The laws over every connection are in test/unit/drive/test_laws.py, in virtual time.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from collections.abc import Iterator
 import signal
 
 from bench import A_WHILE, PATIENCE, Bench, Client, wait_until
+from connections import Connection, needs
 from lifecycle_msgs.msg import Transition
 from nfo_sinus_msgs.msg import DriveStatus
 from parameter_bench import refused, set_one
 import pytest
 from setting_names import SETTINGS
-from ways import Way, needs
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
-pytestmark = pytest.mark.every_way
+pytestmark = pytest.mark.every_connection
 
 #: So slow that a motor which is let go stands soon, Hz.
 _SPEED = 8.0
@@ -44,7 +44,7 @@ class Rig:
     """One drive and its driver for the tests that leave both as they were."""
 
     def __init__(self, bench: Bench) -> None:
-        self.way = bench.way
+        self.connection = bench.connection
         self.drives = bench.drives
         self.drive = _simulator(bench)
         self.driver = bench.driver(*_MODEST)
@@ -60,8 +60,8 @@ class Rig:
 
 
 @pytest.fixture(scope='module')
-def the_rig(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Rig]:
-    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), way) as bench:
+def the_rig(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> Iterator[Rig]:
+    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), connection) as bench:
         yield Rig(bench)
 
 
@@ -90,9 +90,9 @@ def _stays_still(drive: Simulated) -> None:
 
 
 @needs('parameters')
-def test_every_parameter_that_there_is_over_this_way_is_there(rig: Rig) -> None:
+def test_every_parameter_that_there_is_over_this_connection_is_there(rig: Rig) -> None:
     has = rig.client.parameter_names() & _NAMES
-    assert _NAMES - has == rig.way.beyond
+    assert _NAMES - has == rig.connection.beyond
     parameters = rig.drive.state()['parameters']
     for name in ('control.accel', 'freque.f_fix1', 'control.st_mode', 'motor.u_nom'):
         assert rig.client.parameter(name) == parameters[name]
@@ -139,7 +139,7 @@ def test_it_turns_either_way_and_stops(rig: Rig, frequency: float) -> None:
             client.wait_for(
                 'status', lambda status: status.reverse == (frequency < 0), 'the direction'
             )
-        if 'direct' in rig.way.features:
+        if 'direct' in rig.connection.features:
             wait_until(
                 lambda: client.newest('inv_st').text == rig.drive.state()['inv_st_text'],
                 'the text on the display',

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The errands through ROS, over a way of each kind; what a drive has not, the answer says."""
+"""The procedures through ROS, over a connection of each kind; the answer says what is lacking."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from collections.abc import Iterator
 
 from action_msgs.msg import GoalStatus
 from bench import PATIENCE, Bench, Client, seconds, wait_until
+from connections import Connection
 from nfo_sinus_msgs.action import Tune
 from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.srv import GetErrorLog
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from tuner import Tuner
-from ways import Way
 
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
-#: test/unit/drive has the same over every way.
+#: test/unit/drive has the same over every connection.
 pytestmark = pytest.mark.each_kind
 
 _KEPT = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -32,11 +32,11 @@ class Rig:
     """One drive and its driver, which polls so seldom that polls miss stages."""
 
     def __init__(self, bench: Bench) -> None:
-        self.way = bench.way
+        self.connection = bench.connection
         self.drives = bench.drives
         # an enable has left P841 so; with another one a MOVITRAC ignores the reset bit [C110]
         movitrac = ('--set', 'serial.control_mode=Remote control')
-        options = movitrac if bench.way.model == 'movitrac31' else ()
+        options = movitrac if bench.connection.model == 'movitrac31' else ()
         self.drive: Simulated = bench.simulator('--boot-time', '0.5', *options, paced=False)
         bench.driver('-p', 'poll_rate:=2.0')
         self.client: Client = bench.client().connected()
@@ -44,21 +44,21 @@ class Rig:
 
     @property
     def logs(self) -> bool:
-        return self.way.model != 'sinus_optimal'
+        return self.connection.model != 'sinus_optimal'
 
     @property
     def log_has_times(self) -> bool:
         """New entries are published only where the log says when they came."""
-        return self.way.model == 'sinus_g2'
+        return self.connection.model == 'sinus_g2'
 
     @property
     def tunes(self) -> bool:
-        return self.way.model == 'sinus_g2'
+        return self.connection.model == 'sinus_g2'
 
 
 @pytest.fixture(scope='module')
-def rig(tmp_path_factory: pytest.TempPathFactory, way: Way) -> Iterator[Rig]:
-    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), way) as bench:
+def rig(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> Iterator[Rig]:
+    with own_domain() as domain, Bench(domain, tmp_path_factory.mktemp('rig'), connection) as bench:
         yield Rig(bench)
 
 
@@ -86,7 +86,7 @@ def test_a_fault_is_logged_published_and_acknowledged(rig: Rig) -> None:
 
 def test_the_energy_is_reset_or_the_answer_says_why_not(rig: Rig) -> None:
     answer = rig.client.call('reset_energy')
-    if rig.way.name == 'classic_v5':
+    if rig.connection.name == 'classic_v5':
         assert not answer.success and 'firmware 4.38' in answer.message
     elif rig.tunes:
         assert answer.success and answer.message.endswith('-> 0.000 kWh'), answer.message

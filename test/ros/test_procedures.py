@@ -9,6 +9,7 @@ import signal
 
 from action_msgs.msg import GoalStatus
 from bench import PATIENCE, Bench, Client, seconds, wait_until
+from connections import needs
 from nfo_sinus_msgs.action import Tune
 from nfo_sinus_msgs.msg import ErrorLogEntry
 from nfo_sinus_msgs.srv import GetErrorLog
@@ -16,9 +17,8 @@ import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 from tuner import Tuner
-from ways import needs
 
-#: The other ways in have their tests beside those of the drive, without ROS.
+#: The other connections have their tests beside those of the drive, without ROS.
 pytestmark = needs('parameters', 'fine')
 
 _TUNING = 28
@@ -26,7 +26,7 @@ _TUNING = 28
 
 def _standing(bench: Bench) -> int:
     """Return what a drive shows that stands and was left: Stop, or Bus Stby where it is held."""
-    return 24 if 'local' in bench.way.features else 37
+    return 24 if 'local' in bench.connection.features else 37
 
 
 def start(bench: Bench, *arguments: str) -> tuple:
@@ -85,13 +85,13 @@ def test_a_new_entry_is_published_with_the_fault(bench: Bench) -> None:
     assert not simulator.state()['driven']
     client.wait_for('status', lambda status: status.fault, 'the fault stands')
     assert simulator.state()['ack_reads'] == 0
-    wait_until(lambda: _last_error(client).startswith('5 Overload at'), 'told there')
+    wait_until(lambda: _last_error(client).startswith('5 Overload at'), 'reported there')
     # both are of the tick of the first reading, and may be from before it was switched on
     log = client.call('get_error_log', GetErrorLog)
     assert [one.code for one in log.entries] == [5, 3]
     assert [seconds(one.stamp) for one in log.entries] == [0, 0]
     assert '2 of them without the wall time' in log.message
-    # who comes late is told too
+    # who comes late gets it too
     late = bench.client()
     late.listen('entry', ErrorLogEntry, '/nfo_sinus/error_log_entry', kept)
     late.wait_for('entry', lambda one: one == entry, 'the entry')
