@@ -14,6 +14,7 @@ import math
 import threading
 import time
 import traceback
+from typing import TypeVar
 
 _log = logging.getLogger(__name__)
 
@@ -21,6 +22,10 @@ _log = logging.getLogger(__name__)
 _SAME_AGAIN = 60.0
 #: With more waiting messages than this the oldest are too old to be of use, and are dropped.
 _MOST_WAITING = 1000
+#: The same for the values of one stream; its topic keeps no more.
+_MOST_OF_A_STREAM = 10
+
+_T = TypeVar('_T')
 
 
 class PublishQueue:
@@ -54,6 +59,32 @@ class PublishQueue:
         self._waiting.append(function)
         self._something.set()
 
+    def stream(self, publish: Callable[[_T], None]) -> Callable[[_T], None]:
+        """
+        Return what has values published soon, from any thread, in the order in which they come.
+
+        Where they come faster than they are published the oldest are dropped: what is published
+        then is less, but never old.
+        """
+        waiting: deque[_T] = deque(maxlen=_MOST_OF_A_STREAM)
+        queued = False
+
+        def put(value: _T) -> None:
+            nonlocal queued
+            waiting.append(value)
+            if not queued:
+                queued = True
+                self.put(publish_waiting)
+
+        def publish_waiting() -> None:
+            nonlocal queued
+            queued = False
+            # those that come meanwhile have their turn after what else waits
+            for _ in range(len(waiting)):
+                self._run(lambda: publish(waiting.popleft()))
+
+        return put
+
     def put_first(self, function: Callable[[], None]) -> None:
         """Run a function before all that wait, however many; from any thread."""
         self._urgent.append(function)
@@ -74,12 +105,17 @@ class PublishQueue:
         while True:
             self._something.wait(self._time_to_spare())
             self._something.clear()
-            while queue := self._urgent or self._waiting:
-                self._run(queue.popleft())
+            while (function := self._next()) is not None:
+                self._run(function)
             if self._closing:
                 return
-            if (function := self._schedule.take_due(time.monotonic())) is not None:
-                self._run(function)
+
+    def _next(self) -> Callable[[], None] | None:
+        if self._urgent:
+            return self._urgent.popleft()
+        # what is due by the clock is little, and must not wait for the end of what is too much
+        due = self._schedule.take_due(time.monotonic())
+        return self._waiting.popleft() if due is None and self._waiting else due
 
     def _run(self, function: Callable[[], None]) -> None:
         try:

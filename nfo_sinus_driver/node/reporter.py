@@ -85,13 +85,14 @@ class Reporter:
         self._joint_states = create(JointState, '~/joint_states', RELIABLE)
         self._telemetry = create(TelemetryMessage, '~/telemetry', RELIABLE)
         self._measured = create(Measured, '~/measured', RELIABLE)
+        self._snapshots = queue.stream(self._publish_snapshot)
         queue.put_every(_PERIOD, self._report_regularly)
 
     # --- called by the bus --------------------------------------------------------------------
 
     def on_snapshot(self, snapshot: Snapshot) -> None:
         """Publish a poll."""
-        self._queue.put(lambda: self._publish_snapshot(snapshot))
+        self._snapshots(snapshot)
 
     def on_telemetry(self, telemetry: Telemetry) -> None:
         """Publish measured values."""

@@ -178,3 +178,49 @@ def test_what_is_urgent_goes_first_and_is_never_dropped() -> None:
     held.set()
     queue.close(PATIENCE)
     assert done[0] == 'stop' and done.count('stop') == 1
+
+
+def test_a_stream_that_comes_faster_than_it_is_published_is_published_from_its_newest() -> None:
+    done: list[int] = []
+    queue = PublishQueue()
+    stream = queue.stream(done.append)
+    for number in range(500):
+        stream(number)
+    # what comes once is not dropped for it
+    queue.put(lambda: done.append(-1))
+    queue.start()
+    queue.close(PATIENCE)
+    assert done == [*range(500 - 10, 500), -1]
+
+
+def test_a_stream_that_never_ends_keeps_nothing_else_waiting(queue: PublishQueue) -> None:
+    put, due = threading.Event(), threading.Semaphore(0)
+    ended = False
+
+    def publish(number: int) -> None:
+        # the next ones are there before this one has been published
+        if not ended:
+            stream(number + 1)
+            stream(number + 2)
+
+    stream = queue.stream(publish)
+    stream(0)
+    queue.put(put.set)
+    queue.put_every(0.02, due.release)
+    try:
+        assert put.wait(PATIENCE)
+        for _ in range(3):
+            assert due.acquire(timeout=PATIENCE)
+    finally:
+        ended = True
+
+
+def test_a_value_that_cannot_be_published_loses_no_other(caplog: pytest.LogCaptureFixture) -> None:
+    done: list[float] = []
+    queue = PublishQueue()
+    stream = queue.stream(lambda number: done.append(1 / number))
+    for number in (1, 0, 2):
+        stream(number)
+    queue.start()
+    queue.close(PATIENCE)
+    assert done == [1, 0.5] and len(caplog.records) == 1
