@@ -174,5 +174,5 @@ def ros2_parent(pid: int) -> OtherProcess | None:
         is_ros2 = any(os.path.basename(word) == b'ros2' for word in words[:2])
         return OtherProcess(pid) if is_ros2 else None
     except OSError:
-        # it has ended already, or this system does not tell
+        # it has ended already, or this system does not say
         return None

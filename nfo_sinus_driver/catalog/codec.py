@@ -55,7 +55,7 @@ class Codec(abc.ABC, Generic[Raw]):
 
     @abc.abstractmethod
     def fits(self, raw: Raw) -> bool:
-        """Tell whether a value has bytes."""
+        """Return whether a value has bytes."""
 
     @abc.abstractmethod
     def _unpack(self, data: bytes) -> Raw: ...
@@ -78,7 +78,7 @@ class Number(Codec[int]):
         self.maximum = maximum
 
     def fits(self, raw: int) -> bool:
-        """Tell whether it is within the ends."""
+        """Return whether it is within the ends."""
         return self.minimum <= raw <= self.maximum
 
     @property
@@ -151,7 +151,7 @@ class SignedBcd(Number):
         super().__init__(name, bits // 8, -most, most)
 
     def fits(self, raw: int) -> bool:
-        """Tell whether it is within the ends, and not negative."""
+        """Return whether it is within the ends, and not negative."""
         return 0 <= raw <= self.maximum
 
     def _unpack(self, data: bytes) -> int:
@@ -168,7 +168,7 @@ class Text(Codec[str]):
     """ASCII characters, filled up with zeros; blanks at the end do not count."""
 
     def fits(self, raw: str) -> bool:
-        """Tell whether it is short enough, and comes back as it was."""
+        """Return whether it is short enough, and comes back as it was."""
         kept = raw.rstrip(' \0') == raw and '\0' not in raw
         return raw.isascii() and kept and len(raw) <= self.size
 

@@ -60,7 +60,7 @@ class ErrorLogArea:
 
     @property
     def timed(self) -> bool:
-        """It tells when an error happened."""
+        """It reports when an error happened."""
         return self.above is None
 
     def code(self, entry: int) -> int:

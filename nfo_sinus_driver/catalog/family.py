@@ -121,7 +121,7 @@ class Family(Mapping[str, Parameter]):
 
     @property
     def key_of_status(self) -> str:
-        """The parameter that every drive of it has: the status code, or the word that tells it."""
+        """The parameter that every drive of it has: the status code, or the word that has it."""
         return self.key(Role.STATUS_CODE) or self.key(Role.STATUS_WORD)
 
     @functools.cached_property
@@ -156,7 +156,7 @@ class Family(Mapping[str, Parameter]):
         return self.group_of(Role.BUS_ADDRESS) | of_line
 
     def can_be(self, key: str, value: Value) -> bool:
-        """Tell whether a drive can have a value, as far as the manual says: else it was spoiled."""
+        """Return whether a drive can have a value, by its manual: else the value was spoiled."""
         parameter, role = self[key], self.role_of.get(key)
         if role is Role.STATUS_CODE:
             return value in self.status_codes
@@ -190,12 +190,12 @@ def families() -> tuple[str, ...]:
 
 
 def is_family(name: str) -> bool:
-    """Tell whether a name is that of a folder, or the path of a file that describes a drive."""
+    """Return whether a name is that of a folder, or the path of a file that describes a drive."""
     return is_described(name) or name in folders()
 
 
 def is_described(name: str) -> bool:
-    """Tell whether a family is one that a file describes: its name is the path of the file."""
+    """Return whether a family is one that a file describes: its name is the path of the file."""
     return name.endswith(DESCRIBED)
 
 
@@ -205,7 +205,7 @@ def usual_family() -> str:
 
 
 def _has_profile(name: str, method: str) -> bool:
-    """Tell whether a control method has a profile of its own."""
+    """Return whether a control method has a profile of its own."""
     folder = folders().get(name)
     return bool(method) and folder is not None and (folder / method / 'profile.py').exists()
 
@@ -299,7 +299,7 @@ def _speaking(family: Family, words: str, method: str) -> Family:
 
 @functools.cache
 def _in_speed_mode(family: Family, nominal_speed: float) -> Family:
-    """Return a family whose drives tell and take speeds where others do frequencies."""
+    """Return a family whose drives report and take speeds where others do frequencies."""
     profile = family.profile
     mode = profile.speed_mode
     assert mode is not None

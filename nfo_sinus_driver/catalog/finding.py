@@ -4,7 +4,7 @@
 """
 Where families are found: those that are shipped, and those of other packages and workspaces.
 
-A package tells of its families by a resource of the ament index, of the type
+A package declares its families by a resource of the ament index, of the type
 ``nfo_sinus_driver.families``: a line for each file, as its path below the package's share folder;
 or, for those that need code, by an entry point of that group, a Python package whose folder is a
 family.
@@ -39,7 +39,7 @@ class Found:
 
     :ivar name: by which it is chosen.
     :ivar model: what :func:`~nfo_sinus_driver.catalog.load_family` is given.
-    :ivar place: where it stands; :ivar of: who tells of it.
+    :ivar place: where it stands; :ivar of: who declares it.
     """
 
     name: str

@@ -42,7 +42,7 @@ class InverterStatus:
         says that the bus does.
     :ivar by_mode_at: when it said so, likewise.
     :ivar frequency: Hz, where it is read with the status word; NaN elsewhere, and where the drive
-        refuses to tell it.
+        refuses to report it.
     :ivar crest: from which size of it on it may be falling, and when that was last seen.
     :ivar fell: when the last fall by more than a wobble began, and when it was seen; minus infinity
         if there was none, or if it has risen since.
@@ -77,7 +77,7 @@ class InverterStatus:
         return self.model.status_code(self.code)
 
     def means(self, *meanings: Meaning) -> bool:
-        """Tell whether the code means one of these."""
+        """Return whether the code means one of these."""
         return not self.listed.meanings.isdisjoint(meanings)
 
     @property
@@ -151,7 +151,7 @@ class InverterStatus:
     @property
     def keeps_running(self) -> bool:
         """It runs on a command from the bus, and may not be on its way to a stop."""
-        # without a status word nothing tells a stop from a lower reference
+        # without a status word nothing distinguishes a stop from a lower reference
         may_stop = self.word is None and self.means(Meaning.SLOWING)
         falls = self.fell[1] >= self.at - _FALLS_FOR
         slows = self.by_frequency and (self.frequency == 0 or falls)
@@ -159,7 +159,7 @@ class InverterStatus:
 
     def keeps_running_since(self, stopped_at: float) -> bool:
         """
-        Tell whether it keeps running, although it was given a stop.
+        Return whether it keeps running, although it was given a stop.
 
         :param stopped_at: when, s of ``time.monotonic``: a frequency that fell before says nothing.
         """
@@ -178,7 +178,7 @@ class InverterStatus:
         return self.model.profile.status_word.by_frequency
 
     def signed(self, size: float) -> float:
-        """Return a measured frequency or speed with its sign, where the word has to tell that."""
+        """Return a measured frequency or speed with its sign, where the word has to report that."""
         tells_sign = self.model.profile.status_word.tells_sign
         # standstill has no direction
         return 0.0 - size if tells_sign and Fact.REVERSE in self.facts else size

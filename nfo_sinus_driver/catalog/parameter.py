@@ -171,7 +171,7 @@ class Parameter:
 
     @property
     def is_measured(self) -> bool:
-        """Whether it is a number that the drive tells of itself, and no setting."""
+        """Whether it is a number that the drive reports of itself, and no setting."""
         return self.is_readable and not self.is_kept and self.kind in (int, float)
 
     @property
@@ -256,7 +256,7 @@ class Parameter:
         return codec.encode(raw)
 
     def on_step(self, number: float) -> bool:
-        """Tell whether :attr:`steps` have a number; any is on one where there are none."""
+        """Return whether :attr:`steps` have a number; any is on one where there are none."""
         if not self.steps:
             return True
         start, step = self._steps_at(Fraction(number), Fraction(1))
@@ -392,7 +392,7 @@ def _show(number: Fraction) -> str:
 
 def _means(value: float, step: Fraction, factor: Fraction) -> bool:
     """
-    Tell whether a number is meant to be a step of the drive.
+    Return whether a number is meant to be a step of the drive.
 
     Decimal fractions never hit a binary number exactly, and what went through a Float32 message or
     a tool that computes with one is off by more.

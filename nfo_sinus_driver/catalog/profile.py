@@ -41,7 +41,7 @@ class NotPossible(Exception):
 
 
 class Status(Protocol):
-    """What a sequence may ask of the status that the drive tells."""
+    """What a sequence may ask of the status that the drive reports."""
 
     @property
     def word(self) -> int | None:
@@ -149,8 +149,8 @@ def one(step: Step) -> Steps[Any]:
     return (yield step)
 
 
-def taken(steps: Steps[None]) -> Steps[bool]:
-    """Tell whether the drive takes a sequence, and keeps what is looked at."""
+def try_steps(steps: Steps[None]) -> Steps[bool]:
+    """Take some steps; return whether the drive accepted them all."""
     try:
         yield from steps
     except (Refusal, NotPossible):
@@ -168,7 +168,7 @@ class Limits:
 
     :ivar least: the drive takes none below it.
     :ivar most: it takes none above it.
-    :ivar nominal: what the motor is made for, in either direction; infinite where nothing tells it.
+    :ivar nominal: what the motor is made for, in either direction; infinite where it is unknown.
     """
 
     least: float = -math.inf
@@ -186,8 +186,8 @@ class SetpointTarget:
     :ivar at: the parameter in whose place it is written, as for :class:`Write`.
     :ivar forward_only: the drive takes none below 0.
     :ivar directed: its sign is the direction of the motor; else something else gives that.
-    :ivar nominal: what the motor is made for, in the same unit: the parameter that tells it, or the
-        value itself; infinite where nothing tells it.
+    :ivar nominal: what the motor is made for, in the same unit: the parameter that has it, or the
+        value itself; infinite where it is unknown.
     :ivar ends: the two parameters between which the drive takes set-points, if it has such.
     :ivar older_most: as ``most``, of the family's :class:`OlderDialect`.
     """
@@ -215,8 +215,8 @@ class SetpointTarget:
         """
         Find out what the motor is made for, in the unit of the control mode; it only reads.
 
-        :param has: tells whether the drive has a parameter.
-        :returns: infinite where nothing tells it.
+        :param has: returns whether the drive has a parameter.
+        :returns: infinite where nothing reports it.
         """
         if isinstance(self.nominal, float):
             return self.nominal
@@ -226,7 +226,7 @@ class SetpointTarget:
         """
         Find out what a set-point may be; it only reads.
 
-        :param has: tells whether the drive has a parameter.
+        :param has: returns whether the drive has a parameter.
         :param older: its firmware is of the family's :class:`OlderDialect`.
         """
         least, most = self.least, self.most
@@ -321,7 +321,7 @@ class ControlMethod(abc.ABC):
     One way to command a drive: what to write, so that it does something.
 
     :param reference: where a running drive takes its reference from, one of :attr:`references`.
-    :param reaches: tells whether a parameter can be reached over the line.
+    :param reaches: returns whether a parameter can be reached over the line.
     :cvar means: what takes its commands.
     :cvar references: those that there are.
     :cvar coasts: it can release the motor at once.
@@ -361,7 +361,7 @@ class ControlMethod(abc.ABC):
 
     @abc.abstractmethod
     def in_control(self) -> Steps[bool]:
-        """Tell whether the bus has control of the drive, from us or from whom was here before."""
+        """Return whether the bus has control of the drive, from us or from whom was here before."""
 
     @abc.abstractmethod
     def holder(self) -> Steps[Holder]:
@@ -417,11 +417,11 @@ class ControlMethod(abc.ABC):
         :returns: whether the drive has taken one of those that leave no run command.
         """
         removed = yield from self.remove(control_mode)
-        obeyed = yield from taken(self.quick_stop(control_mode))
+        obeyed = yield from try_steps(self.quick_stop(control_mode))
         return obeyed or removed is Removal.COMMAND
 
     def perhaps_in_control(self) -> Steps[bool]:
-        """Tell whether the bus may have control: it has, or the drive does not tell who has."""
+        """Return whether the bus may have control: it has, or the drive does not report who has."""
         try:
             return (yield from self.in_control())
         except Refusal:
@@ -443,7 +443,7 @@ class ControlMethod(abc.ABC):
                 return
             refusal = error
         for steps in others:
-            yield from taken(steps)
+            yield from try_steps(steps)
         if refusal is not None:
             raise refusal
 
@@ -475,7 +475,7 @@ class ControlMethod(abc.ABC):
 @dataclass(frozen=True)
 class Product:
     """
-    Who a drive says it is by its parameters; ``''`` is what it does not tell.
+    Who a drive says it is by its parameters; ``''`` is what it does not report.
 
     :ivar vendor: who made it.
     :ivar model: its product name and size.
@@ -522,9 +522,9 @@ class Profile:
     :ivar in_charge: finds out by which control method the bus has control of a drive, from whom was
         here before; given the status that was seen last, or ``None``.
     :ivar broadcast_stop: releases the motors of all drives of a line that has a broadcast.
-    :ivar names_itself: it tells who it is by Modbus functions 43 and 17.
-    :ivar product: reads who it is, where parameters tell that; :class:`NotPossible` if it is none
-        of this family. ``None``: none tells it.
+    :ivar names_itself: it reports who it is by Modbus functions 43 and 17.
+    :ivar product: reads who it is, where parameters report that; :class:`NotPossible` if it is none
+        of this family. ``None``: none reports it.
     :ivar told_by: a parameter that no other family has there; ``''``: there is none.
     :ivar writes_and_reads: it has Modbus function 23.
     :ivar releases: what its stop mode is where an ordinary stop releases the motor.
@@ -536,7 +536,7 @@ class Profile:
         the family say where each of them is; ``''``: they do not.
     :ivar own_addresses: the parameters that a user may name; ``None``: there are none such.
     :ivar words: the profile of each set of words that a PLC can map, by name; this is the first.
-    :ivar speed_mode: how it means its values in Speed mode, where it does not tell the mode and
+    :ivar speed_mode: how it means its values in Speed mode, where it does not report the mode and
         has no parameters of their own for it; ``None``: it is otherwise, or has none.
     :ivar start_settings: what :meth:`ControlMethod.require_startable` depends on: none of these
         settings changes while the motor is enabled.
@@ -548,7 +548,7 @@ class Profile:
     :ivar busy: exception codes by which it says that it may take the request the next moment.
     :ivar stops_at_timeout: by this value of the role ``stop_at_timeout`` the motor stops.
     :ivar after_write: what makes settings take effect that were written, or keeps them.
-    :ivar pole_pairs: of the motor, where no parameter tells them; 0: not known.
+    :ivar pole_pairs: of the motor, where no parameter reports them; 0: not known.
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
     """
 

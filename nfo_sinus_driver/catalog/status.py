@@ -123,7 +123,7 @@ class State(_LookedUp):
     READY_TO_SWITCH_ON = 3
     SWITCHED_ON = 4
     OPERATION_ENABLED = 5
-    #: DISABLE or SHUTDOWN: the status word does not tell them apart [C37].
+    #: DISABLE or SHUTDOWN: the status word does not distinguish them [C37].
     STOPPING = 6
     QUICK_STOP = 7
     FAULT_REACTION_ACTIVE = 8
@@ -136,20 +136,20 @@ class StatusWord:
     What the status word of one family means.
 
     :ivar state: gives the state that a status word shows.
-    :ivar by_bit: which facts each bit tells.
-    :ivar by_state: which facts only the state tells.
-    :ivar by_clear_bit: which facts each bit tells when it is 0.
+    :ivar by_bit: which facts each bit reports.
+    :ivar by_state: which facts only the state reports.
+    :ivar by_clear_bit: which facts each bit reports when it is 0.
     :ivar stateless: a status word may show none; where not, such a word is none of this drive.
-    :ivar code: gives the status code that a word tells, whatever the word; ``None``: the code is a
-        parameter of its own.
+    :ivar code: gives the status code that a word reports, whatever the word; ``None``: the code is
+        a parameter of its own.
     :ivar shown: which bits of it are published.
     :ivar by_frequency: it goes on saying that the motor runs while that ramps to a stop, so that
-        the frequency has to tell; it is read with every status.
+        the frequency has to show; it is read with every status.
     :ivar only_frequency: it may say that the motor runs, or that it does not, while it does the
-        other: whether it turns is for the frequency alone to tell.
+        other: whether it turns is for the frequency alone to show.
     :ivar frequency_beside: the frequency comes in the telegram of the status word, and is read with
         every status.
-    :ivar tells_sign: frequency and speed are measured without a sign; REVERSE tells it.
+    :ivar tells_sign: frequency and speed are measured without a sign; REVERSE reports it.
     """
 
     state: Callable[[int], State]
@@ -165,13 +165,13 @@ class StatusWord:
     tells_sign: bool = False
 
     def may_say(self, word: int) -> bool:
-        """Tell whether a status word is one of those that the manual knows."""
+        """Return whether a status word is one of those that the manual knows."""
         return self.stateless or self.state(word) is not State.UNKNOWN
 
     @functools.cached_property
     def valid(self) -> Fact:
-        """The facts that this family tells at all; of the others nothing is known."""
-        valid = Fact.ALARM  # where no bit tells it, the inverter status does
+        """The facts that this family reports at all; of the others nothing is known."""
+        valid = Fact.ALARM  # where no bit reports it, the inverter status does
         for facts in (self.by_bit, self.by_state, self.by_clear_bit):
             for fact in facts.values():
                 valid |= fact
@@ -229,7 +229,7 @@ class Role(_LookedUp):
     CONTROL_SOURCE = 'control_source'
     #: Whether keypad or terminals command, whatever the control source says.
     LOCAL_OPERATION = 'local_operation'
-    #: Behind a PLC: which telegram is exchanged; a drive that tells it has parameters there.
+    #: Behind a PLC: which telegram is exchanged; a drive that reports it has parameters there.
     TELEGRAM = 'telegram'
     #: Which fault or alarm it is, where the status word only says that there is one.
     FAULT_CODE = 'fault_code'
@@ -267,7 +267,7 @@ class Role(_LookedUp):
     #: By numerator over denominator the values are multiplied that have the scale of the speed.
     SPEED_SCALE_NUMERATOR = 'speed_scale_numerator'
     SPEED_SCALE_DENOMINATOR = 'speed_scale_denominator'
-    #: Of the motor; where it is missing, nominal frequency and speed tell it.
+    #: Of the motor; where it is missing, nominal frequency and speed report it.
     POLE_PAIRS = 'pole_pairs'
     NOMINAL_CURRENT = 'nominal_current'
     NOMINAL_POWER_FACTOR = 'nominal_power_factor'

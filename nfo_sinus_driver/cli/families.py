@@ -40,7 +40,7 @@ class Family(Verb):
 
 
 def check(name: str) -> bool:
-    """Check a file, print what is wrong in it or what it describes; tell whether it is right."""
+    """Check a file, print what is wrong in it or what it describes; return whether it is right."""
     try:
         model = find(name)
         family = catalog.load_family(model)

@@ -48,7 +48,7 @@ def read(folder: Path, is_wanted: Callable[[str], bool]) -> Iterator[tuple[str, 
     """
     Yield topic, time of receipt (ns) and message, in the order of receipt.
 
-    :param is_wanted: tells of a topic whether it is read.
+    :param is_wanted: returns whether a topic is read.
     :raises ValueError: it is no bag, or one that cannot be read.
     """
     wanted = {topic for topic, _ in topics(folder) if is_wanted(topic)}

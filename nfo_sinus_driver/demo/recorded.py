@@ -257,7 +257,7 @@ class _Reader:
 
 
 def _is_of(drives: Sequence[str], topic: str) -> bool:
-    """Tell whether a topic is one of those that are read."""
+    """Return whether a topic is one of those that are read."""
     if topic in _COMMON:
         return True
     node, _, name = topic.removesuffix(_EVENT).rpartition('/')

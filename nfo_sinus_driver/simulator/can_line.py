@@ -37,7 +37,7 @@ class _Else(enum.Enum):
     FOREIGN = enum.auto()
 
 
-#: What others tell each other: process data, a heartbeat, an answer to another master.
+#: What others send each other: process data, a heartbeat, an answer to another master.
 _FOREIGN = (
     Frame(0x1FA, bytes.fromhex('37060000F4010000')),
     Frame(0x2FB, bytes.fromhex('1F00E803')),
@@ -166,7 +166,7 @@ class CanLine(Wire):
                 yield server
 
     def _carries(self, now: float) -> bool:
-        """Tell whether frames come from the adapter to the nodes, and the other way."""
+        """Return whether frames come from the adapter to the nodes, and the other way."""
         return self._adapter.on_bus(self.timing.baud) and not self.faults.dead(now)
 
     def _put(

@@ -37,7 +37,7 @@ _GENERIC, _COMMUNICATION = 0x01, 0x10
 
 
 class State(enum.IntEnum):
-    """The states of a node, as it tells them; the one after its boot-up it leaves by itself."""
+    """The states of a node, as it reports them; the one after its boot-up it leaves by itself."""
 
     BOOTED = 0x00
     STOPPED = 0x04
@@ -316,7 +316,7 @@ class Server(abc.ABC):
         with _refusals():
             return entry.read()
 
-    def admit(self, index: int, sub_index: int, size: int | None) -> int:
+    def validate(self, index: int, sub_index: int, size: int | None) -> int:
         """Look whether an object may be written with so many bytes; return how many it takes."""
         entry = self._find(index, sub_index)
         if entry.write is None:

@@ -38,7 +38,7 @@ _SMALL = re.compile(rb'[a-f]')
 
 
 class LineError(enum.IntFlag):
-    """What may go wrong on the line: the flags by which a drive tells it [M2 table 4]."""
+    """What may go wrong on the line: the flags by which a drive reports it [M2 table 4]."""
 
     BLOCKED = 1 << 0
     PARITY = 1 << 1
@@ -153,7 +153,7 @@ class Classic(Protocol):
 
     @staticmethod
     def unwrap(frame: bytes) -> Request | None:
-        """Return whom a message is for, and the message; ``None`` if it does not tell."""
+        """Return whom a message is for, and the message; ``None`` if it does not say."""
         if len(frame) < 2 or frame[0] != EOT or frame[1] - _ADDRESS not in ADDRESSES:
             return None
         return Request(frame[1] - _ADDRESS, frame, whole=not parse(frame).wrong)

@@ -118,7 +118,7 @@ class ControlUnit(abc.ABC):
         """Return which parameter is meant: there may be one for the set-points of all modes."""
         return key
 
-    def admit(self, key: str) -> None:
+    def validate(self, key: str) -> None:
         """Look whether a parameter may be written now (Refused: STATE)."""
 
     def stored(self, key: str) -> None:

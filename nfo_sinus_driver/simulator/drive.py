@@ -132,7 +132,7 @@ class SimulatedDrive:
             raise Refused(Reason.ADDRESS, f'{key} cannot be written')
         Memory.check(self.control_unit.scaled(parameter), raw)
         if not self.control_unit.write(key, raw):
-            self.control_unit.admit(key)
+            self.control_unit.validate(key)
             if parameter.stopped and (self.motor.driven or self.motor.turning):
                 raise Refused(Reason.STATE, f'{key} changes only while the motor stands')
             self._store(key, raw)
@@ -201,7 +201,7 @@ class SimulatedDrive:
 
     @property
     def version(self) -> Fraction | None:
-        """The version of its firmware; ``None`` of a drive that does not tell it."""
+        """The version of its firmware; ``None`` of a drive that does not report it."""
         return self.memory.version
 
     def has(self, parameter: Parameter) -> bool:

@@ -132,7 +132,7 @@ class Adapter:
     # ---- from the bus ----
 
     def on_bus(self, rate: int) -> bool:
-        """Tell whether it takes part in a bus with this bit rate."""
+        """Return whether it takes part in a bus with this bit rate."""
         return self.is_open and self.rate == rate
 
     def text_of(self, frame: Frame, now: float) -> bytes:
@@ -146,7 +146,7 @@ class Adapter:
         return f'{kind}{identifier}{len(frame.data)}{data}{stamp}'.encode() + _CR
 
     def _passes(self, frame: Frame) -> bool:
-        """Tell whether one of the two acceptance filters lets a frame through (SJA1000, dual)."""
+        """Return whether one of the two acceptance filters lets a frame through (SJA1000, dual)."""
         if frame.extended:
             seen = (frame.identifier >> 13).to_bytes(2, 'big')
             return any(_matches(seen, self._code[at:], self._mask[at:]) for at in (0, 2))
@@ -163,7 +163,7 @@ class Adapter:
 
 
 def _matches(seen: bytes, code: bytes, mask: bytes) -> bool:
-    """Tell whether the bits that count, those that are 0 in the mask, are alike."""
+    """Return whether the bits that count, those that are 0 in the mask, are alike."""
     return all((a ^ b) & ~c & 0xFF == 0 for a, b, c in zip(seen, code, mask, strict=False))
 
 

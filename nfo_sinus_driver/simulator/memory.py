@@ -96,7 +96,7 @@ class Memory:
 
     @property
     def version(self) -> Fraction | None:
-        """The version of the firmware; ``None`` of a drive that does not tell it."""
+        """The version of the firmware; ``None`` of a drive that does not report it."""
         key = self.model.key(Role.FIRMWARE)
         return self._raw[key] * self.model[key].factor(home(self.model[key])) if key else None
 

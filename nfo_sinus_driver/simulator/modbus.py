@@ -180,7 +180,7 @@ class Server(Requests):
     def __init__(self, drive: SimulatedDrive) -> None:
         self.drive = drive
         self._by_base = _registers(drive.model)
-        # the manuals of some tell of none
+        # the manuals of some have none
         self._log = drive.model.error_logs.get('modbus')
 
     def slave_id(self) -> bytes:

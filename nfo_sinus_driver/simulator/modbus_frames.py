@@ -189,7 +189,7 @@ def _for_all(request: Request) -> bool:
 
 
 def _rtu_length(buffer: bytes) -> int:
-    """Return how long the request at the beginning is, CRC included; 0 when nothing tells."""
+    """Return how long the request at the beginning is, CRC included; 0 when unknown."""
     if len(buffer) < 2:
         return 0
     function = buffer[1]

@@ -315,7 +315,7 @@ class Unit:
 
     @staticmethod
     def heard() -> None:
-        """Take note of a frame; it tells a PLC nothing, its program watches the life counter."""
+        """Take note of a frame; it means nothing to a PLC, its program watches the life counter."""
 
     def advance_to(self, now: float) -> None:
         """Catch up with the caller's clock (s)."""

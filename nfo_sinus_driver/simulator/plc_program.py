@@ -32,7 +32,7 @@ class Block:
     :ivar plc_life: +2, changes with every exchange with the drive.
     :ivar flags: +3, bit 0 the data are valid, bit 1 released to ROS, bit 2 +5 to +7 are valid.
     :ivar version: +4, of this layout.
-    :ivar more1: +5, what the family's longer telegram tells beside; with the next two.
+    :ivar more1: +5, what the family's longer telegram reports beside; with the next two.
     :ivar more2: +6.
     :ivar more3: +7.
     :ivar stw1: +8, control word 1 from the driver.
@@ -69,7 +69,7 @@ class Ton:
     """
     The timer TON of IEC 61131-3: ``q`` once its input has been true for the preset time.
 
-    :param clock: tells the time (s).
+    :param clock: returns the time (s).
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -92,7 +92,7 @@ class RosTelegram1:
     """
     The function block ``FB_RosTelegram1``: one drive, called once in every cycle of the PLC.
 
-    :param clock: tells the time (s).
+    :param clock: returns the time (s).
     :param lost_clears: bits of STW1 that are cleared while ROS is lost or has no release.
     :param lost_sets: bits that are set then, without which the drive would not obey.
     :param ros_time: how long the driver's life counter may stand still (s).

@@ -51,7 +51,7 @@ class Objects(Protocol):
     def read(self, index: int, sub_index: int) -> bytes:
         """Return the value of an object (Abort: it cannot be read)."""
 
-    def admit(self, index: int, sub_index: int, size: int | None) -> int:
+    def validate(self, index: int, sub_index: int, size: int | None) -> int:
         """
         Look whether an object may be written.
 
@@ -144,13 +144,13 @@ class Server:
         flags = request[0]
         if flags & _IS_EXPEDITED:
             size_said = _EXPEDITED - (flags >> 2 & 3) if flags & _HAS_SIZE else None
-            size = self._objects.admit(*self._place, size_said)
+            size = self._objects.validate(*self._place, size_said)
             if size > _EXPEDITED:
                 raise Abort(AbortCode.TOO_SHORT)
             self._objects.write(*self._place, request[4 : 4 + size])
         else:
             size_said = _SIZE.unpack_from(request, 4)[0] if flags & _HAS_SIZE else None
-            self._transfer = _Download(self._objects.admit(*self._place, size_said))
+            self._transfer = _Download(self._objects.validate(*self._place, size_said))
         return self._named(0x60, b'')
 
     def _take_segment(self, request: bytes) -> bytes:

@@ -70,7 +70,7 @@ class Server(abc.ABC):
 
     @property
     def more(self) -> tuple[int, int, int] | None:
-        """What the longer telegram tells behind status word and actual value, if it has one."""
+        """What the longer telegram reports behind status word and actual value, if it has one."""
         return None
 
     @abc.abstractmethod

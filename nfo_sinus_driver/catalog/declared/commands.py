@@ -38,7 +38,7 @@ _KINDS = ('value', 'values', 'set', 'clear', 'on', 'to', 'wait', 'until')
 
 
 class StepReader:
-    """Reads steps; :meth:`use` tells where the status stands, for those that wait for it."""
+    """Reads steps; :meth:`use` says where the status stands, for those that wait for it."""
 
     def __init__(
         self, root: Node, places: Places, settings: Settings, problems: Problems
@@ -266,7 +266,7 @@ def left_by(steps: Sequence[Step]) -> dict[str, tuple[int, int]]:
 
 def takes_back(run: tuple[int, int], stop: tuple[int, int]) -> bool:
     """
-    Tell whether what a stop leaves differs from what run does.
+    Return whether what a stop leaves differs from what run does.
 
     A whole word may be a number. Where a stop only sets and clears bits, it has to clear one that
     run has set: with another one set the motor stands, and starts again when that one is cleared.

@@ -45,7 +45,7 @@ class Condition:
     inverted: bool = False
 
     def holds(self, status: int) -> bool:
-        """Tell whether it holds with a status word."""
+        """Return whether it holds with a status word."""
         return (status & self.mask in self.values) is not self.inverted
 
 
@@ -126,10 +126,10 @@ class SetpointPlace:
     """
     Where set-points go.
 
-    :ivar key: the parameter that takes them; :ivar read_key: the one that tells them, or ``''``.
+    :ivar key: the parameter that takes them; :ivar read_key: the one that reports them, or ``''``.
     :ivar mode: the control mode of their unit.
     :ivar most: the greatest one; :ivar limit: the parameter that limits it, or ``''``.
-    :ivar nominal: what the motor is made for: a value, the parameter that tells it, or ``None``.
+    :ivar nominal: what the motor is made for: a value, the parameter that reports it, or ``None``.
     :ivar signed: a negative one is reverse.
     :ivar direction: what else gives the direction; with neither there is no reverse.
     """
@@ -253,7 +253,7 @@ class Description:
     :ivar registers: of each key of a command, set-point or parameter, its first register or coil.
     :ivar facts: the conditions of the status, by the names of the file.
     :ivar flags: faults that are bits, the gravest first.
-    :ivar holder: the parameter that tells who has control, and its values for the line.
+    :ivar holder: the parameter that reports who has control, and its values for the line.
     :ivar prepare_stops: no run command stands behind ``prepare``.
     :ivar pole_pairs: of the motor; 0: not known.
     :ivar stop_mode: the parameter that says how it stops, and its value for coasting.
@@ -296,5 +296,5 @@ class Description:
 
     @property
     def tells_control(self) -> bool:
-        """The status tells who has control."""
+        """The status reports who has control."""
         return 'remote' in self.facts or 'local' in self.facts

@@ -15,7 +15,7 @@ from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
 from nfo_sinus_driver.catalog.parameter import Access, Address, Parameter
 
 WORD = 0xFFFF
-#: The group of all that commands the drive and tells its status.
+#: The group of all that commands the drive and reports its status.
 _FIELDBUS = 'Fieldbus'
 STATUS_KEY = 'line.status'
 _TYPES = {
@@ -200,7 +200,7 @@ class Places:
             blocks += runs(rest)
         else:
             blocks = runs(sorted(wanted))
-        # what tells most stands in the lowest bits, which are published
+        # what says most stands in the lowest bits, which are published
         first = found[0].register if found else 0
         return self._registers(sorted(blocks, key=lambda run: (len(run), first in run)), block)
 

@@ -151,7 +151,7 @@ class Settings:
         return value
 
     def holder(self, node: Node) -> tuple[str, tuple[Value, ...]] | None:
-        """Return the parameter that tells who has control, and its values for the line."""
+        """Return the parameter that reports who has control, and its values for the line."""
         key = self.known(node.get('parameter'))
         if not key:
             return None

@@ -4,9 +4,9 @@
 """
 How a drive is commanded that a file describes: the lists of steps of the file, by its status.
 
-What the file does not tell is a feature that the drive does not have. Where neither status nor a
-parameter tells who has control, the line counts as having it: a motor that runs is stopped when the
-driver connects.
+What the file does not declare is a feature that the drive does not have. Where neither status nor a
+parameter reports who has control, the line counts as having it: a motor that runs is stopped when
+the driver connects.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from nfo_sinus_driver.catalog.profile import (
     Until,
     Wait,
     Write,
-    taken,
+    try_steps,
 )
 from nfo_sinus_driver.catalog.status import Role, StatusCode
 from nfo_sinus_driver.families._declared.setpoints import Target, target_of
@@ -63,7 +63,7 @@ class Declared(ControlMethod):
     _setpoint: ClassVar[Target]
 
     def in_control(self) -> Steps[bool]:
-        """Tell whether the line has control; where nothing tells, it has."""
+        """Return whether the line has control; where nothing reports, it has."""
         return (yield from self.holder()) is Holder.BUS
 
     def holder(self) -> Steps[Holder]:
@@ -102,7 +102,7 @@ class Declared(ControlMethod):
         a drive may refuse or ignore the stop before that, so it comes again right behind.
         """
         drive = self._drive
-        yield from taken(_carry_out(drive.stop))
+        yield from try_steps(_carry_out(drive.stop))
         for one in drive.requires:
             if one.write:
                 yield Write(one.key, one.value, stored=True)
@@ -111,7 +111,7 @@ class Declared(ControlMethod):
             yield from _carry_out(drive.stop, head=True)
 
     def zero_setpoint(self, control_mode: str) -> Steps[None]:
-        """Write set-point 0, and read it back where the drive tells it."""
+        """Write set-point 0, and read it back where the drive reports it."""
         yield from self._setpoint.set_to_zero()
 
     def run(self) -> Steps[None]:
@@ -145,8 +145,8 @@ class Declared(ControlMethod):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove run command and set-point while a fault is active, each by itself."""
-        command = yield from taken(_each(self._drive.stop, retry=True))
-        setpoint = yield from taken(self.zero_setpoint(control_mode))
+        command = yield from try_steps(_each(self._drive.stop, retry=True))
+        setpoint = yield from try_steps(self.zero_setpoint(control_mode))
         if command:
             return Removal.COMMAND
         return Removal.SETPOINT if setpoint else Removal.NOTHING

@@ -30,7 +30,7 @@ class Target(SetpointTarget):
         return Limits(max(found.least, -most), most, found.nominal)
 
     def set_to_zero(self) -> Steps[None]:
-        """Write set-point 0, and read it back where the drive tells it."""
+        """Write set-point 0, and read it back where the drive reports it."""
         assert self.place is not None
         yield from self.zero(retry=True)
         if not self.place.read_key:

@@ -11,7 +11,7 @@ import functools
 from nfo_sinus_driver.catalog.declared import Code, Condition, Description
 from nfo_sinus_driver.catalog.status import Fact, Kind, Role, State, StatusWord
 
-#: What each condition of the file tells.
+#: What each condition of the file reports.
 _FACTS = {
     'ready': Fact.READY,
     'running': Fact.OPERATION_ENABLED,
@@ -99,7 +99,7 @@ def _state(drive: Description, word: int) -> State:
 
 
 def _code(drive: Description, word: int) -> int:
-    """Return the status code that a status tells: the fault's own number, or what it does."""
+    """Return the status code that a status reports: the fault's own number, or what it does."""
     state = _state(drive, word)
     if state in (State.FAULTED, State.FAULT_REACTION_ACTIVE):
         return _fault(drive, word)
@@ -121,6 +121,6 @@ def _fault(drive: Description, word: int) -> int:
 
 
 def is_remote(drive: Description, word: int) -> bool:
-    """Tell whether the line has control, as far as the status tells."""
+    """Return whether the line has control, as far as the status reports."""
     remote, local = drive.facts.get('remote'), drive.facts.get('local')
     return (remote is None or remote.holds(word)) and (local is None or not local.holds(word))

@@ -28,7 +28,7 @@ from nfo_sinus_driver.catalog.profile import (
     Status,
     Steps,
     Write,
-    taken,
+    try_steps,
 )
 from nfo_sinus_driver.catalog.status import Fact, State, StatusCode, StatusWord
 
@@ -73,7 +73,7 @@ class Words(StatusWord):
 def code_by(
     state_of: Callable[[int], State], *, fault: int, warning: int = 0
 ) -> Callable[[int], int]:
-    """Return what gives the code that a status word tells, by its bits and the state of ZSW1."""
+    """Return what gives the code that a status word reports, by its bits and the state of ZSW1."""
 
     def code(word: int) -> int:
         if word & fault:
@@ -110,7 +110,7 @@ class Telegram1(ControlMethod):
     echoes: ClassVar[bool] = False
 
     def in_control(self) -> Steps[bool]:
-        """Tell whether the bus has control, by this driver or an earlier session."""
+        """Return whether the bus has control, by this driver or an earlier session."""
         word = int((yield Read(STATUS)))
         if not word & RELEASED:
             return False
@@ -165,7 +165,7 @@ class Telegram1(ControlMethod):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove run bits and set-point."""
-        obeyed = yield from taken(self.stop(control_mode))
+        obeyed = yield from try_steps(self.stop(control_mode))
         return Removal.COMMAND if obeyed else Removal.NOTHING
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
@@ -207,5 +207,5 @@ def in_charge(status: Status | None) -> Steps[str]:
 
 
 def setpoints(most: float, *, forward_only: bool = False) -> Mapping[str, SetpointTarget]:
-    """Return where set-points go; which control mode it is the telegram does not tell."""
+    """Return where set-points go; which control mode it is the telegram does not report."""
     return {'Freque': SetpointTarget(SETPOINT, most, forward_only=forward_only)}

@@ -26,7 +26,7 @@ from nfo_sinus_driver.catalog.profile import (
     Steps,
     Write,
     one,
-    taken,
+    try_steps,
 )
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.families.movitrac31 import words
@@ -126,7 +126,7 @@ class FunctionBits(ByLine):
             yield from self.zero_setpoint('')
             yield Write(CONTROL_MODE, words.REMOTE_CONTROL, stored=True)
         except (NotPossible, Refusal):
-            yield from taken(_put_back(found))
+            yield from try_steps(_put_back(found))
             raise
 
     def run(self) -> Steps[None]:
@@ -159,8 +159,8 @@ class FunctionBits(ByLine):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove function bits and set-point while a fault is active, each by itself."""
-        command = yield from taken(one(Write(BITS, 0)))
-        setpoint = yield from taken(self.zero_setpoint(control_mode))
+        command = yield from try_steps(one(Write(BITS, 0)))
+        setpoint = yield from try_steps(self.zero_setpoint(control_mode))
         if command:
             return Removal.COMMAND
         return Removal.SETPOINT if setpoint else Removal.NOTHING
@@ -191,7 +191,7 @@ def _put_back(found: Value) -> Steps[None]:
 
 
 def _would_turn() -> Steps[bool]:
-    """Tell whether function bits and set-point would turn the motor if they counted."""
+    """Return whether function bits and set-point would turn the motor if they counted."""
     bits = yield from read_if_there(BITS)
     directed = bits is not None and int(bits) & (Bits.CLOCKWISE | Bits.COUNTER_CLOCKWISE)
     return bool(directed) and bool((yield from read_if_there(SIZE)))

@@ -100,7 +100,7 @@ class ByLine(ControlMethod):
     target: ClassVar[SetpointTarget]
 
     def in_control(self) -> Steps[bool]:
-        """Tell whether the line has control of the drive, from us or from an earlier session."""
+        """Return whether the line has control of the drive, from us or from an earlier session."""
         return (yield from self.holder()) is Holder.BUS
 
     def holder(self) -> Steps[Holder]:

@@ -23,7 +23,7 @@ from nfo_sinus_driver.catalog.profile import (
     Steps,
     Write,
     one,
-    taken,
+    try_steps,
 )
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.families.movitrac31 import words
@@ -109,8 +109,8 @@ class RemoteSetpoint(ByLine):
         """Write set-point 0, then take control from the terminals, and inhibit the controller."""
         removed = yield from self.remove(control_mode)
         # before, too: where it counts already it does so from the first moment on
-        yield from taken(one(Write(BITS, int(Bits.CONTROLLER_INHIBIT))))
-        yield from taken(one(Write(CONTROL_MODE, words.REMOTE_CONTROL)))
+        yield from try_steps(one(Write(BITS, int(Bits.CONTROLLER_INHIBIT))))
+        yield from try_steps(one(Write(CONTROL_MODE, words.REMOTE_CONTROL)))
         return (yield from _inhibit()) or removed is Removal.COMMAND
 
     def release(self) -> Steps[None]:
@@ -120,8 +120,8 @@ class RemoteSetpoint(ByLine):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove function bits and set-point while a fault is active; without one nothing turns."""
-        yield from taken(one(Write(BITS, 0)))
-        setpoint = yield from taken(self.zero_setpoint(control_mode))
+        yield from try_steps(one(Write(BITS, 0)))
+        setpoint = yield from try_steps(self.zero_setpoint(control_mode))
         return Removal.COMMAND if setpoint else Removal.NOTHING
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
@@ -140,6 +140,6 @@ class RemoteSetpoint(ByLine):
 
 
 def _inhibit() -> Steps[bool]:
-    """Write the controller inhibit; tell whether it is taken, and counts."""
-    inhibited = yield from taken(one(Write(BITS, int(Bits.CONTROLLER_INHIBIT))))
+    """Write the controller inhibit; return whether it is taken, and counts."""
+    inhibited = yield from try_steps(one(Write(BITS, int(Bits.CONTROLLER_INHIBIT))))
     return inhibited and (yield from read_if_there(CONTROL_MODE)) == words.REMOTE_CONTROL

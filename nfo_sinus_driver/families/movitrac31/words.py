@@ -17,7 +17,7 @@ known of the drive:
   stop: the motor is not commanded in either.
 - A fault code is binary if that is one that the manual lists, else decimal. So fault 45, a time-out
   of the line, is always shown; some others mean one fault this way and another that way, and P060
-  tells for certain which it is.
+  says for certain which it is.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ _RELEASED = (State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON)
 
 
 def code_of(word: int) -> int:
-    """Return the status code that index 284 tells: the status number, or 100 + fault code."""
+    """Return the status code that index 284 reports: the status number, or 100 + fault code."""
     fault = word >> 24
     if not fault:
         number = _number(word)
@@ -133,7 +133,7 @@ def state_of(word: int) -> State:
     """
     Return the state that index 284 shows; UNKNOWN for a number that the manual does not list.
 
-    With a fault the motor may still ramp to a stop, or coast: the number tells [C105].
+    With a fault the motor may still ramp to a stop, or coast: the number reports [C105].
     """
     number = _number(word)
     state = State.UNKNOWN if number is None else _STATES.get(number, State.OPERATION_ENABLED)

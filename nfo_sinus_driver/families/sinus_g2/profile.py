@@ -33,7 +33,7 @@ from nfo_sinus_driver.catalog.profile import (
     Until,
     Write,
     one,
-    taken,
+    try_steps,
 )
 from nfo_sinus_driver.catalog.status import Meaning, Role, State, StatusCode
 from nfo_sinus_driver.families.sinus_g2 import words
@@ -180,7 +180,7 @@ class ModeScmd(_G2):
     _soonest: ClassVar[Write] = Write(MODE, Mode.STOP)
 
     def in_control(self) -> Steps[bool]:
-        """Tell whether the bus has control of the drive, from us or from whom was here before."""
+        """Return whether the bus has control of the drive, from us or from whom was here before."""
         mode: int = yield Read(MODE)
         return mode == Mode.BUS
 
@@ -216,14 +216,14 @@ class ModeScmd(_G2):
         Take the run command back and write set-point 0, each step by itself [C126].
 
         Does nothing to a drive that is under the control of its keypad or terminals. Refused
-        although the bus has control or, under Inhibit, nothing tells which: it may be tuning
+        although the bus has control or, under Inhibit, nothing reports which: it may be tuning
         [C101].
         """
         zeroes = (target.zero(retry=False) for target in self._targets(control_mode))
         yield from self._stop_by(one(Write(self._command, Scmd.STOP, retry=False)), *zeroes)
 
     def perhaps_in_control(self) -> Steps[bool]:
-        """Tell whether the bus may have control: under Inhibit nothing tells."""
+        """Return whether the bus may have control: under Inhibit nothing reports."""
         try:
             return (yield Read(MODE)) in (Mode.INHIBIT, Mode.BUS)
         except Refusal:
@@ -242,7 +242,7 @@ class ModeScmd(_G2):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Write SCMD = Stop, set-point 0 and MODE = Stop, and read back what can be read."""
-        command = yield from taken(one(Write(self._command, Scmd.STOP)))
+        command = yield from try_steps(one(Write(self._command, Scmd.STOP)))
         setpoint = yield from self._remove_setpoint(control_mode)
         command |= yield from self._remove_control()
         if command:
@@ -250,15 +250,15 @@ class ModeScmd(_G2):
         return Removal.SETPOINT if setpoint else Removal.NOTHING
 
     def _remove_setpoint(self, control_mode: str) -> Steps[bool]:
-        """Write set-point 0 wherever the motor would follow one; tell whether it is."""
+        """Write set-point 0 wherever the motor would follow one; return whether it is."""
         zeroes: list[bool] = []
         for target in self._targets(control_mode):
-            zeroes.append((yield from taken(target.set_to_zero())))
+            zeroes.append((yield from try_steps(target.set_to_zero())))
         return bool(zeroes) and all(zeroes)
 
     def _remove_control(self) -> Steps[bool]:
-        """Write MODE = Stop, with which no run command stands; tell whether it is."""
-        obeyed = yield from taken(one(Write(MODE, Mode.STOP)))
+        """Write MODE = Stop, with which no run command stands; return whether it is."""
+        obeyed = yield from try_steps(one(Write(MODE, Mode.STOP)))
         return obeyed and not (yield from self.perhaps_in_control())
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
@@ -288,7 +288,7 @@ class ModeScmd(_G2):
         return why
 
     def _controlled_elsewhere(self) -> Steps[bool]:
-        """Tell whether keypad or terminals have control, which MODE = Stop would take from them."""
+        """Return whether keypad or terminals have control, which MODE = Stop would take."""
         mode: int = yield Read(MODE)
         return mode == Mode.EXT
 
@@ -321,7 +321,7 @@ class DriveControl(_G2):
         self._ready = _READY | Control.NET_REF if reference == 'fieldbus' else _READY
 
     def in_control(self) -> Steps[bool]:
-        """Tell whether the network has control, by us or by whom was here before."""
+        """Return whether the network has control, by us or by whom was here before."""
         return bool(int((yield Read(STATUS_WORD))) & words.Status.CTRL_FROM_NET)
 
     def take_control(self) -> Steps[None]:
@@ -385,7 +385,7 @@ class DriveControl(_G2):
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Remove run bits and set-point, quick stop, and take control away by MODE = Stop."""
         obeyed = yield from super().force_stop(control_mode)
-        return (yield from taken(one(Write(MODE, Mode.STOP)))) or obeyed
+        return (yield from try_steps(one(Write(MODE, Mode.STOP)))) or obeyed
 
     def release(self) -> Steps[None]:
         """
@@ -399,12 +399,12 @@ class DriveControl(_G2):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Reset the run bits; where that is refused, write set-point 0 and MODE = Stop."""
-        if (yield from taken(self._change_or_write(~_RUN, Control(0), retry=True))):
+        if (yield from try_steps(self._change_or_write(~_RUN, Control(0), retry=True))):
             return Removal.COMMAND
-        released = yield from taken(one(Write(MODE, Mode.STOP)))
+        released = yield from try_steps(one(Write(MODE, Mode.STOP)))
         if released and not (yield from self.perhaps_in_control()):
             return Removal.COMMAND
-        if (yield from taken(self.zero_setpoint(control_mode))):
+        if (yield from try_steps(self.zero_setpoint(control_mode))):
             return Removal.SETPOINT
         return Removal.NOTHING
 
@@ -452,7 +452,7 @@ class DriveControl(_G2):
     def _change_or_write(self, keep: Control, add: Control, *, retry: bool = False) -> Steps[None]:
         """Change some bits of the control word for a stop, in whatever way the drive takes it."""
         masked = self._reaches(_MASK)
-        if masked and (yield from taken(self._change(keep, add, retry=retry))):
+        if masked and (yield from try_steps(self._change(keep, add, retry=retry))):
             return
         word = self._ready
         try:

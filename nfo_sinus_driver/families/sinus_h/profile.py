@@ -18,7 +18,7 @@ from nfo_sinus_driver.catalog.profile import (
     Steps,
     Until,
     one,
-    taken,
+    try_steps,
 )
 from nfo_sinus_driver.catalog.status import Role, State
 from nfo_sinus_driver.families._telegram1 import method
@@ -69,7 +69,7 @@ class HTelegram1(Telegram1):
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Clear the run bits, then release the motor by CoastStop."""
         removed = yield from self.remove(control_mode)
-        released = yield from taken(one(method.begin(int(OFF & ~Control.NO_COAST_STOP))))
+        released = yield from try_steps(one(method.begin(int(OFF & ~Control.NO_COAST_STOP))))
         return released or removed is Removal.COMMAND
 
 

@@ -26,7 +26,7 @@ STATUS_WORD = Words(
         # the drive has received that the PLC commands it
         Status.CONTROL_REQUESTED: Fact.NETWORK_CONTROL,
     },
-    # bit 2 is what the driver has commanded: with the state it tells that [C63]
+    # bit 2 is what the driver has commanded: with the state it reports that [C63]
     by_state={State.OPERATION_ENABLED: Fact.OPERATION_ENABLED},
     stateless=True,
     code=method.code_by(state_of, fault=Status.FAULT, warning=Status.WARNING),

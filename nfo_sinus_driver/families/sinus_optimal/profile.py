@@ -29,7 +29,7 @@ from nfo_sinus_driver.catalog.profile import (
     Until,
     Write,
     one,
-    taken,
+    try_steps,
 )
 from nfo_sinus_driver.catalog.status import StatusCode
 from nfo_sinus_driver.families.sinus_g2.profile import (
@@ -63,8 +63,8 @@ class ModeSmode(ModeScmd):
     Its MODE has no Stop: 1 is Manual, the keypad's, and 2 is Auto, which may start the motor and is
     never written [C51]. It has no way to release the motor at once [C96].
 
-    Nothing tells its control mode, so whichever is assumed, every set-point is 0 before it runs: an
-    old one in the register of the other mode would turn the motor.
+    Nothing reports its control mode, so whichever is assumed, every set-point is 0 before it runs:
+    an old one in the register of the other mode would turn the motor.
     """
 
     means = 'SMODE'
@@ -126,7 +126,7 @@ class DriveControl(ControlMethod):
     )
 
     def in_control(self) -> Steps[bool]:
-        """Tell whether the bus has control, by us or by whom was here before."""
+        """Return whether the bus has control, by us or by whom was here before."""
         return bool(int((yield Read(STATUS_WORD))) & words.Status.CONTROL_FROM_BUS)
 
     def holder(self) -> Steps[Holder]:
@@ -170,8 +170,8 @@ class DriveControl(ControlMethod):
 
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Reset Switch on, then take Enable away, by which the motor is released [C109]."""
-        obeyed = yield from taken(self._switch_off())
-        return (yield from taken(one(Write(CONTROL_WORD, _READY)))) or obeyed
+        obeyed = yield from try_steps(self._switch_off())
+        return (yield from try_steps(one(Write(CONTROL_WORD, _READY)))) or obeyed
 
     def release(self) -> Steps[None]:
         """
@@ -185,7 +185,7 @@ class DriveControl(ControlMethod):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Reset Switch on."""
-        obeyed = yield from taken(self._switch_off())
+        obeyed = yield from try_steps(self._switch_off())
         return Removal.COMMAND if obeyed else Removal.NOTHING
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:

@@ -82,7 +82,7 @@ def state_of(word: int) -> State:
 
     [M1] has no state machine: this is derived from what it says of each bit, and what speaks of a
     turning motor goes first. UNKNOWN if no bit speaks of a state. QUICK_STOP and
-    NOT_READY_TO_SWITCH_ON never come, for nothing tells them.
+    NOT_READY_TO_SWITCH_ON never come, for nothing reports them.
     """
     if word & Status.FAULT_ACTIVE:
         # while the output stage is still on, the motor is not released

@@ -299,14 +299,14 @@ class DeclaredControlUnit(ControlUnit):
         """Begin to count anew."""
         self._silent_for = 0.0
 
-    def admit(self, key: str) -> None:
+    def validate(self, key: str) -> None:
         """Refuse the set-point where the line has no control."""
         refuses = self.variant.in_local == 'refuses' and not self.obeys
         if key == self._drive.setpoint.key and refuses:
             raise Refused(Reason.STATE, 'the line has no control')
 
     def nameplate(self) -> Nameplate:
-        """Return the motor's data, as far as parameters tell it."""
+        """Return the motor's data, as far as parameters report it."""
         get, roles = self.memory.number, self.memory.model.roles
         usual = Nameplate()
         if self._drive.pole_pairs:

@@ -73,7 +73,7 @@ class Order:
         return self._shown.get(self._passed)
 
     def take(self, place: Place, word: int) -> bool:
-        """Take a word that was written; tell whether the command is complete by it."""
+        """Take a word that was written; return whether the command is complete by it."""
         if place not in self.places:
             return False
         if not self._fits(self._passed % len(self._row), place, word):

@@ -153,7 +153,7 @@ class MovitracControlUnit(ControlUnit):
             return False
         return True
 
-    def admit(self, key: str) -> None:
+    def validate(self, key: str) -> None:
         """Refuse a setting that needs what is not so, and take note of the others."""
         needs = self.variant.settings_need
         if needs == 'output_off' and self.motor.driven:

@@ -4,8 +4,8 @@
 """
 What the simulator has to know of a MOVITRAC 31..: its tables, its serial side, what happens to it.
 
-Of what is wrong with a request its serial side tells the first thing that it comes to ([M4 §2.1.2],
-[M4 §3]).
+Of what is wrong with a request its serial side reports the first thing that it comes to
+([M4 §2.1.2], [M4 §3]).
 """
 
 from __future__ import annotations

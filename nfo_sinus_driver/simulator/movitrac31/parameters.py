@@ -258,7 +258,7 @@ class Eeprom:
         self._saved: dict[str, int] = {}
 
     def lacks(self, key: str) -> bool:
-        """Tell whether a parameter has a value that is lost when power is off."""
+        """Return whether a parameter has a value that is lost when power is off."""
         return key in self._saved
 
     def before(self, key: str) -> None:

@@ -277,7 +277,7 @@ class SinusControlUnit(ControlUnit):
             return int(self.status_word)
         return None
 
-    def admit(self, key: str) -> None:
+    def validate(self, key: str) -> None:
         """Refuse what the drive does not take while a fault is active."""
         refused = self.variant.refuses_in_fault
         if self.faults and (refused == 'all' or (refused == 'scmd' and key == self.run_command)):
@@ -298,7 +298,7 @@ class SinusControlUnit(ControlUnit):
         name = self.memory.model[self.run_command].name
         if raw not in self.run_codes:
             raise Refused(Reason.VALUE, f'{name} has no code {raw:#x}')
-        self.admit(self.run_command)
+        self.validate(self.run_command)
         if not self.on_bus:
             raise Refused(Reason.STATE, f'{name} needs MODE = Bus')
         self._command(raw)

@@ -261,7 +261,7 @@ class G2ControlUnit(SinusControlUnit):
         if raw == Mode.STOP and self.faults.serial:
             self.faults.acknowledge_serial()
         else:
-            self.admit('fieldbus.mode')
+            self.validate('fieldbus.mode')
         self.take(source)
 
     def _command(self, raw: int) -> None:

@@ -52,7 +52,7 @@ class G2Variant(SinusVariant):
     )
     #: Which the manual leaves "TBD". ``full``: identity, texts, heartbeats, guarding; ``minimal``:
     #: device type, error register, vendor and the heartbeat that a node sends; ``bare``: no object
-    #: at all. A node tells its boot-up and obeys network management in any case.
+    #: at all. A node reports its boot-up and obeys network management in any case.
     canopen_profile: str = choice(
         'full', 'minimal', 'bare', text='on CANopen: how much of the communication profile there is'
     )
@@ -69,7 +69,7 @@ class G2Variant(SinusVariant):
     canopen_types: str = choice(
         'table', 'narrow', 'wide', text='on CANopen: how many bytes values have'
     )
-    #: From one, sub-index 0 tells how many there are; from zero, as on PROFIBUS.
+    #: From one, sub-index 0 reports how many there are; from zero, as on PROFIBUS.
     canopen_sub_indices: str = choice(
         'from_one', 'from_zero', text='on CANopen: how the elements of arrays are numbered'
     )
@@ -126,7 +126,7 @@ class Firmware:
     :ivar lower_case: hexadecimal digits are sent as small letters; both are read [C86].
     :ivar bus_only: nothing but MODE is written while the bus has no control [C100].
     :ivar own_bus_codes: control over a fieldbus has InvSt codes of its own, four higher [C3].
-    :ivar tenths: values that it tells with a decimal more on Classic [C115].
+    :ivar tenths: values that it reports with a decimal more on Classic [C115].
     :ivar lacks: parameters that it does not have on Classic [C21].
     :ivar codes: enumerations of which it has these codes only.
     """

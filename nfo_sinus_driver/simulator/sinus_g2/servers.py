@@ -46,7 +46,7 @@ _MODEL_LENGTH = 8
 
 
 class ModbusServer(parts.ModbusServer):
-    """The Modbus side of one G2, which tells who it is."""
+    """The Modbus side of one G2, which reports who it is."""
 
     functions = parts.ModbusServer.functions | parts.NEWER
 
@@ -223,7 +223,7 @@ def _ids(model: Family) -> Mapping[int, tuple[Parameter, int]]:
 
 #: A drive of profile 402, a frequency converter.
 _DEVICE_TYPE = 0x0001_0192
-#: Made up: no manual tells vendor and product.
+#: Made up: no manual gives vendor and product.
 _VENDOR, _PRODUCT = 0x0000_001B, 0x0000_0038
 _NAME, _HARDWARE, _SOFTWARE = 0x1008, 0x1009, 0x100A
 _LOG_ENTRY = 4

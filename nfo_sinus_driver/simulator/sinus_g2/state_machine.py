@@ -251,7 +251,7 @@ class Procedure:
     """
     What one SCMD of tuning does: the drive measures its motor, or calculates it [M0 table 18].
 
-    No manual tells how.
+    No manual says how.
 
     :ivar seconds: how long it takes; real drives take minutes.
     :ivar measures: the power stage works meanwhile, so RUN must be active.

@@ -115,7 +115,7 @@ class OptimalControlUnit(SinusControlUnit):
     def _write_mode(self, raw: int) -> None:
         if raw not in set(Mode):
             raise Refused(Reason.VALUE, f'MODE = {raw} cannot be written')
-        self.admit('fieldbus.mode')
+        self.validate('fieldbus.mode')
         if raw == Mode.MANUAL:
             self.take(Source.KEYPAD if self._running else Source.STOP)
         else:
@@ -309,7 +309,7 @@ class ControlSteps:
                 self._left = _RESPONSE
 
     def next_due(self, shown: Status) -> bool:
-        """Tell whether the next command is taken because its bit stands."""
+        """Return whether the next command is taken because its bit stands."""
         if not self._by_level or self.waiting or self._asked == len(_STEPS):
             return False
         command, needed = _STEPS[self._asked]

@@ -312,7 +312,7 @@ def test_exceptions_have_the_texts_of_the_file_and_what_is_busy_is_asked_again(
             if key == 'ramp.accel' and left:
                 raise Refused(left.pop(), 'as the test says')  # type: ignore[arg-type]
 
-        rig.far.control_unit.admit = refuse  # type: ignore[method-assign]
+        rig.far.control_unit.validate = refuse  # type: ignore[method-assign]
         answer = rig.answer(rig.drive.parameters.change({'ramp.accel': 7.0}))
         assert 'parameters are locked (exception 34)' in answer
         left.clear()

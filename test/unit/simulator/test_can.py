@@ -225,7 +225,7 @@ class Objects:
             raise Abort(self.refusal)
         return self.value
 
-    def admit(self, index, sub_index, size):
+    def validate(self, index, sub_index, size):
         usual = len(self.read(index, sub_index))
         if size not in (None, usual):
             raise Abort(AbortCode.TOO_LONG if size > usual else AbortCode.TOO_SHORT)

@@ -152,7 +152,7 @@ class Bytes:
     def read(self, index, sub_index):
         return self.value
 
-    def admit(self, index, sub_index, size):
+    def validate(self, index, sub_index, size):
         return len(self.value)
 
     def write(self, index, sub_index, data):

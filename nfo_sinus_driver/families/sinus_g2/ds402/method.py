@@ -23,7 +23,7 @@ from nfo_sinus_driver.catalog.profile import (
     Until,
     Write,
     one,
-    taken,
+    try_steps,
 )
 from nfo_sinus_driver.catalog.status import Meaning, State, StatusCode
 from nfo_sinus_driver.families.sinus_g2.ds402 import words
@@ -62,7 +62,7 @@ class Ds402(ControlMethod):
     needs = (CONTROL_WORD, STATUS_WORD, MODE_OF_OPERATION)
 
     def in_control(self) -> Steps[bool]:
-        """Tell whether the bus has control of the drive, from us or from whom was here before."""
+        """Return whether the bus has control of the drive, from us or from whom was here before."""
         return bool(int((yield Read(STATUS_WORD))) & words.Status.REMOTE)
 
     def holder(self) -> Steps[Holder]:
@@ -147,21 +147,21 @@ class Ds402(ControlMethod):
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Switch off, take the voltage away, and take control away by MODE = Stop."""
         obeyed = yield from super().force_stop(control_mode)
-        return (yield from taken(one(Write(_MODE, Mode.STOP)))) or obeyed
+        return (yield from try_steps(one(Write(_MODE, Mode.STOP)))) or obeyed
 
     def release(self) -> Steps[None]:
         """Give control back by MODE = Stop, if the drive takes it, once the motor stands."""
         if (yield from self.in_control()):
-            yield from taken(one(Write(_MODE, Mode.STOP)))
+            yield from try_steps(one(Write(_MODE, Mode.STOP)))
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Switch off; where that is refused, MODE = Stop, and set-point 0."""
-        if (yield from taken(one(Write(CONTROL_WORD, words.SHUTDOWN)))):
+        if (yield from try_steps(one(Write(CONTROL_WORD, words.SHUTDOWN)))):
             return Removal.COMMAND
-        released = yield from taken(one(Write(_MODE, Mode.STOP)))
+        released = yield from try_steps(one(Write(_MODE, Mode.STOP)))
         if released and not (yield from self.perhaps_in_control()):
             return Removal.COMMAND
-        zero = yield from taken(self.zero_setpoint(control_mode))
+        zero = yield from try_steps(self.zero_setpoint(control_mode))
         return Removal.SETPOINT if zero else Removal.NOTHING
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
@@ -174,8 +174,8 @@ class Ds402(ControlMethod):
         error = words.error_text((yield from _read(_ERROR_CODE, 0)))
         serial = Meaning.SERIAL_FAILURE in shown.meanings
         if serial and (yield from self.holder()) is not Holder.LOCAL:
-            yield from taken(one(Write(_MODE, Mode.STOP)))
-        reset = yield from taken(self._reset_fault())
+            yield from try_steps(one(Write(_MODE, Mode.STOP)))
+        reset = yield from try_steps(self._reset_fault())
         if not (reset and (yield from self.perhaps_in_control())):
             yield from self._acknowledge_by_reading(control_mode)
         return error

@@ -17,7 +17,7 @@ from nfo_sinus_driver.catalog.profile import (
     Steps,
     Until,
     one,
-    taken,
+    try_steps,
 )
 from nfo_sinus_driver.catalog.speed_mode import SpeedMode
 from nfo_sinus_driver.catalog.status import Role
@@ -64,7 +64,7 @@ class OptimalTelegram1(Telegram1):
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Clear Switch on, then take Enable away, by which the motor is released [C109]."""
         yield from self.remove(control_mode)
-        return (yield from taken(one(method.begin(self.ready))))
+        return (yield from try_steps(one(method.begin(self.ready))))
 
     def stopping(self, word: int) -> int:
         """Return the word that keeps Enable where the motor is driven, so that it ramps."""

@@ -20,7 +20,7 @@ from nfo_sinus_driver.catalog.profile import (
     Steps,
     Write,
     one,
-    taken,
+    try_steps,
 )
 from nfo_sinus_driver.catalog.status import Fact, Role, State, StatusCode, StatusWord
 
@@ -106,8 +106,8 @@ class DriveControl(ControlMethod):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Take the run command back, and write set-point 0, each by itself."""
-        command = yield from taken(one(Write(_WORD, Word.REMOTE)))
-        setpoint = yield from taken(self.zero_setpoint(control_mode))
+        command = yield from try_steps(one(Write(_WORD, Word.REMOTE)))
+        setpoint = yield from try_steps(self.zero_setpoint(control_mode))
         if command:
             return Removal.COMMAND
         return Removal.SETPOINT if setpoint else Removal.NOTHING
