@@ -179,9 +179,8 @@ def test_it_is_driven() -> None:
         driven.answer(drive.enable())
         driven.turn_at(slave, 30.0)
         slave.trip(8)
-        driven.wait_until(lambda: not drive.following)
+        driven.wait_until(lambda: not drive.following and not slave.runs)
         assert driven.notes.said('External fault')
-        assert not slave.runs
         assert driven.answer(drive.acknowledge()) == 'acknowledged 8 EF'
         assert slave.fault == 0 and not slave.runs
 
