@@ -14,7 +14,6 @@ import math
 import os
 from pathlib import Path
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -44,7 +43,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool, Trigger
-from support import telegram_laws, trace_laws
+from support import ports, telegram_laws, trace_laws
 from support.drives import Drives
 from support.terminal import Terminal
 
@@ -216,7 +215,7 @@ class Bench(contextlib.ExitStack):
         #: What `Simulator` is given of the line, by the names of its arguments.
         self.line: dict[str, Any] = {**connection.simulator, 'control': str(folder / 'control')}
         if connection.protocol == 'modbus_tcp':
-            number = self.enter_context(_reserved())
+            number = self.enter_context(ports.reserved())
             self.port = f'127.0.0.1:{number}'
             self.line['tcp'] = number
         else:
@@ -540,15 +539,6 @@ class Client(contextlib.ExitStack):
 def seconds(stamp: Time) -> float:
     """Return a time stamp as a number."""
     return stamp.sec + stamp.nanosec * 1e-9
-
-
-@contextlib.contextmanager
-def _reserved() -> Iterator[int]:
-    """Have the number of a TCP port that is given to nothing else, and that can yet be served."""
-    with socket.socket() as claim:
-        claim.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        claim.bind(('127.0.0.1', 0))
-        yield claim.getsockname()[1]
 
 
 def _no_traceback(process: Process) -> None:

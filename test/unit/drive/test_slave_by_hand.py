@@ -13,7 +13,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator
 import contextlib
-import socket
 import threading
 import time
 from typing import Any
@@ -21,6 +20,7 @@ from typing import Any
 from pymodbus import datastore
 from pymodbus.server import ModbusTcpServer
 import pytest
+from support import ports
 from support.described import SHIPPED
 from support.rig import Notes
 from support.rig_line import Clock
@@ -101,26 +101,24 @@ class VfdEl(_CONTEXT or object):  # type: ignore[misc]
 @contextlib.contextmanager
 def served(slave: VfdEl) -> Iterator[int]:
     """Serve a slave as unit 1; yield the port."""
-    with socket.socket() as free:
-        free.bind(('127.0.0.1', 0))
-        port = free.getsockname()[1]
     loop = asyncio.new_event_loop()
     started = threading.Event()
     context = datastore.ModbusServerContext(slaves={1: slave}, single=False)
 
-    async def serve() -> None:
+    async def serve(port: int) -> None:
         server = ModbusTcpServer(context, address=('127.0.0.1', port))
         loop.call_later(0.2, started.set)
         with contextlib.suppress(asyncio.CancelledError):
             await server.serve_forever()
 
-    task = loop.create_task(serve())
-    thread = threading.Thread(target=loop.run_until_complete, args=(task,), daemon=True)
-    thread.start()
-    assert started.wait(_PATIENCE)
-    yield port
-    loop.call_soon_threadsafe(task.cancel)
-    thread.join(_PATIENCE)
+    with ports.reserved() as port:
+        task = loop.create_task(serve(port))
+        thread = threading.Thread(target=loop.run_until_complete, args=(task,), daemon=True)
+        thread.start()
+        assert started.wait(_PATIENCE)
+        yield port
+        loop.call_soon_threadsafe(task.cancel)
+        thread.join(_PATIENCE)
 
 
 class Driven:

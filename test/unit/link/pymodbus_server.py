@@ -11,7 +11,6 @@ import contextlib
 import logging
 import os
 import select
-import socket
 import threading
 import tty
 from typing import Any
@@ -24,6 +23,7 @@ except ImportError:
     from pymodbus.pdu.device import ModbusDeviceIdentification
 from pymodbus import datastore, framer as framers
 from pymodbus.datastore import ModbusSequentialDataBlock, ModbusServerContext
+from support import ports
 
 OLD = hasattr(datastore, 'ModbusSlaveContext')
 PATIENCE = 20
@@ -100,12 +100,10 @@ def _served(make: Any) -> Iterator[None]:
 @contextlib.contextmanager
 def tcp_server() -> Iterator[int]:
     """A TCP server; the number of its port."""
-    with socket.socket() as free:
-        free.bind(('127.0.0.1', 0))
-        port: int = free.getsockname()[1]
-    address = ('127.0.0.1', port)
-    with _served(lambda: ModbusTcpServer(_context(), identity=_identity(), address=address)):
-        yield port
+    with ports.reserved() as port:
+        address = ('127.0.0.1', port)
+        with _served(lambda: ModbusTcpServer(_context(), identity=_identity(), address=address)):
+            yield port
 
 
 @contextlib.contextmanager
