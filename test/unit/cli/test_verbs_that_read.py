@@ -407,8 +407,9 @@ def test_monitor_ends_with_ctrl_c(bench: Bench, through: tuple[str, ...]) -> Non
     assert 'Hz' in process.stdout.readline()
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
-    head, line = said.splitlines()
-    assert 'median' in head and line.startswith('line ')
+    # a busy machine may lose answers, which is reported before
+    *_, head, line = said.splitlines()
+    assert 'median' in head and line.startswith('line '), said
     assert process.returncode == 0
 
 
