@@ -107,7 +107,7 @@ def test_the_bag_alone_explains_each_stop(
 def test_each_line_has_a_picture_with_its_stops(bag: Path) -> None:
     assert plot([str(bag)]) == 0
     assert {path.name for path in bag.parent.glob('*.png')} == {
-        'ride_line1.png', 'ride_line2.png'
+        'run_line1.png', 'run_line2.png'
     }
     first, second = read(bag, [_DRIVE, '/line2/outfeed'])
     assert len(first.stops) == len(_STOPS) and not second.stops
