@@ -301,9 +301,13 @@ class Commands:
         await carry_out(self._method.release(), self._params, Priority.SERVICE)
 
     async def remove(self, control_mode: str) -> Removal:
-        """Remove run command and set-point while a fault is active, each by itself [C98]."""
+        """
+        Remove run command and set-point while a fault is active, each by itself [C98].
+
+        Ahead of all else on the bus: the fault may end by itself, and the motor run on.
+        """
         steps = self._method.remove(control_mode)
-        return await carry_out(steps, self._params, Priority.SERVICE)
+        return await carry_out(steps, self._params, Priority.STOP)
 
     async def acknowledge(self, code: int, control_mode: str) -> str:
         """Remove run command and set-point, acknowledge the fault; return its details."""

@@ -29,6 +29,9 @@ NOISY = 2.0
 #: A stop that a fault keeps a drive from taking is not repeated within this, s.
 REFUSED = 0.3
 
+#: Reads that acknowledge a fault.
+ACKNOWLEDGING_READS = ('fieldbus.inv_st_with_ack', 'fieldbus.sio_err')
+
 #: Commands that end a run.
 STOPS = ('stop', 'quick_stop', 'deactivate', 'disconnect', 'stop_for_good')
 #: Commands that may turn the motor.
@@ -87,6 +90,8 @@ class History:
         #: drive may end that fault by itself.
         self._faulted_at = -math.inf
         self._ended_by_fault: float | None = None
+        #: The drive ends the fault that is active by itself; it has so ended the last one.
+        self._ends_itself = self._ended_itself = False
         self._stop_due: int | None = None
         #: How much had been asked when keypad or terminals took the drive from the bus last.
         self._taken_away = -1
@@ -279,16 +284,22 @@ class History:
         if self._broken_since is not None:
             back = self.times.found if not self._ours else self.times.taken_back
             self._no_run_from = max(self._no_run_from, self.now + back + NOISY)
+        elif self._whole_since is not None and self._no_run_from > self.now:
+            # it has come back only just
+            self._no_run_from += NOISY
         self._whole_since = self._broken_since = self._stop_due = None
         for command in self._commands:
             command.undisturbed = False
 
     def _watch_conditions(self) -> None:
         conditions = tuple(self._present_conditions())
+        if not conditions[0]:
+            self._ends_itself, self._ended_itself = self.shown.restarts_itself, False
         if conditions == self._conditions:
             return
         ended = [was and not now for was, now in zip(self._conditions, conditions, strict=True)]
         if conditions[0] and not self._conditions[0]:
+            self._ended_itself = self._ends_itself and not self._acknowledging
             self._forgive_fault()
         self._conditions = conditions
         enabled_at = self.enabled_at
@@ -304,6 +315,14 @@ class History:
             self._faulted_at = self.now
             by_itself = all(map(self.shown.has_tries, self._far.faults.codes))
             self._ended_by_fault = enabled_at if by_itself and sum(ended) == 1 else None
+
+    @property
+    def _acknowledging(self) -> bool:
+        """The last request may have ended a fault."""
+        _, key, data = self._rig.asked[-1]
+        if data is None:
+            return key in ACKNOWLEDGING_READS
+        return not self.shown.stops(key, self._rig.number(data))
 
     def _forgive_fault(self) -> None:
         """Let a run go on whose fault came, and ended by itself, before it had to be noticed."""

@@ -123,7 +123,8 @@ class Laws(History):
         # one that ran before had no fault to acknowledge
         started = self._running_since is not None and self._running_since > begun
         by_us = started and self.disturbed_at < begun and self.enabled_at is None
-        by_itself = self.shown.restarts_itself or self._ended_by_fault is not None
+        by_itself = self.shown.restarts_itself or self._ended_itself
+        by_itself |= self._ended_by_fault is not None
         if not (by_us and self.running and self._far.motor.driven) or by_itself or self._foreign:
             self._turned_from = None
             return

@@ -204,6 +204,18 @@ def test_a_clean_up_while_a_fault_is_being_acknowledged_stops_first() -> None:
         state.rig.close()
 
 
+def test_a_stop_that_a_fault_has_refused_waits_for_no_measured_values() -> None:
+    # the drive ends the fault by itself, and the driver reads what it was in the error log
+    state = Canopen()
+    state.begin(restart_after=0, refuses='all')
+    try:
+        state.another_run(value=20.0, wait=0.0)
+        state.fault(code=5, standing=False, wait=0.02)
+        state.shut_down(wait=0.0)
+    finally:
+        state.rig.close()
+
+
 def test_a_stop_waits_for_no_look_whether_the_motor_has_to_be_stopped() -> None:
     state = Movitrac()
     state.begin(response_time=30.0)
