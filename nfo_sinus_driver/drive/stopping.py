@@ -37,7 +37,8 @@ _NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
 
 class _Outcome(enum.Enum):
     CONFIRMED = enum.auto()
-    #: It is unknown whether the drive has received it: it is repeated at once, for a while.
+    #: It is unknown whether the drive has received it, or it was refused in a fault that is over:
+    #: it is repeated at once, for a while.
     UNANSWERED = enum.auto()
     #: The drive was too busy for it, and may take it the next moment.
     BUSY = enum.auto()
@@ -251,6 +252,7 @@ class StopSequence:
     async def _try_once(self, before: _Outcome) -> _Outcome:
         control_mode = self._state.control_mode
         reasons = self._reasons
+        faulted = self._state.status is not None and self._state.status.faulted
         failure: LinkError | None = None
         try:
             await self._method.stop(control_mode)
@@ -288,7 +290,8 @@ class StopSequence:
         if unconfirmed is None:
             return _Outcome.CONFIRMED
         self._unconfirmed = unconfirmed
-        return _Outcome.UNCONFIRMED
+        over = isinstance(failure, Refused) and faulted and not status.faulted
+        return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED
 
     def _needs_force(self, status: InverterStatus, failure: LinkError | None) -> bool:
         """Return whether an ordinary stop does not do: refused again, ignored or in vain."""

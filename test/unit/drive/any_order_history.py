@@ -95,8 +95,9 @@ class History:
         self._stop_due: int | None = None
         #: How much had been asked when keypad or terminals took the drive from the bus last.
         self._taken_away = -1
-        #: When a stop was last written, taken or refused.
+        #: When a stop was last written, taken or refused, and whether a fault was active.
         self._stop_tried_at = -math.inf
+        self._tried_in_fault = False
         #: When the drive was last seen to tune.
         self._tuned_at = -math.inf
 
@@ -144,7 +145,7 @@ class History:
     @property
     def _refused_just_now(self) -> bool:
         """A fault has just kept the drive from taking a stop: none is due again so soon."""
-        return bool(self._far.faults) and self.now - self._stop_tried_at < REFUSED
+        return self._tried_in_fault and self.now - self._stop_tried_at < REFUSED
 
     def connected(self) -> None:
         """Take note that the driver looks after the drive from now on, or tries to."""

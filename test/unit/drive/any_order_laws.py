@@ -256,7 +256,7 @@ class Laws(History):
         due = self._stop_due
         if stops:
             self._stop_due = None
-            self._stop_tried_at = self.now
+            self._stop_tried_at, self._tried_in_fault = self.now, bool(self._far.faults)
         before = 0 if due is None else len(self._rig.asked) - 1 - due
         if before > self.shown.lead:
             raise Broken(f'{before} transactions went ahead of a stop')

@@ -216,6 +216,22 @@ def test_a_stop_that_a_fault_has_refused_waits_for_no_measured_values() -> None:
         state.rig.close()
 
 
+def test_a_stop_follows_the_first_status_without_the_fault_that_refused_it() -> None:
+    state = Canopen()
+    state.begin(restart_after=0, refuses='all')
+    try:
+        state.at_once(names=('enable', 'stop'), begun='', after=0.0, wait=0.0)
+        state.good_run(value=20.0, wait=0.4)
+        state.activate(wait=0.0)
+        asked = len(state.rig.asked)
+        # the fault is over while the stop is being tried
+        state.fault(code=5, standing=False, wait=0.05)
+        stops = [key for _, key, data in state.rig.asked[asked:] if data == b'\0\0']
+        assert stops.count('fieldbus.scmd') == 2 and not state.laws.standing
+    finally:
+        state.rig.close()
+
+
 def test_a_stop_waits_for_no_look_whether_the_motor_has_to_be_stopped() -> None:
     state = Movitrac()
     state.begin(response_time=30.0)
