@@ -134,6 +134,24 @@ HISTORIES = (
     ),
     Mutant(
         3,
+        'in any order: a stop that a fault has refused waits for measured values',
+        COMMANDS,
+        'self._method.remove(control_mode)\n'
+        '        return await carry_out(steps, self._params, Priority.STOP)',
+        'self._method.remove(control_mode)\n'
+        '        return await carry_out(steps, self._params, Priority.SERVICE)',
+        ('test/unit/drive/test_any_order_found.py',),
+    ),
+    Mutant(
+        3,
+        'in any order: a stop waits although the fault that refused it is over',
+        SEQUENCE,
+        'return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED',
+        'return _Outcome.UNCONFIRMED',
+        ('test/unit/drive/test_any_order_found.py',),
+    ),
+    Mutant(
+        3,
         'in any order: an old set-point is followed for ever',
         SETPOINT,
         'left = last + timeout - self._bus.now() if timeout else math.inf',

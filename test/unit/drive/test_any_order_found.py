@@ -17,6 +17,7 @@ from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 
 BUS_FAIL, RUN = 15, 0x101
+SCMD = 'fieldbus.scmd'
 
 
 def test_a_fault_that_holds_the_stop_does_not_keep_the_line_busy_while_it_connects() -> None:
@@ -210,8 +211,15 @@ def test_a_stop_that_a_fault_has_refused_waits_for_no_measured_values() -> None:
     state.begin(restart_after=0, refuses='all')
     try:
         state.another_run(value=20.0, wait=0.0)
+        asked = len(state.rig.asked)
         state.fault(code=5, standing=False, wait=0.02)
         state.shut_down(wait=0.0)
+        keys = [key for _, key, _ in state.rig.asked[asked:]]
+        refused = keys.index(SCMD)
+        removed = keys.index(SCMD, refused + 1)
+        # what a stop itself writes and reads, and no more
+        status = {'fieldbus.drive_status', 'fieldbus.inv_st'}
+        assert {*keys[refused:removed]} <= {SCMD, 'fieldbus.mode', 'status.frq_set', *status}
     finally:
         state.rig.close()
 
@@ -227,7 +235,7 @@ def test_a_stop_follows_the_first_status_without_the_fault_that_refused_it() -> 
         # the fault is over while the stop is being tried
         state.fault(code=5, standing=False, wait=0.05)
         stops = [key for _, key, data in state.rig.asked[asked:] if data == b'\0\0']
-        assert stops.count('fieldbus.scmd') == 2 and not state.laws.standing
+        assert stops.count(SCMD) == 2 and not state.laws.standing
     finally:
         state.rig.close()
 
