@@ -48,7 +48,6 @@ FAMILY = re.compile(
     '|'.join([*families(), r'sinus_', r'simulator\.sinus\b', r'(?<![a-z0-9])g2', 'optimal']),
     re.IGNORECASE,
 )
-MOST_LINES = 600
 
 LICENCE = re.compile(
     r'(#!.*\n)?# Copyright 20\d\d The nfo_sinus_driver authors\n'
@@ -137,8 +136,6 @@ def violations(path: str, source: str) -> Iterator[str]:
     elif room == 'simulator':
         others = [name for name in families() if name != path.split('/')[1]]
         yield from (f'{path} imports {name}' for name in others if f'simulator.{name}' in source)
-    if (lines := source.count('\n')) > MOST_LINES:
-        yield f'{lines} lines are too many'
 
 
 def time_calls(tree: ast.Module) -> Iterator[ast.Call]:
@@ -319,7 +316,6 @@ def test_what_breaks_a_rule_is_found_and_nothing_else() -> None:
         ('drive/drive.py', 'import time\ntime.monotonic()', 'drive/drive.py asks for the time'),
         ('drive/drive.py', 'say(f"{it} in error.rst_dly: {text}")', 'drive names error.rst_dly'),
         ('drive/drive.py', 'key.startswith("serial.")', 'drive names serial.'),
-        ('drive/drive.py', '\n' * 601, '601 lines are too many'),
         ('simulator/drive.py', 'class OptimalUnit: ...', 'simulator knows Optimal'),
         (
             'simulator/sinus_g2/family.py',
