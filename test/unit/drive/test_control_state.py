@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The table of control: what may lead to a turning motor, that the docs show it as it is, and that
-every row of it is visited in histories that the laws judge.
+The table of control: that the docs show it as it is, and that every row of it is visited in
+histories that the laws judge. What it allows: :mod:`test_control_table`.
 """
 
 from __future__ import annotations
@@ -19,23 +19,10 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Procedure, control_state
-from nfo_sinus_driver.drive.control_state import COMMANDED, TRANSITIONS, ControlEvent, ControlState
+from nfo_sinus_driver.drive.control_state import TRANSITIONS, ControlEvent, ControlState
 
 PAGE = Path(__file__).parents[3] / 'docs' / 'control.md'
 Row = tuple[ControlState, ControlEvent]
-
-
-def reached(start: ControlState, without: frozenset[ControlEvent]) -> set[ControlState]:
-    """Return where the table leads from a state while some events do not happen."""
-    found, new = set[ControlState](), {start}
-    while new:
-        found |= new
-        new = {
-            state
-            for (before, event), state in TRANSITIONS.items()
-            if before in found and event not in without
-        } - found
-    return found
 
 
 def diagram() -> str:
@@ -65,26 +52,6 @@ def tables() -> str:
             *rows,
         )
     )
-
-
-def test_what_may_turn_the_motor_begins_from_idle_alone_and_ends_from_everywhere() -> None:
-    begins = frozenset((ControlEvent.ENABLE, ControlEvent.BEGIN))
-    for state in set(ControlState) - COMMANDED:
-        assert not reached(state, begins) & COMMANDED
-    enabled = [before for before, event in TRANSITIONS if event is ControlEvent.ENABLE]
-    running = [before for before, event in TRANSITIONS if event is ControlEvent.RUNNING]
-    assert (enabled, running) == ([ControlState.IDLE], [ControlState.ENABLING])
-    ends = {
-        TRANSITIONS[state, event]
-        for state in COMMANDED
-        for event in (ControlEvent.STOP, ControlEvent.LOST)
-    }
-    assert ends == {ControlState.STOPPING}
-
-
-def test_every_state_is_reached_and_left() -> None:
-    for state in ControlState:
-        assert reached(state, frozenset()) == set(ControlState)
 
 
 def test_the_page_shows_the_table_as_it_is() -> None:
