@@ -1,4 +1,4 @@
-# ROS 2 Jazzy, and both packages built in the ordinary way; the commands are those of docs/releases.md.
+# ROS 2 Jazzy, and both packages built in the ordinary way; the commands are those of README.md.
 #
 #   docker build -t nfo_sinus_driver .
 #   docker run -it --rm --init nfo_sinus_driver ros2 launch nfo_sinus_driver simulation.launch.py

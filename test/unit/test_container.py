@@ -27,8 +27,10 @@ def commands(page: str, beginning: str) -> list[str]:
 
 def test_it_is_built_and_used_as_the_pages_say() -> None:
     for beginning in ('rosdep install', 'colcon build'):
-        (command,) = commands('docs/releases.md', beginning)
+        (command,) = commands('README.md', beginning)
         assert command in RUN
+    (link,) = commands('README.md', 'ln -s')
+    assert f'RUN {link}\n' in RUN
     build, run = commands('README.md', 'docker')
     assert f'#   {build}\n' in DOCKERFILE and f'#   {run}\n' in DOCKERFILE
     assert ' --init ' in run

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The branch of the packages side by side: found, built and tested in an empty workspace."""
+"""An empty workspace: from a clone of main as the README says, and from the branch of a release."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 import re
 import subprocess
+import sys
 
 import pytest
 from support.places import MSG_DEFS, ROOT
@@ -19,11 +20,10 @@ pytest.importorskip('colcon_core', reason='colcon is not installed')
 if not (ROOT / '.git').exists():
     pytest.skip('this is not a clone of main', allow_module_level=True)
 
+BOTH = {'nfo_sinus_driver', 'nfo_sinus_msgs'}
 #: Of the driver's own tests, those that look for the other package, and one that runs the driver.
-TESTS = (
-    'test/unit/catalog/test_family.py', 'test/unit/cli/test_completion.py',
-    'test/unit/test_docs.py', 'test/ros/test_calls_logged.py',
-)
+WITHOUT_ROS = ('test/unit/catalog/test_family.py', 'test/unit/test_docs.py')
+TESTS = (*WITHOUT_ROS, 'test/unit/cli/test_completion.py', 'test/ros/test_calls_logged.py')
 
 
 def run(*command: object, folder: Path) -> str:
@@ -44,6 +44,25 @@ def run(*command: object, folder: Path) -> str:
     return done.stdout
 
 
+def lines_of_the_readme() -> dict[str, str]:
+    """The commands that make a workspace, by their first words."""
+    page = (ROOT / 'README.md').read_text(encoding='utf-8')
+    (chapter,) = re.findall(r'^## In your own workspace$(.*?)^##', page, re.MULTILINE | re.DOTALL)
+    (block,) = re.findall(r'\n\n((?:    git clone .*\n)(?:    .*\n)+)', chapter)
+    lines = [line.strip() for line in block.splitlines()]
+    return {re.match(r'[a-z0-9]+( [a-z]+)?', line)[0]: line for line in lines}
+
+
+@pytest.fixture(scope='module')
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace with a clone of main, as the README says."""
+    lines = lines_of_the_readme()
+    folder = tmp_path_factory.mktemp('workspace')
+    for line in (lines['git clone'].replace('<this repository>', str(ROOT)), lines['ln']):
+        run('sh', '-c', line, folder=folder)
+    return folder
+
+
 @pytest.fixture(scope='module')
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A repository with the branch."""
@@ -55,17 +74,49 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope='module')
-def workspace(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A workspace with nothing but the branch."""
-    folder = tmp_path_factory.mktemp('workspace')
-    run('git', 'clone', '--quiet', '--branch', 'jazzy', source, 'src/nfo_sinus', folder=folder)
-    return folder
-
-
-def test_both_packages_are_found(workspace: Path) -> None:
+def test_every_tool_finds_both_packages(workspace: Path) -> None:
+    assert lines_of_the_readme()['rosdep install'].startswith('rosdep install --from-paths src ')
+    # what rosdep and bloom look with
     found = packages.find_packages(str(workspace / 'src'))
-    assert {package.name for package in found.values()} == {'nfo_sinus_driver', 'nfo_sinus_msgs'}
+    assert {package.name for package in found.values()} == BOTH
+    assert set(run('colcon', 'list', '--names-only', folder=workspace).split()) == BOTH
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_a_plain_build_makes_both_packages_and_their_tests_pass(workspace: Path) -> None:
+    lines = lines_of_the_readme()
+    run('sh', '-c', lines['colcon build'], folder=workspace)
+    in_workspace = f'{lines["source"]} && exec "$@"'
+    for package, tests in (('nfo_sinus_msgs', ()), ('nfo_sinus_driver', TESTS)):
+        # colcon takes what comes after --pytest-args for that, up to the end
+        chosen = ('--pytest-args', *tests) if tests else ()
+        command = ('colcon', 'test', '--packages-select', package, *chosen)
+        run('bash', '-c', in_workspace, 'bash', *command, folder=workspace)
+        report = run(
+            'colcon', 'test-result', '--verbose', '--test-result-base', f'build/{package}',
+            folder=workspace,
+        )
+        assert ', 0 errors, 0 failures' in report and 'Summary: 0 tests' not in report
+    launch = lines['ros2 launch'].removeprefix('ros2 launch nfo_sinus_driver ')
+    share = workspace / 'install' / 'nfo_sinus_driver' / 'share' / 'nfo_sinus_driver'
+    assert (share / 'launch' / launch).is_file()
+
+
+def test_the_branch_of_a_release_has_the_packages_side_by_side(source: Path, tmp_path: Path) -> None:
+    run('git', 'clone', '--quiet', '--branch', 'jazzy', source, '.', folder=tmp_path)
+    found = packages.find_packages(str(tmp_path))
+    assert {package.name for package in found.values()} == BOTH
+    # all that was built and tested, and nothing else
+    for name, old in (('nfo_sinus_driver', '.'), ('nfo_sinus_msgs', 'msg_defs')):
+        new = run('git', 'ls-tree', '-r', 'HEAD', '.', folder=tmp_path / name)
+        all_of_main = run('git', 'ls-tree', '-r', 'HEAD', '.', folder=source / old)
+        assert new == re.sub(r'^.*\tmsg_defs/.*\n', '', all_of_main, flags=re.MULTILINE)
+    options = ('-p', 'timeout', '-p', 'hypothesispytest', '-p', 'no:cacheprovider')
+    run(
+        sys.executable, '-m', 'pytest', '-q', *options, *WITHOUT_ROS,
+        folder=tmp_path / 'nfo_sinus_driver',
+    )
 
 
 @pytest.mark.parametrize('folder', [ROOT, MSG_DEFS], ids=['driver', 'messages'])
@@ -108,20 +159,3 @@ def test_what_would_be_lost_is_refused(source: Path) -> None:
     assert run('git', 'rev-parse', 'jazzy^2', folder=source) == run(
         'git', 'rev-parse', 'HEAD', folder=source
     )
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(1200)
-def test_a_plain_build_makes_both_packages_and_their_tests_pass(workspace: Path) -> None:
-    run('colcon', 'build', folder=workspace)
-    in_workspace = '. install/local_setup.sh && exec "$@"'
-    for package, tests in (('nfo_sinus_msgs', ()), ('nfo_sinus_driver', TESTS)):
-        # colcon takes what comes after --pytest-args for that, up to the end
-        chosen = ('--pytest-args', *tests) if tests else ()
-        command = ('colcon', 'test', '--packages-select', package, *chosen)
-        run('sh', '-c', in_workspace, 'sh', *command, folder=workspace)
-        report = run(
-            'colcon', 'test-result', '--verbose', '--test-result-base', f'build/{package}',
-            folder=workspace,
-        )
-        assert ', 0 errors, 0 failures' in report and 'Summary: 0 tests' not in report
