@@ -22,7 +22,7 @@ USES_PYMODBUS = $(addprefix test/unit/simulator/test_, \
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench docs parameters
-.PHONY: bench-gate build clean coverage
+.PHONY: all bench-gate build clean coverage
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -39,6 +39,11 @@ run: setup ## driver and simulated drive, up until Ctrl-C, for ros2 topic pub
 
 test: setup ## lint, types, unit, ros, until the first one fails
 	@for stage in lint types unit ros; do \
+		$(MAKE) --no-print-directory $$stage || exit; \
+	done
+
+all: ## all that says whether it is right: test, docs, mutants, campaign (hours)
+	@for stage in test docs mutants campaign; do \
 		$(MAKE) --no-print-directory $$stage || exit; \
 	done
 
@@ -111,6 +116,7 @@ bench-gate: setup ## fail where the driver is slower than its last release (ten 
 	@touch $@
 
 docs: .venv/docs/installed ## the documentation as a site, in site/; every link is checked
+	@echo '== docs: every page is made and in the contents, no link leads nowhere'
 	@.venv/docs/bin/sphinx-build -q -W --keep-going -b html -c docs . site
 	@echo 'site/index.html'
 

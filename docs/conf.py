@@ -1,43 +1,46 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How `make docs` makes a site of README.md and docs/ with Sphinx."""
+"""
+How Sphinx makes a site of README.md and docs/: for `make docs`, and for the build farm by rosdoc2.
+
+rosdoc2 copies docs/ and some of the pages beside it, has an index of its own, and executes this
+file in a configuration that has `rosdoc2_settings`.
+"""
 
 from pathlib import Path
 import re
 
+_BY_ROSDOC2 = 'rosdoc2_settings' in globals()
+
 project = 'nfo_sinus_driver'
 copyright = 'the nfo_sinus_driver authors, Apache License 2.0'
-extensions = ['myst_parser', 'sphinxcontrib.mermaid']
-include_patterns = [
-    *('README.md', 'CONTRIBUTING.md', 'CHANGELOG.rst', 'docs/*.md', 'docs/drives/*.md'),
-    'benchmark/results.md',
-]
-exclude_patterns = ['.*', 'build', 'install', 'log', 'site']
-root_doc = 'docs/README'
-html_theme = 'furo'
-html_title = 'nfo_sinus_driver'
-# what a web server shows of the folder itself; it leads to the first page
-html_extra_path = ['index.html']
 # what a link may point to inside a page: every heading that there is
 myst_heading_anchors = 6
-# as GitHub shows it
-myst_fence_as_directive = ['mermaid']
-
-_INDEX = 'docs/README'
-_ROOT = Path(__file__).resolve().parents[1]
+if not _BY_ROSDOC2:
+    extensions = ['myst_parser', 'sphinxcontrib.mermaid']
+    # as GitHub shows it
+    myst_fence_as_directive = ['mermaid']
+    include_patterns = [
+        *('*.md', 'CHANGELOG.rst', 'docs/*.md', 'docs/drives/*.md', 'benchmark/results.md')
+    ]
+    root_doc = 'docs/README'
+    html_theme = 'furo'
+    html_title = 'nfo_sinus_driver'
+    # what a web server shows of the folder itself; it leads to the first page
+    html_extra_path = ['index.html']
 
 
 def _prepare(app, name, source):
-    """Give the index a table of contents for each group of it; links to folders become text."""
-    folder = (_ROOT / name).parent
+    """Give the index a table of contents for each group of it; links to no page become text."""
+    folder = (Path(app.srcdir) / name).parent
 
-    def without_folder(link):
+    def without_page(link):
         text, target = link.groups()
-        return text if (folder / target).is_dir() else link[0]
+        return link[0] if '://' in target or (folder / target).is_file() else text
 
-    source[0] = re.sub(r'(?<!!)\[([^]]+)\]\(([^)#\s]+)\)', without_folder, source[0])
-    if name != _INDEX:
+    source[0] = re.sub(r'(?<!!)\[([^]]+)\]\(([^)#\s]+)\)', without_page, source[0])
+    if name != 'docs/README':
         return
     # the title of each group, and the rows of its table
     for title, rows in re.findall(r'^## (.+)\n\n((?:\|.*\n)+)', source[0], re.MULTILINE):

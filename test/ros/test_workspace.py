@@ -87,7 +87,7 @@ def test_every_tool_finds_both_packages(workspace: Path) -> None:
 def test_a_plain_build_makes_both_packages_and_their_tests_pass(workspace: Path) -> None:
     lines = lines_of_the_readme()
     run('sh', '-c', lines['colcon build'], folder=workspace)
-    in_workspace = f'{lines["source"]} && exec "$@"'
+    in_workspace = f'{lines["source install"]} && exec "$@"'
     for package, tests in (('nfo_sinus_msgs', ()), ('nfo_sinus_driver', TESTS)):
         # colcon takes what comes after --pytest-args for that, up to the end
         chosen = ('--pytest-args', *tests) if tests else ()

@@ -278,6 +278,17 @@ def test_every_page_is_in_the_index() -> None:
     assert pages - index == {'README.md'}
 
 
+def test_the_site_has_every_page_that_is_in_the_index() -> None:
+    # `make docs` makes it, checks every link, and is part of `make all`
+    docs = ROOT / 'docs'
+    conf = runpy.run_path(str(docs / 'conf.py'))
+    made = {path for pattern in conf['include_patterns'] for path in ROOT.glob(pattern)}
+    linked = {(docs / file).resolve() for file, _ in links(read(docs / 'README.md'))}
+    assert [path for path in linked if path not in made] == []
+    assert all((docs / name).is_file() for name in conf['html_extra_path'])
+    assert re.search(r'^all:.*\n(?:\t.*\n)*?\t.*\bdocs\b', read(ROOT / 'Makefile'), re.MULTILINE)
+
+
 def test_every_claim_of_the_quality_declaration_has_its_place_or_is_not_met() -> None:
     rows = re.findall(r'^\| (.+?) \| ((?:not )?met) \| (.*?) ?\|$', read(DECLARATION), re.MULTILINE)
     tables = re.findall(r'^\| requirement \| state', read(DECLARATION), re.MULTILINE)
