@@ -81,7 +81,7 @@ PROFILE = Profile(
     setpoints=method.setpoints(327.67, forward_only=True),
     in_charge=method.in_charge,
     writes_and_reads=True,
-    # 0382h is the operation command [M3 §7.2.1]
-    own_addresses=OwnAddresses('drive_address', frozenset((0x0382,)), 'M3 §10; C124'),
+    # the operation command and STW1 [M3 §7.2.1]
+    own_addresses=OwnAddresses('drive_address', frozenset((0x0382, 0x047F)), 'M3 §10; C124'),
     most={Role.ACTUAL_FREQUENCY: 327.67},
 )

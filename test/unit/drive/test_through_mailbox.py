@@ -204,6 +204,7 @@ def test_an_address_that_the_drive_lacks_is_reported() -> None:
         ('drv.acc_time=1105h:0', 'the factor is not 0'),
         ('drv.acc_time=10000h', 'not this address'),
         ('drv.command=0382h:1::rw', 'not this address'),
+        ('drv.word=047Fh:1::rw', 'not this address'),
         ('fieldbus.x=1', 'or not this group'),
         ('telegram.torque=1', 'already'),
     ],
