@@ -20,7 +20,7 @@ def share(*folders):
 
 setup(
     name=NAME,
-    version='0.1.0',
+    version='0.9.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={
         NAME: [
@@ -40,8 +40,6 @@ setup(
     # What it needs at run time stands in package.xml, under the names that rosdep knows.
     extras_require={'test': ['hypothesis', 'pytest']},
     zip_safe=False,
-    maintainer='NFO Sinus driver developers',
-    maintainer_email='nfo-sinus-driver@example.org',
     description='Driver for variable-frequency drives (VFDs): NFO Sinus and others',
     keywords=['ROS', 'VFD', 'variable-frequency drive', 'frequency inverter', 'Modbus', 'CANopen'],
     license='Apache-2.0',

@@ -3,4 +3,4 @@
 
 """The version of the package, as in package.xml."""
 
-VERSION = '0.1.0'
+VERSION = '0.9.0'

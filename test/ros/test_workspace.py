@@ -14,12 +14,15 @@ import sys
 import pytest
 from support.places import MSG_DEFS, ROOT
 
+from nfo_sinus_driver.version import VERSION
+
 packages = pytest.importorskip('catkin_pkg.packages', reason='catkin_pkg is not installed')
 changelog = pytest.importorskip('catkin_pkg.changelog')
 pytest.importorskip('colcon_core', reason='colcon is not installed')
 if not (ROOT / '.git').exists():
     pytest.skip('this is not a clone of main', allow_module_level=True)
 
+FORGE = 'git@forge.example:team/nfo_sinus.git'
 BOTH = {'nfo_sinus_driver', 'nfo_sinus_msgs'}
 #: Of the driver's own tests, those that look for the other package, and one that runs the driver.
 WITHOUT_ROS = ('test/unit/catalog/test_family.py', 'test/unit/test_docs.py')
@@ -70,6 +73,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run('git', 'clone', '--quiet', ROOT, '.', folder=folder)
     run('git', 'config', 'user.name', 'A test', folder=folder)
     run('git', 'config', 'user.email', 'test@example.org', folder=folder)
+    run('git', 'remote', 'set-url', 'origin', FORGE, folder=folder)
     run(ROOT / 'tools' / 'release_branch', folder=folder)
     return folder
 
@@ -103,15 +107,31 @@ def test_a_plain_build_makes_both_packages_and_their_tests_pass(workspace: Path)
     assert (share / 'launch' / launch).is_file()
 
 
-def test_the_branch_of_a_release_has_the_packages_side_by_side(source: Path, tmp_path: Path) -> None:
+def test_the_branch_of_a_release_has_the_packages_side_by_side(
+    source: Path, tmp_path: Path
+) -> None:
     run('git', 'clone', '--quiet', '--branch', 'jazzy', source, '.', folder=tmp_path)
-    found = packages.find_packages(str(tmp_path))
-    assert {package.name for package in found.values()} == BOTH
-    # all that was built and tested, and nothing else
+    found = packages.find_packages(str(tmp_path)).values()
+    assert {package.name for package in found} == BOTH
+    address = 'https://forge.example/team/nfo_sinus'
+    for package in found:
+        urls = {one.type: one.url for one in package.urls}
+        assert urls.pop('website') and urls == {
+            'repository': address, 'bugtracker': f'{address}/issues'
+        }
+    # all else that was built and tested, and nothing more
     for name, old in (('nfo_sinus_driver', '.'), ('nfo_sinus_msgs', 'msg_defs')):
-        new = run('git', 'ls-tree', '-r', 'HEAD', '.', folder=tmp_path / name)
-        all_of_main = run('git', 'ls-tree', '-r', 'HEAD', '.', folder=source / old)
-        assert new == re.sub(r'^.*\tmsg_defs/.*\n', '', all_of_main, flags=re.MULTILINE)
+        new, of_main = (
+            re.sub(r'^.*\t(msg_defs/.*|package\.xml)\n', '', listed, flags=re.MULTILINE)
+            for listed in (
+                run('git', 'ls-tree', '-r', 'HEAD', '.', folder=tmp_path / name),
+                run('git', 'ls-tree', '-r', 'HEAD', '.', folder=source / old),
+            )
+        )
+        assert new == of_main
+        manifest = (tmp_path / name / 'package.xml').read_text(encoding='utf-8')
+        without = re.sub(rf'^.*{address}.*\n', '', manifest, flags=re.MULTILINE)
+        assert without == (source / old / 'package.xml').read_text(encoding='utf-8')
     options = ('-p', 'timeout', '-p', 'hypothesispytest', '-p', 'no:cacheprovider')
     run(
         sys.executable, '-m', 'pytest', '-q', *options, *WITHOUT_ROS,
@@ -122,14 +142,41 @@ def test_the_branch_of_a_release_has_the_packages_side_by_side(source: Path, tmp
 @pytest.mark.parametrize('folder', [ROOT, MSG_DEFS], ids=['driver', 'messages'])
 def test_the_changelog_has_the_form_that_the_tools_of_a_release_read(folder: Path) -> None:
     text = (folder / 'CHANGELOG.rst').read_text(encoding='utf-8')
-    title = '1.0.0 (2026-01-01)'
-    released = text.replace(f'Forthcoming\n{"-" * 11}\n', f'{title}\n{"-" * len(title)}\n')
-    assert released != text
     log = changelog.Changelog(folder.name)
-    changelog.populate_changelog_from_rst(log, released)
-    ((version, _, (items, *more)), *_) = log.foreach_version()
-    assert version == '1.0.0' and not more, 'one list'
-    assert len(items.bullets) == len(re.findall(r'^\* ', text, re.MULTILINE))
+    changelog.populate_changelog_from_rst(log, text)
+    versions = {version: content for version, _, content in log.foreach_version()}
+    assert VERSION in versions
+    # one list for each
+    lists = [one for content in versions.values() for one in content]
+    assert len(lists) == len([content for content in versions.values() if content])
+    bullets = sum(len(one.bullets) for one in lists)
+    assert bullets == len(re.findall(r'^\* ', text, re.MULTILINE))
+
+
+@pytest.mark.parametrize(
+    ('origin', 'address'),
+    [
+        ('https://name:secret@forge.example/team/driver.git', 'https://forge.example/team/driver'),
+        ('http://forge.example:3000/team/driver/', 'http://forge.example:3000/team/driver'),
+        ('ssh://git@forge.example:2222/team/driver.git', 'https://forge.example/team/driver'),
+        ('/some/where', ''),
+        ('../where', ''),
+        # the last one: there is none
+        (None, ''),
+    ],
+)
+def test_the_address_of_a_forge_is_that_of_origin(
+    source: Path, origin: str | None, address: str
+) -> None:
+    change = ('set-url', 'origin', origin) if origin else ('remove', 'origin')
+    run('git', 'remote', *change, folder=source)
+    branch = f'branch-{abs(hash(origin))}'
+    said = run(ROOT / 'tools' / 'release_branch', branch, folder=source)
+    assert ('no forge' in said) is not bool(address)
+    manifest = run('git', 'show', f'{branch}:nfo_sinus_msgs/package.xml', folder=source)
+    found = re.findall(r'<url type="repository">(.*)</url>', manifest)
+    assert found == ([address] if address else [])
+    assert 'secret' not in manifest
 
 
 def test_history_goes_on_through_the_branch(source: Path) -> None:

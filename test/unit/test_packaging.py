@@ -1,18 +1,26 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""package.xml names all that is imported, under keys that rosdep has for Ubuntu 24.04 and Jazzy."""
+"""
+What the tools of ROS read of the packages.
+
+package.xml names all that is imported, under keys that rosdep has for Ubuntu 24.04 and Jazzy.
+"""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
 from pathlib import Path
+import re
 import sys
 from xml.etree import ElementTree
 
 import pytest
 from support.places import MSG_DEFS, ROOT
+import yaml
+
+from nfo_sinus_driver.version import VERSION
 
 #: The keys of libraries, by the module that is imported; a ROS package has one name for both.
 KEYS = {
@@ -44,6 +52,9 @@ OPTIONAL = {
     'test/ros/stand_ins/rosbag2_py.py': {'rosbags'},
     'test/unit/view/test_app.py': {'textual'},
 }
+
+
+BOTH = pytest.mark.parametrize('package', [ROOT, MSG_DEFS], ids=['driver', 'messages'])
 
 
 def imported(path: Path) -> set[str]:
@@ -87,7 +98,7 @@ def test_all_that_tests_import_is_installed_for_them() -> None:
     assert list(missing(('test',), TEST)) == []
 
 
-@pytest.mark.parametrize('package', [ROOT, MSG_DEFS], ids=['driver', 'messages'])
+@BOTH
 def test_every_key_exists_on_noble(package: Path) -> None:
     kinds = ('depend', 'buildtool_depend', 'exec_depend', 'test_depend')
     keys = depends(package / 'package.xml', *kinds)
@@ -98,6 +109,44 @@ def test_the_judge_sees_what_is_missing(tmp_path: Path) -> None:
     path = tmp_path / 'file.py'
     path.write_text('import os, scipy.signal\nfrom numpy import array\nfrom . import x\n')
     assert imported(path) == {'scipy', 'numpy'}
+
+
+@BOTH
+def test_a_package_says_who_maintains_it_where_it_is_and_under_which_license(package: Path) -> None:
+    root = ElementTree.parse(package / 'package.xml').getroot()
+    maintainers = [(one.text, one.get('email')) for one in root.findall('maintainer')]
+    first = ElementTree.parse(ROOT / 'package.xml').getroot().find('maintainer')
+    assert first is not None and maintainers == [(first.text, first.get('email'))]
+    # an address that no one reads
+    text = (package / 'package.xml').read_text(encoding='utf-8')
+    assert not re.search(r'example\.(org|com|net)', text)
+    urls = {one.get('type'): str(one.text) for one in root.findall('url')}
+    assert str(root.findtext('name')) in urls['website']
+    (license,) = root.findall('license')
+    given = (package / str(license.get('file'))).read_bytes()
+    assert given == (ROOT / 'LICENSE').read_bytes()
+
+
+@BOTH
+def test_a_changelog_has_the_version_and_one_list_for_each(package: Path) -> None:
+    text = (package / 'CHANGELOG.rst').read_text(encoding='utf-8')
+    titles = re.findall(r'^(.+)\n(-+)$', text, re.MULTILINE)
+    assert [title for title, line in titles if len(title) != len(line)] == []
+    forthcoming, newest, *_ = (title for title, _ in titles)
+    assert forthcoming == 'Forthcoming'
+    assert re.fullmatch(rf'{re.escape(VERSION)} \(20\d\d-\d\d-\d\d\)', newest)
+
+
+def test_the_build_farm_documents_the_pages_and_no_modules() -> None:
+    root = ElementTree.parse(ROOT / 'package.xml').getroot()
+    configuration = (ROOT / str(root.findtext('export/rosdoc2'))).read_text(encoding='utf-8')
+    kind, settings = yaml.safe_load_all(configuration)
+    assert kind == {'type': 'rosdoc2 config', 'version': 1}
+    assert settings['settings'] == {'never_run_sphinx_apidoc': True}
+    ((sphinx,),) = (builder.values() for builder in settings['builders'])
+    # an entry without these is refused
+    assert sphinx.keys() == {'name', 'output_dir', 'user_doc_dir'}
+    assert (ROOT / sphinx['user_doc_dir'] / 'conf.py').is_file()
 
 
 @pytest.mark.parametrize('distribution', ['jazzy', 'kilted'])
