@@ -14,9 +14,10 @@ import re
 import subprocess
 import sys
 
+from support.places import MSG_DEFS, ROOT
+
 from nfo_sinus_driver.catalog import families, load_family
 
-ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = 'nfo_sinus_driver'
 
 #: Rooms that may import ROS, and anything else.
@@ -50,8 +51,8 @@ FAMILY = re.compile(
 )
 
 LICENCE = re.compile(
-    r'(#!.*\n)?# Copyright 20\d\d The nfo_sinus_driver authors\n'
-    r'# SPDX-License-Identifier: Apache-2\.0\n'
+    r'(#!.*\n)?(#|//|\(\*) Copyright 20\d\d The nfo_sinus_driver authors((?: \*\))?)\n'
+    r'\2 SPDX-License-Identifier: Apache-2\.0\3\n'
 )
 
 
@@ -209,11 +210,13 @@ def package_sources() -> dict[str, str]:
     return {path: (ROOT / PACKAGE / path).read_text(encoding='utf-8') for path in package_files()}
 
 
-def own_files() -> list[str]:
-    """Every Python file of the project, by its path; nothing that was built or installed."""
-    folders = (PACKAGE, 'test', 'benchmark', 'examples', 'launch', 'tools', 'docs', 'msg_defs')
-    found = [path for folder in folders for path in (ROOT / folder).rglob('*.py')]
-    return sorted(path.relative_to(ROOT).as_posix() for path in [*found, *ROOT.glob('*.py')])
+def own_files() -> list[Path]:
+    """Every source file of the project; nothing that was built or installed."""
+    folders = (PACKAGE, 'test', 'benchmark', 'config', 'examples', 'launch', 'docs')
+    ends = ('*.py', '*.cpp', 'CMakeLists.txt', '*.msg', '*.srv', '*.action', '*.st')
+    roots = [*(ROOT / folder for folder in folders), MSG_DEFS]
+    found = [path for folder in roots for end in ends for path in folder.rglob(end)]
+    return [*found, *ROOT.glob('*.py'), *ROOT.glob('tools/*'), *ROOT.glob('.ci/*')]
 
 
 def test_every_file_keeps_the_rules_of_the_house() -> None:
@@ -263,12 +266,9 @@ def test_no_files_import_each_other_in_a_circle() -> None:
 
 
 def test_every_file_has_the_licence_header() -> None:
-    without = [
-        path
-        for path in own_files()
-        if not LICENCE.match((ROOT / path).read_text(encoding='utf-8'))
-    ]
-    assert without == []
+    found = {path: path.read_text(encoding='utf-8') for path in own_files() if path.is_file()}
+    assert {path.suffix for path in found} >= {'.py', '.cpp', '.msg', '.srv', '.action', '.st', ''}
+    assert [path for path, text in found.items() if not LICENCE.match(text)] == []
 
 
 def test_rooms_without_ros_load_without_ros() -> None:
