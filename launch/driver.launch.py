@@ -16,8 +16,9 @@ several, the bus node and one for each drive. The drives are named by the parame
 
 The driver ends, with its motors stopped, when this launch is gone, however that happened.
 
-The driver is not respawned. When it ended, somebody ended it or something is wrong that a person
-should look at; and a new one lets no motor turn before it is enabled anyway.
+The driver is not respawned. When it ended, an operator ended it or something is wrong that an
+operator should look at; and a new one lets no motor turn before it is enabled anyway. Where its
+status was not 0, that of ``ros2 launch`` is 1; the rest of the launch goes on.
 """
 
 import os
@@ -29,7 +30,12 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
-from nfo_sinus_driver.launch_arguments import number, parameter_file, written
+from nfo_sinus_driver.launch_arguments import (
+    fail_with_driver,
+    number,
+    parameter_file,
+    written,
+)
 
 #: Launch arguments that overrule a parameter of the same name in the parameter file: for which
 #: nodes, and what it is.
@@ -97,6 +103,7 @@ def _start_driver(context):
             # launch sends SIGINT, then SIGTERM, then SIGKILL, this far apart
             sigterm_timeout=exit_timeout,
             sigkill_timeout=exit_timeout,
+            on_exit=fail_with_driver,
         )
     ]
 

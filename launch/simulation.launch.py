@@ -36,7 +36,12 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.substitutions import ExecutableInPackage
 
-from nfo_sinus_driver.launch_arguments import number, simulated_drives, written
+from nfo_sinus_driver.launch_arguments import (
+    fail_with_driver,
+    number,
+    simulated_drives,
+    written,
+)
 
 _EXIT_TIMEOUT = '15'
 #: Runs a command that Ctrl-C does not end, whether terminal or launch pass it on; SIGTERM does.
@@ -122,7 +127,7 @@ def _start_driver(context, simulator):
         respawn=False,
         sigterm_timeout=_EXIT_TIMEOUT,
         sigkill_timeout=_EXIT_TIMEOUT,
-        on_exit=Shutdown(reason='the driver has ended'),
+        on_exit=_end,
     )
     end_simulator = EmitEvent(
         event=SignalProcess(
@@ -133,6 +138,12 @@ def _start_driver(context, simulator):
         driver,
         RegisterEventHandler(OnProcessExit(target_action=driver, on_exit=[end_simulator])),
     ]
+
+
+def _end(event, context):
+    """End the launch with the driver."""
+    fail_with_driver(event, context)
+    return Shutdown(reason='the driver has ended')
 
 
 def _require_numbers(context):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What the launch files check of their arguments before anything is started.
+What the launch files share: the checks of their arguments, and their exit status.
 
 Without ROS: the launch files give what they have been given.
 """
@@ -94,6 +94,21 @@ def written(sections: Sections) -> list[str]:
     with tempfile.NamedTemporaryFile('w', prefix='nfo_sinus_', delete=False) as file:
         json.dump(sections, file)
     return [file.name]
+
+
+def fail_with_driver(event: Any, context: Any) -> None:
+    """
+    Have launch end with 1 where the driver has ended with another status than 0.
+
+    It has no other status, and no action for it: it counts what reaches the exception handler of
+    its event loop. What else it has started goes on.
+
+    :param event: the end of the driver, a ``launch.events.process.ProcessExited``.
+    :param context: that of launch.
+    """
+    if event.returncode:
+        message = f'the driver has ended with status {event.returncode}, so launch will end with 1'
+        context.asyncio_loop.call_exception_handler({'message': message})
 
 
 def require_packages(needed: Mapping[str, str], find: Callable[[str], object]) -> None:

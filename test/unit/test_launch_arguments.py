@@ -1,17 +1,21 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The arguments of the launch files are looked at before anything is started."""
+"""What the launch files share: their arguments are looked at before anything is started."""
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import yaml
 
 from nfo_sinus_driver.launch_arguments import (
     MOST_DRIVES,
+    fail_with_driver,
     number,
     parameter_file,
     require_packages,
@@ -80,4 +84,24 @@ def test_packages_are_looked_up_before_anything_starts() -> None:
     assert str(missing.value) == (
         'packages are missing: controller_manager (ros2_control), robot_x (frames); '
         'sudo apt install ros-jazzy-controller-manager ros-jazzy-robot-x'
+    )
+
+
+@pytest.mark.parametrize(('status', 'fails'), [(0, False), (1, True), (2, True), (-9, True)])
+def test_launch_fails_where_the_driver_has(status: int, fails: bool) -> None:
+    # launch ends with 1 where its handler was called; test/ros/test_launch_files.py does it
+    handled: list[str] = []
+
+    def handler(_: object, context: dict[str, Any]) -> None:
+        handled.append(context['message'])
+
+    loop = asyncio.new_event_loop()
+    try:
+        loop.set_exception_handler(handler)
+        event = SimpleNamespace(returncode=status)
+        fail_with_driver(event, SimpleNamespace(asyncio_loop=loop))
+    finally:
+        loop.close()
+    assert [f'status {status}, so launch will end with 1' in text for text in handled] == (
+        [True] * fails
     )
