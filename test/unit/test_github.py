@@ -45,7 +45,7 @@ def test_ros_from_apt_is_tried_on_both_machines_and_kilted_may_fail() -> None:
 
 def test_all_that_needs_an_installed_ros_is_run() -> None:
     parts = set(re.findall(r'^check_(\w+)\(\)', SCRIPT.read_text(encoding='utf-8'), re.MULTILINE))
-    called = [re.findall(r'\.ci/ros2" (\w+)', script) for script in runs('apt')]
+    called = [re.findall(r'\.ci/ros2 (\w+)', script) for script in runs('apt')]
     assert parts == {'launch', 'bag', 'cpp', 'control'}
     assert sorted(part for found in called for part in found) == sorted(parts)
     text = '\n'.join(runs('apt'))
@@ -59,9 +59,28 @@ def test_scripts_are_shell_and_what_they_start_is_there(job: str) -> None:
     for script in runs(job):
         subprocess.run(['bash', '-n'], input=script, text=True, check=True)
         for word in shlex.split(script, comments=True):
-            path = word.removeprefix('$SOURCE/')
+            path = word.removeprefix('src/nfo_sinus_driver/')
             if re.match(r'(\.ci|tools|examples)/', path):
                 assert (ROOT / path).exists(), path
+
+
+def test_a_job_in_a_container_names_no_path_of_its_host() -> None:
+    # what these expressions give is where the runner has it, outside the container
+    for name, job in JOBS.items():
+        if 'container' in job:
+            found = re.findall(r'\$\{\{\s*(?:github\.workspace|runner\.\w+)', yaml.safe_dump(job))
+            assert found == [], name
+
+
+def test_the_workspace_is_made_as_the_readme_says() -> None:
+    page = (ROOT / 'README.md').read_text(encoding='utf-8')
+    lines = '\n'.join(runs('apt'))
+    for beginning in ('ln -s', 'colcon build', 'rosdep install --from-paths src -i'):
+        (command,) = re.findall(rf'^    ({beginning}.*)$', page, re.MULTILINE)
+        assert command in lines
+    (clone,) = re.findall(r'git clone <this repository> (\S+)', page)
+    checkout, *_ = APT['steps']
+    assert checkout['with']['path'] == f'workspace/{clone}'
 
 
 def test_the_script_is_shell() -> None:
