@@ -37,21 +37,26 @@ setup(
     ],
     python_requires='>=3.10',
     install_requires=['setuptools'],
-    # What it needs at run time stands in package.xml, under the names that rosdep knows.
-    extras_require={'test': ['hypothesis', 'pytest']},
+    # What it needs at run time stands in package.xml, under the names that rosdep knows. The extras
+    # are for `pip install` without ROS, which nfo-sinus, families and simulator do not need.
+    extras_require={
+        'cli': ['argcomplete', 'pyserial', 'PyYAML', 'textual>=3', 'tqdm'],
+        'simulator': ['pymodbus>=3.6.9', 'PyYAML'],
+        'test': ['hypothesis', 'pytest'],
+    },
     zip_safe=False,
     description='Driver for variable-frequency drives (VFDs): NFO Sinus and others',
     keywords=['ROS', 'VFD', 'variable-frequency drive', 'frequency inverter', 'Modbus', 'CANopen'],
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            f'driver = {NAME}.node.__main__:main',
-            f'families = {NAME}.cli.families:main',
-            f'monitor = {NAME}.node.monitor:main',
-            f'nfo-sinus = {NAME}.cli.main:main',
-            f'plot = {NAME}.demo.record:plot',
-            f'record = {NAME}.demo.record:main',
-            f'simulator = {NAME}.simulator.main:main',
+            f'driver = {NAME}.commands:driver',
+            f'families = {NAME}.commands:families',
+            f'monitor = {NAME}.commands:monitor',
+            f'nfo-sinus = {NAME}.commands:nfo_sinus',
+            f'plot = {NAME}.commands:plot',
+            f'record = {NAME}.commands:record',
+            f'simulator = {NAME}.commands:simulator',
         ],
         # loaded by `ros2 doctor` alone
         'ros2doctor.checks': [f'DriveCheck = {NAME}.node.doctor:DriveCheck'],

@@ -35,8 +35,9 @@ def _first_of(modules: Sequence[str], name: str) -> Any:
     for module in modules:
         try:
             return getattr(importlib.import_module(module), name)
-        except (ImportError, AttributeError):
-            continue
+        except (ImportError, AttributeError) as error:
+            if isinstance(error, ModuleNotFoundError) and error.name == 'pymodbus':
+                raise
     raise ImportError(f'this pymodbus has no {name} in any of {", ".join(modules)}')
 
 

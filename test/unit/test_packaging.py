@@ -94,6 +94,27 @@ def test_all_that_the_package_imports_is_installed_with_it() -> None:
     assert list(missing(('nfo_sinus_driver', 'launch', 'examples'), EXEC)) == []
 
 
+def test_the_extras_of_pip_have_what_the_commands_without_ros_import() -> None:
+    setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
+    (found,) = re.findall(r'extras_require=(\{.*?\n    \}),', setup, re.DOTALL)
+    extras = {
+        name: {re.split('[>=]', one)[0].lower() for one in needed}
+        for name, needed in ast.literal_eval(found).items()
+    }
+    # where the name for pip is not that of the module
+    for_pip = {'serial': 'pyserial', 'yaml': 'pyyaml'}
+    # which simulator/pymodbus_compat.py looks up by name, and what textual brings along
+    by_name, brought = {'cli': set(), 'simulator': {'pymodbus'}}, {'rich'}
+    for extra, rooms in (
+        ('cli', ('bus', 'catalog', 'cli', 'drive', 'families', 'link', 'view')),
+        ('simulator', ('catalog', 'families', 'simulator')),
+    ):
+        folders = [ROOT / 'nfo_sinus_driver' / room for room in rooms]
+        modules = {name for one in folders for path in one.rglob('*.py') for name in imported(path)}
+        needed = modules - {'nfo_sinus_driver'} - brought | by_name[extra]
+        assert {for_pip.get(name, name) for name in needed} == extras[extra], extra
+
+
 def test_all_that_tests_import_is_installed_for_them() -> None:
     assert list(missing(('test',), TEST)) == []
 
