@@ -4,7 +4,8 @@
 """
 A robot with two wheels: from `geometry_msgs/Twist` to the set-points of two drives, in Hz.
 
-Start the driver with two drives in the control mode Freque and a short `setpoint_timeout`, then::
+Start the driver with two drives in the control mode Freque, a short `setpoint_timeout`, and each
+in the `stop_with` of the other, then::
 
     python3 examples/twist_robot.py --ros-args -p wheel_radius:=0.1 -p track:=0.5 \
         -p "gear_ratios:=[20.0, -20.0]" -p pole_pairs:=2

@@ -5,13 +5,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from bench import A_WHILE, Bench, holds_for, wait_until
+from bench import A_WHILE, Bench, Client, holds_for, wait_until
 from connections import needs
+from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 from topic_hardware import Component, Hardware, components
 import yaml
@@ -19,6 +21,7 @@ import yaml
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
+from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _CONFIG = Path(__file__).parents[2] / 'config'
 _FOLDER = _CONFIG / 'diff_drive'
@@ -63,6 +66,18 @@ def test_every_parameter_of_a_file_is_one_of_ours(name: str) -> None:
     for node, parameters in nodes.items():
         known = {'/**': bus | drive, 'nfo_sinus_bus': bus}.get(node, drive)
         assert names(parameters) <= known, node
+
+
+@pytest.mark.parametrize('name', ['conveyor.yaml', 'conveyor_32.yaml', 'diff_drive/drives.yaml'])
+def test_all_drives_of_one_machine_stop_with_each_of_them(name: str) -> None:
+    nodes = sections(_CONFIG / name)
+    drives = {
+        drive: {**nodes['/**'], **nodes[drive]} for drive in nodes['nfo_sinus_bus']['drives']
+    }
+    # one that is only monitored neither stops nor is stopped
+    commanded = {one for one, given in drives.items() if given.get('control_method') != 'monitor'}
+    for drive in commanded:
+        assert {drive, *drives[drive].get('stop_with', ())} == commanded, drive
 
 
 def test_nodes_joints_and_topics_agree_everywhere() -> None:
@@ -203,6 +218,39 @@ def test_wheels_follow_the_controller_and_stop_when_it_is_gone(bench: Bench) -> 
     with Hardware(client, parts, _RATE):
         command(parts, -_SPEED)
         wait_until(lambda: reached(parts, -_SPEED), 'both go on, and backwards')
+
+
+def _faults(simulator: Simulated, _: Client) -> None:
+    simulator.inject('fault', 5, address=1)
+
+
+def _is_stopped(_: Simulated, left: Client) -> None:
+    assert left.call('stop').success
+
+
+@needs('parameters', 'fast')
+@pytest.mark.parametrize('happens', [_faults, _is_stopped])
+def test_a_wheel_that_stops_stops_the_other_whatever_the_controller_sends(
+    bench: Bench, happens: Callable[[Simulated, Client], None]
+) -> None:
+    simulator, _, parts = start(bench)
+    left, right = bench.client('/left_wheel'), bench.client('/right_wheel')
+    with Hardware(left, parts, _RATE):
+        command(parts, _SPEED)
+        wait_until(lambda: reached(parts, _SPEED), 'both wheels turn')
+        happens(simulator, left)
+        right.wait_for(
+            'status',
+            lambda one: one.stop_reason == DriveStatus.REASON_STOP_WITH and not one.enabled
+            and one.stop_text.startswith('it stops with /left_wheel: '),
+            'the other one stops with it',
+        )
+        for address in (1, 2):
+            wait_until(lambda a=address: not simulator.state(a)['turning'], 'it stands')
+        holds_for(
+            A_WHILE, lambda: not any(simulator.state(one)['turning'] for one in (1, 2)),
+            'no command moves either',
+        )
 
 
 @needs('parameters', 'fast')
