@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, TimeoutError as FutureTimeoutError
+import logging
 import time
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -21,6 +22,8 @@ from nfo_sinus_driver.node.executor import received_at
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.qos import COMMANDS
 from nfo_sinus_driver.node.wording import NodeError
+
+_log = logging.getLogger(__name__)
 
 #: How long all of them together may take, s. A start delay of a drive may last an hour.
 _LONGEST_ENABLE = 3700.0
@@ -59,7 +62,7 @@ class AllDrives:
                 failed, done = callback(call)
             except Exception as error:
                 # an exception that leaves a service callback would end the executor
-                self._node.get_logger().error(f'error in a service: {error!r}')
+                _log.exception('error in a service of %s', self._node.get_fully_qualified_name())
                 failed, done = [f'error in the driver: {error}'], []
             response.success = not failed
             response.message = '; '.join((*failed, *done)) or 'no drive is controlled here'

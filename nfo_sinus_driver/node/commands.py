@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, TimeoutError as FutureTimeoutError
 import contextlib
 import functools
+import logging
 import math
 import queue
 import threading
@@ -46,6 +47,8 @@ from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import inv_st
 from nfo_sinus_driver.node.qos import COMMANDS
 from nfo_sinus_driver.node.wording import NodeError
+
+_log = logging.getLogger(__name__)
 
 #: How long a service waits for the bus before it reports that, s. A start delay of the drive may
 #: last an hour.
@@ -121,7 +124,7 @@ class Commands:
             response.message = f'the bus did not get to it within {timeout:g} s'
         except Exception as error:
             # an exception that leaves a service callback would end the executor
-            self._node.get_logger().error(f'error in a service: {error!r}')
+            _log.exception('error in a service of %s', self._node.get_fully_qualified_name())
             response.message = f'error in the driver: {error}'
         return response
 
@@ -311,7 +314,7 @@ class TuningServices:
             return Tuned(False, Report(Cause.NOT_POSSIBLE, why=str(error)), ())
         except Exception as error:
             # an exception that leaves a callback would end the executor
-            self._node.get_logger().error(f'error in a tuning: {error!r}')
+            _log.exception('error in a tuning of %s', self._node.get_fully_qualified_name())
             return Tuned(False, Report(Cause.DRIVER_ERROR, error=str(error)), ())
 
     def _on_goal(self, request: Tune.Goal) -> GoalResponse:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, TimeoutError as FutureTimeoutError
 import dataclasses
 import functools
+import logging
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -36,6 +37,8 @@ from nfo_sinus_driver.node.setpoints import Setpoints
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.wording import NodeError, Wording
 
+_log = logging.getLogger(__name__)
+
 #: How long a stop may wait for the bus, s.
 _LONGEST_STOP = 10.0
 
@@ -50,7 +53,8 @@ def _guarded(transition: _Transition) -> _Transition:
         try:
             return transition(self, state)
         except Exception as error:
-            self.get_logger().error(f'{transition.__name__} failed: {error!r}')
+            _log.exception('%s of %s failed', transition.__name__, self.get_fully_qualified_name())
+            self.lifecycle.complain(f'error in the driver: {error!r}', known=False)
             return TransitionCallbackReturn.ERROR
 
     return guarded

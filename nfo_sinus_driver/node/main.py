@@ -30,6 +30,7 @@ from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME, BusNode
 from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
 from nfo_sinus_driver.node.executor import NodeExecutor, end_all
+from nfo_sinus_driver.node.log_limit import limit_errors
 from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
 from nfo_sinus_driver.node.overrides import (
     bus_overrides,
@@ -245,6 +246,7 @@ def main(signals: HeldSignals, parent: OtherProcess | None, args: list[str] | No
     sys.setswitchinterval(_SWITCH_INTERVAL)
     _limit_arenas()
     stdio = NonblockingStdio()
+    limit_errors()
     try:
         return _run(signals, parent, *take_out_node_name(sys.argv if args is None else args))
     except Exception:

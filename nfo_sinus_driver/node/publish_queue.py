@@ -13,13 +13,10 @@ import logging
 import math
 import threading
 import time
-import traceback
 from typing import TypeVar
 
 _log = logging.getLogger(__name__)
 
-#: How often the same failure is logged, s: it may come with every poll.
-_SAME_AGAIN = 60.0
 #: With more waiting messages than this the oldest are too old to be of use, and are dropped.
 _MOST_WAITING = 1000
 #: The same for the values of one stream; its topic keeps no more.
@@ -40,7 +37,6 @@ class PublishQueue:
         #: These are never dropped, and go first.
         self._urgent: deque[Callable[[], None]] = deque()
         self._schedule = Schedule()
-        self._failures = Failures()
         self._something = threading.Event()
         self._closing = False
         self._thread = threading.Thread(target=self._work, name='publish queue', daemon=True)
@@ -120,31 +116,14 @@ class PublishQueue:
     def _run(self, function: Callable[[], None]) -> None:
         try:
             function()
-        except Exception as error:
+        except Exception:
             # one message that cannot be sent must not silence the others
-            if self._failures.is_due(error, time.monotonic()):
-                _log.exception('a message could not be published; the same is logged once a minute')
+            _log.exception('a message could not be published')
 
     def _time_to_spare(self) -> float | None:
         """Return for how long nothing is due by the clock, s; ``None``: until a change."""
         moment = self._schedule.next_moment
         return None if moment == math.inf else max(0.0, moment - time.monotonic())
-
-
-class Failures:
-    """Which failures are to be logged: each kind once a minute, however frequent."""
-
-    def __init__(self) -> None:
-        self._logged: dict[tuple[object, ...], float] = {}
-
-    def is_due(self, error: Exception, now: float) -> bool:
-        """Return whether to log the error being handled; its kind is its type and place."""
-        place = traceback.extract_tb(error.__traceback__)[-1:]
-        kind = (type(error), *((one.filename, one.lineno) for one in place))
-        if now - self._logged.get(kind, -math.inf) < _SAME_AGAIN:
-            return False
-        self._logged[kind] = now
-        return True
 
 
 #: The golden ratio: starts that are this part of a period apart never crowd.

@@ -251,7 +251,9 @@ class Bench(contextlib.ExitStack):
         assert process.running, process.text
         return self.enter_context(Simulated(self.line['control']))
 
-    def driver(self, *arguments: str, through: tuple[str, ...] = ()) -> Process:
+    def driver(
+        self, *arguments: str, through: tuple[str, ...] = (), fails: bool = False
+    ) -> Process:
         """
         Start a driver on the line; ``-p name:=value`` arguments may follow.
 
@@ -261,13 +263,17 @@ class Bench(contextlib.ExitStack):
         if not any('poll_rate' in argument for argument in arguments):
             given['poll_rate'] = POLL_RATE
         settings = [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
-        return self.bare_driver(*settings, *arguments, through=through)
+        return self.bare_driver(*settings, *arguments, through=through, fails=fails)
 
-    def bare_driver(self, *arguments: str, through: tuple[str, ...] = ()) -> Process:
+    def bare_driver(
+        self, *arguments: str, through: tuple[str, ...] = (), fails: bool = False
+    ) -> Process:
         """
         Start a driver with ROS arguments alone, by way of another command if need be.
 
         With one it is a process that was executed as such, and else a fork.
+
+        :param fails: it has errors of its own, which the test is about.
         """
         command = [*through, _executable('driver'), '--ros-args', *arguments]
         log = self.folder / f'driver{len(self._drivers)}.log'
@@ -275,7 +281,8 @@ class Bench(contextlib.ExitStack):
         self._drivers.append(process)
         _watched.append(process)
         self.callback(_watched.remove, process)
-        self.callback(_no_traceback, process)
+        if not fails:
+            self.callback(_no_traceback, process)
         self.callback(process.end)
         return process
 

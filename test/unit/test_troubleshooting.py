@@ -379,7 +379,7 @@ def templates() -> Iterator[Sentence]:
         (
             CODE.logged,
             (
-                *('cannot start: …', 'error in a service: …', '…; retrying'),
+                *('cannot start: …', 'error in a service of …', '…; retrying'),
                 'set-point … ignored: it is not a finite number',  # given by a caller
                 'parameter … was given to …, but there is none of',  # yielded by a function
                 'error in the driver: …',  # assigned before

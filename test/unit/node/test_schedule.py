@@ -12,7 +12,7 @@ import time
 
 import pytest
 
-from nfo_sinus_driver.node.publish_queue import Failures, PublishQueue, Schedule
+from nfo_sinus_driver.node.publish_queue import PublishQueue, Schedule
 
 #: Far longer than anything here takes, s.
 PATIENCE = 20.0
@@ -128,42 +128,6 @@ def test_it_ends_with_what_is_waiting_and_without_what_is_not_due() -> None:
     queue.close()
     assert not queue.alive
     assert done == ['waiting']
-
-
-def test_a_failure_to_publish_is_logged_once_a_minute_for_each_kind() -> None:
-    failures = Failures()
-
-    def fail(how: str) -> Exception:
-        try:
-            if how == 'lookup':
-                raise KeyError(how)
-            raise AttributeError(how)
-        except (KeyError, AttributeError) as error:
-            return error
-
-    # what differs in its text is the same kind
-    logged = [
-        (second, how)
-        for second in range(150)
-        for how in ('lookup', f'attribute {second}')
-        if failures.is_due(fail(how), float(second))
-    ]
-    assert [second for second, how in logged if how == 'lookup'] == [0, 60, 120]
-    assert [second for second, how in logged if how != 'lookup'] == [0, 60, 120]
-
-
-def test_a_message_that_cannot_be_sent_is_logged_once_and_silences_no_other(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    queue = PublishQueue()
-    sent = threading.Event()
-    for _ in range(500):
-        queue.put(lambda: 1 / 0)
-    queue.put(sent.set)
-    queue.start()
-    assert sent.wait(PATIENCE)
-    queue.close()
-    assert len(caplog.records) == 1
 
 
 def test_what_is_urgent_goes_first_and_is_never_dropped() -> None:
