@@ -181,6 +181,24 @@ def control_mode(drive: Drive) -> str:
     return mode
 
 
+def require_whole(message: JointState) -> None:
+    """
+    Make sure that the arrays of a joint command belong together, or raise a ValueError.
+
+    An array has one value for each name, or none [sensor_msgs/JointState], and a name stands once.
+    """
+    count = len(message.name)
+    for array in ('position', 'velocity', 'effort'):
+        size = len(getattr(message, array))
+        if size not in (0, count):
+            raise ValueError(
+                f'{count} names, but {size} values of {array}: one for each name, or none'
+            )
+    twice = [name for name in message.name if message.name.count(name) > 1]
+    if twice:
+        raise ValueError(f'it names {twice[0]} twice')
+
+
 class Joint:
     """The joint that a motor turns; its ratio is motor turns per turn, negative inverts."""
 

@@ -9,18 +9,20 @@ newest valid one counts, from whichever topic.
 from __future__ import annotations
 
 import math
+import time
 
+from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.msg import Setpoint
 from rclpy.node import Node
-from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.node.bus_context import BusContext
+from nfo_sinus_driver.node.log_limit import LogLimit
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
-from nfo_sinus_driver.node.messages import Joint, control_mode
+from nfo_sinus_driver.node.messages import Joint, control_mode, require_whole
 
 _UNITS = {
     'Freque': Setpoint.HZ,
@@ -34,8 +36,6 @@ _NAMES = {
     Setpoint.PERCENT_TORQUE: '% of nominal torque',
     Setpoint.PROCESS: 'the process unit',
 }
-#: How often the same message is logged, s.
-_LOG_PERIOD = 10.0
 
 
 class Setpoints:
@@ -50,6 +50,9 @@ class Setpoints:
         self._joint = joint
         self._logged_idle = False
         self._warned_of_joint = False
+        self._limit = LogLimit()
+        #: What has a stamp that is to come, as reported.
+        self._ahead: set[str] = set()
         self._joint_command = node.resolve_topic_name('~/joint_command')
         context.subscribe(
             node,
@@ -79,23 +82,22 @@ class Setpoints:
         try:
             mode = control_mode(self._managed.drive)
         except ValueError as error:
-            self._ignore(f'set-point ignored: {error}')
+            self._ignore('mode', f'set-point ignored: {error}')
             return
         if message.unit != _UNITS.get(mode):
             unit = _NAMES.get(message.unit, f'unit {message.unit}')
-            self._ignore(f'set-point in {unit} ignored: the control mode is {mode}')
+            self._ignore('unit', f'set-point in {unit} ignored: the control mode is {mode}')
             return
-        stamp = Time.from_msg(message.header.stamp, clock_type=self._clock.clock_type)
-        timeout = self._managed.settings.setpoint_timeout
-        if stamp.nanoseconds and timeout:
-            age = (self._clock.now() - stamp).nanoseconds / 1e9
-            if age > timeout:
-                self._ignore(f'set-point ignored: it was made {age:.1f} s ago')
-                return
-        self._take(message.value)
+        if self._is_of_now('set-point', message.header.stamp):
+            self._take(message.value)
 
     def _on_joint_command(self, message: JointState) -> None:
         if not self._managed.active:
+            return
+        try:
+            require_whole(message)
+        except ValueError as error:
+            self._ignore('arrays', f'joint command ignored: {error}')
             return
         if self._joint.name not in message.name:
             if not self._warned_of_joint:
@@ -105,27 +107,54 @@ class Setpoints:
                     f'{", ".join(message.name) or "none"}: ignored; joint_name says what ours is'
                 )
             return
-        index = message.name.index(self._joint.name)
-        if index >= len(message.velocity):
-            self._ignore('joint command ignored: it has no velocity')
+        if not message.velocity:
+            self._ignore('no velocity', 'joint command ignored: it has no velocity')
             return
+        velocity = message.velocity[message.name.index(self._joint.name)]
         try:
-            value = self._joint.setpoint(message.velocity[index], self._managed.drive)
+            value = self._joint.setpoint(velocity, self._managed.drive)
         except ValueError as error:
-            self._ignore(f'joint command ignored: {error}')
+            self._ignore('joint', f'joint command ignored: {error}')
             return
-        self._take(value)
+        if self._is_of_now('joint command', message.header.stamp):
+            self._take(value)
+
+    def _is_of_now(self, what: str, stamp: Time) -> bool:
+        """
+        Return whether a stamp is within ``setpoint_timeout`` of the node's clock; 0 is now.
+
+        One that is to come would be fresh until then. It is the clock that is wrong, which is said
+        once for each topic, until a stamp is right again.
+        """
+        timeout = self._managed.settings.setpoint_timeout
+        # the type of the message can have moments that are none for rclpy
+        made = stamp.sec * 10**9 + stamp.nanosec
+        if not (made and timeout):
+            return True
+        age = (self._clock.now().nanoseconds - made) / 1e9
+        if abs(age) <= timeout:
+            self._ahead.discard(what)
+            return True
+        if age > 0:
+            self._ignore(f'old {what}', f'{what} ignored: it was made {age:.1f} s ago')
+        elif what not in self._ahead and self._ignore(
+            f'{what} ahead',
+            f'{what} ignored: its stamp is {-age:.1f} s ahead of the clock of this node: set the '
+            'clocks of both computers alike by NTP, such as chrony, and use_sim_time of both nodes',
+        ):
+            self._ahead.add(what)
+        return False
 
     def _take(self, value: float) -> None:
         if not self._managed.active:
             return
         if not math.isfinite(value):
-            self._ignore(f'set-point {value} ignored: it is not a finite number')
+            self._ignore('number', f'set-point {value} ignored: it is not a finite number')
             return
         try:
             self._managed.drive.set_setpoint(value)
         except DriveError as error:
-            self._ignore(self._managed.wording.say(error))
+            self._ignore('refused', self._managed.wording.say(error))
             return
         if self._managed.drive.following:
             self._logged_idle = False
@@ -136,5 +165,9 @@ class Setpoints:
                 f'set-points arrive, but the drive is not enabled: {enable} to follow them'
             )
 
-    def _ignore(self, text: str) -> None:
-        self._log.warning(text, throttle_duration_sec=_LOG_PERIOD)
+    def _ignore(self, kind: str, text: str) -> bool:
+        """Log why something is ignored, unless its kind was logged just now; return whether."""
+        if self._limit.left_out(kind, time.monotonic()) is None:
+            return False
+        self._log.warning(text)
+        return True

@@ -6,18 +6,22 @@
 from __future__ import annotations
 
 import math
+import re
 import threading
 from types import SimpleNamespace
+from typing import Any
 
-from bench import Bench, Client, wait_until
+from bench import A_WHILE, Bench, Client, holds_for, wait_until
 from connections import needs
 from nfo_sinus_msgs.msg import Setpoint
 import pytest
+from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.drive.identity import Identity
-from nfo_sinus_driver.node.messages import Joint
+from nfo_sinus_driver.node.messages import Joint, require_whole
+from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _RADIANS = 2 * math.pi
 #: The simulated motor has two pole pairs: 20 Hz are 10 turns a second without slip.
@@ -120,6 +124,71 @@ def test_a_command_before_the_drive_was_read_says_so() -> None:
             Joint(lambda: 'belt', lambda: 1.0).setpoint(1.0, drive)
 
 
+def test_a_joint_command_of_arrays_that_do_not_match_moves_nothing(bench: Bench) -> None:
+    simulator, client = start(bench, '-p', 'joint_name:=belt')
+    assert client.enable().success
+    speed = _RADIANS * _TURNS
+    for message, said in (
+        (
+            JointState(name=['other', 'belt', 'third'], velocity=[speed, speed]),
+            'joint command ignored: 3 names, but 2 values of velocity',
+        ),
+        (
+            JointState(name=['belt', 'belt'], velocity=[speed, 0.0]),
+            'joint command ignored: it names belt twice',
+        ),
+    ):
+        with Publisher(client, '/nfo_sinus/joint_command', message):
+            wait_until(lambda said=said: said in bench.log or turns(simulator), 'it says so')
+            holds_for(A_WHILE, lambda: not turns(simulator), said)
+        assert bench.log.count(said) == 1
+    # what a joint has not got is an array without values
+    right = JointState(name=['other', 'belt'], velocity=[99.0, speed])
+    with Publisher(client, '/nfo_sinus/joint_command', right):
+        wait_until(lambda: turns(simulator), 'one that is whole is followed')
+
+
+def turns(simulator: Simulated) -> bool:
+    return bool(simulator.state()['turning'])
+
+
+@pytest.mark.parametrize(
+    ('message', 'why'),
+    [
+        (
+            JointState(name=['a', 'b', 'c'], velocity=[1.0, 2.0]),
+            '3 names, but 2 values of velocity',
+        ),
+        (JointState(name=['a'], velocity=[1.0, 2.0]), '1 names, but 2 values of velocity'),
+        (JointState(velocity=[1.0]), '0 names, but 1 values of velocity'),
+        (
+            JointState(name=['a', 'b'], velocity=[1.0, 2.0], position=[0.0]),
+            '2 names, but 1 values of position',
+        ),
+        (
+            JointState(name=['a'], velocity=[1.0], effort=[0.0, 0.0, 0.0]),
+            '1 names, but 3 values of effort',
+        ),
+        # of its joint or of another one: whatever reads it, reads it alike
+        (JointState(name=['a', 'b', 'a'], velocity=[1.0, 2.0, 3.0]), 'it names a twice'),
+        (JointState(name=['a', 'a', 'a'], velocity=[1.0, 2.0, 3.0]), 'it names a twice'),
+    ],
+)
+def test_what_no_joint_state_may_be(message: JointState, why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        require_whole(message)
+
+
+def test_what_a_joint_state_may_be() -> None:
+    for message in (
+        JointState(),
+        JointState(name=['a', 'b']),
+        JointState(name=['a', 'b'], velocity=[1.0, 2.0]),
+        JointState(name=['a'], position=[0.0], velocity=[1.0], effort=[math.nan]),
+    ):
+        require_whole(message)
+
+
 @needs('reverse')
 def test_set_point_with_a_unit_and_a_time(bench: Bench) -> None:
     simulator, client = start(bench)
@@ -139,6 +208,74 @@ def test_set_point_with_a_unit_and_a_time(bench: Bench) -> None:
     fresh.header.stamp = now
     with Publisher(client, topic, fresh):
         wait_until(lambda: simulator.state()['frequency'] < -1.0, 'it turns the other way')
+
+
+#: What a stamp cannot be, and yet is, s and ns: before the epoch, and as late as its type goes.
+_IMPOSSIBLE = ((-1, 0), (-(2**31), 2**32 - 1), (2**31 - 1, 2**32 - 1))
+_HOUR, _DAY = 3600.0, 86400.0
+_AHEAD = 's ahead of the clock of this node'
+
+
+def stamped(client: Client, message: Any, ahead: float) -> Any:
+    """Give a message the stamp of a moment that is to come, s."""
+    stamp = client.node.get_clock().now() + Duration(seconds=ahead)
+    message.header.stamp = stamp.to_msg()
+    return message
+
+
+@pytest.mark.parametrize('topic', ['setpoint_stamped', 'joint_command'])
+def test_a_set_point_of_a_clock_that_is_ahead_is_ignored_and_that_is_said_once(
+    bench: Bench, topic: str
+) -> None:
+    mode = 'Speed' if topic == 'joint_command' else 'Freque'
+    simulator, client = start(bench, mode=mode)
+    assert client.enable().success
+
+    def message(ahead: float) -> Any:
+        if topic == 'joint_command':
+            turning = JointState(name=['nfo_sinus'], velocity=[_RADIANS * _TURNS])
+            return stamped(client, turning, ahead)
+        return stamped(client, Setpoint(value=15.0, unit=Setpoint.HZ), ahead)
+
+    path = f'/nfo_sinus/{topic}'
+    for ahead in (_HOUR, _DAY):
+        with Publisher(client, path, message(ahead)):
+            wait_until(lambda: _AHEAD in bench.log or turns(simulator), 'it says so')
+            holds_for(A_WHILE, lambda: not turns(simulator), 'it is not followed')
+        assert bench.log.count(_AHEAD) == 1
+    assert re.search(r'its stamp is 3[56]\d\d\.\d s ahead .* chrony.* use_sim_time', bench.log)
+    # one that was late does not count either
+    with Publisher(client, path, message(-_HOUR)):
+        wait_until(lambda: 'it was made 360' in bench.log or turns(simulator), 'it says so')
+    assert not turns(simulator)
+    # a little is no reason: no two clocks are the same
+    with Publisher(client, path, message(1.0)):
+        wait_until(lambda: turns(simulator), 'it is followed')
+    client.wait_for('status', lambda one: not one.setpoint, 'no set-point arrives', 30.0)
+    wait_until(lambda: not turns(simulator), 'it stands')
+    with Publisher(client, path, message(_HOUR)):
+        wait_until(lambda: bench.log.count(_AHEAD) == 2, 'it was right, and is wrong again')
+    assert not turns(simulator)
+
+
+def test_a_stamp_that_cannot_be_is_no_error_of_the_driver(bench: Bench) -> None:
+    simulator, client = start(bench)
+    assert client.enable().success
+    for seconds, nanoseconds in _IMPOSSIBLE:
+        for topic, message in (
+            ('setpoint_stamped', Setpoint(value=15.0, unit=Setpoint.HZ)),
+            ('joint_command', JointState(name=['nfo_sinus'], velocity=[_RADIANS * _TURNS])),
+        ):
+            message.header.stamp.sec = seconds
+            message.header.stamp.nanosec = nanoseconds
+            with Publisher(client, f'/nfo_sinus/{topic}', message):
+                holds_for(1.0, lambda: not turns(simulator), 'it is not followed')
+    assert 'set-point ignored: it was made' in bench.log
+    assert 'joint command ignored: it was made' in bench.log
+    # that there is no traceback, each test sees at its end
+    fine = stamped(client, Setpoint(value=15.0, unit=Setpoint.HZ), 0.0)
+    with Publisher(client, '/nfo_sinus/setpoint_stamped', fine):
+        wait_until(lambda: turns(simulator), 'the next one counts')
 
 
 @needs('parameters')
