@@ -275,6 +275,22 @@ LAWS = (
         ('test/unit/drive/test_drive_commands.py', '-k', 'ahead_of_all'),
     ),
     Mutant(
+        2,
+        'a set-point of a moment that is to come is fresh',
+        'nfo_sinus_driver/node/setpoints.py',
+        'if abs(age) <= timeout:',
+        'if age <= timeout:',
+        ('test/ros/test_joint.py', '-k', 'ahead and setpoint_stamped'),
+    ),
+    Mutant(
+        8,
+        'a joint command with fewer velocities than names is followed',
+        'nfo_sinus_driver/node/messages.py',
+        'if size not in (0, count):',
+        'if False:',
+        ('test/ros/test_joint.py', '-k', 'do_not_match'),
+    ),
+    Mutant(
         4,
         'parameters are written although they do not change',
         WRITER,
