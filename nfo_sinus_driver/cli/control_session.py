@@ -236,10 +236,12 @@ def control_session(
 ) -> Iterator[ControlSession]:
     """Open the line to command a drive; signals are held while the ``with`` block lasts."""
     live = live and sys.stdout is not None and sys.stdout.isatty()
+    # it may ask something, which Ctrl-C ends
+    session = Session(options, writes=True)
     with (
         # before any other thread is there
         HeldSignals() as signals,
         Screen(live=live) as screen,
-        Session(options, writes=True) as session,
+        session,
     ):
         yield ControlSession(session, screen, signals, mute)

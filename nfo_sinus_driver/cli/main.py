@@ -19,6 +19,7 @@ from nfo_sinus_driver.cli.monitor import Monitor
 from nfo_sinus_driver.cli.options import (
     DEFAULTS,
     LINE_AND_DRIVE,
+    USUAL,
     Verb,
     add_flag,
     add_setting,
@@ -38,7 +39,8 @@ _USAGE = 2
 _INTERRUPTED = 130
 _EPILOG = """
 Options may stand before and after the verb; "nfo-sinus VERB --help" lists those of a verb.
-Reading never changes anything in a drive, and a motor that runs runs on.
+Reading never changes anything in a drive, and a motor that runs runs on; not so on canopen, where
+the first request gives the bus control, and a motor that the terminals run stops: it asks before.
 """
 
 
@@ -114,7 +116,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     except ValueError as error:
         parser.exit(_USAGE, f'{parser.prog}: error: {error}\n')
     VERBS[options.verb].complete(options)
-    for name, default in DEFAULTS.items():
+    for name, default in {**DEFAULTS, **USUAL}.items():
         if not hasattr(options, name):
             setattr(options, name, default)
     others = (*getattr(options, 'addresses', ()), getattr(options, 'against', None))
@@ -134,6 +136,7 @@ def make_parser() -> argparse.ArgumentParser:
     group = common.add_argument_group('line and drive, as the parameters of the driver')
     for name in LINE_AND_DRIVE:
         add_setting(group, name, f'--{name.replace("_", "-")}')
+    add_flag(group, '--yes', 'do it without asking')
     parser = argparse.ArgumentParser(
         prog='nfo-sinus', description='Looks after frequency inverters on a serial line.',
         epilog=_EPILOG, parents=[common],

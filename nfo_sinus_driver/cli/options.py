@@ -29,6 +29,8 @@ LINE_AND_DRIVE = (
 #: What of them a family may say, as it leaves the factory.
 LINE = ('protocol', 'baud_rate', 'char_format', 'address')
 DEFAULTS = {name: SETTINGS[name].default for name in LINE_AND_DRIVE}
+#: What every verb has besides, where nothing else was typed or filled in.
+USUAL = {'yes': False, 'may_take_control': False}
 #: What is as short as it can be for each of 247 addresses.
 OF_SCAN = {'response_timeout': 0.1, 'retries': 0}
 
@@ -123,11 +125,6 @@ def add_setting(group: argparse._ActionsContainer, name: str, option: str, **mor
 def add_flag(parser: argparse._ActionsContainer, option: str, meaning: str) -> None:
     """Add an option that takes no value."""
     parser.add_argument(option, action='store_true', help=meaning)
-
-
-def add_yes(parser: argparse.ArgumentParser) -> None:
-    """Add the option of those that ask."""
-    add_flag(parser, '--yes', 'do it without asking')
 
 
 def add_allow(parser: argparse.ArgumentParser) -> None:

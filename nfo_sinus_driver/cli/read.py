@@ -24,7 +24,7 @@ from nfo_sinus_driver.cli.console import (
     say,
 )
 from nfo_sinus_driver.cli.control_session import control_session
-from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, add_yes, change, count
+from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, change, count
 from nfo_sinus_driver.cli.parameter_file import (
     BARRED,
     is_barred,
@@ -152,7 +152,6 @@ class Errors(Verb):
             help='at most so many entries; more than 32 where a drive has them (default: 0, which '
             'is all, or 32)',
         )
-        add_yes(parser)
         add_flag(parser, '--erase', 'erase it, after it was shown')
 
     def main(self, options: argparse.Namespace) -> int:

@@ -13,8 +13,15 @@ import time
 from typing import Any, TypeVar
 
 from nfo_sinus_driver.bus import Bus, Statistics
-from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.cli.console import CliError, UsageError, progress, remark, say
+from nfo_sinus_driver.catalog import Value, load_profile
+from nfo_sinus_driver.cli.console import (
+    CliError,
+    UsageError,
+    progress,
+    remark,
+    require_yes,
+    say,
+)
 from nfo_sinus_driver.drive import (
     Cause,
     Drive,
@@ -106,7 +113,11 @@ class OfflineDrive(Listener):
 
 
 class Session:
-    """The line that the options name, open in a ``with`` block; only read without ``writes``."""
+    """
+    The line that the options name, open in a ``with`` block; only read without ``writes``.
+
+    It begins with a question where the first request takes control of a drive.
+    """
 
     def __init__(self, options: argparse.Namespace, *, writes: bool = False) -> None:
         self._options = options
@@ -125,6 +136,12 @@ class Session:
             self._settings(options.address)
         except ValueError as error:
             raise UsageError(str(error)) from None
+        if not options.may_take_control:
+            profile = load_profile(options.model)
+            if why := profile.holds_control.get(link.protocol.addressing):
+                stops = f'{why}: a motor that the terminals run stops'
+                require_yes(options, f'{stops[0].upper()}{stops[1:]}. Go on?')
+            options.may_take_control = True
 
     def __enter__(self) -> Session:
         self._bus.start()

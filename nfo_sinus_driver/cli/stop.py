@@ -26,6 +26,10 @@ class Stop(Verb):
         """Add what may be typed."""
         add_flag(parser, '--quick', 'release the motor at once: it coasts')
 
+    def complete(self, options: argparse.Namespace) -> None:
+        """Ask nothing: where the first request stops a motor, that is what is wanted."""
+        options.may_take_control = True
+
     def main(self, options: argparse.Namespace) -> int:
         """Stop a motor that the bus runs."""
         with control_session(options, live=not options.json) as control:

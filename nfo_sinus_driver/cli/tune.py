@@ -16,7 +16,7 @@ from nfo_sinus_driver.cli.control_session import (
     Ended,
     control_session,
 )
-from nfo_sinus_driver.cli.options import Verb, add_yes
+from nfo_sinus_driver.cli.options import Verb
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.drive import Cause, DriveError, Procedure, Report, Tuned
 from nfo_sinus_driver.drive.procedure import require_known
@@ -48,7 +48,6 @@ class Tune(Verb):
             help='full or basic tuning, rs: only the stator resistance, calculate: from the motor '
             'plate alone',
         )
-        add_yes(parser)
 
     def main(self, options: argparse.Namespace) -> int:
         """Tune, and report which parameters have changed."""

@@ -427,6 +427,9 @@ class Drive:
     async def _connect(self, retry: bool) -> None:
         state = self.state
         self.params.connected()
+        takes_control = state.model.profile.holds_control.get(self.params.protocol)
+        if takes_control and not self.statistics.transactions:
+            state.notify(Severity.WARNING, Cause.TAKES_CONTROL, why=takes_control)
         try:
             await state.nameplate.identify(retry=retry)
         except Refused as error:
@@ -456,9 +459,8 @@ class Drive:
         if self._controller is not None:
             self._controller.connected()
         self._report_identity()
-        why = state.model.profile.holds_control.get(self.params.protocol)
-        if self._controller is None and why:
-            state.notify(Severity.WARNING, Cause.HELD_BY_LINE, why=why)
+        if self._controller is None and takes_control:
+            state.notify(Severity.WARNING, Cause.HELD_BY_LINE, why=takes_control)
         self._watchdog.warn_if_unfit()
 
     async def _read_nameplate(self) -> Identity:

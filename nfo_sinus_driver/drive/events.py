@@ -57,6 +57,7 @@ class Cause(enum.Enum):
         'PLC runs'
     )
     RESTARTED = 'the drive has started anew, as its boot-up message says: check its mains'
+    TAKES_CONTROL = '{why}: a motor that the terminals run stops now'
     HELD_BY_LINE = 'only watched, and yet {why}: a motor that the terminals ran has stopped'
     OTHER_MODEL = '{error}: every {model} has it; is this another model? {call.set_model}'
     NOT_THE_MODEL = '{drive} answers, but not as a {model} does ({why}): is --model right?'

@@ -47,6 +47,22 @@ LAWS = (
         (TRACE,),
     ),
     Mutant(
+        1,
+        'the command line takes control of a drive unasked',
+        'nfo_sinus_driver/cli/session.py',
+        'if not options.may_take_control:',
+        'if False:',
+        ('test/unit/cli/test_line_takes_control.py', '-k', 'before_yes and info'),
+    ),
+    Mutant(
+        1,
+        'nothing is said before a drive is taken from the terminals',
+        'nfo_sinus_driver/drive/drive.py',
+        'if takes_control and not self.statistics.transactions:',
+        'if False:',
+        ('test/unit/drive/test_canopen_laws.py', '-k', 'first_frame'),
+    ),
+    Mutant(
         2,
         'a fault does not end the enable',
         ADVICE,

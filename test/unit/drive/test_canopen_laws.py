@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.drive import Cause, Event, Severity
 from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 from nfo_sinus_driver.simulator.can_frames import Frame
 from nfo_sinus_driver.simulator.canopen import Server
@@ -182,6 +182,35 @@ def test_only_watched_and_yet_in_bus_mode() -> None:
         assert rig.notes.said(
             'only watched, and yet the CANopen module holds the drive in bus mode'
         )
+
+
+@pytest.mark.parametrize('method', ['mode_scmd', 'drive_control', 'ds402', 'monitor'])
+def test_before_the_first_frame_it_says_that_a_motor_of_the_terminals_stops(method: str) -> None:
+    with Rig('canopen', control_method=method, drives=2) as rig:
+        asked_when_said: list[int] = []
+        listener = rig.notes.on_event
+
+        def on_event(event: Event) -> None:
+            if event.cause is Cause.TAKES_CONTROL:
+                assert event.severity is Severity.WARNING
+                asked_when_said.append(sum(unit == 1 for unit, _, _ in rig.asked))
+            listener(event)
+
+        rig.notes.on_event = on_event
+        rig.far.control_unit.press('ext')
+        rig.pass_time(1.0)
+        assert rig.far.motor.driven and not rig.asked
+        # as often as it is tried, and however often it is lost
+        rig.line.state = 'silent'
+        for _ in range(3):
+            rig.answer(rig.drive.connect(retry=False))
+        rig.line.mend()
+        rig.connect()
+        rig.far.silence(5.0)
+        rig.pass_time(8.0)
+        assert rig.drive.snapshot.connected
+        assert asked_when_said == [0]
+        assert not rig.far.motor.driven
 
 
 def test_of_two_nodes_one_is_silent() -> None:
