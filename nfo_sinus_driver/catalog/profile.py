@@ -550,6 +550,8 @@ class Profile:
     :ivar after_write: what makes settings take effect that were written, or keeps them.
     :ivar pole_pairs: of the motor, where no parameter reports them; 0: not known.
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
+    :ivar keeps_run: it keeps its run command without power, and runs again when it is back;
+        ``None``: no manual says.
     """
 
     title: str
@@ -583,6 +585,7 @@ class Profile:
     stops_at_timeout: Value = True
     after_write: Sequence[Write] = ()
     pole_pairs: int = 0
+    keeps_run: bool | None = None
 
     def seen_by(self, method: str) -> Profile:
         """Return the same as one of its control methods sees it."""

@@ -66,6 +66,11 @@ def notes(family: catalog.Family) -> list[str]:
         found.append('it has no coast: quick_stop is an ordinary stop, or a quick ramp')
     if not family.key(catalog.Role.COMMUNICATION_TIMEOUT):
         found.append('it has no time-out of its own: the motor runs on when the driver is gone')
+    if profile.keeps_run is None:
+        found.append(
+            'does its run command survive a power cycle? Look in the manual, or try it without the '
+            'motor, and add keeps_run: true or false; with true a silence of 0.4 s stops the motor'
+        )
     addresses = [one.at('modbus') for one in family.values() if 'modbus' in one.addresses]
     registers = [one.index for one in addresses if one.space != 'coil']
     if min(registers, default=0) >= _PRINTED_FROM:

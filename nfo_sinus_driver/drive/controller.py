@@ -146,8 +146,8 @@ class Controller:
         # after the stop of this motor is on its way
         self._bus.call(lambda: self._on_stop(why))
 
-    def stop_beside(self, why: Report) -> None:
-        """Stop the motor, if this driver may run it, because another drive stops."""
+    def stop_because(self, why: Report) -> None:
+        """Stop the motor, if this driver may run it, for a reason that its status does not show."""
         if self.commanded:
             self._sequence.start(why)
             self._report_stop(why)
@@ -516,6 +516,11 @@ class Controller:
         if self._lost_in_use:
             self._sequence.start()
         return self._lost_in_use
+
+    def silent(self, seconds: float) -> None:
+        """Stop a motor whose drive has not answered for so long, s, that it may run anew."""
+        if self.enabled and self._state.may_have_restarted(seconds):
+            self.stop_because(Report(Cause.MAY_HAVE_RESTARTED))
 
     def alarmed_by(self, status: InverterStatus) -> bool:
         """Return whether a status is a reason to stop."""

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import math
 
 from nfo_sinus_driver.catalog import Fact, InverterStatus, Kind, Meaning, State
-from nfo_sinus_driver.drive.drive_state import DriveState
+from nfo_sinus_driver.drive.drive_state import SHORTEST_POWER_OFF, DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.link import (
     GatewayFault,
@@ -96,6 +96,8 @@ def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -
         cause = Cause.DRIVER_PAUSED
     elif not status.runs:
         cause = Cause.STOPPED_BY_ITSELF
+    elif state.model.profile.keeps_run and state.unheard:
+        cause = Cause.MAY_HAVE_RESTARTED
     return cause and state.report(cause, seconds=state.timeout.shortest)
 
 
@@ -131,7 +133,7 @@ def explain_fall(
         silent = away >= _LIFE_STOOD + state.usual_interval
         most = min(was - _LEAST_FALL, was * _CAUGHT)
     else:
-        silent, most = state.missed_reply and away >= _SHORTEST_POWER_OFF, was / 2
+        silent, most = state.missed_reply and away >= SHORTEST_POWER_OFF, was / 2
     # where the frequency is not read with the status, it is NaN and does not fall
     if not (silent and was >= _LEAST_FALL and abs(status.frequency) < most):
         return None
@@ -143,8 +145,6 @@ def explain_fall(
     )
 
 
-#: No drive is switched off and on, and answers, within less, s; a lost answer takes less.
-_SHORTEST_POWER_OFF = 0.4
 #: A PLC's life counter that stands still for this much longer than the poll interval is a silence
 #: of the drive, s [C125].
 _LIFE_STOOD = 0.2

@@ -195,7 +195,7 @@ class Drive:
     def stop_beside(self, why: Report) -> None:
         """Stop the motor, if this driver may run it, because another one stops; on the bus."""
         if self._controller is not None:
-            self._controller.stop_beside(why)
+            self._controller.stop_because(why)
 
     def activate(self) -> None:
         """Poll at full rate and measure."""

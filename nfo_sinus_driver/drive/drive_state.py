@@ -37,6 +37,8 @@ _log = logging.getLogger(__name__)
 
 #: How long a drive may take to carry out a command, its start delay not counted, s.
 TIMEOUT = 2.0
+#: No drive is switched off and on, and answers, within less, s; a lost answer takes less.
+SHORTEST_POWER_OFF = 0.4
 #: How often the status is read while something is awaited, s.
 LOOK_PERIOD = 0.02
 #: No start delay of a drive is longer, s.
@@ -356,6 +358,15 @@ class DriveState:
         timeout = self.timeout
         alone = self._alone if not self._asked_in_vain else 0.0
         return timeout.stops_motor and 0 < timeout.shortest <= alone
+
+    def may_have_restarted(self, silent: float) -> bool:
+        """Return whether a drive that was silent for so long, s, may run again by itself."""
+        return bool(self.model.profile.keeps_run) and silent >= SHORTEST_POWER_OFF
+
+    @property
+    def unheard(self) -> bool:
+        """Before the newest status no frame came for as long as a loss takes, asked or not."""
+        return self._alone >= self.settings.lost_after
 
     @property
     def usual_interval(self) -> float:

@@ -213,6 +213,10 @@ class Cause(enum.Enum):
         '({now:.4g} {unit}, before {before:.4g} {unit}; {status}). It may have been switched off '
         'and on: check its mains and the line'
     )
+    MAY_HAVE_RESTARTED = (
+        'the drive did not answer for so long that it may have been switched off and on, and it '
+        'keeps its run command without power: check its mains and the line'
+    )
     DRIVER_PAUSED = (
         'this {call.program} did not run for longer than the time-out of the drive itself '
         '({seconds:g} s), after which the drive stops the motor ({status}): check the load of the '

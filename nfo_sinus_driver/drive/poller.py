@@ -31,8 +31,10 @@ _INACTIVE_PERIOD = 0.5
 _YIELDING_PERIOD = 2.0
 #: How often the control mode is read, while no motor at standstill may start by a set-point, s.
 _MODE_PERIOD = 1.0
-#: How often the status is read at least while the motor runs, s.
+#: How often the status is read at least while the motor runs, s; and of a drive that keeps its run
+#: command without power: so two requests of the least time without it get no answer.
 _WATCH_PERIOD = 0.2
+_RESTART_WATCH_PERIOD = 0.1
 #: How often a drive that is lost is tried again, at first and at last, s.
 _RECONNECT_PERIOD = 1.0
 _SLOWEST_RECONNECT = 4.0
@@ -263,8 +265,21 @@ class Poller:
         # however low the poll rate, a motor that runs is watched, and so is one whose run
         # command may still be active, for it would start when its fault ends
         controller = self._controller
+        if self._may_restart:
+            return min(pause, _RESTART_WATCH_PERIOD)
         watched = controller is not None and (controller.stopping or self._setpoint.following)
         return min(pause, _WATCH_PERIOD) if watched else pause
+
+    @property
+    def _may_restart(self) -> bool:
+        """After a moment without power the motor would run again, as if nothing had been."""
+        return bool(self._state.model.profile.keeps_run) and self._setpoint.following
+
+    @property
+    def _priority(self) -> Priority:
+        """The priority of what a poll reads."""
+        urgent = self._may_restart and not self._state.responsive
+        return Priority.LOOK if urgent else Priority.POLL
 
     @property
     def _period(self) -> float:
@@ -345,7 +360,7 @@ class Poller:
             nonlocal received
             word, received = received, None
             return await state.read_status(
-                Priority.POLL,
+                self._priority,
                 retry=False,
                 alarming=self._alarming,
                 received=word,
@@ -369,7 +384,7 @@ class Poller:
         if self._mode_is_due:
             self._mode_read_at = self._bus.now()
             before = state.control_mode
-            mode = await self._insist(lambda: state.read_control_mode(Priority.POLL, retry=False))
+            mode = await self._insist(lambda: state.read_control_mode(self._priority, retry=False))
             if mode != before and self._controller:
                 # before it is published: a set-point never has the unit of another mode
                 self._controller.on_status(status)
@@ -408,7 +423,7 @@ class Poller:
     async def _read_measured(self, role: Role) -> float:
         try:
             key = self._state.model.key(role)
-            return await self._insist(lambda: self._state.measure(key, Priority.POLL))
+            return await self._insist(lambda: self._state.measure(key, self._priority))
         except (PortError, Interrupted):
             # raised once only: the status that is read next would show a drive that was stopped
             raise
@@ -436,6 +451,7 @@ class Poller:
             except LinkError:
                 self._state.unanswered()
                 now = self._bus.now()
+                self._check_silence(now)
                 failing_since = min(failing_since, now)
                 in_vain = now - failing_since >= self._state.settings.lost_after
                 if self._silent_for_long or in_vain:
@@ -445,6 +461,13 @@ class Poller:
                 self._state.answered()
                 self._setpoint.answered()
                 return answer
+
+    def _check_silence(self, now: float) -> None:
+        """Report a silence of more than one lost answer to what may have to stop the motor."""
+        silences = self._bus.silences
+        # it has begun before the request that was in vain just now
+        if self._controller is not None and silences.lasts(self._unit, self._requested_at) >= 0:
+            self._controller.silent(now - silences.last_frame_at(self._unit))
 
     def _on_poll_failed(self, error: LinkError | DriveError) -> None:
         state, now = self._state, self._bus.now()

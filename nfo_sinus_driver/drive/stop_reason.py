@@ -64,6 +64,7 @@ _CAUSES: Mapping[StopReason, tuple[Cause, ...]] = {
         Cause.DRIVE_STARTING,
         Cause.RESTARTED,
         Cause.SLOWER_AFTER_SILENCE,
+        Cause.MAY_HAVE_RESTARTED,
         Cause.CONTROL_LOST_WHILE_AWAY,
     ),
     StopReason.SETPOINT_REFUSED: (Cause.SETPOINT_REFUSED,),

@@ -614,6 +614,14 @@ LAWS = (
     ),
     Mutant(
         2,
+        'a drive that keeps its run command runs again after a moment without power',
+        CONTROLLER,
+        '        if self.enabled and self._state.may_have_restarted(seconds):',
+        '        if False:',
+        ('test/unit/drive/test_described_oddities.py', '-k', 'survives_starts'),
+    ),
+    Mutant(
+        2,
         'a card that was fitted is never asked for again',
         'nfo_sinus_driver/drive/parameter_access.py',
         '        self._denials.clear()',

@@ -255,6 +255,7 @@ class Description:
     :ivar flags: faults that are bits, the gravest first.
     :ivar holder: the parameter that reports who has control, and its values for the line.
     :ivar prepare_stops: no run command stands behind ``prepare``.
+    :ivar keeps_run: the drive keeps its run command without power; ``None``: the file does not say.
     :ivar pole_pairs: of the motor; 0: not known.
     :ivar stop_mode: the parameter that says how it stops, and its value for coasting.
     :ivar defaults: with what value a parameter leaves the factory, by key.
@@ -275,6 +276,7 @@ class Description:
     stop: Steps
     prepare: Steps = ()
     prepare_stops: bool = False
+    keeps_run: bool | None = None
     coast: Steps = ()
     quick_stop: Steps = ()
     reset: Steps = ()

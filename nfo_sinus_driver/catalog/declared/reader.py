@@ -108,6 +108,7 @@ class _Reader:
             facts=facts,
             setpoint=setpoint,
             **commands.lists(),
+            keeps_run=root.flag('keeps_run') if 'keeps_run' in root else None,
             after_write=after_write,
             requires=tuple(self._requires(control, settings)),
             holder=settings.holder(control.get('holder')),

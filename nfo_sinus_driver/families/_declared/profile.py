@@ -251,6 +251,7 @@ def profile_of(drive: Description) -> Profile:
         busy=drive.line.busy,
         stops_at_timeout=True if drive.timeout is None else drive.timeout.stops,
         pole_pairs=drive.pole_pairs,
+        keeps_run=drive.keeps_run,
         after_write=tuple(Write(step.key, step.raw) for step in drive.after_write),
         line_check=dict.fromkeys(('modbus_rtu', 'modbus_tcp'), drive.line.shown)
         if drive.line.shown

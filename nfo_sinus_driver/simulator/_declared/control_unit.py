@@ -267,7 +267,9 @@ class DeclaredControlUnit(ControlUnit):
         return not self._time_out and (self._run or not self.motor.driven)
 
     def restart(self) -> None:
-        """Forget commands and set-point."""
+        """Forget commands and set-point, unless the file says that the drive keeps them."""
+        if self._drive.keeps_run:
+            return
         self._words.clear()
         self._orders = orders_of(self._drive)
         self._run = self._reverse = self._coasts = self._quick = False

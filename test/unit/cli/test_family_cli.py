@@ -44,6 +44,16 @@ def test_a_forgotten_numbering_is_remarked(
         assert ('add numbering: 40001' in capsys.readouterr().out) is remarked
 
 
+def test_whether_the_run_command_survives_a_power_cycle_is_asked_where_it_is_not_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for number, said in enumerate(('', 'keeps_run: true\n', 'keeps_run: false\n')):
+        file = tmp_path / f'mine{number}.vfd.yaml'
+        file.write_text(Path(V20).read_text() + said)
+        assert main(['family', 'check', str(file)]) == 0
+        assert ('add keeps_run' in capsys.readouterr().out) is (not said)
+
+
 def test_families_are_listed(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -427,3 +427,53 @@ def test_a_drive_that_ignores_commands_in_local_is_not_taken_for_enabled(tmp_pat
             rig.far.control_unit.settle()
             rig.pass_time(1.0)
             assert not rig.drive.following
+
+
+@pytest.mark.parametrize(('drives', 'poll_rate'), [(1, 50.0), (1, 5.0), (1, 0.5), (4, 20.0)])
+def test_a_run_command_that_survives_starts_no_motor_when_the_power_is_back(
+    tmp_path: Path, drives: int, poll_rate: float
+) -> None:
+    # the ramp is so short that no poll finds the motor slower than before
+    file = described(tmp_path, keeps_run=True)
+    for number, off in enumerate((0.3, 0.4, 0.5, 0.7, 0.95, 2.0)):
+        with DescribedRig(file, drives=drives, poll_rate=poll_rate) as rig:
+            rig.turn()
+            rig.pass_time(0.037 * number)
+            rig.far.power_cycle(off)
+            rig.pass_time(off + 0.4)
+            assert not rig.drive.following, off
+            assert not rig.turns, off
+            stopped = Cause.MAY_HAVE_RESTARTED if off < 1 else Cause.LOST
+            assert rig.notes.said(stopped), rig.notes.events
+            assert all(one.following for address, one in rig.drives.items() if address > 1)
+    with DescribedRig(file, poll_rate=poll_rate) as rig:
+        rig.turn()
+        rig.far.power_cycle(0.5)
+        rig.pass_time(1.5)
+        rig.assert_only_enable_helps()
+
+
+@pytest.mark.parametrize(('drives', 'poll_rate'), [(1, 50.0), (1, 0.5), (4, 20.0)])
+def test_a_lost_answer_stops_no_motor_whose_run_command_survives(
+    tmp_path: Path, drives: int, poll_rate: float
+) -> None:
+    file = described(tmp_path, keeps_run=True)
+    for what in ('drop', 'unheard', 'damage'):
+        with DescribedRig(file, drives=drives, poll_rate=poll_rate) as rig:
+            rig.turn()
+            for key in ('line.status', 'measured.actual_frequency', 'line.setpoint'):
+                rig.spoil(what, key, written=key == 'line.setpoint')
+                rig.send(20.0 if rig.drive.snapshot.setpoint < 20 else 19.5)
+                rig.pass_time(1.1)
+            assert rig.drive.following and rig.turns, (poll_rate, what, rig.notes.events)
+
+
+def test_a_driver_that_stood_still_stops_a_motor_whose_run_command_survives(
+    tmp_path: Path,
+) -> None:
+    with DescribedRig(described(tmp_path, keeps_run=True)) as rig:
+        rig.turn()
+        rig.clock.now += 1.5
+        rig.pass_time(0.3)
+        assert rig.notes.said(Cause.MAY_HAVE_RESTARTED), rig.notes.events
+        assert not rig.drive.following
