@@ -53,6 +53,15 @@ DESCRIBED = '.vfd.yaml'
 _WIDEST_WORD = 0xFFFFFFFF
 #: A motor may be overhauled by so much, as a share of the greatest set-point.
 _BEYOND_SETPOINTS = 1.1
+#: What multiplies set-points or measured values, beside what the tables name as a scale: speeds of
+#: a shaft are frequencies by the pole pairs, or by what is nominal.
+_SCALING = (
+    Role.SPEED_SCALE_NUMERATOR,
+    Role.SPEED_SCALE_DENOMINATOR,
+    Role.POLE_PAIRS,
+    Role.NOMINAL_FREQUENCY,
+    Role.NOMINAL_SPEED,
+)
 #: What a parameter of the line is for a drive, whatever its group.
 _OF_LINE = (Role.BUS_PROTOCOL, Role.BUS_ADDRESS, Role.BAUD_RATE, Role.CHARACTER_FORMAT)
 
@@ -154,6 +163,12 @@ class Family(Mapping[str, Parameter]):
         """The keys of the settings of the line, by which the drive may be lost."""
         of_line = {self.key(role) for role in _OF_LINE if role in self.roles}
         return self.group_of(Role.BUS_ADDRESS) | of_line
+
+    @functools.cached_property
+    def scaling(self) -> frozenset[str]:
+        """The keys of the parameters that set-points or measured values are multiplied by."""
+        named = {one.scale for one in self.values() if one.scale in self}
+        return frozenset(named | {self.key(role) for role in _SCALING if role in self.roles})
 
     def can_be(self, key: str, value: Value) -> bool:
         """Return whether a drive can have a value, by its manual: else the value was spoiled."""

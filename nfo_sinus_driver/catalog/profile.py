@@ -328,6 +328,8 @@ class ControlMethod(abc.ABC):
     :cvar quick_stop_by: the setting by which a quick stop may be a ramp; ``''``: the motor coasts.
     :cvar stop_ramp: it can have the drive take a stop ramp of its own.
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
+    :cvar unused_scales: parameters that multiply its set-points where they are not all the same;
+        a start requires that they are.
     :cvar needs: parameters without which a drive cannot be commanded by it.
     :cvar procedures: what begins each procedure that it has.
     :cvar holders: who has control, where this method sees that otherwise than its :class:`Profile`.
@@ -346,6 +348,7 @@ class ControlMethod(abc.ABC):
     quick_stop_by: ClassVar[str] = ''
     stop_ramp: ClassVar[bool] = False
     older: ClassVar[bool] = True
+    unused_scales: ClassVar[Sequence[str]] = ()
     needs: ClassVar[Sequence[str]] = ()
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
     control_retained: ClassVar[str] = ''

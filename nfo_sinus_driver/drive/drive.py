@@ -85,7 +85,9 @@ class Drive:
             self.state, self.setpoint, self._controller, lambda: self._connect(retry=False)
         )
         self._procedures = procedures = Procedures(self.state, self._controller)
-        self.parameters = Parameters(self.state, procedures, self.run, self._take_parameters)
+        self.parameters = Parameters(
+            self.state, procedures, self.run, self._take_parameters, self._take_scale
+        )
         self._watchdog = CommunicationWatchdog(
             self.state, self.parameters, commanded=self._controller is not None
         )
@@ -506,6 +508,12 @@ class Drive:
         if any(self.state.model.key(role) in keys for role in _MODE_ROLES):
             self._poller.read_mode_soon()
         self.state.listener.on_parameters(keys)
+
+    def _take_scale(self, change: Change) -> None:
+        """Stop a motor whose set-points would mean another speed from now on."""
+        is_used = self.state.nameplate.scales.found.get(change.key) == change.new
+        if self._controller is not None and not is_used:
+            self._controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
 
     def _set_active(self, active: bool) -> None:
         self._bus.cancel(self._telemetry_task)

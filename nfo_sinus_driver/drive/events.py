@@ -193,6 +193,13 @@ class Cause(enum.Enum):
         'the control mode was changed to {mode} at the drive, and set-points are in {unit} now: '
         'check what sends them'
     )
+    SCALE_IMPOSSIBLE = (
+        '{key} is {value:g}, and set-points or measured values are multiplied by it: set it first'
+    )
+    SCALE_CHANGED = (
+        'what set-points or measured values are multiplied by was changed at the drive ({change}): '
+        'check that it is right'
+    )
     DRIVE_STARTING = 'the drive is starting ({status}): it was switched off and on; check its mains'
     RUN_INPUT_LOST = 'the {enable_input} of the drive was lost ({status}): close it'
     STOPPED_BY_ITSELF = (

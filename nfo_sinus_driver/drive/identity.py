@@ -81,7 +81,7 @@ class Nameplate:
         self.is_older = False
         #: Why no parameters are reached behind a PLC, as reported; ``''``: they are.
         self._mailbox_trouble = ''
-        self.scales = Scales(params, self.has, settings.scales)
+        self.scales = Scales(params, self.has, settings.scales, settings.method_class.unused_scales)
 
     async def identify(self, *, retry: bool = True) -> Identity:
         """

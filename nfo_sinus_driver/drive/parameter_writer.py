@@ -165,8 +165,9 @@ class ParameterWriter:
             raise not_changed(stopped, self._state.report(Cause.STANDSTILL_NEEDED))
 
     def _require_not_enabled(self, key: str) -> None:
-        """Refuse what a start depends on while the motor is enabled, even at set-point 0."""
-        depends = key in self._state.model.profile.start_settings
+        """Refuse what a start or a set-point depends on while enabled, even at set-point 0."""
+        model = self._state.model
+        depends = key in model.profile.start_settings or key in model.scaling
         if depends and self._procedures.commanded:
             raise not_changed(key, Report(Cause.NOT_WHILE_ENABLED))
 

@@ -89,6 +89,7 @@ class Parameters:
 
     :param run: runs a coroutine on the bus; its errors explain themselves.
     :param on_change: called on the bus with the keys of parameters whose value is new.
+    :param on_scale: called on the bus with a change, at the drive, of what scales other values.
     :raises LinkError: the drive does not answer.
     :raises ParameterError: a value is not taken, and why.
     """
@@ -99,12 +100,14 @@ class Parameters:
         procedures: Procedures,
         run: Callable[[Callable[[], Coroutine[Any, Any, Any]]], Future[Any]],
         on_change: Callable[[Collection[str]], None],
+        on_scale: Callable[[Change], None],
     ) -> None:
         self._bus = state.bus
         self._state = state
         self._params = state.params
         self.run = run
         self._on_change = on_change
+        self._on_scale = on_scale
         self._writer = ParameterWriter(state, procedures)
         self._keys: tuple[str, ...] = ()
         self._data: dict[str, bytes] = {}
@@ -414,7 +417,9 @@ class Parameters:
     def _learn(self, key: str, data: bytes, *, quiet: bool = False) -> None:
         """Take the value that the drive has of a parameter, and report a change."""
         own = self._params.is_own(key, data)
-        if self._data.get(key) == data:
+        same = self._data.get(key) == data
+        # the same bytes mean another value where what scales them was changed
+        if same and not self._state.model[key].scale:
             return
         # other threads may be reading the old ones
         self._data = {**self._data, key: data}
@@ -425,8 +430,10 @@ class Parameters:
         except ValueError as error:
             # and the value before no longer counts
             self._state.notify(Severity.WARNING, Cause.NOT_POSSIBLE, why=str(error))
+        if same and values.get(key) == before:
+            return
         self._values = values
-        if not quiet and before is not None and key in values:
+        if not (quiet or same) and before is not None and key in values:
             self._report_change(Change(key, before, values[key], self._state.model[key].unit), own)
         try:
             self._on_change((key,))
@@ -436,6 +443,8 @@ class Parameters:
     def _report_change(self, change: Change, own: bool) -> None:
         if not self._desired.report_drift(change.key) and not own:
             self._state.notify(Severity.INFO, Cause.CHANGED_AT_DRIVE, change=change)
+        if change.key in self._state.model.scaling and not own:
+            self._on_scale(change)
 
 
 class DesiredConfig:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Coroutine
 import contextlib
+import functools
 import logging
 import math
 from typing import Any, TypeVar
@@ -17,6 +18,7 @@ from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import Conditions, explain_failure, explain_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.snapshot import NAN, NOT_MEASURED, Measured, Snapshot
@@ -29,7 +31,8 @@ _T = TypeVar('_T')
 _INACTIVE_PERIOD = 0.5
 #: How often an idle one is polled at most while another one is read for the first time, s.
 _YIELDING_PERIOD = 2.0
-#: How often the control mode is read, while no motor at standstill may start by a set-point, s.
+#: How often the control mode is read, and what scales values, while no motor at standstill may
+#: start by a set-point, s.
 _MODE_PERIOD = 1.0
 #: How often the status is read at least while the motor runs, s; and of a drive that keeps its run
 #: command without power: so two requests of the least time without it get no answer.
@@ -102,8 +105,8 @@ class Poller:
         self._failed_reconnects = 0
         #: When a value was last asked for, and how long it took, s: long, where the line is full.
         self._requested_at = self._turn = 0.0
-        #: When the control mode was last read.
-        self._mode_read_at = 0.0
+        #: When was last read what changes rarely: the control mode, and the scales.
+        self._rare_read_at = 0.0
         self._complaint: Report | None = None
         #: A status word that came with a set-point, and has not been checked yet.
         self._received: Reply | None = None
@@ -192,7 +195,7 @@ class Poller:
 
     def read_mode_soon(self) -> None:
         """Read the control mode with the next poll: it may be another one now."""
-        self._mode_read_at = -math.inf
+        self._rare_read_at = -math.inf
         self.wake()
 
     def connected(self) -> None:
@@ -202,6 +205,7 @@ class Poller:
         self._failed_reconnects = 0
         self._complaint = None
         self._received = None
+        self._rare_read_at = self._bus.now()
         self._state.forget_polled()
 
     async def _poll_repeatedly(self) -> None:
@@ -320,12 +324,15 @@ class Poller:
         return silent >= self._state.settings.lost_after
 
     @property
-    def _mode_is_due(self) -> bool:
-        """The control mode is to be read again; it can only change at standstill."""
-        state = self._state
-        stands = self._setpoint.following and 0 in (state.frequency, state.speed)
+    def _may_start(self) -> bool:
+        """A motor at standstill may start by the next set-point."""
+        return self._setpoint.following and 0 in (self._state.frequency, self._state.speed)
+
+    @property
+    def _rare_is_due(self) -> bool:
+        """What changes rarely is to be read again."""
         period = max(_MODE_PERIOD, _MODE_TURNS * self._turn)
-        return stands or self._bus.now() - self._mode_read_at > period
+        return self._bus.now() - self._rare_read_at > period
 
     @property
     def _slow_period(self) -> float:
@@ -381,13 +388,17 @@ class Poller:
         state = self._state
         last = self.snapshot.actual
         status = await self._read_status()
-        if self._mode_is_due:
-            self._mode_read_at = self._bus.now()
+        rare = self._rare_is_due
+        if rare:
+            self._rare_read_at = self._bus.now()
+        if rare or self._may_start:
+            # it can only change at standstill
             before = state.control_mode
             mode = await self._insist(lambda: state.read_control_mode(self._priority, retry=False))
             if mode != before and self._controller:
                 # before it is published: a set-point never has the unit of another mode
                 self._controller.on_status(status)
+            await self._check_scales(all_of_them=rare)
         actual = _ACTUAL.get(state.control_mode)
         steady = True
         if actual is not None:
@@ -398,6 +409,24 @@ class Poller:
             if role is not actual and (age >= self._slow_period or not steady):
                 await self._measure(role)
         self._publish(status)
+
+    async def _check_scales(self, *, all_of_them: bool) -> None:
+        """Read what scales set-points, or any value, and stop the motor if that was changed."""
+        state, scales = self._state, self._state.nameplate.scales
+        target = state.model.profile.setpoints.get(state.control_mode)
+        keys = scales.keys if all_of_them else scales.of(target.key) if target else ()
+        for key in keys:
+            before = scales.found.get(key)
+            read = functools.partial(scales.read_one, key, self._priority)
+            try:
+                await self._insist(read)
+            except Refused:
+                # it may be busy
+                continue
+            now = scales.found[key]
+            if before not in (None, now) and self._controller:
+                change = Change(key, before, now, state.model[key].unit)
+                self._controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
 
     def _report_fault(self, status: InverterStatus, reported: bool) -> None:
         """Report on change that a fault is active, unless a stop because of it was reported."""

@@ -89,6 +89,9 @@ class StartSequence:
         await self._method.require_startable()
         # the keypad may have changed it since the drive was connected
         await read_scales(state)
+        scales = state.nameplate.scales
+        if key := scales.impossible:
+            raise DriveError(Cause.SCALE_IMPOSSIBLE, key=key, value=scales.found[key])
         return control_mode, await read_limits(state, control_mode)
 
     async def start(self, control_mode: str, prepare: Prepare) -> None:

@@ -36,6 +36,7 @@ from nfo_sinus_driver.node.scale import Scale, require_scale
 from nfo_sinus_driver.node.setpoints import Setpoints
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.wording import NodeError, Wording
+from nfo_sinus_driver.setting import DISABLED
 
 _log = logging.getLogger(__name__)
 
@@ -323,7 +324,7 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _require_same_scale(self, changed: Mapping[str, object]) -> None:
         # the set-points that go on arriving would mean another speed
-        for name in ('scale', 'unit'):
+        for name in (one.name for one in DRIVE_SETTINGS.values() if one.change == DISABLED):
             now = self.get_parameter(name).value
             if changed.get(name, now) != now and self.managed.drive.following:
                 raise ValueError(f'{name} can only be changed while the drive is not enabled')

@@ -20,7 +20,7 @@ _OF_NODE = (
         1.0,
         'motor turns per turn of the output shaft; negative inverts the direction of joint_states '
         'and joint_command',
-        also='not 0', name='gear_ratio',
+        also='not 0', change=DISABLED, name='gear_ratio',
     ),
     Setting(
         1.0,

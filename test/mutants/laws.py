@@ -614,6 +614,22 @@ LAWS = (
     ),
     Mutant(
         2,
+        'a scale that is changed at the drive makes another speed of a set-point',
+        WATCH,
+        '            if before not in (None, now) and self._controller:',
+        '            if False:',
+        ('test/unit/drive/test_scale_changes.py', '-k', 'at_standstill'),
+    ),
+    Mutant(
+        2,
+        'a client changes a scale under a motor that is enabled',
+        WRITER,
+        ' or key in model.scaling',
+        '',
+        ('test/unit/drive/test_scale_changes.py', '-k', 'no_client'),
+    ),
+    Mutant(
+        2,
         'a drive that keeps its run command runs again after a moment without power',
         CONTROLLER,
         '        if self.enabled and self._state.may_have_restarted(seconds):',

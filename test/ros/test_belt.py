@@ -60,14 +60,14 @@ def test_it_is_not_changed_under_a_motor_that_follows_set_points(bench: Bench) -
     bench.driver(*_BELT)
     client = bench.client().connected()
     assert client.enable().success
-    for name, value in (('scale', 0.01), ('unit', 'mm/s')):
+    for name, value in (('scale', 0.01), ('unit', 'mm/s'), ('gear_ratio', 2.0)):
         refused = client.set_parameters(**{name: value})
         assert not refused.successful
         assert refused.reason == f'{name} can only be changed while the drive is not enabled'
     # the same again is no change: what was dumped can be loaded
     assert client.set_parameters(scale=0.02).successful
     assert client.call('stop').success
-    assert client.set_parameters(scale=0.01).successful
+    assert client.set_parameters(scale=0.01, gear_ratio=2.0).successful
     assert client.set_parameters(unit='').successful
     wait_until(lambda: client.messages['status'][-1].unit == 'Hz', "the drive's own unit")
     refused = client.set_parameters(scale=0.0)

@@ -33,7 +33,9 @@ CONTROL_WORD = 'fieldbus.control_word'
 STATUS_WORD = 'fieldbus.status_word'
 MODE_OF_OPERATION = 'fieldbus.modes_of_operation_display'
 _ERROR_CODE = 'fieldbus.error_code'
-_DIMENSION = 'fieldbus.vl_dimension_factor_'
+_DIMENSION = (
+    'fieldbus.vl_dimension_factor_numerator', 'fieldbus.vl_dimension_factor_denominator'
+)
 _LEAST = 'fieldbus.vl_velocity_min_amount'
 _MODE = 'fieldbus.mode'
 _INV_ST_WITH_ACK = 'fieldbus.inv_st_with_ack'
@@ -59,6 +61,7 @@ class Ds402(ControlMethod):
     coasts = True
     older = False
     addressing: ClassVar[str] = 'canopen'
+    unused_scales = _DIMENSION
     needs = (CONTROL_WORD, STATUS_WORD, MODE_OF_OPERATION)
 
     def in_control(self) -> Steps[bool]:
@@ -78,8 +81,9 @@ class Ds402(ControlMethod):
 
         :raises NotPossible: the drive multiplies set-points, or has a least speed (CiA 402).
         """
-        above = yield from _read(f'{_DIMENSION}numerator', 1)
-        below = yield from _read(f'{_DIMENSION}denominator', 1)
+        numerator, denominator = _DIMENSION
+        above = yield from _read(numerator, 1)
+        below = yield from _read(denominator, 1)
         if above != below:
             raise NotPossible(
                 f'vl dimension factor (object 604Ch) is {above}/{below}, so that set-points do '
