@@ -614,6 +614,22 @@ LAWS = (
     ),
     Mutant(
         2,
+        'a setting of a described drive is its run command',
+        'nfo_sinus_driver/catalog/declared/registers.py',
+        '                if not together and ',
+        '                if False and ',
+        ('test/unit/catalog/test_descriptions.py', '-k', 'exclude_each_other'),
+    ),
+    Mutant(
+        2,
+        'the reset of a described drive gives its run command',
+        'nfo_sinus_driver/catalog/declared/commands.py',
+        '                if by_bits or (known',
+        '                if False and (known',
+        ('test/unit/catalog/test_descriptions.py', '-k', 'nothing_but_run'),
+    ),
+    Mutant(
+        2,
         'a scale that is changed at the drive makes another speed of a set-point',
         WATCH,
         '            if before not in (None, now) and self._controller:',

@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 from nfo_sinus_driver.catalog.declared.description import (
     Assign,
@@ -22,6 +22,7 @@ from nfo_sinus_driver.catalog.declared.description import (
 from nfo_sinus_driver.catalog.declared.places import WORD, PlacedCondition, Places
 from nfo_sinus_driver.catalog.declared.settings import Settings
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
+from nfo_sinus_driver.catalog.parameter import Parameter
 
 #: All of them, in the order in which a drive is used.
 NAMES = ('prepare', 'run', 'stop', 'coast', 'quick_stop', 'reset', 'release')
@@ -96,7 +97,8 @@ class StepReader:
         place = self._place(node, name)
         if place is None:
             return None
-        return Put(self._places.word(self._places.register(place)), self._word(node['value']))
+        word = self._word(node['value'])
+        return Put(self._places.word(name, place, word), word)
 
     def _put_several(self, node: Node, name: str) -> Step | None:
         place = self._place(node, name)
@@ -109,14 +111,13 @@ class StepReader:
             )
         if len(words) > self._places.most_registers:
             self._problems.add(node.line, f'{name} writes more than most_registers in a message')
-        register = self._places.register(place)
-        if register + len(words) > WORD + 1:
+        if self._places.register(place) + len(words) > WORD + 1:
             self._problems.add(node.line, f'{name} writes beyond the last register')
             return None
         raw = 0
         for word in words:
             raw = raw << 16 | word
-        return Put(self._places.word(register, len(words)), raw)
+        return Put(self._places.word(name, place, *words), raw)
 
     def _change(self, node: Node, name: str) -> Step | None:
         place = self._place(node, name)
@@ -125,13 +126,13 @@ class StepReader:
         bits, cleared = node.integer('set') & WORD, node.integer('clear') & WORD
         if bits & cleared or not bits | cleared:
             self._problems.add(node.line, f'{name} sets and clears the same bits, or none')
-        return Change(self._places.word(self._places.register(place)), bits, cleared)
+        return Change(self._places.word(name, place, bits | cleared), bits, cleared)
 
     def _switch(self, node: Node, name: str) -> Step | None:
         if 'coil' not in node or 'register' in node:
             self._problems.add(node.line, f'a step of {name} needs the coil that is on or off')
             return None
-        return Put(self._places.coil_key(self._places.coil(node['coil'])), int(node.flag('on')))
+        return Put(self._places.coil_key(name, node['coil']), int(node.flag('on')))
 
     def _assign(self, node: Node, name: str) -> Step | None:
         key = self._settings.known(node.get('parameter'))
@@ -161,30 +162,141 @@ class StepReader:
         return raw & WORD
 
 
+#: A register or a coil as it is sent, and whether it is a coil; or a parameter.
+_Place = tuple[int, bool] | str
+
+
+class _RunWord(NamedTuple):
+    """
+    A word by which run, or the direction, runs the motor; a coil has one bit.
+
+    :ivar bits: those of it that a stop clears; 0: words are numbers here, or known in part.
+    """
+
+    word: int
+    bits: int
+
+
 class Commands:
-    """The commands of one file, checked beside each other."""
+    """
+    The commands of one file, checked beside each other.
+
+    :param made: the parameters that write their registers and coils, by key.
+    """
 
     def __init__(
-        self, control: Node, reader: StepReader, direction: Direction | None, problems: Problems
+        self,
+        control: Node,
+        reader: StepReader,
+        direction: Direction | None,
+        made: Mapping[str, Parameter],
+        problems: Problems,
     ) -> None:
         self._control = control
+        self._made = made
         self._problems = problems
         self._direction = direction
         self._lists = {name: reader.read(control.get(name), name) for name in NAMES}
+        self._run = self._left_by('run')
         for name in NAMES:
             self._check_pauses(name)
         for name in ('stop', 'coast', 'quick_stop'):
             if name in control:
                 self._check_stop(name)
         for name in ('prepare', 'reset', 'release'):
-            self._check_runs_nothing(name)
+            self.require_no_run(name, self._lists[name], control.get(name).line)
+        self._check_settings()
         self._check_direction()
 
     def lists(self) -> dict[str, Any]:
         """Return them by name, and whether no run command stands behind prepare."""
-        run, left = left_by(self._lists['run']), left_by(self._lists['prepare'])
+        run, left = self._run, self._left_by('prepare')
         stops = bool(run) and all(key in left and takes_back(run[key], left[key]) for key in run)
         return {**self._lists, 'prepare_stops': stops}
+
+    def require_no_run(self, name: str, steps: Steps, line: int) -> None:
+        """See to it that no step of what is no run command gives one, not for a moment."""
+        for place, word, known in self._states(steps):
+            for run in self._run_words(place):
+                by_bits = run.bits and word & known & run.bits == run.bits
+                if by_bits or (known == -1 and word == run.word):
+                    what = f'the bits {run.bits:X}h' if by_bits else f'{word:X}h'
+                    self._problems.add(
+                        line,
+                        f'{name} gives the run command: it writes {what} where run does (line '
+                        f'{self._control["run"].line}), and the motor would turn',
+                    )
+
+    def _words(self, step: Step) -> Iterator[tuple[_Place, int, int]]:
+        """Yield what a step writes: where, the word, and which bits of it are known then."""
+        if isinstance(step, Assign):
+            yield step.key, hash(step.value), -1
+        elif isinstance(step, (Put, Change)):
+            address = self._made[step.key].at('modbus')
+            coil = address.space == 'coil'
+            if isinstance(step, Change):
+                yield (address.index, coil), step.set, step.set | step.clear
+                return
+            count = 1 if coil else address.codec.size // 2
+            for number in range(count):
+                word = step.raw >> 16 * (count - 1 - number) & WORD
+                yield (address.index + number, coil), word, -1
+
+    def _states(self, steps: Steps) -> Iterator[tuple[_Place, int, int]]:
+        """Yield what stands after each word of some steps: where, the bits, and which are known."""
+        left: dict[_Place, tuple[int, int]] = {}
+        for step in steps:
+            for place, word, known in self._words(step):
+                before, sure = left.get(place, (0, 0))
+                left[place] = before & ~known | word, sure | known
+                yield place, *left[place]
+
+    def _left_by(self, name: str) -> dict[_Place, tuple[int, int]]:
+        """Return what a command leaves in registers and coils: the bits, and which are known."""
+        return {place: (word, known) for place, word, known in self._states(self._lists[name])}
+
+    @property
+    def _direction_place(self) -> _Place | None:
+        if self._direction is None:
+            return None
+        address = self._made[self._direction.key].at('modbus')
+        return address.index, address.space == 'coil'
+
+    def _run_words(self, place: _Place) -> Iterator[_RunWord]:
+        """Yield the words that run the motor there."""
+        stop, left, direction = self._left_by('stop').get(place), self._run.get(place), None
+        if self._direction is not None and place == self._direction_place:
+            direction = self._direction
+            left = left or (direction.forward, -1)
+        if left is None or isinstance(place, str):
+            return
+        if stop is None or not takes_back(left, stop):
+            # the last word of an edge is 0
+            steps = self._lists['run'] if left[0] == 0 else ()
+            written = (one for step in steps for one in self._words(step))
+            yield from (_RunWord(word, 0) for at, word, _ in written if at == place and word)
+            return
+        words = [left]
+        if direction is not None:
+            words += [(direction.forward, -1), (direction.reverse, -1)]
+        for word, known in words:
+            sure = known & stop[1]
+            # where a stop sets bits that a run does not have, words are numbers
+            numbers = stop[0] & ~word & sure
+            yield _RunWord(word, 0 if numbers else word & ~stop[0] & sure)
+
+    def _check_settings(self) -> None:
+        """See to it that no setting is the run command."""
+        run, stop = (
+            {step.key for step in self._lists[name] if isinstance(step, Assign)}
+            for name in ('run', 'stop')
+        )
+        for key in sorted(run & stop):
+            self._problems.add(
+                self._control['run'].line,
+                f'run and stop write {key}, a setting that any client may set, and the motor '
+                'would turn: write its register, and leave it out of the parameters',
+            )
 
     def _check_pauses(self, name: str) -> None:
         pauses = [step.seconds for step in self._lists[name] if isinstance(step, Pause)]
@@ -198,22 +310,11 @@ class Commands:
                 self._control[name].line, f'{name} begins with a pause: a stop is never delayed'
             )
 
-    def _check_runs_nothing(self, name: str) -> None:
-        """See to it that what is no run command leaves none."""
-        run, left = left_by(self._lists['run']), left_by(self._lists[name])
-        for key, (value, known) in run.items():
-            if value and key in left and not known & ~left[key][1] and not takes_back(
-                run[key], left[key]
-            ):
-                self._problems.add(
-                    self._control[name].line, f'{name} leaves the run command: the motor would turn'
-                )
-
     def _check_direction(self) -> None:
         """See to it that run leaves the direction that it is said to: forward."""
-        if self._direction is None:
+        if self._direction is None or self._direction_place is None:
             return
-        value, _ = left_by(self._lists['run']).get(self._direction.key, (None, 0))
+        value, _ = self._run.get(self._direction_place, (None, 0))
         if value not in (None, self._direction.forward):
             self._problems.add(
                 self._control['run'].line,
@@ -224,10 +325,9 @@ class Commands:
     def _check_stop(self, name: str) -> None:
         """See to it that a stop takes back what run has left."""
         line = self._control[name].line
-        run = left_by(self._lists['run'])
-        stop = left_by(self._lists[name])
-        if self._direction is not None:
-            run.setdefault(self._direction.key, (self._direction.forward, WORD))
+        run, stop, place = dict(self._run), self._left_by(name), self._direction_place
+        if self._direction is not None and place is not None:
+            run.setdefault(place, (self._direction.forward, WORD))
         if not run or not stop:
             what = 'run' if not run else name
             self._problems.add(line, f'{what} writes nothing: add a step with a value')
@@ -236,8 +336,8 @@ class Commands:
             # edges, which the drive keeps
             return
         runs = [run]
-        if self._direction is not None:
-            runs.append({**run, self._direction.key: (self._direction.reverse, WORD)})
+        if self._direction is not None and place is not None:
+            runs.append({**run, place: (self._direction.reverse, WORD)})
         if not all(
             any(takes_back(left[key], stop[key]) for key in left if key in stop) for left in runs
         ):
@@ -247,21 +347,6 @@ class Commands:
                 'itself: have it clear what run has written there, too (such as clear, with '
                 'the bits that run sets)',
             )
-
-
-def left_by(steps: Sequence[Step]) -> dict[str, tuple[int, int]]:
-    """Return what steps leave in registers and coils, by key: the bits, and which are known."""
-    left: dict[str, tuple[int, int]] = {}
-    for step in steps:
-        if isinstance(step, Put):
-            left[step.key] = (step.raw, -1)
-        elif isinstance(step, Change):
-            value, known = left.get(step.key, (0, 0))
-            value = (value | step.set) & ~step.clear
-            left[step.key] = (value, known | step.set | step.clear)
-        elif isinstance(step, Assign):
-            left[step.key] = (hash(step.value), -1)
-    return left
 
 
 def takes_back(run: tuple[int, int], stop: tuple[int, int]) -> bool:

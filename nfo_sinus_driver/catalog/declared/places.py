@@ -11,10 +11,12 @@ from fractions import Fraction
 
 from nfo_sinus_driver.catalog.codec import codec_of
 from nfo_sinus_driver.catalog.declared.description import Condition, LineDefaults, StatusPlace
+from nfo_sinus_driver.catalog.declared.registers import Registers, Use
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
 from nfo_sinus_driver.catalog.parameter import Access, Address, Parameter
 
 WORD = 0xFFFF
+_SIGN = 0x8000
 #: The group of all that commands the drive and reports its status.
 _FIELDBUS = 'Fieldbus'
 STATUS_KEY = 'line.status'
@@ -50,6 +52,7 @@ class Places:
     Makes parameters of what a file says of registers and coils.
 
     :ivar made: those of commands and status, by key.
+    :ivar registers: the use of each register and coil.
     """
 
     def __init__(self, file: Node, line: LineDefaults, problems: Problems) -> None:
@@ -59,6 +62,7 @@ class Places:
         self._line = line
         self._status_register = file.get('status').get('register')
         self.made: dict[str, Parameter] = {}
+        self.registers = Registers(problems)
 
     @property
     def functions(self) -> tuple[int, ...]:
@@ -115,6 +119,10 @@ class Places:
             )
         mask, values, inverted = self._bits(node, what, coil=coil)
         number = self.coil(place) if coil else self.register(place)
+        # a whole word may be a value as well, and its highest bit the sign of one
+        if mask not in (WORD, _SIGN):
+            space = 'coil' if coil else 'register'
+            self.registers.take(Use.BITS, what, node.line, space, number)
         return PlacedCondition(number, coil, mask, values, inverted, node.line)
 
     def _bits(
@@ -164,14 +172,20 @@ class Places:
 
     # --- parameters of commands and status ---
 
-    def word(self, register: int, count: int = 1) -> str:
-        """Return the key of what writes a register, or several in one message."""
+    def word(self, what: str, node: Node, *words: int) -> str:
+        """Return the key of what writes a word to a register, or several in one message."""
+        register, count = self.register(node), len(words)
+        for number, word in enumerate(words, register):
+            use = Use.COMMAND if word else Use.ZERO
+            self.registers.take(use, what, node.line, 'register', number)
         key = f'line.r{register:04x}' + (f'_{count}' if count > 1 else '')
         self._make(key, self._writes, register, f'uint{16 * count}_be')
         return key
 
-    def coil_key(self, coil: int) -> str:
+    def coil_key(self, what: str, node: Node) -> str:
         """Return the key of a coil."""
+        coil = self.coil(node)
+        self.registers.take(Use.COMMAND, what, node.line, 'coil', coil)
         key = f'line.coil_{coil}'
         self._make(key, 'coil', coil, 'uint8')
         return key
@@ -241,11 +255,14 @@ class Places:
 
     # --- values ---
 
-    def address(self, node: Node, what: str, *, writable: bool = False) -> Address:
+    def address(
+        self, node: Node, what: str, *, writable: bool = False, use: Use = Use.VALUE
+    ) -> Address:
         """Return where a value stands."""
         factor = self._factor(node, what)
         if 'coil' in node:
             coil = self.coil(node['coil'])
+            self.registers.take(use, what, node.line, 'coil', coil)
             return Address('modbus', 'coil', coil, None, codec_of('uint8'), factor, '')
         if 'register' not in node:
             self._problems.add(node.line, f'{what} says not where: add register or coil')
@@ -261,6 +278,8 @@ class Places:
         space = 'input' if node.text('table') == 'input' else self._writes
         if space == 'input' and writable:
             self._problems.add(node.line, f'{what}: an input register cannot be written')
+        if 'bits' not in node:
+            self.registers.take(use, what, node.line, space, register, made.size // 2)
         return Address('modbus', space, register, None, made, factor, '')
 
     def _check_wide(self, node: Node, what: str, register: int, *, writable: bool) -> None:

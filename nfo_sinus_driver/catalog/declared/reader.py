@@ -28,6 +28,7 @@ from nfo_sinus_driver.catalog.declared.description import (
 )
 from nfo_sinus_driver.catalog.declared.parameter_table import with_parameters
 from nfo_sinus_driver.catalog.declared.places import WORD, PlacedCondition, Places, internal
+from nfo_sinus_driver.catalog.declared.registers import Use
 from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters, with_scale
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
 from nfo_sinus_driver.catalog.parameter import Access, Parameter, Value
@@ -41,7 +42,6 @@ _MODES = {'Hz': 'Freque', 'rpm': 'Speed'}
 #: Where faults that are bits begin to be counted.
 _FLAGS_FROM = 100
 _MOST_FAULTS = 64
-_SIGN = 0x8000
 _OF_STATUS = ('register', 'block')
 
 
@@ -90,10 +90,12 @@ class _Reader:
         self._require_apart(facts)
         steps.use(status)
         setpoint = self._setpoint(settings)
-        commands = Commands(control, steps, setpoint.direction, self._problems)
-        measured, roles = self._measured(facts)
+        commands = Commands(
+            control, steps, setpoint.direction, self._places.made, self._problems
+        )
+        measured, roles = self._measured()
         self._require_one_holder(control, settings)
-        after_write = tuple(self._after_write(steps))
+        after_write = tuple(self._after_write(steps, commands))
         parameters = {**settings.parameters, **measured, **self._places.made}
         return Description(
             name=self._path.name.removesuffix(SUFFIX),
@@ -177,7 +179,11 @@ class _Reader:
             if 'codes' in node:
                 self._problems.add(node.line, 'faults has codes, but no register that tells them')
             return None
-        return self._places.register(node['register'])
+        register = self._places.register(node['register'])
+        if 'bits' not in node:
+            line = node['register'].line
+            self._places.registers.take(Use.FAULT, 'the fault', line, 'register', register)
+        return register
 
     def _codes(self, register: int | None, status: StatusPlace) -> FaultCodes | None:
         if register is None or status.coils:
@@ -223,7 +229,8 @@ class _Reader:
 
     def _setpoint(self, settings: Settings) -> SetpointPlace:
         node = self._root['setpoint']
-        address = self._places.address(node, 'the set-point', writable=True)
+        what = 'the set-point'
+        address = self._places.address(node, what, writable=True, use=Use.SETPOINT)
         write_only = node.text('access') == 'w'
         access = Access.WRITE if write_only or 'read_register' in node else Access.READ_WRITE
         unit, most = node.text('unit'), node.number('most') or Fraction(1)
@@ -232,7 +239,9 @@ class _Reader:
         read_key = '' if write_only else SETPOINT_KEY
         if 'read_register' in node:
             read_key = SETPOINT_READ_KEY
-            index = self._places.register(node['read_register'])
+            index, line = self._places.register(node['read_register']), node['read_register'].line
+            count = address.codec.size // 2
+            self._places.registers.take(Use.VALUE, what, line, 'register', index, count)
             shifted = replace(address, index=index)
             made[read_key] = settings.scaled(node, internal(read_key, shifted, Access.READ, unit))
         codec, carried = address.number, most / address.factor
@@ -277,16 +286,13 @@ class _Reader:
                 node.line, 'forward and reverse have to differ; of a coil they are 0 and 1'
             )
         if coil:
-            key = self._places.coil_key(self._places.coil(node['coil']))
-            return Direction(key, forward, reverse)
-        key = self._places.word(self._places.register(node['register']))
+            return Direction(self._places.coil_key('direction', node['coil']), forward, reverse)
+        key = self._places.word('direction', node['register'], forward | reverse)
         return Direction(key, forward, reverse)
 
     # --- the rest ---
 
-    def _measured(
-        self, facts: Mapping[str, Condition]
-    ) -> tuple[dict[str, Parameter], dict[Role, str]]:
+    def _measured(self) -> tuple[dict[str, Parameter], dict[Role, str]]:
         made: dict[str, Parameter] = {}
         roles: dict[Role, str] = {Role.STATUS_WORD: 'line.status'}
         for name, node in self._root.get('measured').mapping.items():
@@ -295,30 +301,7 @@ class _Reader:
             parameter = internal(key, address, Access.READ, _UNITS.get(name, ''))
             made[key] = with_scale(node, parameter)
             roles[role] = key
-        self._require_own_registers(made)
         return made, roles
-
-    def _require_own_registers(self, measured: Mapping[str, Parameter]) -> None:
-        """See to it that no two values stand in one register, and none in that of status bits."""
-        # the highest bit may be the sign of a value
-        taken = {
-            one.register: f'status {name}'
-            for name, one in self._conditions.items()
-            if not one.coil and one.mask not in (WORD, _SIGN)
-        }
-        for key, parameter in measured.items():
-            name, address = key.partition('.')[2], parameter.at('modbus')
-            node = self._root['measured'][name]
-            if 'bits' in node or not address.space.startswith('register'):
-                continue
-            for register, *_ in address.occupied:
-                other = taken.setdefault(register, name)
-                if other != name:
-                    self._problems.add(
-                        node.line,
-                        f'{name} and {other} stand in the same register: check its number and its '
-                        'type; some bits of one are said with bits',
-                    )
 
     def _requires(self, control: Node, settings: Settings) -> Iterator[Requirement]:
         for node in control.get('requires').items:
@@ -328,9 +311,11 @@ class _Reader:
                 if value is not None:
                     yield Requirement(key, value, node.flag('write'), node.text('text'))
 
-    def _after_write(self, steps: StepReader) -> Iterator[Put]:
+    def _after_write(self, steps: StepReader, commands: Commands) -> Iterator[Put]:
         node = self._root.get('after_write')
-        for step in steps.read(node, 'after_write'):
+        listed = steps.read(node, 'after_write')
+        commands.require_no_run('after_write', listed, node.line)
+        for step in listed:
             if isinstance(step, Put):
                 yield step
             else:

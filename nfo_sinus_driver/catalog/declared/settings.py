@@ -30,7 +30,6 @@ class Settings:
         self._root = root
         self._places = places
         self._problems = problems
-        self._taken: dict[tuple[str, int], str] = {}
         self.parameters: dict[str, Parameter] = {}
         self.roles: dict[Role, str] = {}
         self.defaults: dict[str, Value] = {}
@@ -104,12 +103,6 @@ class Settings:
             self._problems.add(
                 node['choices'].line, f'{key}: choices are numbers that the register carries'
             )
-        place = made.at('modbus')
-        for taken in place.occupied if place.space.startswith('register') else ():
-            at = (place.space, taken[0])
-            other = self._taken.setdefault(at, key)
-            if other != key and not ('bits' in node and made.access is Access.READ):
-                self._problems.add(node.line, f'{key} and {other} stand in the same register')
 
     def _take_role(self, key: str, node: Node) -> None:
         if 'role' not in node:

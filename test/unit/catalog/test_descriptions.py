@@ -112,6 +112,156 @@ def test_a_status_may_be_the_size_or_the_sign_of_a_value(tmp_path: Path) -> None
     assert complaints(tmp_path, GOOD.replace('running: {bit: 0}', status)) == []
 
 
+#: Two uses of one register or coil that exclude each other: what is replaced, and which two.
+_RUN, _PARAMETER = 'run: [{register: 10, value: 1}]', '  ramp.accel: {register: 30'
+TWO_USES = {
+    'a parameter': (_PARAMETER, '  ramp.accel: {register: 10', 'ramp.accel', 'run'),
+    'a parameter, beside another step': (
+        _RUN, 'run: [{register: 9, values: [7, 0]}, {register: 10, value: 1}]\n  coast: '
+        '[{register: 30, value: 0}, {register: 10, value: 0}]', 'ramp.accel', 'coast',
+    ),
+    'the second register of a parameter': (
+        '{register: 32, factor: 0.1, unit: s}', '{register: 9, type: uint32, unit: s}',
+        'serial.timeout', 'run',
+    ),
+    'the second register of a parameter, with function 16 alone': (
+        'write: 6 and 16', 'write: 16', 'other.one', 'ramp.accel',
+    ),
+    'the set-point': ('setpoint: {register: 11', 'setpoint: {register: 10', 'set-point', 'run'),
+    'the second register of the set-point': (
+        'setpoint: {register: 11, type: int16', 'setpoint: {register: 9, type: int32',
+        'set-point', 'run',
+    ),
+    'the set-point and a parameter': (_PARAMETER, '  ramp.accel: {register: 11', 'ramp.accel',
+                                      'set-point'),
+    'the second of several registers': (
+        _RUN, 'run: [{register: 10, values: [1, 5]}]', 'run', 'set-point',
+    ),
+    'a direction on the set-point': (
+        'type: int16, factor: 0.1, unit: Hz, most: 60, signed: true',
+        'factor: 0.1, unit: Hz, most: 60, direction: {register: 11, forward: 1, reverse: 2}',
+        'direction', 'set-point',
+    ),
+    'a measured value': ('{register: 22, type: int16', '{register: 10, type: int16',
+                         'actual_frequency', 'run'),
+    'a measured value and a parameter': (_PARAMETER, '  ramp.accel: {register: 22',
+                                         'actual_frequency', 'ramp.accel'),
+    'the fault': ('register: 21', 'register: 10', 'fault', 'run'),
+    'the fault and a measured value': ('register: 21', 'register: 22', 'fault',
+                                       'actual_frequency'),
+    'the set-point that is read': (
+        'signed: true}', 'signed: true, read_register: 22}', 'actual_frequency', 'set-point',
+    ),
+    'what follows a change': (
+        '\ntimeout', '\nafter_write: [{register: 30, value: 1}]\ntimeout', 'after_write',
+        'ramp.accel',
+    ),
+    'a coil': (
+        _RUN, 'run: [{register: 10, value: 1}, {coil: 3, on: true}]', 'other.coil', 'run',
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', TWO_USES)
+def test_no_register_has_two_uses_that_exclude_each_other(tmp_path: Path, name: str) -> None:
+    old, new, one, other = TWO_USES[name]
+    more = '  other.one: {register: 29, type: uint32}\n' if one == 'other.one' else ''
+    more += '  other.coil: {coil: 3, choices: {0: No, 1: Yes}}\n'
+    good = GOOD.replace(_PARAMETER, more + _PARAMETER)
+    if not more.startswith('  other.one'):
+        assert complaints(tmp_path, good) == []
+    assert old in good
+    text = good.replace(old, new, 1)
+    found = complaints(tmp_path, text)
+    (said,) = [line for line in found if 'stand in the same' in line]
+    assert one in said and other in said, said
+    # both lines are named
+    lines = [int(number) for number in re.findall(r'line (\d+)', said)]
+    assert len(lines) == 2
+    assert all(re.search(r'register|values|coil|run', text.splitlines()[at - 1]) for at in lines)
+
+
+def test_the_other_line_may_be_in_the_table_of_parameters(tmp_path: Path) -> None:
+    (tmp_path / 'own.csv').write_text('parameter,register\nramp.fast_stop,10\n')
+    text = re.sub(r'(?s)parameters:.*', 'parameters: own.csv\n', GOOD)
+    text = text.replace('  requires:\n    - {parameter: source.command, value: Bus}\n', '')
+    (said,) = complaints(tmp_path, text)
+    assert 'made_up.vfd.yaml, line 7: run and ramp.fast_stop (own.csv, line 2)' in said
+
+
+#: Uses of one register that go together, as drives have them.
+TOGETHER = {
+    'status and fault': ('register: 21', 'register: 20'),
+    'status and fault, in bits': ('register: 21', 'register: 20\n  bits: [8, 15]'),
+    'status where commands are written': ('register: 20', 'register: 10'),
+    'set-point 0 in one message with a command': (
+        'stop: [{register: 10, value: 0}]', 'stop: [{register: 10, values: [0, 0]}]',
+    ),
+    'who has control, by a parameter': (
+        'fault: {bit: 3}', 'fault: {bit: 3}\n  block: {register: 20, count: 2}',
+    ),
+    'some bits of a parameter': (
+        _PARAMETER, '  other.bits: {register: 31, bits: [0, 3], access: r}\n' + _PARAMETER,
+    ),
+    'holding and input registers': (
+        '{register: 22, type: int16', '{register: 10, table: input, type: int16',
+    ),
+    'a coil and a register': (_PARAMETER, '  other.coil: {coil: 10}\n' + _PARAMETER),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', TOGETHER)
+def test_uses_that_go_together_are_right(tmp_path: Path, name: str) -> None:
+    old, new = TOGETHER[name]
+    assert old in GOOD
+    assert complaints(tmp_path, GOOD.replace(old, new, 1)) == []
+
+
+_RESET = 'reset: [{register: 10, set: 8}, {wait: 0.1}, {register: 10, clear: 8}]'
+
+
+@pytest.mark.parametrize(
+    ('run', 'stop', 'reset', 'right'),
+    [
+        ('value: 1', 'value: 0', '{register: 10, value: 8}, {register: 10, value: 0}', True),
+        ('value: 1', 'value: 0', '{register: 10, value: 9}, {register: 10, value: 0}', False),
+        ('value: 1', 'value: 0', '{register: 10, value: 8}, {register: 10, value: 9}', False),
+        ('value: 1', 'value: 0', '{register: 9, values: [0, 9]}, {register: 10, value: 0}', False),
+        ('value: 1', 'value: 0', '{register: 10, set: 9}, {register: 10, clear: 9}', False),
+        ('value: 15', 'value: 6', '{register: 10, set: 1}, {register: 10, set: 8}', False),
+        ('set: 1', 'clear: 1', '{register: 10, value: 9}, {register: 10, clear: 8}', False),
+        ('value: 0x47F', 'value: 0x47E', '{register: 10, value: 0x4FF}', False),
+        ('value: 0x47F', 'value: 0x47E', '{register: 10, value: 0x4FE}', True),
+        # commands by numbers, and not by bits
+        ('value: 1', 'value: 6', '{register: 10, value: 7}', True),
+        ('value: 1', 'value: 6', '{register: 10, value: 1}', False),
+        ('value: 15', 'value: 6', '{register: 10, value: 0x87}', True),
+    ],
+)
+@pytest.mark.parametrize('name', ['reset', 'prepare', 'release', 'after_write'])
+def test_nothing_but_run_gives_the_run_command(
+    tmp_path: Path, run: str, stop: str, reset: str, right: bool, name: str
+) -> None:
+    text = GOOD.replace('{register: 10, value: 1}', f'{{register: 10, {run}}}')
+    text = text.replace('{register: 10, value: 0}', f'{{register: 10, {stop}}}', 1)
+    text = text.replace(f'  {_RESET}\n', '')
+    if name == 'after_write':
+        text += f'after_write: [{reset}]\n'
+    else:
+        text = text.replace('  run:', f'  {name}: [{reset}]\n  run:')
+    found = complaints(tmp_path, text)
+    assert (found == []) is right, found
+    assert right or f'{name} gives the run command' in found[0]
+
+
+def test_no_setting_is_the_run_command(tmp_path: Path) -> None:
+    text = GOOD.replace('run: [{register: 10, value: 1}]', 'run: [{parameter: own.run, to: 1}]')
+    text = text.replace('[{register: 10, value: 0}]', '[{parameter: own.run, to: 0}]')
+    text = text.replace(_PARAMETER, '  own.run: {register: 33}\n' + _PARAMETER)
+    (said,) = complaints(tmp_path, text)
+    assert 'own.run' in said and 'any client' in said
+
+
 #: What is replaced by what, and what is said of it.
 BAD = {
     'no YAML': ('vfd: 1', 'vfd: [1', 'is no YAML'),
@@ -175,7 +325,7 @@ BAD = {
         'signed: true}', 'direction: {register: 10, forward: 1, reverse: 1}}', 'have to differ',
     ),
     'a prepare that runs': (
-        '  run:', '  prepare: [{register: 10, value: 1}]\n  run:', 'prepare leaves the run command',
+        '  run:', '  prepare: [{register: 10, value: 1}]\n  run:', 'prepare gives the run command',
     ),
     'a reset that runs': ('{register: 10, clear: 8}]', '{register: 10, value: 1}]', 'would turn'),
     'a run that is not forward': (
