@@ -42,17 +42,15 @@ CANNOT_SEND = 'frames do not leave: is any other node on the bus, with this bit 
 
 
 class CanPort(Protocol):
-    """
-    What carries frames.
+    """What carries frames."""
 
-    :ivar trouble: what keeps frames off the bus, as far as it knows; ``''``: nothing.
-    """
-
-    trouble: str
+    @property
+    def trouble(self) -> str:
+        """What keeps frames off the bus, as far as it knows; ``''``: nothing."""
 
     def open(self) -> None:
         """
-        Open it.
+        Open it; where it is open, close it before, and discard what has not left.
 
         :raises PortError: it is absent, not permitted, in use, or unable to do the settings.
         """
@@ -88,6 +86,8 @@ _REMOTE = 0x4000_0000
 #: The type of a network interface that is a CAN bus (linux/if_arp.h).
 _IS_CAN = '280'
 _INTERFACES = Path('/sys/class/net')
+#: What Linux shows of an interface in bus-off; one with ``restart-ms`` leaves it by itself.
+_NO_CARRIER = '0'
 
 
 class SocketCan:
@@ -104,14 +104,16 @@ class SocketCan:
             _FILTER.pack(identifier, mask | _OTHER_FRAMES) for identifier, mask in filters
         )
         self._socket: socket.socket | None = None
-        self.trouble = ''
+        #: The queue is full, for no node acknowledges.
+        self._is_full = False
 
     def open(self) -> None:
         """
-        Open the interface.
+        Open the interface; one that is open is closed before.
 
         :raises PortError: there is no such interface, or the kernel has no CAN.
         """
+        self.close()
         try:
             bus = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         except OSError as error:
@@ -124,7 +126,25 @@ class SocketCan:
             bus.close()
             raise self._lost(error) from error
         self._socket = bus
-        self.trouble = ''
+        self._is_full = False
+
+    @property
+    def trouble(self) -> str:
+        """What keeps frames off the bus; ``''``: nothing that is known."""
+        name = self._name
+        try:
+            # a frame that is sent then is dropped, and no error says so
+            carrier = (_INTERFACES / name / 'carrier').read_text('ascii')
+        except OSError:
+            # it is down or gone, which sending reports
+            carrier = ''
+        if carrier.strip() == _NO_CARRIER:
+            return (
+                f'{name} is in bus-off after too many errors: check wires, terminators and bit '
+                f'rate; where it does not restart by itself, sudo ip link set {name} down, then '
+                f'sudo ip link set {name} up type can restart-ms 100'
+            )
+        return CANNOT_SEND if self._is_full else ''
 
     def close(self) -> None:
         """Close it; harmless when it is closed already."""
@@ -145,8 +165,7 @@ class SocketCan:
         except OSError as error:
             if error.errno not in (errno.ENOBUFS, errno.EAGAIN):
                 raise self._lost(error) from error
-            # the queue is full, for no node acknowledges
-            self.trouble = CANNOT_SEND
+            self._is_full = True
 
     def receive(self, until: float) -> Sequence[Frame]:
         """
@@ -163,7 +182,7 @@ class SocketCan:
                 identifier, length, data = _FRAME.unpack(bus.recv(_FRAME.size))
                 if identifier in IDENTIFIERS and length <= MOST_DATA:
                     found.append(Frame(identifier, data[:length]))
-                    self.trouble = ''
+                    self._is_full = False
         except BlockingIOError:
             pass
         except OSError as error:

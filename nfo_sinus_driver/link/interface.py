@@ -283,7 +283,9 @@ class Link(Protocol):
 
     def open(self) -> None:
         """
-        Open the port; where it is open, and nothing comes from it, another connection beside it.
+        Open the port; where it is open, and nothing comes from it, open it again.
+
+        What was handed over and has not left is discarded; what may still arrive is not forgotten.
 
         :raises Connecting: that takes longer.
         :raises PortError: it cannot be opened; the message says what to do.
@@ -349,6 +351,8 @@ class LinkError(Exception):
     maybe_done = False
     #: The unit answered the resync read before this request: it responds.
     responded = False
+    #: What is between has answered, if not the unit: the port is not mute.
+    heard = False
     #: What the port knows of the reason, to be shown; ``''`` if nothing.
     hint = ''
 
@@ -374,9 +378,13 @@ class GatewaySilent(NoAnswer):
 class GatewayLate(NoAnswer):
     """The gateway answered too late; the message says what to do."""
 
+    heard = True
+
 
 class NoData(NoAnswer):
     """A PLC answered that it has no valid data from the drive; the message says more."""
+
+    heard = True
 
 
 class Interrupted(LinkError):
@@ -396,6 +404,8 @@ class Unconfirmed(LinkError):
 class NoPath(LinkError):
     """A gateway does not know where the drive is; the message says what to do."""
 
+    heard = True
+
 
 class DamagedAnswer(LinkError):
     """Something came, but no answer to this request: noise, a collision or wrong line settings."""
@@ -405,6 +415,8 @@ class DamagedAnswer(LinkError):
 
 class GatewayFault(DamagedAnswer):
     """The gateway answered against the standard; the message says what to do."""
+
+    heard = True
 
 
 class NeverSilent(DamagedAnswer):
@@ -421,6 +433,7 @@ class Refused(LinkError):
         from ``SETTINGS_CONFLICT`` on are not of Modbus.
     """
 
+    heard = True
     ILLEGAL_FUNCTION = 1
     ILLEGAL_ADDRESS = 2
     ILLEGAL_VALUE = 3

@@ -6,8 +6,8 @@ A CAN bus behind an adapter that speaks LAWICEL's protocol, which Linux calls sl
 
 A line ends with CR: ``t`` identifier (three digits) length data; ``r`` and no data is a remote
 frame, which is only sent. A BEL in place of a line means *no*; an empty line, ``z`` and ``Z`` mean
-*done*. Digits are sent in upper case and read in both. Other lines, such as those of extended and
-remote frames, are passed over.
+*done*. ``F`` asks for the status flags, two digits. Digits are sent in upper case and read in both.
+Other lines, such as those of extended and remote frames, are passed over.
 """
 
 from __future__ import annotations
@@ -42,6 +42,17 @@ BEL = b'\a'
 CLOSE = b'C' + CR
 #: The command that takes the adapter onto the bus.
 OPEN = b'O' + CR
+#: The command that reads the status flags, and what its bits mean; an old adapter may refuse it.
+FLAGS = b'F' + CR
+_FLAGS = {
+    0x01: 'receive queue full',
+    0x02: 'transmit queue full',
+    0x04: 'error warning',
+    0x08: 'data overrun',
+    0x20: 'error passive',
+    0x40: 'arbitration lost',
+    0x80: 'bus error',
+}
 #: Ends an incomplete command of an earlier program; an adapter refuses or ignores it.
 FLUSH = 3 * CR
 
@@ -50,6 +61,7 @@ _LONGEST_LINE = 26
 #: A frame, with a time stamp or without.
 _FRAME = re.compile(rb't([0-7][0-9A-Fa-f]{2})([0-8])((?:[0-9A-Fa-f]{2})*)')
 _STAMP = 4
+_FLAGS_LINE = re.compile(rb'F([0-9A-Fa-f]{2})')
 
 
 class Output(NamedTuple):
@@ -59,11 +71,13 @@ class Output(NamedTuple):
     :ivar frames: in their order.
     :ivar done: how often it confirmed a command.
     :ivar refused: how often it refused one.
+    :ivar flags: the last status flags that it said; ``None``: none.
     """
 
     frames: Sequence[Frame]
     done: int
     refused: int
+    flags: int | None = None
 
 
 def encode(frame: Frame) -> bytes:
@@ -109,7 +123,9 @@ class Reader:
         self._line = rest[-_LONGEST_LINE:]
         frames = [frame for line in lines if (frame := _decode(line)) is not None]
         done = sum(line in (b'', b'z', b'Z') for line in lines)
-        return Output(frames, done, sum(line.endswith(BEL) for line in lines))
+        said = [int(match[1], 16) for line in lines if (match := _FLAGS_LINE.fullmatch(line))]
+        refused = sum(line.endswith(BEL) for line in lines)
+        return Output(frames, done, refused, said[-1] if said else None)
 
 
 def _decode(line: bytes) -> Frame | None:
@@ -123,6 +139,12 @@ def _decode(line: bytes) -> Frame | None:
     return Frame(int(match[1], 16), bytes.fromhex(match[3][:length].decode()))
 
 
+def _trouble(flags: int) -> str:
+    """Return what an adapter with these status flags, which refuses a frame, has to say."""
+    found = ', '.join(text for bit, text in _FLAGS.items() if flags & bit)
+    return f'{CANNOT_SEND} (status flags of the adapter: {flags:02X}, {found or "no error"})'
+
+
 #: How long an adapter may take to confirm a command, s; some never do.
 _REPLY_TIME = 0.1
 #: How long it has to be silent before it is set up, s: longer when it seemed to refuse.
@@ -134,6 +156,9 @@ _LONGEST_TALK = 1.0
 class LawicelPort:
     """
     One adapter; it is on the bus as long as the port is open.
+
+    After too many errors it leaves the bus by itself (bus-off), and refuses every frame until it
+    was taken off the bus and onto it again, as :meth:`open` does.
 
     :param rate: bit rate of the bus, bit/s.
     :raises ValueError: there is no such bit rate; the message says which ones there are.
@@ -179,10 +204,14 @@ class LawicelPort:
     def receive(self, until: float) -> Sequence[Frame]:
         """Return what has come; wait for the first bytes until a moment of ``time.monotonic``."""
         output = self._reader.feed(self._port.read(until))
-        if output.refused:
-            self.trouble = CANNOT_SEND
-        elif output.frames:
+        if output.frames:
             self.trouble = ''
+        elif output.flags is not None:
+            self.trouble = _trouble(output.flags)
+        elif output.refused and not self.trouble:
+            # the answer comes as any other
+            self.trouble = CANNOT_SEND
+            self._port.write(FLAGS)
         return output.frames
 
     def _set_up(self, silence: float) -> str:

@@ -40,7 +40,7 @@ from nfo_sinus_driver.link.interface import (
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, read_of, understand
 from nfo_sinus_driver.link.protocols import MODBUS_TCP
-from nfo_sinus_driver.link.tcp_connection import Connection, TcpConnection
+from nfo_sinus_driver.link.tcp_connection import CLOSED_HINT, Connection, TcpConnection
 
 _HEADER = struct.Struct('>HHH')
 #: The lengths of a message, from unit and function alone to the most data.
@@ -94,11 +94,7 @@ _SLICE = 0.02
 _CLOSINGS = 2
 #: For how many of the last requests given up an answer is recognised as late.
 _GIVEN_UP = 64
-_HINT = 'is the gateway switched on and its address right?'
-_CLOSED_HINT = (
-    'it may have restarted, or serve fewer connections at a time than there are clients: end other '
-    'clients, or allow more in its settings'
-)
+_HINT = f'is the gateway switched on and its address right? If so, {CLOSED_HINT}'
 
 
 class TcpLink(ModbusLink):
@@ -402,7 +398,7 @@ class TcpLink(ModbusLink):
         return PortError(f'{self._name} cannot be reached ({error}): {_HINT}')
 
     def _lost(self, why: OSError) -> PortError:
-        hint = _CLOSED_HINT if isinstance(why, ConnectionError) else _HINT
+        hint = CLOSED_HINT if isinstance(why, ConnectionError) else _HINT
         return PortError(f'the connection to {self._name} was lost ({why}): {hint}')
 
 
@@ -429,7 +425,9 @@ def _of_gateway(request: Request[Any], refusal: Refused) -> LinkError:
             'check the table of units and the serial port in the settings of the gateway'
         )
     if refusal.code == Refused.NO_ANSWER:
-        return NoAnswer(
+        silent = NoAnswer(
             f'unit {request.unit} did not answer the gateway (exception {refusal.code})'
         )
+        silent.heard = True
+        return silent
     return refusal

@@ -20,7 +20,7 @@ class Port(Protocol):
 
     def open(self) -> None:
         """
-        Open it.
+        Open it; where it is open, close it before, and discard what has not left.
 
         :raises PortError: it is absent, not permitted, in use, or unable to do the settings.
         """

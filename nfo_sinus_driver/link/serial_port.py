@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import array
+import contextlib
 import errno
 import fcntl
 import os
@@ -47,10 +48,14 @@ class SerialPort:
 
     def open(self) -> None:
         """
-        Open the port, lock it and configure it.
+        Open the port, lock it and configure it; one that is open is closed before.
+
+        Its modem lines stay as they are meanwhile, for they reset some adapters.
 
         :raises PortError: absent, not permitted, in use, or unable to do the settings.
         """
+        self._discard()
+        self.close()
         fd = _open_device(self._path)
         try:
             self._lock(fd)
@@ -81,6 +86,7 @@ class SerialPort:
                 data = data[self._write_some(fd, data) :]
                 wait = max(0.0, deadline - time.monotonic())
                 if data and not select.select((), (fd,), (), wait)[1]:
+                    self._discard()
                     raise PortError(f'{self._path} takes no more bytes: is the adapter stuck?')
         except OSError as error:
             raise self._lost(error) from error
@@ -100,6 +106,12 @@ class SerialPort:
         if not data:
             raise self._lost(OSError(errno.EIO, 'end of file'))
         return data
+
+    def _discard(self) -> None:
+        """Discard what has not left: it must not leave later, and closing would wait for it."""
+        if self._fd is not None:
+            with contextlib.suppress(termios.error):
+                termios.tcflush(self._fd, termios.TCOFLUSH)
 
     @staticmethod
     def _write_some(fd: int, data: bytes) -> int:

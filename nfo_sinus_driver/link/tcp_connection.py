@@ -18,6 +18,11 @@ _ACKNOWLEDGE_TIMEOUT = 5
 #: has lost it says so, and one that is gone does not answer.
 _KEEPALIVE = {socket.TCP_KEEPIDLE: 2, socket.TCP_KEEPINTVL: 1, socket.TCP_KEEPCNT: 3}
 _READ_SIZE = 4096
+#: What to do where a connection is closed, or refused by what is there.
+CLOSED_HINT = (
+    'it may have restarted, or it serves one client at a time and another has it: end that one, or '
+    'allow more in its settings'
+)
 #: The addresses of a name, while they can be reached: a lookup may take long.
 _known: dict[tuple[str, int], list[tuple[socket.AddressFamily, object]]] = {}
 
@@ -102,14 +107,18 @@ class TcpConnection:
         if not self._is_connected and (known := _known.pop(self._where, None)) and known[1:]:
             _known[self._where] = known[1:]
         if discard:
-            # else the kernel would keep trying to deliver them
-            one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack('ii', 1, 0))
+            discard_unsent(one)
         one.close()
 
     def _open_socket(self) -> socket.socket:
         if self._socket is None:
             raise ConnectionError('it is not open')
         return self._socket
+
+
+def discard_unsent(one: socket.socket) -> None:
+    """Have the kernel not keep trying to deliver what has not arrived when it is closed."""
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack('ii', 1, 0))
 
 
 def watch_over(one: socket.socket) -> None:

@@ -12,10 +12,10 @@ from urllib.parse import urlsplit
 import serial
 
 from nfo_sinus_driver.link.interface import LineSettings, PortError
-from nfo_sinus_driver.link.tcp_connection import watch_over
+from nfo_sinus_driver.link.tcp_connection import CLOSED_HINT, discard_unsent, watch_over
 
 _READ_SIZE = 512
-_CONNECT_HINT = 'is the device server switched on and its address right?'
+_CONNECT_HINT = f'is the device server switched on and its address right? If so, {CLOSED_HINT}'
 #: The kinds of URL that lead to a device server.
 _SERVERS = ('socket', 'rfc2217')
 _REMEDY = (
@@ -33,7 +33,11 @@ class UrlPort:
         self._serial: serial.SerialBase | None = None
 
     def open(self) -> None:
-        """Connect (PortError: no answer)."""
+        """Connect (PortError: no answer); where that was done, anew."""
+        connection = getattr(self._serial, '_socket', None)
+        if connection is not None:
+            discard_unsent(connection)
+        self.close()
         try:
             self._serial = serial.serial_for_url(
                 self._url,
@@ -83,7 +87,7 @@ class UrlPort:
         return self._serial
 
     def _lost(self, error: OSError) -> PortError:
-        return PortError(f'{self._url} was lost ({error}): {_CONNECT_HINT}')
+        return PortError(f'{self._url} was lost ({error}): {CLOSED_HINT}')
 
 
 def _check(url: str) -> None:

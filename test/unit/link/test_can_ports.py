@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 import errno
 import os
 from pathlib import Path
+import re
 import select
 import socket
 import struct
@@ -177,6 +178,37 @@ def test_what_an_adapter_could_not_send(adapter: Adapter) -> None:
     while adapter.coming:
         port.receive(0.0)
     assert port.trouble == ''
+
+
+def test_an_adapter_is_asked_once_what_keeps_frames_off(adapter: Adapter) -> None:
+    port = LawicelPort(adapter, 125_000, adapter.monotonic)
+    port.open()
+    adapter.says |= {b't60584013200000000000\r': b'\a', b'F\r': b'FA4\r'}
+    for _ in range(3):
+        port.send(REQUEST)
+        while adapter.coming:
+            port.receive(0.0)
+    assert port.trouble.endswith('adapter: A4, error warning, error passive, bus error)')
+    assert adapter.written.count(b'F\r') == 1
+    # off the bus and onto it again
+    adapter.written.clear()
+    adapter.says[b't60584013200000000000\r'] = b'z\r' + ANSWER_LINE
+    port.open()
+    assert adapter.written == [b'\r\r\r', b'C\r', b'S4\r', b'O\r'] and not port.trouble
+    port.send(REQUEST)
+    assert port.receive(0.0) == [] and port.receive(0.0) == []
+    assert not port.trouble
+
+
+def test_an_adapter_that_has_no_flags(adapter: Adapter) -> None:
+    port = LawicelPort(adapter, 125_000, adapter.monotonic)
+    port.open()
+    adapter.says |= {b't60584013200000000000\r': b'\a', b'F\r': b'\a'}
+    for _ in range(3):
+        port.send(REQUEST)
+        port.receive(0.0)
+        port.receive(0.0)
+    assert port.trouble == can.CANNOT_SEND and adapter.written.count(b'F\r') == 1
 
 
 # --- a whole bus ----------------------------------------------------------------------------------
@@ -375,6 +407,41 @@ def test_no_node_acknowledges(paper: PaperSocket) -> None:
     del paper.fails['send']
     paper.arrive(raw(0x585, ANSWER.data))
     port.receive(0.0)
+    assert port.trouble == ''
+
+
+def test_an_interface_that_is_open_is_opened_again(
+    paper: PaperSocket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port = make()
+    port.open()
+    second = PaperSocket()
+    monkeypatch.setattr(can.socket, 'socket', lambda *_: second)
+    port.open()
+    assert not paper.is_open and second.bound == ('can0',)
+    port.close()
+
+
+def test_bus_off_is_told_with_the_command(
+    paper: PaperSocket, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(can, '_INTERFACES', tmp_path)
+    (tmp_path / 'can0').mkdir()
+    carrier = tmp_path / 'can0' / 'carrier'
+    port = make()
+    port.open()
+    assert port.trouble == ''
+    carrier.write_text('1\n', encoding='ascii')
+    assert port.trouble == ''
+    carrier.write_text('0\n', encoding='ascii')
+    # a frame that is sent is dropped without an error
+    port.send(REQUEST)
+    assert re.search(
+        'can0 is in bus-off.*sudo ip link set can0 down, then sudo ip link set can0 up type can '
+        'restart-ms 100',
+        port.trouble,
+    )
+    carrier.write_text('1\n', encoding='ascii')
     assert port.trouble == ''
 
 

@@ -385,7 +385,9 @@ def test_write_that_takes_long_but_goes_on(
     assert pty.receive(6) == b'slowly'
 
 
-def test_port_that_takes_nothing(port: SerialPort, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_port_that_takes_nothing(
+    port: SerialPort, monkeypatch: pytest.MonkeyPatch, discarded: list[int]
+) -> None:
     def full(*_: object) -> int:
         raise BlockingIOError
 
@@ -393,9 +395,63 @@ def test_port_that_takes_nothing(port: SerialPort, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(serial_port.select, 'select', lambda *_: ([], [], []))
     with pytest.raises(PortError, match='takes no more bytes'):
         port.write(b'x')
+    # else Linux would wait for it for half a minute when the port is closed
+    assert discarded
+
+
+@pytest.fixture
+def discarded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The descriptors of which was discarded what had not left."""
+    flush = termios.tcflush
+    discarded: list[int] = []
+
+    def note(fd: int, queue: int) -> None:
+        if queue == termios.TCOFLUSH:
+            discarded.append(fd)
+        flush(fd, queue)
+
+    monkeypatch.setattr(serial_port.termios, 'tcflush', note)
+    return discarded
+
+
+def test_an_open_port_is_opened_again(pty: Pty, port: SerialPort, discarded: list[int]) -> None:
+    before = descriptors()
+    os.write(pty.far, b'before')
+    port.open()
+    assert descriptors() == before and len(discarded) == 1
+    port.write(b'now')
+    assert pty.receive(3) == b'now'
+    os.write(pty.far, b'x')
+    assert read(port, 1) == b'x'
+
+
+def test_what_took_a_port_that_is_opened_again_is_named(
+    pty: Pty, port: SerialPort, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: list[int] = []
+
+    def close(fd: int) -> None:
+        os_close(fd)
+        if not taken:
+            taken.append(os.open(pty.path, os.O_RDWR | os.O_NOCTTY))
+            fcntl.flock(taken[0], fcntl.LOCK_EX)
+
+    os_close = os.close
+    monkeypatch.setattr(serial_port.os, 'close', close)
+    try:
+        with pytest.raises(PortError, match=r'is in use by .*: end that first'):
+            port.open()
+    finally:
+        monkeypatch.undo()
+        os.close(taken[0])
+    port.open()
 
 
 # --- ports reached by URL -------------------------------------------------------------------------
+
+
+#: More than a client receives that does not read, and less than can be handed over, bytes.
+_MUCH = 1_000_000
 
 
 class Server:
@@ -403,6 +459,7 @@ class Server:
 
     def __init__(self) -> None:
         self.listener = socket.create_server(('127.0.0.1', 0))
+        self.listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         self.listener.settimeout(PATIENCE)
         self.url = f'socket://127.0.0.1:{self.listener.getsockname()[1]}'
         self.client: socket.socket | None = None
@@ -443,6 +500,38 @@ def test_bytes_go_both_ways_over_tcp(server: Server) -> None:
     port.close()
     port.close()
     assert client.recv(1) == b''
+
+
+def test_an_open_connection_is_made_anew(server: Server) -> None:
+    port = UrlPort(server.url, LineSettings())
+    port.open()
+    old = server.accept()
+    port.write(bytes(_MUCH))
+    port.open()
+    # what has not arrived never does
+    arrived = 0
+    with contextlib.suppress(ConnectionResetError):
+        while some := old.recv(4096):
+            arrived += len(some)
+    assert arrived < _MUCH
+    old.close()
+    new = server.accept()
+    port.write(b'now')
+    assert received(new, 3) == b'now'
+    new.sendall(b'x')
+    assert read(port, 1) == b'x'
+    port.close()
+
+
+def test_a_server_for_one_client_is_told_as_that(server: Server) -> None:
+    port = UrlPort(server.url, LineSettings())
+    port.open()
+    server.accept().close()
+    with pytest.raises(PortError, match=r'was lost .*serves one client at a time and another has'):
+        read(port, 1)
+    server.close()
+    with pytest.raises(PortError, match=r'refused.*serves one client at a time and another has it'):
+        port.open()
 
 
 def test_read_over_tcp_gives_up_when_its_time_is_over(server: Server) -> None:

@@ -194,6 +194,15 @@ def test_closing_ends_every_quarantine() -> None:
     assert bench.asked == [0x400, 0x400]
 
 
+def test_opening_an_open_port_again_ends_none() -> None:
+    """A stuck adapter may pass on what it has held back."""
+    bench = Bench([Fate(1.5)])
+    bench.expect(NoAnswer, lambda: bench.read(A))
+    bench.link.open()
+    assert bench.read(B).data == bench.answer_of(2)
+    assert bench.asked == [A.index, TWO.index, B.index]
+
+
 def test_lost_port_is_passed_on() -> None:
     bench = Bench()
 
