@@ -234,6 +234,12 @@ class Scheduler:
 _MISSING_AFTER = 2.0
 #: The share of the time that all missing units may take together while others answer.
 _MISSING_SHARE = 1 / 20
+#: How much longer than before a port is mute, s, until it is opened again, each time in vain; and
+#: the longest: less than the command line repeats a stop before it gives up.
+_MUTE_STEP = 2.0
+_MUTE_LONGEST = 6.0
+#: The same where nothing was ever heard: opening it was in vain already, s.
+_MUTE_FROM_THE_START = 30.0
 
 
 class Silences:
@@ -245,6 +251,12 @@ class Silences:
 
     Each request to a unit that is missing costs the others a whole time-out, so there is a pause
     behind it, in which none of the missing units gets one.
+
+    Where no unit answers any more, the port itself may be mute: what carries the bytes may pass
+    none until it is opened again, and report no error. Units that are switched off look the same,
+    so it is opened again more and more seldom. An address that never answered shows nothing.
+
+    :ivar heard: something valid has ever come.
     """
 
     def __init__(self) -> None:
@@ -255,9 +267,14 @@ class Silences:
         #: When the last valid frame of any unit came.
         self._any_frame_at = -math.inf
         self._pause_ends = -math.inf
+        self.heard = False
+        #: Since when every request has failed, and how often the port was opened since the last
+        #: that did not.
+        self._mute_since = math.inf
+        self._opened = 0
 
-    def note(self, unit: int, now: float, error: LinkError | None, seconds: float = 0.0) -> None:
-        """Note the outcome of a request that kept the line for ``seconds``."""
+    def note(self, unit: int, now: float, error: LinkError | None, seconds: float = 0.0) -> bool:
+        """Note the outcome of a request that took ``seconds``; return whether the port carries."""
         if error is None or error.responded or isinstance(error, Refused):
             pause = now - self._last_frame_at.get(unit, now)
             self._longest[unit] = max(self._longest.get(unit, 0.0), pause)
@@ -267,6 +284,37 @@ class Silences:
             self._pause_ends = now + seconds * (1 / _MISSING_SHARE - 1)
         if error is not None and not isinstance(error, (PortError, Refused)):
             self._since.setdefault(unit, now)
+        if error is None or error.responded or error.heard:
+            self.heard, self._opened, self._mute_since = True, 0, math.inf
+            return True
+        if not isinstance(error, PortError) and (not self.heard or unit in self._last_frame_at):
+            self._mute_since = min(self._mute_since, now)
+        return False
+
+    def opened(self) -> None:
+        """Note that the port was opened, for the first time or again."""
+        self._opened += 1
+        self._mute_since = math.inf
+        # those that are missing may only have been cut off
+        self._pause_ends = -math.inf
+
+    def hurry(self) -> None:
+        """Have a port that is mute opened again soon, however often that was in vain."""
+        self._opened = 0
+
+    def mute_for(self, now: float) -> float:
+        """Return for how long nothing has come, s, although units were asked; 0: not at all."""
+        return max(0.0, now - self._mute_since)
+
+    def is_mute(self, now: float, lost_after: float) -> bool:
+        """
+        Return whether the port is to be opened again.
+
+        :param lost_after: how long every unit of the line may be silent, s.
+        """
+        longest = min(_MUTE_STEP * self._opened, _MUTE_LONGEST)
+        least = longest if self.heard else _MUTE_FROM_THE_START
+        return now - self._mute_since >= max(lost_after, least)
 
     def is_silent(self, unit: int) -> bool:
         """Return whether a unit has not answered the last request to it."""

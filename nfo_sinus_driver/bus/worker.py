@@ -44,8 +44,6 @@ from nfo_sinus_driver.bus.tasks import (
 from nfo_sinus_driver.link import (
     Address,
     Clock,
-    Connecting,
-    GatewaySilent,
     Identification,
     InProgress,
     LineProtocol,
@@ -103,9 +101,11 @@ class Bus:
         self._being_read_first: set[int] = set()
         self._read_before: set[int] = set()
         self._current: Task | None = None
-        #: Since when the gateway has sent nothing, and how long that may last for each unit, s.
-        self._mute_since = math.inf
+        #: How long each unit may be silent, s.
         self._lost_after: dict[int, float] = {}
+        #: Called when the port is found mute, and when it is not any more.
+        self._on_mute: Callable[[float], None] = lambda seconds: None
+        self._is_mute = False
         #: Called when a unit has restarted.
         self._on_restart: dict[int, Callable[[], None]] = {}
         self._thread = threading.Thread(target=self._work, name='bus', daemon=True)
@@ -181,8 +181,16 @@ class Bus:
         return self._link.remarks.texts
 
     def require_sign_of_life(self, unit: int, seconds: float) -> None:
-        """Try another connection to the far end when nothing came from it for ``seconds``."""
+        """Open the port again when no unit has answered for ``seconds``, the longest of all."""
         self.call(lambda: self._lost_after.update({unit: seconds}))
+
+    def on_mute(self, call: Callable[[float], None]) -> None:
+        """
+        Call a function, on the worker, when the port is opened again because no unit answers.
+
+        :param call: given for how long none has, s; and 0 when one answers again.
+        """
+        self._on_mute = call
 
     def on_restart(self, unit: int, call: Callable[[], None]) -> None:
         """Call a function, on the worker, when a unit reports that it has restarted."""
@@ -213,6 +221,11 @@ class Bus:
     ) -> Transfer:
         """Write one parameter and read another at once; see :meth:`Link.write_and_read`."""
         return Transfer(unit, address, priority, data, source=source)
+
+    def last_tries(self, unit: int, seconds: float) -> None:
+        """Open a port that is mute within ``seconds``, however often that was in vain."""
+        self._lost_after[unit] = min(seconds, self._lost_after.get(unit, seconds))
+        self.silences.hurry()
 
     def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
         """Give a task a reading that came with another answer; false if it waits for no such."""
@@ -351,8 +364,7 @@ class Bus:
         self._awake.clear()
         self._take_in()
         self._ring_timers()
-        if not self._port.is_open:
-            self._open_when_due()
+        self._open_when_due()
         supervised_at = self._supervise() if self._port.is_open else math.inf
         if not self._port.is_open:
             self._fail_all(self._port.error)
@@ -507,37 +519,41 @@ class Bus:
 
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = self.now()
-        self.silences.note(unit, now, error, now - started)
+        answered = unit != self.protocol.broadcast
+        if answered and self.silences.note(unit, now, error, now - started):
+            self._report_mute(0.0)
         self._scheduler.took(now - started)
         if isinstance(error, PortError):
             self._port.mark_lost(error, now + REOPEN_PERIOD)
         else:
             self.recorder.transaction(unit, now, now - started, error)
-            self._note_life(now, error)
-
-    def _note_life(self, now: float, error: LinkError | None) -> None:
-        """Open another connection where nothing at all has come from a gateway for long."""
-        if not isinstance(error, GatewaySilent):
-            self._mute_since = math.inf
-            return
-        self._mute_since = min(self._mute_since, now)
-        if now - self._mute_since < min(self._lost_after.values(), default=math.inf):
-            return
-        self._mute_since = math.inf
-        try:
-            self._link.open()
-        except Connecting:
-            # the link uses it as soon as it is there
-            pass
-        except PortError as lost:
-            self._port.mark_lost(lost, now + REOPEN_PERIOD)
-            return
-        self.recorder.opened()
 
     def _open_when_due(self) -> None:
+        """Open a port that is not open, or open and mute."""
         now = self.now()
-        if now >= self._port.reopen_at and self._port.open(now + REOPEN_PERIOD):
+        if self._port.is_open:
+            # ahead of the request that shows whether it helps
+            if not self.silences.is_mute(now, max(self._lost_after.values(), default=math.inf)):
+                return
+            if self.silences.heard:
+                self._report_mute(self.silences.mute_for(now))
+        elif now < self._port.reopen_at:
+            return
+        self._port.open(now + REOPEN_PERIOD)
+        if self._port.is_open:
             self.recorder.opened()
+            self.silences.opened()
+
+    def _report_mute(self, seconds: float) -> None:
+        """Report on change for how long no unit has answered, s; 0: one does."""
+        if self._is_mute == bool(seconds):
+            return
+        self._is_mute = not self._is_mute
+        try:
+            self._on_mute(seconds)
+        except Exception:
+            # the line has to be served all the same
+            _log.exception('a mute port could not be reported; the bus worker goes on')
 
     def _fail_all(self, error: PortError) -> None:
         for entry in self._scheduler.clear():

@@ -93,6 +93,7 @@ class ControlSession(Listener):
         self._mute = mute
         self.screen = screen
         self.offline = session.drive()
+        session.on_mute(self._on_mute)
         self.drive: Drive
         self.show: Callable[[], object] = lambda: None
         self.reported: list[Report] = []
@@ -224,6 +225,11 @@ class ControlSession(Listener):
             return
         self.reported.append(event.report)
         self.screen.say(say(event.report))
+
+    def _on_mute(self, seconds: float) -> None:
+        """Say for how long the drive has not answered, s; 0: it does again."""
+        again = f'no answer for {seconds:.1f} s: the port is opened again, until the drive answers'
+        self.screen.say(again if seconds else 'the drive answers again')
 
     def on_telemetry(self, telemetry: Telemetry) -> None:
         """Take measured values."""

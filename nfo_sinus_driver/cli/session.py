@@ -162,6 +162,10 @@ class Session:
         except ValueError as error:
             raise UsageError(str(error)) from None
 
+    def on_mute(self, call: Callable[[float], None]) -> None:
+        """Call a function, on the worker of the bus, as :meth:`Bus.on_mute`."""
+        self._bus.on_mute(call)
+
     def polled(self, address: int) -> None:
         """Take note that one round of reading a drive is over."""
         now = time.monotonic()

@@ -40,7 +40,7 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
     :param check: what to check while the drive has never answered; ``None``: it has, so its
         settings are right [C93].
     """
-    if isinstance(error, _SAYS_WHAT_TO_DO):
+    if isinstance(error, _SAYS_WHAT_TO_DO) or (check is None and error.hint):
         return Report(Cause.LINE_FAILED, error=str(error))
     if check is None:
         return Report(Cause.NOT_REACHED, error=str(error))

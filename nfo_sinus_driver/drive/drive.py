@@ -292,6 +292,9 @@ class Drive:
         if not self.ever_responded:
             # it may not be there at all, or be just about to answer for the first time
             patience = min(patience, _FIRST_ANSWER)
+        else:
+            # time is left for the stop then
+            self._bus.last_tries(self._unit, patience / 2)
         until = self._bus.now() + patience
         answer = await self._deactivate(why, patience)
         if self._controller is not None and answer is not None:

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A link that is opened again whenever it is lost."""
+"""A link that is opened again whenever it is lost, or open and mute."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class Reconnect:
         self.error = PortError('the port is not open yet')
         self.reopen_at = 0.0
 
-    def open(self, reopen_at: float) -> bool:
-        """Try to open the link, and if that fails again at ``reopen_at``; return whether it is."""
+    def open(self, reopen_at: float) -> None:
+        """Try to open the link, or one that is open and mute again; the next at ``reopen_at``."""
         try:
             self._link.open()
         except Connecting:
             # the next call goes on at once; the caller may do something else between
-            return False
+            return
         except PortError as error:
             self.mark_lost(error, reopen_at)
         except BaseException as error:
@@ -41,7 +41,6 @@ class Reconnect:
             self.mark_lost(PortError(f'error in the link: {error!r}'), reopen_at)
         else:
             self.is_open = True
-        return self.is_open
 
     def mark_lost(self, error: PortError, reopen_at: float) -> None:
         """Close the link because of an error, until it may be tried again."""

@@ -58,6 +58,10 @@ class BusNode(Node):
         self.bus_context = BusContext(Bus(link, limit), settings.retries)
         AllDrives(self, self.bus_context)
         self.bus_context.subscribe(self, {'~/setpoint_all': (Float32, self._on_setpoint_all)})
+        publish_queue = self.bus_context.publish_queue
+        self.bus_context.bus.on_mute(
+            lambda seconds: publish_queue.put(lambda: self._log_mute(seconds))
+        )
         self._logged_port: str | None = ''
         self._logged_remarks: set[str] = set()
         self._last_diagnosis: tuple[bytes, str] | None = None
@@ -137,6 +141,17 @@ class BusNode(Node):
         """What to check while no drive answers: of all drives if they agree, else of the line."""
         found = {drive.line_check for drive in self.bus_context.drives}
         return found.pop() if len(found) == 1 else self.bus_context.bus.protocol.check
+
+    def _log_mute(self, seconds: float) -> None:
+        """Log for how long no drive has answered, s; 0: one does again."""
+        if seconds:
+            self.get_logger().warning(
+                f'{self._port}: no drive has answered for {seconds:.1f} s: the port is opened '
+                'again, and every few seconds until one answers; check power, cable, and adapter '
+                'or gateway'
+            )
+        else:
+            self.get_logger().info(f'{self._port}: drives answer again')
 
     def _log_port(self, error: str | None) -> None:
         """Log whether the port is open, on change."""

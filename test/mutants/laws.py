@@ -34,6 +34,9 @@ from mutant import (
 
 #: What reverses under DriveControl.
 REVERSES = ('test/unit/drive/test_table_16.py', '-k', 'reverse_is_bit_13')
+#: A port that is open and passes nothing.
+SILENCES = 'nfo_sinus_driver/bus/scheduler.py'
+MUTE_PORT = 'test/unit/drive/test_mute_port.py'
 #: What the laws ask of a MOVITRAC alone.
 MOVITRAC_LAWS = 'test/unit/drive/test_movitrac_laws.py'
 
@@ -659,5 +662,29 @@ LAWS = (
         '        self._denials.clear()',
         '        pass',
         ('test/unit/drive/test_movitrac_commands.py', '-k', 'fitted_meanwhile'),
+    ),
+    Mutant(
+        3,
+        'an open port that is mute is never opened again',
+        SILENCES,
+        '        return now - self._mute_since >= max(lost_after, least)',
+        '        return False',
+        (MUTE_PORT, '-k', 'motor_stops and rtu'),
+    ),
+    Mutant(
+        3,
+        'an end waits for the next opening of a mute port',
+        DRIVE,
+        '            self._bus.last_tries(self._unit, patience / 2)',
+        '            pass',
+        (MUTE_PORT, '-k', 'end'),
+    ),
+    Mutant(
+        3,
+        'drives that a mute port has cut off wait behind each other',
+        SILENCES,
+        '        self._pause_ends = -math.inf\n\n    def hurry',
+        '\n    def hurry',
+        (MUTE_PORT, '-k', 'longest'),
     ),
 )

@@ -73,7 +73,10 @@ class Line:
     :param echo: the adapter returns what is sent.
     :ivar state: ``whole``; ``silent``: nothing is heard; ``deaf``: what is asked is carried out,
         but no answer comes; ``noise``: the answer is damaged; ``late``: it comes after the
-        time-out; ``gone``: the port is.
+        time-out; ``gone``: the port is; ``mute``: nothing passes until it was opened again
+        ``mute_for`` more times; ``bus_off``: the CAN adapter refuses frames until it was off the
+        bus.
+    :ivar opened: when the port was opened.
     :ivar losses: how many answers are still lost; :ivar unheard: how many requests are;
         :ivar doubled: how many answers come twice.
     :ivar plan: called with each request; what it returns goes wrong with it: one of
@@ -133,6 +136,8 @@ class Line:
         self._seldom_at = 0.0
         self.passed: Callable[[], None] = lambda: None
         self.plan: Callable[[bytes], str | None] = lambda frame: None
+        self.opened: list[float] = []
+        self.mute_for = 1
         self.sessions: list[Session] = []
         self.refuses = self.lost = self.closes = False
         self._asking: Session | None = None
@@ -251,12 +256,22 @@ class Line:
 
     def open(self) -> None:
         self._require_port()
+        self._come = b''
+        self.opened.append(self.clock.now)
+        if self.state == 'mute':
+            self.mute_for -= 1
+            if not self.mute_for:
+                self.state, self.mute_for = 'whole', 1
 
     def close(self) -> None:
         self._come = b''
 
     def write(self, data: bytes) -> None:
         self._require_port()
+        if self.state == 'mute':
+            return
+        if self.state == 'bus_off' and self._bus_off(data):
+            return
         fate = self._fate(data)
         if fate == 'unheard':
             if self._protocol.name != 'canopen':
@@ -271,6 +286,16 @@ class Line:
             late = _LATE * (self.settings.response_timeout + more) if fate == 'delay' else 0.0
             self.wire.faults.add(fate, seconds=late)
         self.wire.receive(data, self.clock.now)
+
+    def _bus_off(self, data: bytes) -> bool:
+        """Answer as an adapter that has left the bus by itself; return whether it did."""
+        if data.startswith((b't', b'r')):
+            self._come += b'\a'
+        elif data == b'F\r':
+            self._come += b'FA4\r'
+        elif data == b'C\r':
+            self.state = 'whole'
+        return self.state == 'bus_off'
 
     def read(self, until: float) -> bytes:
         self._require_port()
@@ -294,6 +319,8 @@ class Line:
         return b''
 
     def send(self, data: bytes) -> None:
+        if self.state == 'mute':
+            return
         if self._asking is None:
             self._come += data
         else:

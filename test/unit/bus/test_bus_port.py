@@ -118,6 +118,40 @@ def test_sleepers_are_not_troubled_by_a_lost_port(bus: Bus, link: FakeLink) -> N
     assert result(bus.run(sleeper())) == 'slept'
 
 
+def test_mute_port_that_cannot_be_reported_is_opened_again(bus: Bus, link: FakeLink) -> None:
+    reports: list[float] = []
+
+    def report(seconds: float) -> None:
+        reports.append(seconds)
+        raise ValueError('oops')
+
+    bus.on_mute(report)
+    bus.require_sign_of_life(UNIT, 0.01)
+    result(ask(bus, 1, Priority.POLL))
+    link.answer = raiser(NoAnswer(''))
+    while link.opened < 2:
+        failure(ask(bus, 1, Priority.POLL))
+    link.answer = lambda done: packed(done.number)
+    assert result(ask(bus, 2, Priority.POLL)) == packed(2)
+    silent, speaks = reports
+    assert silent >= 0.01 and speaks == 0
+    assert bus.statistics().reconnects == 1
+
+
+def test_mute_port_that_cannot_be_opened_again_is_lost(bus: Bus, link: FakeLink) -> None:
+    bus.require_sign_of_life(UNIT, 0.01)
+    result(ask(bus, 1, Priority.POLL))
+    link.answer = raiser(NoAnswer(''))
+    link.opening = raiser(PortError('another has it'))
+    while bus.port_error is None:
+        failure(ask(bus, 1, Priority.POLL))
+    assert str(failure(ask(bus, 1, Priority.STOP))) == 'another has it' and link.closed == 1
+    link.answer = lambda done: packed(done.number)
+    link.opening = lambda: None
+    wait_until(lambda: bus.port_error is None)
+    assert result(ask(bus, 2, Priority.POLL)) == packed(2)
+
+
 def test_reconnects_are_counted(bus: Bus, link: FakeLink) -> None:
     for times in range(1, 4):
         link.answer = raiser(PortError('gone'))

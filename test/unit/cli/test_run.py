@@ -388,6 +388,7 @@ def test_a_cut_line_is_not_called_a_stop(bench: Bench) -> None:
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert 'lost: ' in err and 'the stop is NOT confirmed' in err
+    assert err.count('the port is opened again') == 1
     assert 'ending WITHOUT a confirmed stop, the motor may still run' in err
     assert 'emergency stop' in err
 
@@ -401,7 +402,7 @@ def test_a_line_that_comes_back_carries_the_stop(bench: Bench) -> None:
         bench.simulator.inject('heal')
         err = process.stderr.read()
         assert process.wait(PATIENCE) == 1
-    assert 'the stop is confirmed now' in err
+    assert 'the stop is confirmed now' in err and 'the drive answers again' in err
     assert bench.stopped
 
 

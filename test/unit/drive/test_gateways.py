@@ -16,6 +16,7 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.link.tcp_connection import Connection
 
 
 def muted(rig: Rig) -> None:
@@ -83,6 +84,24 @@ def test_the_stop_at_exit_takes_another_connection() -> None:
         rig.answer(rig.drive.disconnect(rig.drive.settings.shutdown_timeout))
         rig.pass_time(0.5)
         assert rig.far.motor.frequency == 0 and len(rig.line.sessions) == 2
+
+
+def test_connections_that_stay_mute_are_made_more_and_more_seldom() -> None:
+    with Rig('tcp') as rig:
+        muted(rig)
+        connect = rig.link._make
+
+        def mute(host: str, port: int) -> Connection:
+            connection = connect(host, port)
+            rig.line.sessions[-1].mute = True
+            return connection
+
+        rig.link._make = mute
+        rig.pass_time(60.0)
+        assert 8 < len(rig.line.sessions) < 14
+        rig.link._make = connect
+        rig.pass_time(10.0)
+        assert rig.far.motor.frequency == 0
 
 
 @pytest.mark.parametrize('lost_after', [1.0, 3.0])
