@@ -316,6 +316,11 @@ class Silences:
         least = longest if self.heard else _MUTE_FROM_THE_START
         return now - self._mute_since >= max(lost_after, least)
 
+    def paused(self, seconds: float) -> None:
+        """Note that nothing was sent for so long, s, for the worker did not run."""
+        self._since = {unit: since + seconds for unit, since in self._since.items()}
+        self._mute_since += seconds
+
     def is_silent(self, unit: int) -> bool:
         """Return whether a unit has not answered the last request to it."""
         return unit in self._since

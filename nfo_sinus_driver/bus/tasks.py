@@ -20,6 +20,7 @@ from nfo_sinus_driver.link import (
     Address,
     DamagedAnswer,
     Identification,
+    InProgress,
     Inquiry,
     LinkError,
     PortError,
@@ -65,6 +66,7 @@ class Transfer:
     :ivar require_wanted: called by the worker at the moment of sending; what it raises goes to the
         coroutine, and nothing is sent.
     :ivar source: what is read in the same transaction as the write, or ``None``.
+    :ivar once: it is not read again if the answer may be old.
     """
 
     unit: int
@@ -74,11 +76,28 @@ class Transfer:
     send: Callable[[], Reply] | None = None
     require_wanted: Callable[[], None] = lambda: None
     source: Address | None = None
+    once: bool = False
+
+    @property
+    def _only_reads(self) -> bool:
+        return self.data is None and self.send is None
 
     def reads(self, unit: int, address: Address) -> bool:
         """Return whether it only reads a parameter."""
-        reading = self.data is None and self.send is None
-        return reading and self.unit == unit and self.address == address
+        return self._only_reads and self.unit == unit and self.address == address
+
+    def without_old(self, reply: Reply) -> Reply:
+        """
+        Return what counts of a reply that a worker took which has paused meanwhile.
+
+        :raises InProgress: it is to be read again.
+        """
+        if self.source is not None:
+            return reply._replace(data=b'')
+        if self._only_reads and not self.once:
+            self.once = True
+            raise InProgress(reply.arrived)
+        return reply
 
     def __await__(self) -> Generator[Transfer, Reply, Reply]:
         return (yield self)

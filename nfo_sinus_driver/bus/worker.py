@@ -78,12 +78,18 @@ class Bus:
     ) -> None:
         self._link = link
         self.now = now
+        self._clock = link.clock
+        #: For how long the worker had paused when that was last noted, s.
+        self._paused = 0.0
         self._request_period = 1 / max_requests if max_requests else 0.0
         #: Until then only stops are sent.
         self._paced_until = -math.inf
         self._port = Reconnect(link)
         self._inbox: deque[Task | LatestValue | Callable[[], None]] = deque()
         self._awake = threading.Event()
+        #: A stop has come in since the inbox was emptied last.
+        self._stop_waits = False
+        link.stop_waits = lambda: self._stop_waits
         #: Which units do not answer, for coroutines on the worker.
         self.silences = Silences()
         self._scheduler = Scheduler(
@@ -129,10 +135,17 @@ class Bus:
         elif not self._closed:
             self._end()
 
-    def run(self, coroutine: Coroutine[Any, Any, _T]) -> Future[_T]:
-        """Run a coroutine on the worker; the future has its result, or what it raises."""
+    def run(self, coroutine: Coroutine[Any, Any, _T], *, stops: bool = False) -> Future[_T]:
+        """
+        Run a coroutine on the worker; the future has its result, or what it raises.
+
+        :param stops: it stops a motor, so what is on the line ends as soon as it can.
+        """
         task = Task(coroutine)
         self._enter(task)
+        if stops:
+            # not before: the worker may be emptying its inbox
+            self._stop_waits = True
         return task.future
 
     def call(self, function: Callable[[], None]) -> None:
@@ -198,12 +211,18 @@ class Bus:
 
     # --- for coroutines on the worker ---------------------------------------------------------
 
-    def read(self, unit: int, address: Address, priority: Priority) -> Awaitable[Reply]:
-        """Read one parameter, one transaction at a time."""
+    def read(
+        self, unit: int, address: Address, priority: Priority, *, once: bool = False
+    ) -> Awaitable[Reply]:
+        """
+        Read one parameter, one transaction at a time.
+
+        :param once: not again where the answer may be old, for reading it has an effect.
+        """
         parts = self._link.parts(address)
         if len(parts) > 1:
             return consistent_read(unit, parts, priority)
-        return Transfer(unit, address, priority)
+        return Transfer(unit, address, priority, once=once)
 
     def write(
         self,
@@ -362,18 +381,34 @@ class Bus:
         :returns: when there is more to do, s on the steady clock, unless a request comes before.
         """
         self._awake.clear()
+        self._note_pause()
         self._take_in()
         self._ring_timers()
         self._open_when_due()
         supervised_at = self._supervise() if self._port.is_open else math.inf
         if not self._port.is_open:
             self._fail_all(self._port.error)
-            return min(self._sleepers.next_moment, self._port.reopen_at)
+            return self._clock.until(min(self._sleepers.next_moment, self._port.reopen_at))
         if self._send_next():
             return -math.inf
         paced_until = self._paced_until if self._scheduler.waits else math.inf
         missing_from = self.silences.missing_from if self._scheduler.missing_wait else math.inf
-        return min(self._sleepers.next_moment, paced_until, missing_from, supervised_at)
+        until = min(self._sleepers.next_moment, paced_until, missing_from, supervised_at)
+        return self._clock.until(until)
+
+    @property
+    def paused(self) -> float:
+        """For how long the worker has not run so far, s; for coroutines on it."""
+        return self._clock.paused
+
+    def _note_pause(self) -> float:
+        """Return for how long the worker has not run since the last call, s."""
+        self._clock()
+        seconds = self._clock.paused - self._paused
+        if seconds:
+            self._paused = self._clock.paused
+            self.silences.paused(seconds)
+        return seconds
 
     def _supervise(self) -> float:
         """Serve heartbeat and guarding; return when that is due again, s."""
@@ -395,6 +430,7 @@ class Bus:
         return supervision.due
 
     def _take_in(self) -> None:
+        self._stop_waits = False
         while self._inbox:
             item = self._inbox.popleft()
             if isinstance(item, Task):
@@ -485,7 +521,12 @@ class Bus:
         self.spawn(wait())
 
     def _transact(self, transfer: Transfer) -> Reply:
-        started = self.now()
+        """
+        Carry out a transaction.
+
+        What was read while the worker paused may be old: it is read again, once.
+        """
+        started = self._clock()
         paced_until = self._paced_until
         self._paced_until = started + self._request_period
         try:
@@ -499,6 +540,8 @@ class Bus:
                 reply = self._link.write_and_read(
                     transfer.unit, transfer.address, transfer.data, transfer.source
                 )
+            if self._clock.resumed_at > started:
+                reply = transfer.without_old(reply)
         except InProgress:
             self._account(transfer.unit, started, None)
             raise
@@ -519,14 +562,15 @@ class Bus:
 
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = self.now()
+        seconds = now - started - self._note_pause()
         answered = unit != self.protocol.broadcast
-        if answered and self.silences.note(unit, now, error, now - started):
+        if answered and self.silences.note(unit, now, error, seconds):
             self._report_mute(0.0)
-        self._scheduler.took(now - started)
+        self._scheduler.took(seconds)
         if isinstance(error, PortError):
             self._port.mark_lost(error, now + REOPEN_PERIOD)
         else:
-            self.recorder.transaction(unit, now, now - started, error)
+            self.recorder.transaction(unit, now, seconds, error)
 
     def _open_when_due(self) -> None:
         """Open a port that is not open, or open and mute."""

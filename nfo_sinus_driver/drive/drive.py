@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Coroutine, Sequence
 from concurrent.futures import Future
+import functools
 import logging
 import math
-from typing import Any, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Statistics, Task
 from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
@@ -35,6 +36,7 @@ from nfo_sinus_driver.link import LinkError, Refused
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
+_P = ParamSpec('_P')
 
 #: How long an exit waits for the first answer of a drive that has never answered, s.
 _FIRST_ANSWER = 1.0
@@ -47,6 +49,18 @@ _QUICK_STOP = Report(Cause.QUICK_STOP_REQUESTED, by=_BY)
 _ACKNOWLEDGE = Report(Cause.ACKNOWLEDGE_REQUESTED, by=_BY)
 _LEFT = Report(Cause.TRANSITION_REQUESTED, by=_BY)
 _ENDS = Report(Cause.DRIVER_ENDS, by=_BY)
+
+
+def _stops(
+    method: Callable[Concatenate[Drive, _P], Coroutine[Any, Any, _T]],
+) -> Callable[Concatenate[Drive, _P], Future[_T]]:
+    """Have a method run on the bus, as :func:`on_bus` does; it stops the motor."""
+
+    @functools.wraps(method)
+    def run(me: Drive, /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
+        return me.run(lambda: method(me, *args, **kwargs), stops=True)
+
+    return run
 
 
 class Drive:
@@ -168,8 +182,14 @@ class Drive:
         protocol = self._bus.protocol
         return self.state.model.profile.line_check.get(protocol.name, protocol.check)
 
-    def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
-        """Run a coroutine on the bus; an error of the line becomes one that explains it."""
+    def run(
+        self, command: Callable[[], Coroutine[Any, Any, _T]], *, stops: bool = False
+    ) -> Future[_T]:
+        """
+        Run a coroutine on the bus; an error of the line becomes one that explains it.
+
+        :param stops: it stops the motor.
+        """
 
         async def explained() -> _T:
             try:
@@ -180,7 +200,7 @@ class Drive:
             except Cancelled:
                 raise DriveError(Cause.ENDING) from None
 
-        return self._bus.run(explained())
+        return self._bus.run(explained(), stops=stops)
 
     def on_stop(self, call: Callable[[Report], None]) -> None:
         """Call a function on the bus whenever the motor is stopped, with the reason."""
@@ -255,7 +275,7 @@ class Drive:
             method = self.settings.method
             raise DriveError(self.state.report(Cause.OTHER_METHOD_RUNS, method=method))
 
-    @on_bus
+    @_stops
     async def disconnect(self, timeout: float, why: Report = _LEFT) -> Report:
         """Stop the motor, wait ``timeout`` s at most for standstill, and release control."""
         # no client may enable it until the motor stands still
@@ -279,12 +299,12 @@ class Drive:
             self._fault_namer.end()
             self._poller.end()
 
-    @on_bus
+    @_stops
     async def deactivate(self, why: Report = _LEFT) -> Report | None:
         """Stop the motor, if it may run, and only watch the drive until it is active again."""
         return await self._deactivate(why)
 
-    @on_bus
+    @_stops
     async def stop_for_good(self, patience: float, why: Report = _ENDS) -> Report | None:
         """Stop the motor within ``patience`` s; it can never be enabled again."""
         if self._controller is not None:
@@ -316,17 +336,17 @@ class Drive:
         self._poller.wake()
         return answer
 
-    @on_bus
+    @_stops
     async def stop(self, why: Report = _STOP) -> Report:
         """Stop as the drive's StMode says; control is kept."""
         return await self._procedures.controller.stop(why)
 
-    @on_bus
+    @_stops
     async def rapid_stop(self, why: Report = _STOP) -> Report:
         """Stop along the stop ramp of the drive, where it has one; control is kept."""
         return await self._procedures.controller.rapid_stop(why)
 
-    @on_bus
+    @_stops
     async def quick_stop(self, why: Report = _QUICK_STOP) -> Report:
         """Release the motor at once: it coasts."""
         return await self._procedures.controller.quick_stop(why)
@@ -403,7 +423,7 @@ class Drive:
 
         return await self._tuning.tune_now(procedure, report)
 
-    @on_bus
+    @_stops
     async def cancel_tuning(self) -> Report | None:
         """Stop a tuning, if there is one; stop nothing else."""
         return await self._procedures.abort()

@@ -220,7 +220,7 @@ class ParameterAccess:
     async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges, once: an operator has requested it."""
         assert self.model[key].access is Access.ACKNOWLEDGE, key
-        reply = await self._ask(self.address(key), priority, None, retry=False)
+        reply = await self._ask(self.address(key), priority, None, retry=False, once=True)
         return self.value(key, reply.data)
 
     async def acknowledge_and_write(self, key: str, step: Write) -> None:
@@ -313,6 +313,8 @@ class ParameterAccess:
         data: bytes | None,
         retry: bool,
         require_wanted: Callable[[], None] = lambda: None,
+        *,
+        once: bool = False,
     ) -> Reply:
         tries = 1 + self._retries if retry else 1
         # a busy drive has done nothing; a stop that is sent once is repeated by its caller
@@ -320,7 +322,7 @@ class ParameterAccess:
         while True:
             try:
                 if data is None:
-                    return await self._bus.read(self._unit, address, priority)
+                    return await self._bus.read(self._unit, address, priority, once=once)
                 return await self._bus.write(self._unit, address, data, priority, require_wanted)
             except (NoAnswer, DamagedAnswer) as error:
                 self.count(error)

@@ -103,7 +103,8 @@ class Poller:
         self._failing_since = math.inf
         #: How often in a row it could not be connected to.
         self._failed_reconnects = 0
-        #: When a value was last asked for, and how long it took, s: long, where the line is full.
+        #: When a value was last asked for, pauses of the worker aside, and how long it took, s:
+        #: long, where the line is full.
         self._requested_at = self._turn = 0.0
         #: When was last read what changes rarely: the control mode, and the scales.
         self._rare_read_at = 0.0
@@ -318,6 +319,11 @@ class Poller:
         return not any(abs(value) > 0 for value in (self._state.frequency, self._state.speed))
 
     @property
+    def _running(self) -> float:
+        """The time, but for pauses of the worker, s."""
+        return self._bus.now() - self._bus.paused
+
+    @property
     def _silent_for_long(self) -> bool:
         """It has answered no request for ``lost_after``."""
         silent = self._bus.silences.lasts(self._unit, self._bus.now())
@@ -386,7 +392,7 @@ class Poller:
 
     async def _poll(self) -> None:
         state = self._state
-        last = self.snapshot.actual
+        last, paused = self.snapshot.actual, self._bus.paused
         status = await self._read_status()
         rare = self._rare_is_due
         if rare:
@@ -408,7 +414,9 @@ class Poller:
             age = self._bus.now() - state.last_polled(role).at
             if role is not actual and (age >= self._slow_period or not steady):
                 await self._measure(role)
-        self._publish(status)
+        if self._bus.paused == paused:
+            # else the status may be old: the next poll is due
+            self._publish(status)
 
     async def _check_scales(self, *, all_of_them: bool) -> None:
         """Read what scales set-points, or any value, and stop the motor if that was changed."""
@@ -446,7 +454,7 @@ class Poller:
         value = await self._read_measured(role)
         state.polled(role, value)
         if role in state.model.roles:
-            self._turn = self._bus.now() - self._requested_at
+            self._turn = self._running - self._requested_at
         return value
 
     async def _read_measured(self, role: Role) -> float:
@@ -472,7 +480,7 @@ class Poller:
         """
         failing_since = math.inf
         while True:
-            self._requested_at = self._bus.now()
+            asked_at, self._requested_at = self._bus.now(), self._running
             try:
                 answer = await read()
             except (PortError, Refused, Interrupted, NoData):
@@ -480,7 +488,7 @@ class Poller:
             except LinkError:
                 self._state.unanswered()
                 now = self._bus.now()
-                self._check_silence(now)
+                self._check_silence(asked_at, now)
                 failing_since = min(failing_since, now)
                 in_vain = now - failing_since >= self._state.settings.lost_after
                 if self._silent_for_long or in_vain:
@@ -491,11 +499,11 @@ class Poller:
                 self._setpoint.answered()
                 return answer
 
-    def _check_silence(self, now: float) -> None:
+    def _check_silence(self, asked_at: float, now: float) -> None:
         """Report a silence of more than one lost answer to what may have to stop the motor."""
         silences = self._bus.silences
         # it has begun before the request that was in vain just now
-        if self._controller is not None and silences.lasts(self._unit, self._requested_at) >= 0:
+        if self._controller is not None and silences.lasts(self._unit, asked_at) >= 0:
             self._controller.silent(now - silences.last_frame_at(self._unit))
 
     def _on_poll_failed(self, error: LinkError | DriveError) -> None:

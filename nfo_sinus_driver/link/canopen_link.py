@@ -25,6 +25,7 @@ from nfo_sinus_driver.link.interface import (
     Clock,
     DamagedAnswer,
     Identification,
+    InProgress,
     LineSettings,
     LinkError,
     NoAnswer,
@@ -34,11 +35,12 @@ from nfo_sinus_driver.link.interface import (
     Remarks,
     Reply,
 )
-from nfo_sinus_driver.link.late_replies import LateReplies
+from nfo_sinus_driver.link.late_replies import LISTENING_STEP, STOP_WAITS, LateReplies
 from nfo_sinus_driver.link.lawicel import LawicelPort
 from nfo_sinus_driver.link.port import port_of
 from nfo_sinus_driver.link.protocols import CANOPEN
 from nfo_sinus_driver.link.sdo import SECOND, Download, Kind, ObjectShapes, Transfer, Upload
+from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 #: Bit rate of the serial port of an adapter; those on USB do not care.
 _ADAPTER_RATE = 115_200
@@ -231,7 +233,8 @@ class CanopenLink:
     def __init__(
         self, port: CanPort, settings: LineSettings, now: Clock = time.monotonic
     ) -> None:
-        self._now = now
+        self.clock = self._now = ThreadClock(now)
+        self.stop_waits: Callable[[], bool] = lambda: False
         self._port = port
         self._settings = settings
         self.remarks = Remarks()
@@ -308,7 +311,7 @@ class CanopenLink:
             try:
                 return self._read_once(unit, address, sub_index)
             except DamagedAnswer:
-                if not self._another.is_there(self._now()):
+                if not self._another.is_there(self._now()) or self.stop_waits():
                     raise
         return self._read_once(unit, address, sub_index)
 
@@ -319,6 +322,8 @@ class CanopenLink:
         certain = self._late.first_certain(unit, questions, self._now())
         if certain is not upload:
             self._resync_read(certain)
+            if self.stop_waits():
+                raise InProgress(self._now())
         try:
             arrived = self._transact(upload)
         except LinkError as error:
@@ -403,6 +408,8 @@ class CanopenLink:
 
     def _settle(self, unit: int) -> None:
         """Try to read something, so that the next answer is believed again."""
+        if self.stop_waits():
+            return
         try:
             questions = self._resync_reads(unit)
             self._resync_read(self._late.first_certain(unit, questions, self._now()))
@@ -459,7 +466,7 @@ class CanopenLink:
 
     def _take(self, until: float) -> Sequence[Frame]:
         """Return what has come, as the port does; note which nodes have restarted."""
-        frames = self._port.receive(until)
+        frames = self._port.receive(self._now.until(until))
         self._note(frames)
         return frames
 
@@ -480,7 +487,8 @@ class CanopenLink:
         deadline = sent + self._settings.response_timeout
         other = 0
         while True:
-            frames = self._port.receive(min(deadline, self.supervision.sign_due))
+            until = min(deadline, self.supervision.sign_due)
+            frames = self._port.receive(self._now.until(until))
             now = self._now()
             self.supervision.send_due(now)
             if unit in self._note(frames):
@@ -530,8 +538,12 @@ class CanopenLink:
         self._late.note(transfer, answer.data, now, 0.0)
         if self._late.repeated is not None and now < sent + soonest:
             until = sent + max(soonest, self._late.longest(unit))
-            while self._now() < until:
-                came = self._take(until)
+            while (later := self._now()) < until:
+                if self.stop_waits():
+                    raise DamagedAnswer(f'unit {unit}: {STOP_WAITS}')
+                self.supervision.send_due(later)
+                came = self._take(min(until, later + LISTENING_STEP))
                 if any(frame.identifier == answer.identifier for frame in came):
                     raise DamagedAnswer(f'unit {unit}: an answer came twice')
-        self._late.took(unit, now - sent)
+        if self._now.resumed_at <= sent:
+            self._late.took(unit, now - sent)

@@ -11,6 +11,8 @@ import functools
 import re
 from typing import NamedTuple, Protocol
 
+from nfo_sinus_driver.link.thread_clock import ThreadClock
+
 #: The baud rates of serial lines to drives, bit/s.
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600)
 _FORMAT = re.compile(r'([78])([EON])([12])')
@@ -272,10 +274,15 @@ class Link(Protocol):
 
     :ivar protocol: that of the line.
     :ivar remarks: what it has noticed.
+    :ivar clock: the clock of that thread, for what else it waits for, too.
+    :ivar stop_waits: returns whether a stop waits for the line, and is set by that thread: then a
+        link waits for no more than the answer to the request that it has sent.
     """
 
     protocol: LineProtocol
     remarks: Remarks
+    clock: ThreadClock
+    stop_waits: Callable[[], bool]
 
     @property
     def supervision(self) -> Supervision | None:

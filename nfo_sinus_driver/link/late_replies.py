@@ -19,6 +19,9 @@ from nfo_sinus_driver.link.interface import NotReady
 LATEST_REPLY = 4
 #: How long a line is not trusted after unrequested bytes, s.
 SUSPECT_FOR = 60.0
+#: How often a link that listens finds out whether a stop waits, s; and why it then believes less.
+LISTENING_STEP = 0.005
+STOP_WAITS = 'a stop was sent before the answer was certain'
 #: How much later than its slowest recent reply a unit may reply.
 _LATER = 1.25
 #: The share of a slow reply that is remembered with each of the next ones.
@@ -69,12 +72,16 @@ class LateReplies(Generic[_Request, _Kind]):
 
     :param response_timeout: how long a reply is waited for, s.
     :param kinds: returns the kinds of replies that a request may have.
+    :param longest: how long a reply may take that is not late, s; 0: the ``response_timeout``.
     :ivar repeated: the earlier request to which the unit gave the same reply as to the last one;
         ``None`` if it did not.
     """
 
     def __init__(
-        self, response_timeout: float, kinds: Callable[[_Request], Iterable[_Kind]]
+        self,
+        response_timeout: float,
+        kinds: Callable[[_Request], Iterable[_Kind]],
+        longest: float = 0.0,
     ) -> None:
         self._response_timeout = response_timeout
         self._memory = (LATEST_REPLY - 1) * response_timeout
@@ -86,6 +93,7 @@ class LateReplies(Generic[_Request, _Kind]):
         self.repeated: _Request | None = None
         #: Until when a reply is likely to come twice.
         self._suspect_until = 0.0
+        self._longest = longest or response_timeout
         #: How long a unit has taken at most to reply, s.
         self._slowest: dict[int, float] = {}
 
@@ -186,8 +194,9 @@ class LateReplies(Generic[_Request, _Kind]):
 
     def took(self, unit: int, seconds: float) -> None:
         """Note how long a unit took to reply; a slow reply is remembered for some dozens."""
-        self._slowest[unit] = max(seconds, _DECAY * self._slowest.get(unit, 0.0))
+        slowest = max(seconds, _DECAY * self._slowest.get(unit, 0.0))
+        self._slowest[unit] = min(slowest, self._longest)
 
     def longest(self, unit: int) -> float:
         """Return how long a unit may take to reply, by its recent replies, s."""
-        return _LATER * self._slowest.get(unit, 0.0)
+        return min(_LATER * self._slowest.get(unit, 0.0), self._longest)

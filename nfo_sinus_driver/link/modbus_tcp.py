@@ -32,6 +32,7 @@ from nfo_sinus_driver.link.interface import (
     LinkError,
     NoAnswer,
     NoPath,
+    NotReady,
     PortError,
     Refused,
     Remarks,
@@ -41,6 +42,7 @@ from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, read_of, understand
 from nfo_sinus_driver.link.protocols import MODBUS_TCP
 from nfo_sinus_driver.link.tcp_connection import CLOSED_HINT, Connection, TcpConnection
+from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 _HEADER = struct.Struct('>HHH')
 #: The lengths of a message, from unit and function alone to the most data.
@@ -126,7 +128,8 @@ class TcpLink(ModbusLink):
         connection: Callable[[str, int], Connection] = TcpConnection,
         now: Clock = time.monotonic,
     ) -> None:
-        self._now = now
+        self.clock = self._now = ThreadClock(now)
+        self.stop_waits: Callable[[], bool] = lambda: False
         self._host = host
         self._port = port
         self._name = f'[{host}]:{port}' if ':' in host else f'{host}:{port}'
@@ -229,7 +232,7 @@ class TcpLink(ModbusLink):
         """Wait for the connection that was begun; return whether it is in use now."""
         assert self._begun is not None
         try:
-            if not self._begun.connected(until):
+            if not self._begun.connected(self._now.until(until)):
                 if self._now() < self._begun_until:
                     return False
                 raise TimeoutError('timed out')
@@ -307,6 +310,8 @@ class TcpLink(ModbusLink):
             raise self._lost(error) from error
         # the gateway answers one request a connection, and this one changes nothing
         self._connect_again()
+        if self.stop_waits():
+            raise NotReady(self._now())
         try:
             return self._exchange(request)
         except OSError as error:
@@ -327,7 +332,7 @@ class TcpLink(ModbusLink):
         deadline = self._now() + self._response_timeout
         others: list[int] = []
         while True:
-            data = connection.read(deadline)
+            data = connection.read(self._now.until(deadline))
             now = self._now()
             for number, message in self._reader.feed(data):
                 if number == self._number:

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 from nfo_sinus_driver.link.another_master import Codec
 from nfo_sinus_driver.link.interface import Address, DamagedAnswer, Refused, Reply
+from nfo_sinus_driver.link.late_replies import STOP_WAITS
 from nfo_sinus_driver.link.protocols import MOVITRAC
 from nfo_sinus_driver.link.request_link import CodecLink
 
@@ -449,8 +450,10 @@ class MovitracLink(CodecLink):
     def _confirm(self, request: Any, answer: Any, arrived: float, until: float) -> None:
         # it may be the one before, sent twice, or another unit's, late
         foreign = self._late.may_be_of_another(request.unit, kind(answer), arrived)
-        if not (self._again or foreign) or self._now() >= until:
+        if not (self._again or foreign):
             return
-        if data := self._read_line(until):
+        if data := self._listen(until):
             self._another.hear(data, self._now())
             raise DamagedAnswer(f'unit {request.unit}: two answers came, one of them is late')
+        if self._now() < until:
+            raise DamagedAnswer(f'unit {request.unit}: {STOP_WAITS}')

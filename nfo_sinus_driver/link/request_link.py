@@ -11,7 +11,7 @@ serves those whose codec distinguishes answers from requests.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 import contextlib
 import time
 from typing import Any, Generic, Protocol, TypeVar
@@ -21,19 +21,22 @@ from nfo_sinus_driver.link.interface import (
     Address,
     Clock,
     DamagedAnswer,
+    InProgress,
     LineProtocol,
     LineSettings,
     LinkError,
     NeverSilent,
     NoAnswer,
     NothingToAsk,
+    NotReady,
     PortError,
     Refused,
     Remarks,
     Reply,
 )
-from nfo_sinus_driver.link.late_replies import LateReplies
+from nfo_sinus_driver.link.late_replies import LISTENING_STEP, LateReplies
 from nfo_sinus_driver.link.port import Port, port_of
+from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 #: How long a write waits at least for a line that is not silent, s.
 WRITE_WAIT = 0.02
@@ -135,7 +138,8 @@ class RequestLink(ABC, Generic[_Request]):
     _late: LateReplies[Any, Any]
 
     def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
-        self._now = now
+        self.clock = self._now = ThreadClock(now)
+        self.stop_waits: Callable[[], bool] = lambda: False
         self._port = port
         self._settings = settings
         self.remarks = Remarks()
@@ -144,6 +148,8 @@ class RequestLink(ABC, Generic[_Request]):
         self._line_end = 0.0
         #: How many of the last answers had long pauses.
         self._in_pieces = 0.0
+        #: When the last request had been sent.
+        self._sent_at = 0.0
 
     @classmethod
     def on_port(cls: type[_Self], port: str, settings: LineSettings) -> _Self:
@@ -234,7 +240,8 @@ class RequestLink(ABC, Generic[_Request]):
             try:
                 return self._ask_once(request)
             except DamagedAnswer:
-                if not tries_left or not self._another.is_there(self._now()):
+                others = self._another.is_there(self._now())
+                if not (tries_left and others) or self.stop_waits():
                     raise
         raise AssertionError
 
@@ -251,7 +258,7 @@ class RequestLink(ABC, Generic[_Request]):
         """
         Have the unit answer another request first, if needed; return whether it did.
 
-        :raises NotReady: all that could be sent first is in quarantine, too.
+        :raises NotReady: all that could be sent first is in quarantine, too; or a stop waits.
         """
         if not self._late.quarantined(request.unit, self._now()):
             return False
@@ -264,6 +271,8 @@ class RequestLink(ABC, Generic[_Request]):
             # the request itself has not been sent
             error.maybe_done = False
             raise
+        if self.stop_waits():
+            raise InProgress(self._now())
         self._await_gap(request)
         return True
 
@@ -293,29 +302,34 @@ class RequestLink(ABC, Generic[_Request]):
         at all it is sent into the noise, once no earlier answer can still be coming.
 
         :raises NeverSilent: there is none.
+        :raises NotReady: a stop waits, and goes ahead of a read.
         """
         wait = self._write_wait if is_write else self._settings.response_timeout
         give_up = self._now() + wait
         gap = self._gap_before(request)
         stray = False
         while True:
-            data, now, silent = self._await_silence(gap, wait)
+            data, now, silent = self._await_silence(gap, wait, is_write)
             if data and not self._another.hear(data, now):
                 stray = True
                 self._note_unrequested(data, request)
+            if not is_write and self.stop_waits():
+                raise NotReady(now)
             if not silent and not is_write:
                 raise NeverSilent(_NEVER_SILENT)
             until = min(self._another.open_until(request.unit), give_up)
             if now >= until:
                 break
             # requests of another master are answered first
-            if data := self._read_line(until):
+            if data := self._read_line(until) if is_write else self._listen(until):
                 self._another.hear(data, self._now())
                 gap = self._gap
         self._take_late(request, now)
         return stray
 
-    def _await_silence(self, gap: float, wait: float) -> tuple[bytes, float, bool]:
+    def _await_silence(
+        self, gap: float, wait: float, is_write: bool
+    ) -> tuple[bytes, float, bool]:
         """
         Wait for silence on the line.
 
@@ -326,13 +340,13 @@ class RequestLink(ABC, Generic[_Request]):
         give_up = max(self._line_end + gap, self._now()) + wait
         came = b''
         while True:
-            data = self._port.read(self._line_end + gap)
+            data = self._port.read(self._now.until(self._line_end + gap))
             now = self._now()
             if data:
                 came += data
                 gap = self._gap
                 self._line_end = max(self._line_end, now)
-                if now > give_up:
+                if now > give_up or (not is_write and self.stop_waits()):
                     return came, now, False
             elif now >= self._line_end + gap:
                 return came, now, True
@@ -342,13 +356,23 @@ class RequestLink(ABC, Generic[_Request]):
         self._late.sent(request)
         self._echo.sent(frame)
         self._line_end = self._now() + len(frame) * self._settings.char_time
+        self._sent_at = self._line_end
         self._port.write(frame)
-        return self._line_end
+        return self._sent_at
+
+    def _listen(self, until: float) -> bytes:
+        """Return the next bytes on the line until a moment, or none once a stop waits."""
+        while (now := self._now()) < until and not self.stop_waits():
+            data = self._port.read(self._now.until(min(until, now + LISTENING_STEP)))
+            if data:
+                self._line_end = max(self._line_end, self._now())
+                return data
+        return b''
 
     def _read_line(self, until: float) -> bytes:
         """Return the next bytes on the line until a moment; empty: it has passed."""
         while True:
-            data = self._port.read(until)
+            data = self._port.read(self._now.until(until))
             now = self._now()
             if data:
                 # bytes that come while the request is still being sent are no answer to it
@@ -357,8 +381,15 @@ class RequestLink(ABC, Generic[_Request]):
             if now >= until:
                 return data
 
+    @property
+    def _has_run(self) -> bool:
+        """The thread has run since the last request: what it measures is of the line."""
+        return self._now.resumed_at <= self._sent_at
+
     def _note_pause(self, longest: float) -> bool:
         """Note the longest pause, s, within a whole answer; return whether it is too long."""
+        if not self._has_run:
+            return False
         too_long = longest > _LONG_PAUSE
         self._in_pieces = self._in_pieces + 1 if too_long else _KEPT_OF_PAUSES * self._in_pieces
         if self._in_pieces >= _MANY_PAUSES:
@@ -391,10 +422,9 @@ class CodecLink(RequestLink[Any]):
     def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
         super().__init__(port, settings, now)
         codec = self._codec
-        self._late = LateReplies(settings.response_timeout, codec.kinds)
-        self._another: OtherRequests = OtherRequests(
-            self.remarks, settings.response_timeout + self._longest_response, codec
-        )
+        longest = settings.response_timeout + self._longest_response
+        self._late = LateReplies(settings.response_timeout, codec.kinds, longest)
+        self._another: OtherRequests = OtherRequests(self.remarks, longest, codec)
         #: The last answer is the one before, and came before the request can have been answered.
         self._again = False
         #: The last request, its answer and when it came; ``None``: it had none.
@@ -466,6 +496,8 @@ class CodecLink(RequestLink[Any]):
 
     def _settle(self, unit: int) -> None:
         """Try to read something, so that the next answer is believed again."""
+        if self.stop_waits():
+            return
         try:
             self._await_gap(self._codec.enquiry(unit, self._everywhere[0]))
             self._resync_read(self._first_certain(unit))
@@ -497,7 +529,8 @@ class CodecLink(RequestLink[Any]):
             raise
         # units answer in order: late answers of it have come before this
         self._late.release(request.unit)
-        self._took(request.unit, arrived - sent - length)
+        if self._has_run:
+            self._took(request.unit, arrived - sent - length)
         self._last = request, answer, arrived
         # and the request has left, even where the port is faster than its settings say
         self._line_end = arrived

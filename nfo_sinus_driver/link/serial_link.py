@@ -23,7 +23,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Reply,
 )
-from nfo_sinus_driver.link.late_replies import Doubt, LateReplies
+from nfo_sinus_driver.link.late_replies import STOP_WAITS, Doubt, LateReplies
 from nfo_sinus_driver.link.modbus_link import SPECIFIC, ModbusLink, ReadDevice, ReportSlaveId
 from nfo_sinus_driver.link.modbus_pdu import (
     AnswerReader,
@@ -78,8 +78,6 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self._resync_addresses: dict[int, tuple[Address, ...]] = {}
         #: How long a pause within an answer may be on this line, s, by the answers so far.
         self._pause = 0.0
-        #: When the last request had been sent.
-        self._sent_at = 0.0
         #: A resync read is under way that only confirms an answer.
         self._confirming = False
         #: Other bytes came with the last answer.
@@ -197,7 +195,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         now = self._now()
         doubt = self._late.doubt_about(request, now, names_it=names_it)
         if doubt is Doubt.LISTEN:
-            self._listen(request)
+            self._require_one(request)
         elif doubt is Doubt.ONCE_MORE:
             self._late.quarantine(request.unit, (request.answer_head,), now)
         elif doubt is Doubt.RESYNC:
@@ -206,6 +204,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
     def _resync(self, request: Request[Any]) -> None:
         """Have a unit answer another request: a second answer would come before."""
+        if self.stop_waits():
+            raise DamagedAnswer(f'unit {request.unit}: {STOP_WAITS}')
         stray = self._stray
         self._confirming = True
         try:
@@ -223,15 +223,16 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             self._confirming = False
         raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
 
-    def _listen(self, request: Request[Any]) -> None:
+    def _require_one(self, request: Request[Any]) -> None:
         """Wait as long as the right answer may take, in case this was the one before again."""
         length = self._frame_length(request.answer_length) * self._settings.char_time
         until = self._sent_at + self._late.longest(request.unit) + length
-        while (now := self._now()) < until:
-            if self._port.read(until):
-                self._line_end = max(self._line_end, now)
-                self._late.note_unrequested(self._now())
-                raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
+        if self._listen(until):
+            self._late.note_unrequested(self._now())
+            raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
+        if self._now() < until:
+            self._late.expect(request, self._now())
+            raise DamagedAnswer(f'unit {request.unit}: {STOP_WAITS}')
 
     def _await_gap(self, request: Request[Any], *, is_write: bool = False) -> bool:
         try:
@@ -264,7 +265,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
     def _transact(self, request: Request[_T]) -> tuple[_T, float]:
         frame = self._encode(request)
         self._another.sent(frame)
-        self._sent_at = self._send(request, frame)
+        self._send(request, frame)
         reader = self._reader(request)
         try:
             answer, arrived = self._receive(request, reader, frame)
@@ -303,7 +304,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         if not late and self._late.repeated is None:
             # and the request has left, even where the port is faster than its settings say
             self._line_end = arrived
-        self._late.took(request.unit, arrived - self._sent_at - length)
+        if self._has_run:
+            self._late.took(request.unit, arrived - self._sent_at - length)
         if came_back and not alone:
             # another master has sent the same request, which is answered, too
             self._late.quarantine(request.unit, (request.answer_head,), arrived)
@@ -327,7 +329,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         last = longest = 0.0
         refusals: list[Refused] = []
         while True:
-            data = self._port.read(deadline)
+            data = self._port.read(self._now.until(deadline))
             now = self._now()
             if not data:
                 if now < deadline:

@@ -86,7 +86,7 @@ class AllDrives:
         try:
             bus, drives = self._context.bus, self._context.drives
             models = [managed.drive.model for managed in drives]
-            bus.run(broadcast_stop(bus, models)).result(_LONGEST_STOP)
+            bus.run(broadcast_stop(bus, models), stops=True).result(_LONGEST_STOP)
         except Exception as error:
             return f'a stop for all could not be broadcast: {error}'
         return 'a stop for all was broadcast, which releases every motor; no drive confirms it'

@@ -228,6 +228,10 @@ class Line:
         """Have something done at a moment."""
         heapq.heappush(self._events, (at, next(self._order), do))
 
+    def stand_still(self, at: float, seconds: float) -> None:
+        """Have the driver do nothing from a moment on, while all else goes on."""
+        self.later(at, lambda: self.go_to(self.clock.now + seconds))
+
     @property
     def _due(self) -> float:
         return min(self.wire.due, self._events[0][0] if self._events else _NEVER)

@@ -109,5 +109,5 @@ def take_time(link: FakeLink, took: dict[int, float]) -> Clock:
         clock.now += took.get(done.number, 0.0)
         return packed(done.number)
 
-    link.answer, link.clock = answer, clock.monotonic
+    link.answer, link.time = answer, clock.monotonic
     return clock

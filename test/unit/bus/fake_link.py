@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 import contextlib
+import math
 import threading
 import time
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from typing import NamedTuple
 from support.addresses import packed, register
 
 from nfo_sinus_driver.link import PROTOCOLS, Address, NoAnswer, Remarks, Reply, Supervision
+from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 #: No honest wait takes this long, on any machine, s.
 PATIENCE = 30.0
@@ -46,7 +48,7 @@ class FakeLink:
 
     :ivar done: every transaction, in order.
     :ivar answer: called with each; returns the bytes, or raises.
-    :ivar clock: its steady clock.
+    :ivar time: its steady clock; :ivar clock: the same for the worker.
     :ivar opening: called when the port is opened; may raise.
     """
 
@@ -56,7 +58,8 @@ class FakeLink:
 
     def __init__(self) -> None:
         self.done: list[Done] = []
-        self.clock: Callable[[], float] = time.monotonic
+        self.time: Callable[[], float] = time.monotonic
+        self.clock = ThreadClock(self.now)
         self.answer: Callable[[Done], bytes] = lambda done: packed(done.number)
         self.opening: Callable[[], None] = lambda: None
         self.closing: Callable[[], None] = lambda: None
@@ -89,7 +92,7 @@ class FakeLink:
         return [done.number for done in self.done]
 
     def now(self) -> float:
-        return self.clock()
+        return self.time()
 
     def open(self) -> None:
         self.opening()
@@ -126,6 +129,8 @@ class FakeLink:
         self.resync_reads[unit] = tuple(addresses)
 
     def _transact(self, done: Done) -> Reply:
+        # as long as the test wants it to take
+        self.clock.until(math.inf)
         with self._condition:
             self.done.append(done)
             while self._hold:

@@ -22,6 +22,7 @@ from nfo_sinus_driver.link import (
     Remarks,
     Reply,
 )
+from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 #: How long an access takes, s.
 _ACCESS = 0.002
@@ -37,6 +38,7 @@ class FarEnd:
     rig: MadeUpRig
 
     def __init__(self, registers: dict[int, int]) -> None:
+        self.clock = ThreadClock(lambda: self.rig.clock.now)
         self.registers = registers
         #: What becomes of the next access to a register.
         self.fates: dict[int, LinkError] = {}

@@ -1,0 +1,160 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+A driver that stood still: stopped by a signal, suspended, in a virtual machine that paused.
+
+What it measures meanwhile says nothing of the line, and what it read may be old.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from support.rig import CONNECTIONS, Rig
+
+#: For how long, s.
+_STOOD = 5.0
+#: When the operator stops the motor after that, s, and how soon that is on the wire, s.
+_LATER = 0.15
+_AT_ONCE = 0.05
+#: The moments at which it begins, within the time of some transactions, s; all that are tried.
+_MOMENTS = (0.004, 0.011, 0.018, 0.027, 0.039)
+_ALL_MOMENTS = tuple(0.003 * n for n in range(20))
+#: For how long requests are counted, s.
+_WHILE = 2.0
+
+every_connection = pytest.mark.parametrize('connection', CONNECTIONS)
+
+
+def running(connection: str) -> Rig:
+    """Two drives that stand enabled, at set-point 0."""
+    baud = {'baud': 19200} if CONNECTIONS[connection].protocol == 'modbus_rtu' else {}
+    rig = Rig(connection, drives=2, line=baud, setpoint_timeout=0.0, poll_rate=50.0)
+    rig.connect()
+    rig.enable()
+    rig.pass_time(0.5)
+    return rig
+
+
+def time_to_wire(rig: Rig, at: float) -> float:
+    """Stop the first drive at a moment, wherever the driver is; return how soon it is sent, s."""
+    written: list[float] = []
+
+    def stop() -> None:
+        if not rig.drive.following:
+            # it is stopped already, as by a PLC
+            written.append(at)
+        rig.drive.stop()
+
+    def meet(key: str, data: bytes | None) -> None:
+        if data is not None and rig.clock.now >= at:
+            written.append(rig.clock.now)
+
+    rig.meet = meet
+    rig.line.later(at, stop)
+    rig.wait_until(lambda: written)
+    return written[0] - at
+
+
+@every_connection
+def test_a_stop_is_on_the_wire_at_once_after_that(connection: str) -> None:
+    took = []
+    for begins in _ALL_MOMENTS if connection == 'rtu' else _MOMENTS:
+        with running(connection) as rig:
+            rig.line.stand_still(rig.clock.now + begins, _STOOD)
+            took.append(time_to_wire(rig, rig.clock.now + begins + _STOOD + _LATER))
+    assert max(took) <= _AT_ONCE, [round(one, 3) for one in took]
+
+
+@every_connection
+def test_no_answer_is_waited_for_longer_after_that(connection: str) -> None:
+    for begins in _MOMENTS[::2]:
+        with running(connection) as rig:
+            over = rig.clock.now + begins + _STOOD
+            rig.line.stand_still(over - _STOOD, _STOOD)
+            rig.line.later(over, lambda rig=rig: rig.line.unplug(2))
+            timeout = rig.line.settings.response_timeout
+            if rig.connection.protocol == 'movitrac':
+                # as P843 may have it wait
+                timeout += 0.2
+            took = time_to_wire(rig, over + _LATER)
+            assert took <= timeout + _AT_ONCE
+
+
+@every_connection
+def test_all_is_read_as_often_after_that(connection: str) -> None:
+    for begins in _MOMENTS[:2]:
+        with running(connection) as rig:
+
+            def asked(rig: Rig = rig) -> Counter[tuple[int, str]]:
+                begun = len(rig.asked)
+                rig.pass_time(_WHILE)
+                return Counter((unit, key) for unit, key, _ in rig.asked[begun:])
+
+            before = asked()
+            rig.line.stand_still(rig.clock.now + begins, _STOOD)
+            rig.pass_time(_STOOD + 0.2)
+            if rig.line.plc is not None:
+                # it has stopped them meanwhile
+                rig.pass_time(5.0)
+                rig.enable()
+            after = asked()
+            # of the telemetry some values are read in turn
+            often = (one for one in before if before[one] > 2 * _WHILE)
+            seldom = {one: after[one] for one in often if after[one] < 0.7 * before[one]}
+            assert not seldom, {one: (before[one], after[one]) for one in seldom}
+
+
+@every_connection
+def test_nothing_old_is_published_after_that(connection: str) -> None:
+    for begins in _MOMENTS[1:4]:
+        with running(connection) as rig:
+            at = rig.clock.now + begins
+            rig.line.later(at + 1.0, lambda rig=rig: rig.far.trip(rig.a_fault))
+            rig.line.stand_still(at, _STOOD)
+            published: list[int] = []
+            rig.line.later(
+                at + _STOOD, lambda rig=rig: published.append(len(rig.notes.snapshots))
+            )
+            rig.pass_time(begins + _STOOD + 1.0)
+            later = rig.notes.snapshots[published[0] :]
+            assert later and all(not one.enabled for one in later)
+            assert all(one.status is None or one.status.faulted for one in later)
+
+
+def test_a_drive_that_was_unplugged_is_found_as_soon_after_that() -> None:
+    with running('rtu') as rig:
+        rig.line.unplug(2)
+        rig.pass_time(6.0)
+        assert not rig.drives[2].snapshot.connected
+        # in the middle of a request to it
+        rig.wait_until(lambda: rig.asked[-1][0] == 2)
+        begun = len(rig.asked)
+        rig.meet = lambda key, data: rig.line.stand_still(rig.clock.now + 0.02, _STOOD)
+        rig.wait_until(lambda: any(unit == 2 for unit, _, _ in rig.asked[begun:]))
+        rig.meet = lambda key, data: None
+        rig.pass_time(_STOOD)
+        rig.line.unplug()
+        rig.wait_until(lambda: rig.drives[2].snapshot.connected, 6.0)
+
+
+# --- what else a stop would wait for --------------------------------------------------------------
+
+
+@every_connection
+def test_a_stop_is_on_the_wire_at_once_while_a_drive_is_known_as_slow(connection: str) -> None:
+    # it is, for some dozens of answers, so the line is listened to for longer
+    took = []
+    for moment in _MOMENTS[:3]:
+        with running(connection) as rig:
+            wire, slow = rig.line.wire, 0.15
+            name = '_turnaround' if rig.connection.protocol == 'canopen' else '_pause'
+            usual = getattr(wire, name)
+            setattr(wire, name, slow)
+            rig.pass_time(0.5)
+            setattr(wire, name, usual)
+            rig.pass_time(slow)
+            took.append(time_to_wire(rig, rig.clock.now + 0.1 + moment))
+    assert max(took) <= _AT_ONCE, [round(one, 3) for one in took]
