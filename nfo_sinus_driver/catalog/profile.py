@@ -325,7 +325,6 @@ class ControlMethod(abc.ABC):
     :cvar means: what takes its commands.
     :cvar references: those that there are.
     :cvar coasts: it can release the motor at once.
-    :cvar quick_stop_by: the setting by which a quick stop may be a ramp; ``''``: the motor coasts.
     :cvar stop_ramp: it can have the drive take a stop ramp of its own.
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
     :cvar unused_scales: parameters that multiply its set-points where they are not all the same;
@@ -345,7 +344,6 @@ class ControlMethod(abc.ABC):
     means: ClassVar[str]
     references: ClassVar[Sequence[str]]
     coasts: ClassVar[bool] = False
-    quick_stop_by: ClassVar[str] = ''
     stop_ramp: ClassVar[bool] = False
     older: ClassVar[bool] = True
     unused_scales: ClassVar[Sequence[str]] = ()
@@ -404,7 +402,7 @@ class ControlMethod(abc.ABC):
         """
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
-        """Release the motor, or stop it by :attr:`quick_stop_by`; control may be given back."""
+        """Release the motor; control may be given back. Where it cannot be, stop as usual."""
         return self.stop(control_mode)
 
     def rapid_stop(self, control_mode: str) -> Steps[None]:

@@ -212,11 +212,6 @@ class Commands:
         return self._method.stop_ramp
 
     @property
-    def quick_stop_by(self) -> str:
-        """The setting of the drive that decides a quick stop; ``''``: it releases the motor."""
-        return self._method.quick_stop_by
-
-    @property
     def plc_time(self) -> float:
         """How long after the driver's last message a PLC stops the drive, s; 0: no PLC."""
         return self._method.plc_time

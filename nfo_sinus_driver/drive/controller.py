@@ -306,8 +306,7 @@ class Controller:
         """
         Release the motor at once, so that it coasts; MODE and SCMD release control, too.
 
-        Where a setting of the drive decides, the motor may ramp down; where the drive has no quick
-        stop, stop as usual [C96].
+        Where the drive has no quick stop, stop as usual [C96].
         """
         if not self.method.coasts:
             return Report(Cause.NO_QUICK_STOP, stop=await self.stop(why))
@@ -335,7 +334,7 @@ class Controller:
                 return self._no_control(self._state.status)
             self._sequence.start()
             await self._settle()
-            return self._quick_stopped()
+            return Report(Cause.QUICK_STOPPED)
 
     async def rapid_stop(self, why: Report) -> Report:
         """
@@ -352,29 +351,17 @@ class Controller:
         status = self._state.status
         if status is None or not status.driven or status.faulted:
             return stopped
-        if status.state is State.QUICK_STOP:
+        # the quick stop of PROFIdrive leads to S1, where the motor may still ramp [M3 §6]
+        if status.state in (State.QUICK_STOP, State.SWITCH_ON_DISABLED):
             return self._state.report(Cause.RAPID_STOPPING)
         return self._state.report(Cause.NOT_RAPID, stop=stopped)
 
     async def _await_quick_stop(self, sent_at: float) -> None:
-        """Wait until the motor is released, or on its way to a stop where a setting decides."""
-        by = self.method.quick_stop_by
-
-        def stops(status: InverterStatus) -> bool:
-            return not (status.keeps_running_since(sent_at) if by else status.driven)
-
+        """Wait until the motor is released."""
         # a PLC with old data goes on showing the status before
         await self._state.wait_until(
-            lambda status: status.at >= sent_at and stops(status), Priority.LOOK
+            lambda status: status.at >= sent_at and not status.driven, Priority.LOOK
         )
-
-    def _quick_stopped(self) -> Report:
-        """Return what a quick stop has done, as far as the drive shows it."""
-        by, status = self.method.quick_stop_by, self._state.status
-        if not by:
-            return Report(Cause.QUICK_STOPPED)
-        ramps = status is not None and status.driven
-        return Report(Cause.QUICK_STOP_RAMPS if ramps else Cause.QUICK_STOP_OFF, by=by)
 
     async def acknowledge(self, why: Report) -> Report:
         """Acknowledge a fault; remove run command and set-point first, if the drive allows it."""

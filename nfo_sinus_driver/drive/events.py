@@ -123,8 +123,6 @@ class Cause(enum.Enum):
     COASTING = 'stopping: it coasts'
     RAMPING = 'stopping: it ramps down'
     QUICK_STOPPED = 'released: the motor coasts'
-    QUICK_STOP_RAMPS = 'stopping: it ramps down (quick stop by {by})'
-    QUICK_STOP_OFF = 'stopped: the output is at 0 Hz (quick stop by {by})'
     NO_QUICK_STOP = '{stop} (this drive has no quick stop)'
     RAPID_STOPPING = 'stopping: by its stop ramp ({status})'
     NOT_RAPID = (

@@ -306,7 +306,6 @@ DRIVES = {
             'hot_motor': Fault(11, **_SOME_FAULT),
         },
         run=0x0008, nominal=60.0,
-        quick_stopped='stopping: it ramps down (quick stop by ADV-8 Stop Mode)',
     ),
     'movitrac31': Movitrac(
         control_method='function_bits',

@@ -11,15 +11,7 @@ ADV-8 says; out of S4 there is no other way than that, QuickStop and CoastStop [
 from __future__ import annotations
 
 from nfo_sinus_driver.catalog.own_parameters import OwnAddresses
-from nfo_sinus_driver.catalog.profile import (
-    Profile,
-    Read,
-    Removal,
-    Steps,
-    Until,
-    one,
-    try_steps,
-)
+from nfo_sinus_driver.catalog.profile import Profile, Read, Steps, Until
 from nfo_sinus_driver.catalog.status import Role, State
 from nfo_sinus_driver.families._telegram1 import method
 from nfo_sinus_driver.families._telegram1.method import Telegram1
@@ -31,7 +23,7 @@ class HTelegram1(Telegram1):
     """Control by telegram 1: switched on, then enabled."""
 
     coasts = True
-    quick_stop_by = 'ADV-8 Stop Mode'
+    stop_ramp = True
     caution = (
         'at its keypad set PRT-12 Lost Cmd Mode to Free-Run or Dec (from the factory it is None, '
         'and the motor runs on), and PRT-13 to the time after which it does that'
@@ -63,14 +55,12 @@ class HTelegram1(Telegram1):
         return int(ON)
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
+        """Release the motor by CoastStop, which leaves S4 for S1; control is kept [M3 §7.2.1]."""
+        yield method.begin(int(OFF & ~Control.NO_COAST_STOP))
+
+    def rapid_stop(self, control_mode: str) -> Steps[None]:
         """Stop by QuickStop, as ADV-8 says, which leaves S4 for S1; control is kept [M3 §6]."""
         yield method.begin(int(OFF & ~Control.NO_QUICK_STOP))
-
-    def force_stop(self, control_mode: str) -> Steps[bool]:
-        """Clear the run bits, then release the motor by CoastStop."""
-        removed = yield from self.remove(control_mode)
-        released = yield from try_steps(one(method.begin(int(OFF & ~Control.NO_COAST_STOP))))
-        return released or removed is Removal.COMMAND
 
 
 PROFILE = Profile(

@@ -202,19 +202,33 @@ def test_what_a_plc_goes_on_showing_confirms_no_stop(connection: str, command: s
         assert not rig.drive.stop_unconfirmed
 
 
+@pytest.mark.parametrize('echo_bits', ['state', 'word'])
+def test_quick_stop_releases_a_sinus_h(echo_bits: str) -> None:
+    ramp = {'adv.stop_mode': 'Dec', 'drv.dec_time': 10.0}
+    with Rig(SINUS_H, parameters=ramp, options={'echo_bits': echo_bits}) as rig:
+        rig.turn()
+        assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
+        # bit 1 alone is taken back from SwitchOFF: out of S4 to S1 [M3 §6]
+        assert words(rig.line.frames)[-1] == 0x0474
+        assert rig.far.control_unit.report()['state'] == 'S1'
+        assert not rig.far.motor.driven and rig.far.motor.turning
+        rig.pass_time(12.0)
+        rig.assert_only_enable_helps()
+
+
 @pytest.mark.parametrize(
     ('stop_mode', 'answer'),
     [
-        ('Dec', 'stopping: it ramps down (quick stop by ADV-8 Stop Mode)'),
-        ('Free-Run', 'stopped: the output is at 0 Hz (quick stop by ADV-8 Stop Mode)'),
+        ('Dec', 'stopping: by its stop ramp (202 Inhibited)'),
+        ('Free-Run', 'stopped (202 Inhibited)'),
     ],
 )
 @pytest.mark.parametrize('echo_bits', ['state', 'word'])
-def test_quick_stop_of_a_sinus_h_is_adv_8(stop_mode: str, answer: str, echo_bits: str) -> None:
+def test_rapid_stop_of_a_sinus_h_is_adv_8(stop_mode: str, answer: str, echo_bits: str) -> None:
     ramp = {'adv.stop_mode': stop_mode, 'drv.dec_time': 10.0}
     with Rig(SINUS_H, parameters=ramp, options={'echo_bits': echo_bits}) as rig:
         rig.turn()
-        assert rig.answer(rig.drive.quick_stop()) == answer
+        assert rig.answer(rig.drive.rapid_stop()) == answer
         # bit 2 alone is taken back from SwitchOFF: out of S4 to S1 [M3 §6]
         assert words(rig.line.frames)[-1] == 0x0472
         assert rig.far.control_unit.report()['state'] == 'S1'
@@ -230,7 +244,7 @@ def test_a_sinus_h_that_ignores_its_stops_is_released() -> None:
         machine = rig.far.control_unit.machine
         for exit in [exit for exit in machine._exits if exit[1].name != 'COAST_STOP']:
             machine._exits.pop(exit)
-        assert 'NOT confirmed' in rig.answer(rig.drive.quick_stop())
+        assert 'NOT confirmed' in rig.answer(rig.drive.stop())
         rig.wait_until(lambda: not rig.far.motor.driven, 15.0)
         assert 0x0474 in words(rig.line.frames)
         rig.pass_time(1.0)
