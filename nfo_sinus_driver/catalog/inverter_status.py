@@ -118,6 +118,19 @@ class InverterStatus:
             return State.UNKNOWN
         return self.model.profile.status_word.state(self.word)
 
+    @functools.cached_property
+    def unknown(self) -> bool:
+        """Neither its word nor its code is one that the manual lists: it says nothing."""
+        stateless = self.word is not None and self.model.profile.status_word.stateless
+        if self.state is not State.UNKNOWN or stateless:
+            return False
+        return self.code_is_of_word or self.code not in self.model.status_codes
+
+    @property
+    def code_is_of_word(self) -> bool:
+        """The word has the code, too."""
+        return self.word is not None and self.model.profile.status_word.code is not None
+
     @property
     def faulted(self) -> bool:
         """A fault is active, or waits for being acknowledged [M0 table 15]."""
@@ -166,11 +179,20 @@ class InverterStatus:
         if not self.by_frequency:
             return self.keeps_running
         stands = self.at > stopped_at and self.frequency == 0
-        stops = stands or self.fell[0] > stopped_at
+        stops = stands or self.falls_since(stopped_at)
         if self._only_frequency:
             # energised at set-point 0 it stands, too
             return self.from_bus and not (stops and not self.runs)
         return self.runs_by_bus and not stops
+
+    def falls_since(self, moment: float) -> bool:
+        """Return whether its frequency has begun to fall after a moment, s, and has not risen."""
+        return self.fell[0] > moment
+
+    @property
+    def stands_running(self) -> bool:
+        """The motor stands, and the word goes on saying that the bus runs it."""
+        return self.by_frequency and self.runs_by_bus and self.frequency == 0
 
     @property
     def by_frequency(self) -> bool:
@@ -210,9 +232,9 @@ class InverterStatus:
 
     @property
     def driven(self) -> bool:
-        """The output stage drives the motor, be it only to a stop."""
+        """The output stage drives the motor, be it only to a stop; or nothing denies that."""
         if self.state is State.UNKNOWN or self.tuning:
-            return self.tuning or self._driven_by_code
+            return self.tuning or self.unknown or self._driven_by_code
         stands = self.by_frequency and self.frequency == 0
         turns = self._only_frequency and abs(self.frequency) > 0
         return turns or (self.state in _DRIVEN and not stands)

@@ -326,6 +326,8 @@ class ControlMethod(abc.ABC):
     :cvar references: those that there are.
     :cvar coasts: it can release the motor at once.
     :cvar stop_ramp: it can have the drive take a stop ramp of its own.
+    :cvar reads_run_command: its status may show a run without a run command of the line, so that
+        :meth:`has_run_command` finds out whether one stands.
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
     :cvar unused_scales: parameters that multiply its set-points where they are not all the same;
         a start requires that they are.
@@ -345,6 +347,7 @@ class ControlMethod(abc.ABC):
     references: ClassVar[Sequence[str]]
     coasts: ClassVar[bool] = False
     stop_ramp: ClassVar[bool] = False
+    reads_run_command: ClassVar[bool] = False
     older: ClassVar[bool] = True
     unused_scales: ClassVar[Sequence[str]] = ()
     needs: ClassVar[Sequence[str]] = ()
@@ -420,6 +423,11 @@ class ControlMethod(abc.ABC):
         removed = yield from self.remove(control_mode)
         obeyed = yield from try_steps(self.quick_stop(control_mode))
         return obeyed or removed is Removal.COMMAND
+
+    def has_run_command(self) -> Steps[bool]:
+        """Return whether a run command of the line stands in a drive that shows a run."""
+        yield from ()
+        return True
 
     def perhaps_in_control(self) -> Steps[bool]:
         """Return whether the bus may have control: it has, or the drive does not report who has."""

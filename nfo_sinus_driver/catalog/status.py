@@ -240,8 +240,9 @@ class Role(_LookedUp):
     PROCESS_UNIT = 'process_unit'
     STOP_MODE = 'stop_mode'
     START_DELAY = 'start_delay'
-    #: How long the motor is braked by direct current before it starts.
+    #: How long the motor is braked by direct current before it starts, and once it has stopped.
     START_BRAKING = 'start_braking'
+    STOP_BRAKING = 'stop_braking'
 
     ACTUAL_FREQUENCY = 'actual_frequency'
     ACTUAL_SPEED = 'actual_speed'

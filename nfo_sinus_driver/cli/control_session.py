@@ -183,7 +183,7 @@ class ControlSession(Listener):
     def confirmed_late(self) -> bool:
         """Let a stop be retried for a while; true when the drive has confirmed it."""
         self._wait_while(lambda: self.drive.stop_unconfirmed, _LAST_TRIES)
-        if self.drive.stop_unconfirmed:
+        if self.drive.stop_unconfirmed or self.drive.stop_overdue:
             self.screen.say(
                 'ending WITHOUT a confirmed stop, the motor may still run: use the enable input or '
                 'the emergency stop; nfo-sinus stop tries again'

@@ -55,7 +55,7 @@ def _stop(control: ControlSession, options: argparse.Namespace) -> tuple[bool, s
     offline.identify(thoroughly=False)
     status = offline.read_status()
     shown = offline.state.describe()
-    if not status.from_bus:
+    if not (status.from_bus or status.unknown):
         if status.driven or status.means(Meaning.START_DELAY):
             return False, (
                 f'keypad or terminals run the motor ({shown}), so the bus cannot stop it: '
@@ -102,7 +102,7 @@ class Ack(Verb):
                 facts = {
                     'acknowledged': not failed and _is_to_acknowledge(status),
                     'code': status.code,
-                    'text': offline.state.nameplate.text_of(status.code),
+                    'text': offline.state.text_of(status),
                     'code_now': now.code,
                     'text_now': offline.state.text,
                     'message': answer,

@@ -212,6 +212,11 @@ class Commands:
         return self._method.stop_ramp
 
     @property
+    def reads_run_command(self) -> bool:
+        """A status that shows a run does not say whether a run command stands."""
+        return self._method.reads_run_command
+
+    @property
     def plc_time(self) -> float:
         """How long after the driver's last message a PLC stops the drive, s; 0: no PLC."""
         return self._method.plc_time
@@ -273,6 +278,10 @@ class Commands:
     async def run(self, reached: Reached) -> None:
         """Give the run command, once: the state before a second one would be unknown."""
         await carry_out(self._method.run(), self._params, Priority.SERVICE, reached)
+
+    async def has_run_command(self) -> bool:
+        """Return whether a run command of the bus stands in a drive that shows a run."""
+        return await carry_out(self._method.has_run_command(), self._params, Priority.LOOK)
 
     async def stop(self, control_mode: str) -> None:
         """Remove the run command and write set-point 0, ahead of all else on the bus."""

@@ -36,6 +36,9 @@ from nfo_sinus_driver.drive.stop_reason import StopReason, reason_of
 from nfo_sinus_driver.drive.stopping import StopSequence
 from nfo_sinus_driver.link import LinkError, Refused
 
+#: How long a stop at the end of a release may take at least, s.
+_LEAST_PATIENCE = 1.0
+
 
 class Controller:
     """
@@ -66,7 +69,8 @@ class Controller:
         self._refusal: tuple[float, Report] | None = None
         #: The last status that was checked.
         self._checked: InverterStatus | None = None
-        self._stood_at = -math.inf
+        #: When it was last seen not to run, and not to stand while its run command does.
+        self._stood_at = self._ran_at = -math.inf
         #: It was lost while its motor may have been running by this driver.
         self._lost_in_use = False
 
@@ -94,8 +98,9 @@ class Controller:
 
     @property
     def stop_overdue(self) -> bool:
-        """A stop was not confirmed in time, and no fault keeps the motor still."""
-        return self._sequence.overdue
+        """A stop was not confirmed in time, or not at all, and no fault keeps the motor still."""
+        unclear = self._sequence.unclear is not None and not self.commanded
+        return unclear or self._sequence.overdue
 
     @property
     def commanded(self) -> bool:
@@ -285,7 +290,7 @@ class Controller:
         if status is None or not status.from_bus:
             return self._no_control(status)
         if not status.driven:
-            return self._state.report(Cause.STOPPED)
+            return self._state.report(Cause.COASTING if self._sequence.coasts else Cause.STOPPED)
         try:
             coasts = await self._state.coasts_to_stop()
         except LinkError:
@@ -333,7 +338,7 @@ class Controller:
             if not may_run:
                 return self._no_control(self._state.status)
             self._sequence.start()
-            await self._settle()
+            await self._sequence.wait_confirmed()
             return Report(Cause.QUICK_STOPPED)
 
     async def rapid_stop(self, why: Report) -> Report:
@@ -429,11 +434,7 @@ class Controller:
         stopped = stopped or await self.stop()
         if self.blocked_by_fault:
             raise DriveError(self._state.report(Cause.RELEASE_BLOCKED))
-        stands = True
-        try:
-            await self._state.wait_until(lambda now: not now.driven, Priority.SERVICE, timeout)
-        except DriveError:
-            stands = False
+        stands = await self._await_standstill(timeout)
         await prepare()
         if not stands:
             await self._state.timeout.read()
@@ -444,6 +445,37 @@ class Controller:
         if await self.method.retains_control():
             return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.control_retained)
         return Report(Cause.CONTROL_RELEASED, stop=stopped)
+
+    async def _await_standstill(self, timeout: float) -> bool:
+        """
+        Wait until the motor stands; return whether it does, and does not only ramp.
+
+        :raises DriveError: its run command is still there, or it does not slow down.
+        """
+        until = self._bus.now() + timeout
+        while True:
+            left = max(until - self._bus.now(), 0.0)
+            try:
+                # a run command that was kept shows when the ramp is over
+                await self._state.wait_until(
+                    lambda now: not now.driven or now.keeps_running, Priority.SERVICE, left
+                )
+            except DriveError:
+                return False
+            status = self._state.status
+            assert status is not None
+            if self._stands_running(status):
+                # for a moment, or while the motor is braked
+                with contextlib.suppress(DriveError):
+                    await self._state.wait_until(
+                        lambda now: not self._stands_running(now),
+                        Priority.SERVICE,
+                        min(until - self._bus.now(), self._sequence.shown_for),
+                    )
+                status = self._state.status or status
+            if not (status.keeps_running or await self._sequence.unrest(status)):
+                return True
+            await self.stop(patience=max(until - self._bus.now(), _LEAST_PATIENCE))
 
     async def leave(self, timeout: float) -> None:
         """
@@ -529,12 +561,26 @@ class Controller:
             reason = self._why_stopped(status) or self._why_slower(status, before)
             if reason is None and self._state.settings.follows_setpoints:
                 reason = self._following.check()
-        elif not (self.commanded or self.stopping) and self._runs_unasked(status):
-            reason = Report(Cause.RUNS_UNASKED)
+        elif not (self.commanded or self.stopping):
+            reason = self._why_stopped_again(status)
         if reason is not None:
             self._sequence.start(reason)
             self._report_stop(reason)
         return reason is not None
+
+    def _why_stopped_again(self, status: InverterStatus) -> Report | None:
+        """Return why a motor is stopped that was not enabled since its last stop."""
+        if self._runs_unasked(status):
+            return Report(Cause.RUNS_UNASKED)
+        self._ran_at = self._ran_at if self._stands_running(status) else status.at
+        stood_for = status.at - max(self._ran_at, self._control.since)
+        if stood_for < self._sequence.shown_for:
+            return None
+        return self._state.report(Cause.RUN_COMMAND_STANDS)
+
+    def _stands_running(self, status: InverterStatus) -> bool:
+        """Return whether a motor stands while its drive shows a run command."""
+        return status.stands_running and not self.method.reads_run_command
 
     def _runs_unasked(self, status: InverterStatus) -> bool:
         self._stood_at = self._stood_at if status.keeps_running else status.at

@@ -87,6 +87,8 @@ def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -
     cause = None
     if status.state is State.NOT_READY_TO_SWITCH_ON:
         cause = Cause.DRIVE_STARTING
+    elif status.unknown:
+        cause = Cause.UNKNOWN_STATUS
     elif not status.from_bus:
         cause = _why_control_is_lost(state, status)
     elif Fact.RUN_INPUT_MISSING in status.facts:

@@ -168,7 +168,7 @@ class Drive:
 
     @property
     def stop_overdue(self) -> bool:
-        """A stop was not confirmed in time, and no fault keeps the motor still."""
+        """A stop was not confirmed in time, or not at all, and no fault keeps the motor still."""
         return self._controller is not None and self._controller.stop_overdue
 
     @property

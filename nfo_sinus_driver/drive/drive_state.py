@@ -77,8 +77,8 @@ class Turning(NamedTuple):
 
 
 def _turning(model: Family) -> Turning:
-    """Return how: by the frequency, or by the speed where the telegram has only that."""
-    if Role.ACTUAL_FREQUENCY not in model.roles and model.profile.speed_mode is not None:
+    """Return how: by the frequency, or by the speed where there is only that."""
+    if Role.ACTUAL_FREQUENCY not in model.roles and Role.ACTUAL_SPEED in model.roles:
         return Turning(Role.ACTUAL_SPEED, 'rpm', 'Speed', 1 / 60)
     return Turning(Role.ACTUAL_FREQUENCY, 'Hz', 'Freque', 1.0)
 
@@ -272,13 +272,38 @@ class DriveState:
         """Add the frequency to a status, where its word shows no stop, or where it is free."""
         if not (status.by_frequency or self.model.profile.status_word.frequency_beside):
             return self._note_status(status)
+        measured = await self._measured_with(status, self.status, priority, retry=retry)
+        return self._note_status(measured)
+
+    async def measured_with(
+        self, status: InverterStatus, before: InverterStatus | None
+    ) -> InverterStatus:
+        """
+        Return a status with the frequency, measured now unless it has come with it.
+
+        :param before: the last one that was measured; what it fell from is in it.
+        :raises LinkError: the drive does not answer.
+        """
+        has = self.nameplate.has(self.model.key(self.turning.role))
+        if not has or not math.isnan(status.frequency):
+            return status
+        return await self._measured_with(status, before, Priority.LOOK, retry=False)
+
+    async def _measured_with(
+        self,
+        status: InverterStatus,
+        before: InverterStatus | None,
+        priority: Priority,
+        *,
+        retry: bool,
+    ) -> InverterStatus:
         role, hertz = self.turning.role, self.turning.hertz
         try:
             value = await self._measure(self.model.key(role), priority, retry, status)
         except Refused:
             value = math.nan
         self.polled(role, value)
-        return self._note_status(status.with_frequency(value * hertz, self.status))
+        return status.with_frequency(value * hertz, before)
 
     async def _read_int(self, key: str, priority: Priority, retry: bool) -> tuple[int, float]:
         reply = await self.params.read_reply(key, priority, retry=retry)
@@ -580,6 +605,13 @@ class DriveState:
             return 0.0
         return await self.params.read_number(key, Priority.SERVICE)
 
+    async def read_stop_braking(self) -> float:
+        """Read how long the drive brakes a motor that has stopped, s; if unknown, 0."""
+        key = self.model.key(Role.STOP_BRAKING)
+        if not self.nameplate.has(key):
+            return 0.0
+        return await self.params.read_number(key, Priority.LOOK)
+
     @property
     def kind(self) -> Kind:
         """Whether the inverter status is a fault, an alarm or neither."""
@@ -588,7 +620,13 @@ class DriveState:
     @property
     def text(self) -> str:
         """The inverter status as on the display."""
-        return '' if self.status is None else self.nameplate.text_of(self.status.code)
+        return '' if self.status is None else self.text_of(self.status)
+
+    def text_of(self, status: InverterStatus) -> str:
+        """Return a status as on the display; one that the manual does not list, as its number."""
+        if status.unknown and status.code_is_of_word:
+            return f'Unknown status {status.word:04X}h'
+        return self.nameplate.text_of(status.code)
 
     def describe(self) -> str:
         """Return code and text of the inverter status; ``''`` before it was read."""

@@ -144,6 +144,11 @@ class Cause(enum.Enum):
         '({status}); the {enable_input} or the emergency stop keeps it so'
     )
     STOP_CONFIRMED_LATE = 'the stop is confirmed now: {status}'
+    STOP_UNCLEAR = (
+        'the stop is NOT confirmed: {why}, although its run command was removed and it was '
+        'released. Look whether the motor turns: a load may drive it, or what is measured is not '
+        'its speed. Use the {enable_input} or the emergency stop if it is driven'
+    )
     STOP_FORCED = (
         'an ordinary stop did not do ({why}): control was taken from the drive, or its motor was '
         'released ({status}). Find out why it did not stop, and whether another master commands '
@@ -169,6 +174,18 @@ class Cause(enum.Enum):
     TUNING_ENERGISES = 'the motor is energised by a tuning ({status})'
     TUNING_REFUSES = 'the motor is energised by a tuning ({status}): {error}'
     DRIVE_SAYS = 'the drive says {status}'
+    UNKNOWN_STATUS = (
+        'its status ({status}) is none that its manual or its file lists, and shows nothing: look '
+        'at the drive what it does, and check that it is of this model'
+    )
+    RUN_COMMAND_STANDS = (
+        'the run command stands in the drive ({status}), and the next set-point would turn the '
+        'motor'
+    )
+    STILL_TURNS = (
+        'the drive says {status}, and yet the motor turns at {now:.4g} {unit} and does not slow '
+        'down'
+    )
     # --- the motor is stopped by a command, and whose
     STOP_REQUESTED = 'a stop was requested: {by}'
     DISABLE_REQUESTED = 'a disable was requested: {by}'

@@ -582,7 +582,7 @@ def take_snapshot(
         setpoint=state.own_setpoint if watched else setpoint.commanded,
         setpoint_age=setpoint.age,
         setpoint_clamped=setpoint.clamped,
-        text=state.nameplate.text_of(status.code),
+        text=state.text_of(status),
         description=code.description,
         remedy=code.remedy,
         kind=status.kind,

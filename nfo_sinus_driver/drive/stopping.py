@@ -32,6 +32,13 @@ _LONGEST_COMPLAINT_PERIOD = 60.0
 _UNANSWERED_BEFORE_FORCE = 4
 #: The slowest ramp, of 2000 s, shows in the frequency by then, s, however coarse that is.
 _RAMP_SHOWS_BY = 7.0
+#: How long a motor that was released may show its speed without a fall, s, until it is reported
+#: that this is not clear.
+_CLEAR_BY = 2.0
+#: A slower motor stands still, or what is measured fluctuates, Hz.
+_STANDSTILL = 0.5
+#: How long a drive may go on showing its run command at standstill, s, its braking not counted.
+_SHOWN_FOR = 1.5
 _NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
 
 
@@ -46,6 +53,12 @@ class _Outcome(enum.Enum):
     UNCONFIRMED = enum.auto()
     #: A fault keeps the motor still, and the drive refuses the stop until it is over.
     BLOCKED_BY_FAULT = enum.auto()
+    #: The drive has taken all there is and shows no run, but a speed that does not fall.
+    UNCLEAR = enum.auto()
+
+
+#: What ends the tries.
+_ENDS = (_Outcome.CONFIRMED, _Outcome.UNCLEAR)
 
 
 class StopSequence:
@@ -65,6 +78,8 @@ class StopSequence:
         self._task: Task | None = None
         #: How many operations are stopping the motor by other means.
         self._external = 0
+        #: When the stop for the present reasons was begun, s.
+        self._begun_at = math.inf
         #: When the last attempt ended that counts; minus infinity before the first.
         self._tried_at = -math.inf
         #: How often there was a new reason; an earlier attempt does not confirm it.
@@ -75,12 +90,26 @@ class StopSequence:
         self._sent_at = math.inf
         #: From when on an unconfirmed stop is reported.
         self._due = 0.0
-        #: From when on a drive that has taken it and does not confirm it is stopped by force.
-        self._force_at = math.inf
+        #: From when on a drive that has taken it and does not confirm it is stopped by force, and
+        #: when one has first taken that.
+        self._force_at = self._forced_at = math.inf
+        #: When it was first seen that the motor stands and the run command does, too.
+        self._stood_at = math.inf
+        #: How long the drive may go on showing that, s.
+        self.shown_for = _SHOWN_FOR
+        #: The last status with a speed since the stop.
+        self._measured: InverterStatus | None = None
         #: How many attempts in a row the drive has refused, and how many got no answer.
         self._refusals = self._unanswered = 0
         #: The last stop that was confirmed was one by force.
         self.forced = False
+        #: Why it is not clear whether the last one stops the motor; ``None``: it does.
+        self.unclear: Report | None = None
+
+    @property
+    def coasts(self) -> bool:
+        """The last stop left a motor that still turned when its speed was measured last."""
+        return self._measured is not None and abs(self._measured.frequency) > _STANDSTILL
 
     @property
     def overdue(self) -> bool:
@@ -112,9 +141,11 @@ class StopSequence:
         if self._control.blocked and self._bus.now() > self._tried_at + _RETRY_PERIOD:
             self.restart()
         if self._task is None:
+            self._begun_at = self._bus.now()
             self._tried_at = -math.inf
             self._unconfirmed = _NO_ANSWER_YET
-            self._sent_at = self._force_at = math.inf
+            self._sent_at = self._force_at = self._forced_at = self._stood_at = math.inf
+            self._measured = self.unclear = None
             self._refusals = self._unanswered = 0
             self.forced = False
             self._due = self._bus.now() + drive_state.TIMEOUT
@@ -127,7 +158,9 @@ class StopSequence:
             self.start(why)
         else:
             self._tried_at = -math.inf
+            self._begun_at = self._bus.now()
             self._sent_at = math.inf
+            self._measured = None
             self._reasons += 1
             self._control.dispatch(ControlEvent.FAULT_OVER)
             self._bus.wake(self._task)
@@ -154,13 +187,15 @@ class StopSequence:
                 raise DriveError(Cause.STOP_UNCONFIRMED, why=self._unconfirmed)
         if task is not None and task.future.exception() is not None:
             raise DriveError(Cause.STOP_UNCONFIRMED_AT_END)
+        if self.unclear is not None:
+            raise DriveError(self.unclear)
 
     async def _keep_trying(self) -> None:
         complain_at = self._due
         pause = 0.0
         stood = False
         outcome = _Outcome.UNCONFIRMED
-        while (outcome := await self._attempt(outcome)) is not _Outcome.CONFIRMED:
+        while (outcome := await self._attempt(outcome)) not in _ENDS:
             if self._control.blocked:
                 await self._fault_gone()
                 self._due = complain_at = self._bus.now() + drive_state.TIMEOUT
@@ -180,9 +215,12 @@ class StopSequence:
                     )
                 stood = stands
             await self._rest(outcome)
+        if outcome is _Outcome.UNCLEAR:
+            self.unclear = self._state.report(Cause.STOP_UNCLEAR, why=self._unconfirmed)
+            self._state.notify(Severity.ERROR, self.unclear)
         self._task = None
         self._report_end()
-        if pause:
+        if pause and self.unclear is None:
             self._state.notify(Severity.INFO, self._state.report(Cause.STOP_CONFIRMED_LATE))
 
     @property
@@ -193,6 +231,7 @@ class StopSequence:
             return False
         # a code that is not in the manual shows nothing
         shows = status.state is not State.UNKNOWN or status.standby
+        shows = shows and self._unconfirmed.cause is not Cause.STILL_TURNS
         return shows and not (status.driven or status.runs)
 
     async def _fault_gone(self) -> None:
@@ -277,19 +316,25 @@ class StopSequence:
         if failure is None:
             status = await self._newer(status, reasons, self._sent_at)
         if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
-            if await self._method.remove(control_mode) is Removal.COMMAND:
-                return _Outcome.CONFIRMED
+            removed = await self._method.remove(control_mode) is Removal.COMMAND
+            removed_at = self._bus.now()
             # some faults end as control is released
             status = await self._state.read_status(Priority.LOOK, retry=False)
-            if status.faulted:
+            if removed:
+                failure = None
+                self._sent_at = min(self._sent_at, removed_at)
+                status = await self._newer(status, reasons, removed_at)
+            elif status.faulted and not await self.unrest(status):
                 self._unconfirmed = report_of(failure)
                 return _Outcome.BLOCKED_BY_FAULT
-        unconfirmed = self._why_unconfirmed(status, failure)
+        unconfirmed = await self._why_unconfirmed(status, failure)
         if unconfirmed is not None and self._needs_force(status, failure):
             unconfirmed = await self._force(control_mode, reasons, unconfirmed)
         if unconfirmed is None:
             return _Outcome.CONFIRMED
         self._unconfirmed = unconfirmed
+        if unconfirmed.cause is Cause.STILL_TURNS and self._bus.now() > self._forced_at + _CLEAR_BY:
+            return _Outcome.UNCLEAR
         over = isinstance(failure, Refused) and faulted and not status.faulted
         return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED
 
@@ -303,6 +348,9 @@ class StopSequence:
         if failure is not None:
             return True
         shows_at = min(self._sent_at + _RAMP_SHOWS_BY, self._force_at)
+        if status.stands_running:
+            # it may be braked first, or magnetised for a while
+            shows_at = max(shows_at, self._stands_since(status) + self.shown_for)
         # a status from before, kept by a PLC, does not show whether the motor ramps down
         return status.at > self._sent_at and self._bus.now() >= shows_at
 
@@ -314,7 +362,9 @@ class StopSequence:
         if not obeyed:
             return why
         self._sent_at = min(self._sent_at, sent_at)
-        unconfirmed = self._why_unconfirmed(await self._newer(status, reasons, sent_at), None)
+        self._forced_at = min(self._forced_at, sent_at)
+        status = await self._newer(status, reasons, sent_at)
+        unconfirmed = await self._why_unconfirmed(status, None)
         if unconfirmed is None:
             self.forced = True
             self._state.notify(Severity.WARNING, self._state.report(Cause.STOP_FORCED, why=why))
@@ -334,7 +384,9 @@ class StopSequence:
             status = await self._state.read_status(Priority.LOOK, retry=False)
         return status
 
-    def _why_unconfirmed(self, status: InverterStatus, refusal: LinkError | None) -> Report | None:
+    async def _why_unconfirmed(
+        self, status: InverterStatus, refusal: LinkError | None
+    ) -> Report | None:
         """Return why a stop is not confirmed; ``None`` if it is."""
         if status.tuning and refusal:
             return self._state.report(Cause.TUNING_REFUSES, error=str(refusal))
@@ -345,5 +397,40 @@ class StopSequence:
         if refusal is None and status.at < self._sent_at:
             # a PLC with old data goes on showing the status before
             return _NO_ANSWER_YET
-        keeps_running = status.keeps_running_since(self._sent_at)
-        return self._state.report(Cause.DRIVE_SAYS) if keeps_running else None
+        if status.unknown:
+            return self._state.report(Cause.UNKNOWN_STATUS)
+        if status.keeps_running_since(self._sent_at):
+            return self._state.report(Cause.DRIVE_SAYS)
+        return None if status.local else await self.unrest(status)
+
+    async def unrest(self, status: InverterStatus) -> Report | None:
+        """
+        Return what shows that a motor without a run may turn, or may be turned; ``None``: nothing.
+
+        :param status: of a drive that stops, or stands.
+        """
+        if status.runs_by_bus and await self._has_run_command(status):
+            return self._state.report(Cause.RUN_COMMAND_STANDS)
+        if status.driven:
+            # it is on its way
+            return None
+        self._measured = status = await self._state.measured_with(status, self._measured)
+        if not self.coasts or status.falls_since(self._begun_at):
+            return None
+        turning = self._state.turning
+        now = status.frequency / turning.hertz
+        return self._state.report(Cause.STILL_TURNS, now=now, unit=turning.unit)
+
+    async def _has_run_command(self, status: InverterStatus) -> bool:
+        """Return whether a drive that shows a run has a run command, as far as that shows yet."""
+        if self._method.reads_run_command:
+            return await self._method.has_run_command()
+        # on its ramp it shows a run, too
+        braking = await self._state.read_stop_braking()
+        self.shown_for = _SHOWN_FOR + braking
+        return status.at >= self._stands_since(status) + braking
+
+    def _stands_since(self, status: InverterStatus) -> float:
+        """Return when the motor was first seen to stand while a run was shown; infinite: never."""
+        self._stood_at = min(self._stood_at, status.at) if status.stands_running else math.inf
+        return self._stood_at

@@ -224,7 +224,8 @@ class DriveNode(LifecycleNodeMixin, Node):
         """
         drive = self.managed.drive
         confirmed = self._stop_for(what, drive.deactivate)
-        return confirmed or not (drive.stop_unconfirmed and drive.snapshot.connected)
+        turns = drive.stop_unconfirmed or drive.stop_overdue
+        return confirmed or not (turns and drive.snapshot.connected)
 
     def _stop_for(self, what: str, command: Callable[[Report], Future[Any]]) -> bool:
         """Send a command that stops the motor; return whether the drive has confirmed it."""

@@ -48,6 +48,11 @@ class Condition:
         """Return whether it holds with a status word."""
         return (status & self.mask in self.values) is not self.inverted
 
+    @property
+    def names_numbers(self) -> bool:
+        """It names some of the numbers that several bits can be, and says nothing of the others."""
+        return not self.inverted and bool(self.mask & (self.mask - 1))
+
 
 @dataclass(frozen=True)
 class Put:

@@ -25,6 +25,8 @@ class Code(enum.IntEnum):
     ALARM_RUNNING = enum.auto()
     #: A fault whose number the file does not have.
     FAULT = enum.auto()
+    #: A status that the file does not have.
+    UNKNOWN = enum.auto()
 
 
 _STANDS, _RUNS = frozenset({Meaning.BUS_STANDBY}), frozenset({Meaning.BUS_RUNNING})
@@ -41,6 +43,7 @@ _TEXTS: Mapping[Code, tuple[str, str, frozenset[Meaning]]] = {
     ),
     Code.ALARM: ('', '', _STANDS),
     Code.ALARM_RUNNING: ('', '', _RUNS),
+    Code.UNKNOWN: ('Unknown', 'A status that the file of the drive does not list', frozenset()),
 }
 _DRIVEN = (Code.RUNNING, Code.STOPPING, Code.LOCAL_RUNNING, Code.ALARM_RUNNING)
 

@@ -28,6 +28,12 @@ _FACTS = {
 }
 
 
+#: Those that say what the drive does.
+_STATES = ('fault', 'quick_stop', 'stopping', 'running', 'sleeping', 'inhibited', 'ready')
+#: Those of a motor that stands.
+_STANDS = ('inhibited', 'ready')
+
+
 @dataclass(frozen=True)
 class Words(StatusWord):
     """What the status of one drive means; ``facts_of`` has a condition for each fact."""
@@ -95,7 +101,28 @@ def _state(drive: Description, word: int) -> State:
     if says('running') or says('sleeping'):
         # what sleeps keeps the run command and starts again by itself
         return State.OPERATION_ENABLED
-    return State.SWITCH_ON_DISABLED if says('inhibited') else State.READY_TO_SWITCH_ON
+    if says('inhibited'):
+        return State.SWITCH_ON_DISABLED
+    return State.READY_TO_SWITCH_ON if says('ready') or _is_known(drive, word) else State.UNKNOWN
+
+
+def _is_known(drive: Description, word: int) -> bool:
+    """
+    Return whether a status of which no condition says what the drive does is that of one at rest.
+
+    Bits that are clear say that it does nothing. A number that no condition names says nothing; 0
+    is the exception where no number is named for a motor that stands.
+    """
+    numbers = {
+        name: drive.facts[name]
+        for name in _STATES
+        if name in drive.facts and drive.facts[name].names_numbers
+    }
+    standing = [numbers[name] for name in _STANDS if name in numbers]
+    return not any(
+        word & one.mask or any(one.mask & other.mask for other in standing)
+        for one in numbers.values()
+    )
 
 
 def _code(drive: Description, word: int) -> int:
@@ -103,6 +130,8 @@ def _code(drive: Description, word: int) -> int:
     state = _state(drive, word)
     if state in (State.FAULTED, State.FAULT_REACTION_ACTIVE):
         return _fault(drive, word)
+    if state is State.UNKNOWN:
+        return Code.UNKNOWN
     driven = state not in (State.READY_TO_SWITCH_ON, State.SWITCH_ON_DISABLED)
     if drive.tells_control and not is_remote(drive, word):
         return Code.LOCAL_RUNNING if driven else Code.LOCAL

@@ -48,6 +48,8 @@ from nfo_sinus_driver.families.movitrac31.line import (
 from nfo_sinus_driver.families.movitrac31.product import read_if_there
 from nfo_sinus_driver.families.movitrac31.words import Bits
 
+_DIRECTIONS = Bits.CLOCKWISE | Bits.COUNTER_CLOCKWISE
+
 
 class DirectionAndSize(Size, DirectedTarget):
     """A set-point whose size stands in index 223, and whose sign is one of two direction bits."""
@@ -64,6 +66,8 @@ class FunctionBits(ByLine):
     means = 'function bits'
     coasts = True
     stop_ramp = True
+    # standing enabled without a direction may be shown as Enable [C105]
+    reads_run_command = True
     holders: ClassVar[Mapping[Value, Holder]] = {
         words.STANDARD: Holder.LOCAL,
         # terminals start the motor there
@@ -142,6 +146,11 @@ class FunctionBits(ByLine):
         """
         yield from self._stop_by(take_direction(), self.target.zero(retry=False))
 
+    def has_run_command(self) -> Steps[bool]:
+        """Return whether a direction stands in the function bits; false if they are not read."""
+        bits = yield from read_if_there(BITS)
+        return bits is not None and bool(int(bits) & _DIRECTIONS)
+
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once, by controller inhibit; control is kept."""
         inhibit = Write(BITS, int(Bits.CONTROLLER_INHIBIT))
@@ -193,5 +202,5 @@ def _put_back(found: Value) -> Steps[None]:
 def _would_turn() -> Steps[bool]:
     """Return whether function bits and set-point would turn the motor if they counted."""
     bits = yield from read_if_there(BITS)
-    directed = bits is not None and int(bits) & (Bits.CLOCKWISE | Bits.COUNTER_CLOCKWISE)
+    directed = bits is not None and int(bits) & _DIRECTIONS
     return bool(directed) and bool((yield from read_if_there(SIZE)))

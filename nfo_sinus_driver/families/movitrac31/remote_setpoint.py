@@ -52,6 +52,7 @@ class RemoteSetpoint(ByLine):
     """
 
     means = 'the set-point beside the terminals'
+    reads_run_command = True
     holders: ClassVar[Mapping[Value, Holder]] = {
         words.STANDARD: Holder.LOCAL,
         words.REMOTE_SETPOINT: Holder.BUS,
@@ -104,6 +105,11 @@ class RemoteSetpoint(ByLine):
     def stop(self, control_mode: str) -> Steps[None]:
         """Write set-point 0; and take the direction away that function bits may give."""
         yield from self._stop_by(self.target.zero(retry=False), take_direction())
+
+    def has_run_command(self) -> Steps[bool]:
+        """Return false: the terminals go on running the motor, at set-point 0."""
+        yield from ()
+        return False
 
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Write set-point 0, then take control from the terminals, and inhibit the controller."""

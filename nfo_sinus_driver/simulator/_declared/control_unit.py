@@ -56,7 +56,7 @@ class DeclaredControlUnit(ControlUnit):
         self._orders = orders_of(drive)
         self._words: dict[Place, int] = {}
         self._run = self._reverse = self._coasts = self._quick = False
-        self._silent_for = 0.0
+        self._silent_for = self._braked_for = 0.0
         self.local = False
 
     # ---- commands ----
@@ -240,8 +240,14 @@ class DeclaredControlUnit(ControlUnit):
             motor.demand = self._demand
         elif motor.driven:
             motor.demand = 0.0
-            if self._coasts or not self.run_input or motor.at_zero:
+            stopped = motor.at_zero and self._braked_for >= self._braking
+            if self._coasts or not self.run_input or stopped:
                 motor.release()
+
+    @property
+    def _braking(self) -> float:
+        """How long a motor that has stopped is braked by direct current (s)."""
+        return self.memory.number(self.memory.model.roles.get(Role.STOP_BRAKING, ''), 0.0)
 
     @property
     def _demand(self) -> float:
@@ -287,7 +293,9 @@ class DeclaredControlUnit(ControlUnit):
         return self.memory.number(timeout.key) if acts else 0.0
 
     def wait(self, dt: float) -> None:
-        """Count how long the line is silent; stop when that is too long."""
+        """Count how long the motor is braked, and the line is silent: too long, and it stops."""
+        brakes = self.motor.driven and self.motor.at_zero and not self._run
+        self._braked_for = self._braked_for + dt if brakes else 0.0
         self._silent_for += dt
         if self._time_out and self._silent_for > self._time_out and (self._run or self.faults):
             self._silent_for = 0.0

@@ -403,7 +403,8 @@ def test_the_same_thing_has_the_same_key_on_g2_and_optimal() -> None:
 
 def test_roles() -> None:
     # pole pairs follow from its nominal values, and no setting of it is a keypad's control
-    own = {Role.POLE_PAIRS, Role.LOCAL_OPERATION}
+    # and it brakes no motor that has stopped [M2 table 1]
+    own = {Role.POLE_PAIRS, Role.LOCAL_OPERATION, Role.STOP_BRAKING}
     # behind a PLC
     assert set(Role) - set(G2.roles) == own | {Role.TELEGRAM, Role.FAULT_CODE}
     assert set(G2.roles) > set(OPTIMAL.roles)
