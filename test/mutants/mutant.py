@@ -34,6 +34,7 @@ PROFILE = 'nfo_sinus_driver/catalog/profile.py'
 ANY_ORDER = 'test/unit/drive/test_any_order.py'
 EVERY_STEP = 'test/unit/drive/test_every_step_of_a_stop.py'
 LAW_2 = ('test/unit/drive/test_laws.py', '-k', 'rtu and test_2 and stop')
+STOPPED_IS_TRUE = 'test/unit/drive/test_stopped_is_true.py'
 STOP_CONFIRMED = ('test/unit/drive/test_stop_is_confirmed.py',)
 CONTROL_TAKEN = ('test/unit/drive/test_control_is_taken.py',)
 TUNING_BEGINS = (TUNING, '-k', 'any_moment')
