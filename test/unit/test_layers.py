@@ -30,8 +30,8 @@ MAY_USE = {
     'simulator': {'pymodbus'},
     'view': {'rich', 'textual'},
 }
-#: What opens by number, and nothing but /dev/null.
-OPENS_NO_PORT = frozenset({'node/nonblocking_stdio.py'})
+#: What opens by number, and nothing but /dev/null; what opens and locks files.
+OPENS_NO_PORT = frozenset({'node/nonblocking_stdio.py', 'state_folder.py'})
 #: Rooms that are about families and name them.
 NAMES_FAMILIES = {'families', 'simulator'}
 #: Rooms in which serial ports are opened.
@@ -119,7 +119,7 @@ def violations(path: str, source: str) -> Iterator[str]:
     room = room_of(path)
     for name in imports_of(tree, path):
         top = name.partition('.')[0]
-        if top in PORT_MODULES and room not in OPENS_PORTS:
+        if top in PORT_MODULES and room not in OPENS_PORTS and path not in OPENS_NO_PORT:
             yield f'{room} opens ports with {top}'
         known = {PACKAGE, *sys.stdlib_module_names, *MAY_USE.get(room, ())}
         if room not in WITH_ROS and top not in known:
