@@ -1,10 +1,12 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Settings of the property tests, and of the garbage collector."""
+"""Settings of the property tests, and of the garbage collector; a state folder of their own."""
 
 import contextlib
 import gc
+import os
+import tempfile
 
 from hypothesis import HealthCheck, settings
 from support.examples import FULL
@@ -21,6 +23,9 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile('ours')
+# what programs under test remember of simulated drives is not to be found by real ones
+_state = tempfile.TemporaryDirectory(prefix='nfo_state_')
+os.environ['XDG_STATE_HOME'] = _state.name
 #: After how many new objects garbage is looked for; Python's own number makes tests a tenth slower.
 _SELDOM = 50_000
 if not FULL:

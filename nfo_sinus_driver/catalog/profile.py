@@ -555,7 +555,9 @@ class Profile:
     :ivar line: of the factory, by its manual, by the names of the driver's settings.
     :ivar refusals: what exception codes mean that say something of their own; by the code.
     :ivar busy: exception codes by which it says that it may take the request the next moment.
-    :ivar stops_at_timeout: by this value of the role ``stop_at_timeout`` the motor stops.
+    :ivar timeout_conditions: the parameters on which it depends that the motor stops when its own
+        time-out is over, each with the values by which it does, first the one to be written; where
+        there is none, the motor stops.
     :ivar after_write: what makes settings take effect that were written, or keeps them.
     :ivar pole_pairs: of the motor, where no parameter reports them; 0: not known.
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
@@ -591,7 +593,7 @@ class Profile:
     line: Mapping[str, int | str] = field(default_factory=dict)
     refusals: Mapping[int, str] = field(default_factory=dict)
     busy: frozenset[int] = frozenset()
-    stops_at_timeout: Value = True
+    timeout_conditions: Mapping[str, Sequence[Value]] = field(default_factory=dict)
     after_write: Sequence[Write] = ()
     pole_pairs: int = 0
     keeps_run: bool | None = None

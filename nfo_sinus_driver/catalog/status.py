@@ -273,9 +273,8 @@ class Role(_LookedUp):
     NOMINAL_CURRENT = 'nominal_current'
     NOMINAL_POWER_FACTOR = 'nominal_power_factor'
 
-    #: After how long a silence of the line the drive stops the motor by itself, and if it does.
+    #: After how long a silence of the line the drive stops the motor by itself.
     COMMUNICATION_TIMEOUT = 'communication_timeout'
-    STOP_AT_TIMEOUT = 'stop_at_timeout'
     BUS_PROTOCOL = 'bus_protocol'
     BUS_ADDRESS = 'bus_address'
     BAUD_RATE = 'baud_rate'

@@ -302,9 +302,9 @@ def _timeout(model: str) -> str:
     timeout = None if model == AUTO else load_parameter(model, Role.COMMUNICATION_TIMEOUT)
     if timeout is None:
         return ''
-    stop = load_parameter(model, Role.STOP_AT_TIMEOUT)
-    written = timeout.name if stop is None else f'{timeout.name}, and {stop.name} = ON'
-    return _TIMEOUT.format(written=written)
+    family = load_family(model)
+    names = [timeout.name, *(family[key].name for key in family.profile.timeout_conditions)]
+    return _TIMEOUT.format(written=' and '.join(names))
 
 
 def _named(facts: Mapping[str, str]) -> str:

@@ -37,6 +37,7 @@ from nfo_sinus_driver.drive import (
 )
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.link import BusSettings, Refused
+from nfo_sinus_driver.state_folder import StateFolder
 
 _T = TypeVar('_T')
 
@@ -133,6 +134,7 @@ class Session:
                 options.response_timeout,
             ).open()
             self._bus = Bus(link, link.protocol.most_requests)
+            self._memory = StateFolder(options.port)
             self._settings(options.address)
         except ValueError as error:
             raise UsageError(str(error)) from None
@@ -158,7 +160,8 @@ class Session:
     def commanded_drive(self, listener: Listener, **settings: Any) -> Drive:
         """Return the drive that the options name, to be commanded; nothing is sent."""
         try:
-            return Drive(self._bus, self._settings(self._options.address, **settings), listener)
+            wanted = self._settings(self._options.address, **settings)
+            return Drive(self._bus, wanted, listener, self._memory)
         except ValueError as error:
             raise UsageError(str(error)) from None
 

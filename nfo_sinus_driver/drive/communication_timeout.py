@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Mapping
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family, Role, Value
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.link import Refused
 
 
 class CommunicationTimeout:
@@ -23,14 +24,14 @@ class CommunicationTimeout:
         self, params: ParameterAccess, model: Family, has: Callable[[str], bool]
     ) -> None:
         self._params = params
-        self._seconds_key = model.key(Role.COMMUNICATION_TIMEOUT)
-        self._stop_key = model.key(Role.STOP_AT_TIMEOUT)
-        self._stops = model.profile.stops_at_timeout
+        self._key = model.key(Role.COMMUNICATION_TIMEOUT)
+        self._conditions = model.profile.timeout_conditions
+        #: The values of those parameters; ``None``: not known.
+        self._found: dict[str, Value | None] = dict.fromkeys(self._conditions)
         self._has = has
+        self._is_read = False
         #: SioTot, s; 0 turns it off.
         self.seconds = 0.0
-        #: AutoStop: without it the motor runs on when SioTot has passed [C91].
-        self.stops_motor = False
         #: After how long without a heartbeat or guarding the drive reacts, s, and which of both;
         #: 0: it does not.
         self.watched_for = 0.0
@@ -42,9 +43,30 @@ class CommunicationTimeout:
         return min(filter(None, (self.seconds, self.watched_for)), default=0.0)
 
     @property
+    def keys(self) -> tuple[str, ...]:
+        """The parameters that it consists of, and that the drive has; the time first."""
+        return tuple(key for key in (self._key, *self._conditions) if self._has(key))
+
+    @property
     def can_be_set(self) -> bool:
         """The time-out can be read and set over this line."""
-        return self._has(self._seconds_key) and (not self._stop_key or self._has(self._stop_key))
+        return len(self.keys) == 1 + len(self._conditions)
+
+    @property
+    def prevented_by(self) -> Mapping[str, Value | None]:
+        """The parameters by which the motor runs on, with their values; ``None``: not known."""
+        return {
+            key: value for key, value in self._found.items() if value not in self._conditions[key]
+        }
+
+    @property
+    def stops_motor(self) -> bool:
+        """When it is over the drive stops the motor, such as with AutoStop = ON [C91]."""
+        return self._is_read and not self.prevented_by
+
+    def stopping(self, key: str) -> Value:
+        """Return the value of a parameter to be written so that the motor stops."""
+        return self._conditions[key][0]
 
     async def watch(self, seconds: float) -> None:
         """
@@ -56,17 +78,24 @@ class CommunicationTimeout:
         self.watched_for = seconds if self.watched_by else 0.0
 
     async def read(self) -> None:
-        """Read SioTot and AutoStop, where the drive has them."""
+        """Read SioTot, and on what it depends that the motor stops, where the drive has them."""
         if not self.can_be_set:
             return
-        self.seconds = await self._params.read_number(self._seconds_key, Priority.SERVICE)
-        if not self._stop_key:
-            # where no parameter can change that, it stops the motor
-            self.stops_motor = True
-            return
-        data = await self._params.read_data(self._stop_key, Priority.SERVICE)
-        # a code that means neither ON nor OFF is not relied on
-        self.stops_motor = data == self._params.encode(self._stop_key, self._stops)
+        self.seconds = await self._params.read_number(self._key, Priority.SERVICE)
+        for key in self._conditions:
+            self._found[key] = await self._read(key)
+        self._is_read = True
+
+    async def _read(self, key: str) -> Value | None:
+        """Return a value; a code that means none, or one that is refused, is not relied on."""
+        try:
+            return await self._params.read(key, Priority.SERVICE)
+        except ValueError:
+            return None
+        except Refused as error:
+            if error.code == Refused.BUSY:
+                raise
+            return None
 
     def take(self, keys: Collection[str], values: Mapping[str, Value]) -> bool:
         """
@@ -74,8 +103,9 @@ class CommunicationTimeout:
 
         :param values: of all parameters of the drive, by key.
         """
-        if self._seconds_key in keys:
-            self.seconds = float(values[self._seconds_key])
-        if self._stop_key in keys:
-            self.stops_motor = values.get(self._stop_key) == self._stops
-        return self._seconds_key in keys
+        for key in self._conditions:
+            if key in keys:
+                self._found[key] = values.get(key)
+        if self._key in keys:
+            self.seconds = float(values[self._key])
+        return self._key in keys

@@ -23,6 +23,7 @@ from nfo_sinus_driver.drive.error_log import ErrorLog, ErrorLogMonitor
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.fault_name import FaultNamer
 from nfo_sinus_driver.drive.identity import Identity
+from nfo_sinus_driver.drive.memory import Memory, ProcessMemory
 from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters, on_bus
 from nfo_sinus_driver.drive.poller import Poller, take_snapshot
@@ -72,6 +73,7 @@ class Drive:
     the reason: a report whose values name the caller.
 
     :param listener: called with every poll and event, on the worker of the bus.
+    :param memory: keeps what is to be put back in the drive; by default for this process alone.
     :ivar model: what the catalog knows of its family.
     :ivar state: what is known of it; its methods, and those of the following, are for coroutines
         on the bus.
@@ -81,7 +83,13 @@ class Drive:
     :ivar parameters: its settings.
     """
 
-    def __init__(self, bus: Bus, settings: DriveSettings, listener: Listener) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        settings: DriveSettings,
+        listener: Listener,
+        memory: Memory | None = None,
+    ) -> None:
         settings.require_line(bus.protocol)
         self._bus = bus
         self._unit = settings.address
@@ -103,7 +111,7 @@ class Drive:
             self.state, procedures, self.run, self._take_parameters, self._take_scale
         )
         self._watchdog = CommunicationWatchdog(
-            self.state, self.parameters, commanded=self._controller is not None
+            self.state, self.parameters, memory or ProcessMemory(), self._controller
         )
         self.log = ErrorLog(self.state, procedures)
         self._error_log_monitor = ErrorLogMonitor(self.state, self.log)
@@ -288,9 +296,7 @@ class Drive:
             except (LinkError, DriveError) as error:
                 self._watchdog.left(error)
                 raise
-            # whatever has control at this moment: it may come back to the bus by itself
-            goes_on = bool(self._controller.method.control_retained)
-            await self._watchdog.put_back(goes_on=goes_on)
+            await self._watchdog.put_back()
             return answer
         finally:
             self._bus.cancel(self._parameters_task)
@@ -477,6 +483,7 @@ class Drive:
             self._watchdog.connected()
         if not early:
             await self._read_nameplate()
+        await self._watchdog.recall()
         self._poller.connected()
         self.setpoint.connected()
         self.log.connected()

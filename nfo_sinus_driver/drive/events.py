@@ -320,7 +320,7 @@ class Cause(enum.Enum):
     OWN_TIMEOUT_STOPS_NOTHING = (
         'the time-out of the drive itself does not stop the motor '
         + _RUNS_ON.format(
-            why='{name} is {found}', remedy='{call.set_drive_timeout}, which makes it {stops}'
+            why='{found}', remedy='{call.set_drive_timeout}, which sets {wanted}'
         )
     )
     OWN_TIMEOUT_KEPT = (
@@ -356,7 +356,16 @@ class Cause(enum.Enum):
     )
     OWN_TIMEOUT_NOT_PUT_BACK = (
         'the time-out of the drive itself ({name}) stays {timeout:g} s, which this {call.program} '
-        'has set: {why}. Set {key} as it was before, if another master needs that'
+        'has set: {why}. The next clean end puts it back; set {key} as it was before, if another '
+        'master needs that at once'
+    )
+    OWN_TIMEOUT_RECALLED = (
+        'an earlier {call.program} was ended before it could put back the time-out of the drive '
+        'itself ({names}): the end of this one does'
+    )
+    NOT_REMEMBERED = (
+        'what this {call.program} sets in the drive and puts back at its end is not remembered '
+        'elsewhere ({why}): if it is killed, or one before it was, check {keys}'
     )
     OWN_TIMEOUT_NOT_OURS = 'this {call.program} has not set it, and leaves it as it is'
     WATCH_LEFT = (

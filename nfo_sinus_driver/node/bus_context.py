@@ -16,6 +16,7 @@ from std_msgs.msg import Float32
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Report
+from nfo_sinus_driver.drive.memory import Memory
 from nfo_sinus_driver.drive.settings import BLOCK_SIZE
 from nfo_sinus_driver.node.graph_watch import PERIOD, GraphWatch
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
@@ -28,10 +29,16 @@ _LONGEST_GATHERING = 0.1
 
 @dataclass
 class BusContext:
-    """One bus and the drives on it; a request without an answer is repeated ``retries`` times."""
+    """
+    One bus and the drives on it.
+
+    :ivar retries: how often a request without an answer is repeated.
+    :ivar memory: keeps what is to be put back in the drives.
+    """
 
     bus: Bus
     retries: int
+    memory: Memory
     publish_queue: PublishQueue = field(default_factory=PublishQueue)
     setpoint_subscriber: SetpointSubscriber = field(default_factory=SetpointSubscriber)
     #: The names of all drives of the line, those to come too.

@@ -29,6 +29,7 @@ from nfo_sinus_driver.node.qos import RELIABLE
 from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.setting import Setting
+from nfo_sinus_driver.state_folder import StateFolder
 
 _PERIOD = 1.0
 #: How long the start waits for the port to open, and how often that is checked, s.
@@ -55,7 +56,8 @@ class BusNode(Node):
         self._port = settings.port
         link = settings.open()
         limit = settings.max_requests if link.protocol.most_requests else 0.0
-        self.bus_context = BusContext(Bus(link, limit), settings.retries)
+        memory = StateFolder(settings.port)
+        self.bus_context = BusContext(Bus(link, limit), settings.retries, memory)
         AllDrives(self, self.bus_context)
         self.bus_context.subscribe(self, {'~/setpoint_all': (Float32, self._on_setpoint_all)})
         publish_queue = self.bus_context.publish_queue

@@ -99,6 +99,7 @@ class DriveNode(LifecycleNodeMixin, Node):
                 lambda: self.get_parameter('scale').value, lambda: self.get_parameter('unit').value
             ),
             context.bus,
+            context.memory,
             self._drive_settings(values),
             reporter,
             self.lifecycle,

@@ -12,6 +12,7 @@ import dataclasses
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Drive, DriveSettings, Listener, Report
 from nfo_sinus_driver.drive.detect import detect_model
+from nfo_sinus_driver.drive.memory import Memory
 from nfo_sinus_driver.drive.settings import AUTO
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.scale import Scale
@@ -44,6 +45,7 @@ class ManagedDrive:
         wording: Wording,
         scale: Scale,
         bus: Bus,
+        memory: Memory,
         settings: DriveSettings,
         listener: Listener,
         lifecycle: Lifecycle,
@@ -53,6 +55,7 @@ class ManagedDrive:
         self.wording = wording
         self.scale = scale
         self._bus = bus
+        self._memory = memory
         self._settings = settings
         self._listener = listener
         self._lifecycle = lifecycle
@@ -147,7 +150,7 @@ class ManagedDrive:
         return self._drive.disconnect(self._settings.shutdown_timeout, why)
 
     def _make_drive(self) -> Drive:
-        drive = Drive(self._bus, self._concrete, self._listener)
+        drive = Drive(self._bus, self._concrete, self._listener, self._memory)
         drive.on_stop(self._on_stop)
         return drive
 

@@ -393,7 +393,7 @@ LAWS = (
         (INTERFACE, '-k', 'monitor'),
         # the watchdog refuses a monitor, and so does every write of a setting
         (
-            (DRIVE, 'commanded=self._controller is not None', 'commanded=True'),
+            (WATCHDOG, '        if self._controller is None:\n', '        if False:\n'),
             (WRITER, "    if settings.method == 'monitor':", '    if False:'),
         ),
     ),
@@ -412,6 +412,47 @@ LAWS = (
         '        self._unasked = True\n',
         '',
         ('test/unit/drive/test_own_timeout.py', '-k', 'as_it_was_found and rtu'),
+    ),
+    Mutant(
+        9,
+        'what a killed driver has set is taken for a choice of the owner',
+        DRIVE,
+        '        await self._watchdog.recall()\n',
+        '',
+        ('test/unit/drive/test_own_timeout.py', '-k', 'after_one_that_was_killed and rtu'),
+    ),
+    Mutant(
+        9,
+        'what is put back at the end is remembered too late',
+        WATCHDOG,
+        '        await self._remember()\n        return await self._change(wanted)\n',
+        '        changes = await self._change(wanted)\n'
+        '        await self._remember()\n        return changes\n',
+        ('test/unit/drive/test_own_timeout.py', '-k', 'remembered_before and rtu'),
+    ),
+    Mutant(
+        9,
+        'what a driver that runs has set is put back by another program',
+        'nfo_sinus_driver/state_folder.py',
+        '    except BlockingIOError:\n        return False',
+        '    except BlockingIOError:\n        return True',
+        ('test/unit/test_state_folder.py', '-k', 'its_own_until'),
+    ),
+    Mutant(
+        9,
+        'a drive that does not stop its motor by itself is said to',
+        'nfo_sinus_driver/drive/communication_timeout.py',
+        'return self._is_read and not self.prevented_by',
+        'return self._is_read',
+        ('test/unit/drive/test_described_oddities.py', '-k', 'all_that_it_depends_on'),
+    ),
+    Mutant(
+        9,
+        'a way to stop that the owner has chosen is overwritten',
+        'nfo_sinus_driver/drive/communication_timeout.py',
+        'if value not in self._conditions[key]',
+        'if value != self._conditions[key][0]',
+        ('test/unit/drive/test_described_oddities.py', '-k', 'all_that_it_depends_on'),
     ),
     Mutant(
         9,
@@ -434,7 +475,7 @@ LAWS = (
         'an end without a confirmed stop takes the time-out of the drive away',
         DRIVE,
         '                self._watchdog.left(error)\n',
-        '                await self._watchdog.put_back(goes_on=True)\n',
+        '                await self._watchdog.put_back()\n',
         ('test/unit/drive/test_own_timeout.py', '-k', 'without_a_confirmed_stop and rtu'),
     ),
     Mutant(
@@ -643,9 +684,9 @@ LAWS = (
     Mutant(
         9,
         'a time-out goes on where control is kept',
-        'nfo_sinus_driver/drive/drive.py',
-        'goes_on = bool(self._controller.method.control_retained)',
-        'goes_on = False',
+        WATCHDOG,
+        'return self._controller is not None and bool(self._controller.method.control_retained)',
+        'return False',
         ('test/unit/drive/test_movitrac_commands.py', '-k', 'clean_end'),
     ),
     Mutant(

@@ -221,7 +221,9 @@ class Bench(contextlib.ExitStack):
         else:
             self.port = self.line['link'] = str(folder / 'line')
         self.trace = folder / 'trace.jsonl'
-        self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
+        self._environment = {
+            **os.environ, 'ROS_DOMAIN_ID': str(domain), 'XDG_STATE_HOME': str(folder / 'state'),
+        }
         if connection.method == 'telegram1':
             self._environment[forks.PLC_TIME] = str(_PLC_TIME)
         self.domain = domain

@@ -141,6 +141,31 @@ def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
     assert state['fault'], 'the drive stopped for another reason'
 
 
+@needs('sio_tot')
+def test_the_driver_after_one_that_was_killed_puts_back_what_that_one_has_found(
+    bench: Bench,
+) -> None:
+    drive = bench.simulator(*bench.drives.ramps(1), *bench.drives.timeout(8.0))
+    settings = ('-p', 'drive_timeout:=-1.0', '-p', 'lost_after:=3.0')
+    driver = bench.driver(*settings)
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        assert bench.drives.has_timeout(drive.state(), 3.5)
+        driver.signal(signal.SIGKILL)
+        assert driver.wait() == -signal.SIGKILL
+        state = drive.wait_for(lambda state: not state['driven'], timeout=PATIENCE)
+    assert bench.drives.has_timeout(state, 3.5)
+    driver = bench.driver(*settings)
+    wait_until(lambda: 'was ended before it could put back' in bench.log, 'it is recalled')
+    client = bench.client().connected()
+    assert client.call('fault_ack').success
+    # older firmware takes settings only while the bus has control
+    assert client.call('enable', SetBool, data=True).success
+    driver.signal(signal.SIGTERM)
+    assert driver.wait() == 0, driver.text
+    assert bench.drives.has_timeout(drive.state(), 8.0)
+
+
 @needs('timeout')
 def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(1))

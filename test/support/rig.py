@@ -32,6 +32,7 @@ from nfo_sinus_driver.drive import (
     Telemetry,
 )
 from nfo_sinus_driver.drive.control_state import ControlState
+from nfo_sinus_driver.drive.memory import Memory, ProcessMemory
 from nfo_sinus_driver.link import Address, Refused, Reply
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from support import telegram_laws, trace_laws
@@ -198,6 +199,7 @@ class Rig:
     :ivar asked: every request, as ``meet`` has it, and its drive; what is read before a write in
         one piece stands as two.
     :ivar acknowledged: how often the test itself has a fault acknowledged.
+    :ivar memory: what the driver that begins after one that was killed finds.
     """
 
     def __init__(
@@ -252,6 +254,7 @@ class Rig:
         self.meet: Callable[[str, bytes | None], str | None] = lambda key, data: None
         self.asked: list[tuple[int, str, bytes | None]] = []
         self.acknowledged = 0
+        self.memory: Memory = ProcessMemory()
         self._broken: AssertionError | None = None
         self._program: Callable[[], None] | None = None
         self._program_at = 0.0
@@ -263,7 +266,7 @@ class Rig:
         self.notes_of = {address: Notes(self.clock) for address in self.fars}
         self.bus = Bus(self.link, now=self.clock.monotonic)
         self.drives = {
-            address: Drive(self.bus, settings, self.notes_of[address])
+            address: Drive(self.bus, settings, self.notes_of[address], self.memory)
             for address, settings in self._settings.items()
         }
         self._keys = {address: self._places(drive) for address, drive in self.drives.items()}

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from nfo_sinus_driver import families
-from nfo_sinus_driver.catalog import Role, load_family
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.catalog.declared import SUFFIX, Description, read
 
 _HARDEST = {
@@ -60,7 +60,6 @@ def ramps(model: str, up: float, down: float) -> dict[str, float]:
 
 
 def stopping_at_timeout(model: str, method: str) -> dict[str, Any]:
-    """Return the setting of a drive by which its own time-out stops the motor, if there is one."""
-    family = load_family(model, method)
-    key = family.key(Role.STOP_AT_TIMEOUT)
-    return {key: family.profile.stops_at_timeout} if key else {}
+    """Return the settings of a drive by which its own time-out stops the motor."""
+    conditions = load_family(model, method).profile.timeout_conditions
+    return {key: values[0] for key, values in conditions.items()}

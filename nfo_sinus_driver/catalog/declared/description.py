@@ -241,11 +241,16 @@ class LineDefaults:
 
 @dataclass(frozen=True)
 class Timeout:
-    """The drive's own time-out: its parameter, and what it does then, if that can be chosen."""
+    """
+    The drive's own time-out.
+
+    :ivar key: its parameter.
+    :ivar conditions: the parameters on which it depends that the motor stops then, each with the
+        values by which it does, first the one to be written.
+    """
 
     key: str
-    action: str = ''
-    stops: Value = True
+    conditions: Mapping[str, Sequence[Value]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -334,12 +334,28 @@ class _Reader:
             return None
         if settings.parameters[key].access is not Access.READ_WRITE:
             self._problems.add(node.line, f'{key} has to be written and read (access: rw)')
-        action = node.get('action')
-        what = settings.known(action.get('parameter'))
-        if not what:
-            return Timeout(key)
-        stops: Value | None = settings.value(what, action['stops'])
-        return Timeout(key, what, True if stops is None else stops)
+        conditions: dict[str, Sequence[Value]] = {}
+        action = [node['action']] if 'action' in node else []
+        for one in (*action, *node.get('requires').items):
+            what = settings.known(one['parameter'])
+            if what == key or what in conditions:
+                self._problems.add(one.line, f'{what} stands in timeout twice')
+            elif what:
+                conditions[what] = tuple(self._timeout_values(one, what, settings))
+        return Timeout(key, conditions)
+
+    def _timeout_values(self, node: Node, key: str, settings: Settings) -> Iterator[Value]:
+        """Yield the values of a condition of the time-out; it has to have some."""
+        if settings.parameters[key].access is not Access.READ_WRITE:
+            self._problems.add(node.line, f'{key} has to be written and read (access: rw)')
+        given = [node[name] for name in ('stops', 'value', 'values') if name in node]
+        if len(given) != 1:
+            self._problems.add(node.line, f'{key}: one of value and values is needed')
+            return
+        for one in given[0].items or [given[0]]:
+            value = settings.value(key, one)
+            if value is not None:
+                yield value
 
 
 _UNITS = {

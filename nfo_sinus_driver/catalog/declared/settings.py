@@ -173,10 +173,9 @@ def with_scale(node: Node, parameter: Parameter) -> Parameter:
 def role_parameters(root: Node) -> Mapping[Role, str]:
     """Return the roles that other sections give to parameters."""
     roles: dict[Role, str] = {}
-    timeout, holder = root.get('timeout'), root['control'].get('holder')
+    holder = root['control'].get('holder')
     for role, node in (
-        (Role.COMMUNICATION_TIMEOUT, timeout.get('parameter')),
-        (Role.STOP_AT_TIMEOUT, timeout.get('action').get('parameter')),
+        (Role.COMMUNICATION_TIMEOUT, root.get('timeout').get('parameter')),
         (Role.CONTROL_SOURCE, holder.get('parameter')),
         (Role.STOP_MODE, root['control'].get('stop_mode').get('parameter')),
     ):

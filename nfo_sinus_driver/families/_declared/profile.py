@@ -249,7 +249,7 @@ def profile_of(drive: Description) -> Profile:
         line=drive.line.factory,
         refusals=drive.line.exceptions,
         busy=drive.line.busy,
-        stops_at_timeout=True if drive.timeout is None else drive.timeout.stops,
+        timeout_conditions={} if drive.timeout is None else drive.timeout.conditions,
         pole_pairs=drive.pole_pairs,
         keeps_run=drive.keeps_run,
         after_write=tuple(Write(step.key, step.raw) for step in drive.after_write),

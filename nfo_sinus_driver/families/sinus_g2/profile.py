@@ -510,6 +510,8 @@ PROFILE = Profile(
         factors={'status.trq_act': Fraction(1, 10)},
     ),
     most=MOST,
+    # with OFF the motor runs on, whatever SioTot is ([M0 §5.3.5], [C91])
+    timeout_conditions={'serial.auto_stop': (True,)},
     # a module with a drive profile need not have them [M0 §7]
     may_lack={'canopen': DriveControl.needs},
     # before it code 1 is another format ([C3], [C5])

@@ -289,7 +289,7 @@ class DeclaredControlUnit(ControlUnit):
         timeout = self._drive.timeout
         if timeout is None:
             return 0.0
-        acts = not timeout.action or self.memory.get(timeout.action) == timeout.stops
+        acts = all(self.memory.get(key) in stops for key, stops in timeout.conditions.items())
         return self.memory.number(timeout.key) if acts else 0.0
 
     def wait(self, dt: float) -> None:

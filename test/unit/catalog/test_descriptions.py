@@ -335,6 +335,32 @@ BAD = {
     'a unit of another kind': ('unit: Hz, most', 'unit: km/h, most', 'choose one of Hz, rpm'),
     'a parameter that is none': ('timeout: {parameter: serial.timeout}',
                                  'timeout: {parameter: serial.tiemout}', 'none of the parameters'),
+    **{
+        name: (
+            'timeout: {parameter: serial.timeout}',
+            'timeout: {parameter: serial.timeout, ' + more + '}',
+            said,
+        )
+        for name, more, said in (
+            ('a time-out that requires what is no parameter',
+             'requires: [{parameter: source.bus, value: Bus}]', 'none of the parameters'),
+            ('a time-out that requires no value',
+             'requires: [{parameter: source.command}]', 'one of value and values'),
+            ('a time-out that requires a value twice',
+             'requires: [{parameter: source.command, value: Bus, values: [Bus]}]', 'one of value'),
+            ('a time-out that requires a value that is none',
+             'requires: [{parameter: source.command, values: [Panel]}]', 'none of Keypad, Bus'),
+            ('a time-out that requires one thing twice',
+             'action: {parameter: source.command, stops: Bus}, '
+             'requires: [{parameter: source.command, value: Bus}]', 'stands in timeout twice'),
+            ('a time-out that requires itself',
+             'requires: [{parameter: serial.timeout, value: 2}]', 'stands in timeout twice'),
+            ('a time-out that stops by nothing',
+             'action: {parameter: source.command, stops: []}', 'it needs 1 or more'),
+            ('a time-out that stops by a list of lists',
+             'action: {parameter: source.command, stops: [[Bus]]}', 'has to be'),
+        )
+    },
     'a choice that is none': ('value: Bus}', 'value: Panel}', 'none of Keypad, Bus'),
     'minimum above maximum': ('minimum: 0.1, maximum: 60', 'minimum: 60, maximum: 1', 'below'),
     'a maximum too great': ('maximum: 60', 'maximum: 7000', 'does not fit'),

@@ -54,6 +54,12 @@ def nfo(
 
 
 @pytest.fixture(autouse=True)
+def remembered_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test finds what another one has left in a drive of the same serial number."""
+    monkeypatch.setenv('XDG_STATE_HOME', str(tmp_path / 'state'))
+
+
+@pytest.fixture(autouse=True)
 def signals_as_before() -> Iterator[None]:
     """The command leaves the signals as it found them."""
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

@@ -21,6 +21,8 @@ from typing import Any
 from cli_bench import COMMAND, PATIENCE, QUICK, ROOT, Bench, Done, MakeBench, wait_until
 import pytest
 
+from nfo_sinus_driver.state_folder import StateFolder
+
 Nfo = Callable[..., Done]
 RUN = (0x02, 0x98)
 OPTIMAL = {'model': 'sinus_optimal', 'serial_numbers': []}
@@ -124,7 +126,7 @@ def test_the_set_point_stays_fresh(bench: Bench) -> None:
 
 @pytest.mark.parametrize(
     ('typed', 'why'),
-    [((), 'AutoStop is OFF'), (('--drive-timeout', 0), 'SioTot is 0, and --drive-timeout 0 leav')],
+    [((), 'AutoStop = OFF'), (('--drive-timeout', 0), 'SioTot is 0, and --drive-timeout 0 leav')],
 )
 def test_it_warns_once_of_a_drive_without_a_time_out(
     make_bench: MakeBench, typed: tuple[object, ...], why: str
@@ -151,6 +153,40 @@ def test_by_default_a_time_out_that_may_stop_the_motor_is_set_for_the_run(
         _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0 and 'time-out' not in err
     assert bench.value('serial.sio_tot') == 0.0
+
+
+def test_what_a_run_that_was_killed_has_set_the_next_end_puts_back(make_bench: MakeBench) -> None:
+    bench = make_bench(settings={**QUICK, 'serial.auto_stop': True})
+    with bench.running('--for', 60) as process:
+        wait_until(lambda: bench.value('serial.sio_tot') == 2.0)
+        process.kill()
+    wait_until(lambda: bench.state()['fault'])
+    assert bench.run('ack').status == 0
+    assert bench.value('serial.sio_tot') == 0.0
+
+
+def test_a_command_leaves_alone_what_a_driver_that_runs_has_set(make_bench: MakeBench) -> None:
+    settings = {**QUICK, 'serial.auto_stop': True, 'serial.sio_tot': 2.0}
+    bench = make_bench(settings=settings)
+    borrowed = {'serial.sio_tot': (0.0, 2.0)}
+    driver = StateFolder('')
+    driver.write('sinus_g2 NFO1001', borrowed).result(PATIENCE)
+    assert bench.run('run', 10, '--for', 0.3).status == 0
+    assert bench.value('serial.sio_tot') == 2.0
+    assert driver.read('sinus_g2 NFO1001').result(PATIENCE) == borrowed
+
+
+@pytest.mark.parametrize('where', ['no home', 'a file'])
+def test_without_a_folder_to_remember_in_it_runs_and_says_what_to_check(
+    make_bench: MakeBench, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    bench = make_bench(settings={**QUICK, 'serial.auto_stop': True})
+    monkeypatch.setenv('XDG_STATE_HOME', '' if where == 'no home' else __file__)
+    monkeypatch.delenv('HOME', raising=False)
+    done = bench.run('run', 10, '--for', 0.3)
+    assert done.status == 0 and bench.value('serial.sio_tot') == 0.0
+    assert done.err.count('is not remembered') == 1
+    assert 'check serial.sio_tot' in done.err
 
 
 def test_json(bench: Bench) -> None:

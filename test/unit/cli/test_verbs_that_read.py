@@ -279,7 +279,7 @@ def test_scan_writes_a_parameter_file_for_the_driver(
             'ros__parameters': {'address': 2, 'model': 'sinus_g2', 'drive_timeout': 2.0}
         },
     }
-    assert 'writes it to the drive (SioTot, and AutoStop = ON)' in file.read_text()
+    assert 'writes it to the drive (SioTot and AutoStop)' in file.read_text()
     assert '# NFO Sinus 1.50/400, firmware 4.38 / 4018, serial NFO1001\n' in file.read_text()
     # it may have been edited since
     file.write_text('mine')

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.described import DescribedRig
+from support.described import SHIPPED, DescribedRig
 import yaml
 
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 from nfo_sinus_driver.simulator.memory import Refused
 
 #: A drive without peculiarities; of each odd one, what is otherwise.
@@ -406,6 +407,149 @@ def test_its_own_time_out_is_set_and_stops_it_when_the_driver_is_gone(tmp_path: 
         assert not rig.far.motor.turning
         rig.begin()
         rig.connect()
+
+
+#: A time-out that stops the motor only if three other settings are so.
+WITH_CONDITIONS: dict[str, Any] = {
+    'parameters': {
+        **PLAIN['parameters'],
+        'serial.timeout': {'register': 52, 'factor': 0.1, 'unit': 's', 'default': 6},
+        'serial.action': {
+            'register': 53, 'name': 'C1', 'choices': {0: 'Warn', 1: 'Ramp', 2: 'Coast'},
+        },
+        'serial.detection': {'register': 54, 'name': 'C2', 'choices': {0: 'OFF', 1: 'ON'}},
+        'serial.watches': {'register': 55, 'name': 'C3', 'maximum': 9},
+    },
+    'timeout': {
+        'parameter': 'serial.timeout',
+        'action': {'parameter': 'serial.action', 'stops': ['Ramp', 'Coast']},
+        'requires': [
+            {'parameter': 'serial.detection', 'value': 'ON'},
+            {'parameter': 'serial.watches', 'values': [2, 3]},
+        ],
+    },
+}
+ALL_MET = {'serial.action': 'Coast', 'serial.detection': True, 'serial.watches': 3}
+
+
+def runs_on_after_a_kill(rig: DescribedRig) -> bool:
+    """Return whether the motor of a driver that is killed turns after its drive's time-out."""
+    rig.follow(20.0)
+    rig.kill()
+    rig.line.go_to(rig.clock.now + 10.0)
+    return rig.turns
+
+
+@pytest.mark.parametrize(
+    ('unmet', 'said', 'sets'),
+    [
+        ({}, '', {}),
+        ({'serial.action': 'Warn'}, 'C1 = Warn', {'serial.action': 'Ramp'}),
+        ({'serial.detection': False}, 'C2 = OFF', {'serial.detection': True}),
+        ({'serial.watches': 7}, 'C3 = 7', {'serial.watches': 2}),
+        (
+            {'serial.action': 'Warn', 'serial.detection': False, 'serial.watches': 0},
+            'C1 = Warn, C2 = OFF, C3 = 0',
+            {'serial.action': 'Ramp', 'serial.detection': True, 'serial.watches': 2},
+        ),
+    ],
+)
+def test_a_time_out_stops_the_motor_only_if_all_that_it_depends_on_is_so(
+    tmp_path: Path, unmet: dict[str, Any], said: str, sets: dict[str, Any]
+) -> None:
+    file = described(tmp_path, **WITH_CONDITIONS)
+    found = {'serial.timeout': 6.0, **ALL_MET, **unmet}
+    # by default it is the owner's choice, and what follows of it is said
+    with DescribedRig(file, parameters=found, drive_timeout=AS_THE_DRIVE_CAN) as rig:
+        rig.connect()
+        warned = rig.notes.said(Cause.OWN_TIMEOUT_STOPS_NOTHING, Severity.WARNING)
+        assert warned == bool(unmet) and (not warned or rig.notes.said(f'({said})'))
+        rig.enable()
+        assert rig.notes.said(Cause.OWN_TIMEOUT_SET) == (not unmet)
+        assert runs_on_after_a_kill(rig) == bool(unmet)
+        assert {key: rig.far.peek(key) for key in ALL_MET} == {**ALL_MET, **unmet}
+    # asked for, it is set; a choice of the owner by which it stops is left
+    with DescribedRig(file, parameters=found, drive_timeout=2.0) as rig:
+        rig.connect()
+        rig.enable()
+        assert rig.notes.said(Cause.OWN_TIMEOUT_SET)
+        assert {key: rig.far.peek(key) for key in ALL_MET} == {**ALL_MET, **sets}
+        assert not runs_on_after_a_kill(rig)
+        rig.begin()
+        rig.connect()
+        # put back, for nothing in this file gives control back
+        rig.answer(rig.drive.disconnect(4.0))
+        assert {key: rig.far.peek(key) for key in found} == found
+
+
+def test_a_condition_that_cannot_be_read_is_not_met(tmp_path: Path) -> None:
+    file = described(tmp_path, **WITH_CONDITIONS)
+    found = {'serial.timeout': 6.0, **ALL_MET}
+    with DescribedRig(file, parameters=found, drive_timeout=AS_THE_DRIVE_CAN) as rig:
+        rig.spoil('refused', 'serial.detection', 1000, written=False)
+        rig.connect()
+        assert rig.notes.said('(C2 = ?)')
+        rig.enable()
+        assert not rig.notes.said(Cause.OWN_TIMEOUT_SET)
+        rig.reset(drive_timeout=2.0)
+        rig.kill()
+        rig.begin()
+        rig.connect()
+        assert 'serial.detection' in rig.answer(rig.drive.enable())
+        assert not rig.drive.following
+
+
+@pytest.mark.parametrize('drive_timeout', [AS_THE_DRIVE_CAN, 2.0])
+def test_a_condition_that_changes_meanwhile_is_noticed_by_the_next_enable(
+    tmp_path: Path, drive_timeout: float
+) -> None:
+    file = described(tmp_path, **WITH_CONDITIONS)
+    found = {'serial.timeout': 6.0, **ALL_MET}
+    with DescribedRig(file, parameters=found, drive_timeout=drive_timeout) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        rig.answer(rig.drive.stop())
+        assert not rig.notes.said(Cause.OWN_TIMEOUT_STOPS_NOTHING)
+        rig.far.set_from_keypad('serial.detection', False)
+        rig.pass_time(15.0)
+        rig.enable()
+        left = drive_timeout == AS_THE_DRIVE_CAN
+        assert rig.notes.said(Cause.OWN_TIMEOUT_STOPS_NOTHING, Severity.WARNING) == left
+        assert rig.far.peek('serial.detection') is not left
+        assert runs_on_after_a_kill(rig) == left
+
+
+#: What a shipped drive is set to, and whether the motor runs on after a kill.
+@pytest.mark.parametrize(
+    ('name', 'found', 'stops'),
+    [
+        ('schneider_atv12', {'serial.fault': 'Ignore'}, False),
+        ('schneider_atv12', {'serial.fault': 'Speed kept'}, False),
+        ('schneider_atv12', {}, True),
+        ('schneider_atv12', {'serial.fault': 'Fast stop'}, True),
+        ('yaskawa_v1000', {'serial.fault': 'Continue'}, False),
+        ('yaskawa_v1000', {'serial.fault': 'Coast', 'serial.detection': 'Disabled'}, False),
+        ('yaskawa_v1000', {'serial.fault': 'Coast'}, True),
+        ('yaskawa_v1000', {'serial.fault': 'Fast stop'}, True),
+        ('delta_ms300', {'serial.fault': 'Coast'}, True),
+        ('delta_vfd_el', {'serial.fault': 'Coast'}, True),
+        ('danfoss_fc101', {'serial.fault': 'Stop and trip'}, True),
+        ('danfoss_fc101', {'serial.fault': 'Freeze output'}, False),
+    ],
+)
+def test_a_shipped_drive_that_does_not_stop_by_itself_is_not_told_to(
+    name: str, found: dict[str, Any], stops: bool
+) -> None:
+    settings = {'serial.timeout': 6.0, **found}
+    for timeout in (AS_THE_DRIVE_CAN, 2.0):
+        with DescribedRig(SHIPPED[name], parameters=settings, drive_timeout=timeout) as rig:
+            rig.connect()
+            rig.enable()
+            sure = stops or timeout > 0
+            assert rig.notes.said(Cause.OWN_TIMEOUT_SET) == sure
+            if stops and found:
+                assert rig.far.peek('serial.fault') == found['serial.fault']
+            assert runs_on_after_a_kill(rig) != sure
 
 
 def test_a_drive_that_ignores_commands_in_local_is_not_taken_for_enabled(tmp_path: Path) -> None:

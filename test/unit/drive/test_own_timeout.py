@@ -17,6 +17,7 @@ from support.variants import ramps
 
 from nfo_sinus_driver.catalog import Role, load_family
 from nfo_sinus_driver.drive import Cause, Severity, StopReason
+from nfo_sinus_driver.drive.memory import ProcessMemory
 from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 
 #: How soon after its time-out a motor has to stand, s.
@@ -154,7 +155,7 @@ def test_9_an_end_without_a_confirmed_stop_leaves_the_drive_to_stop_by_itself(
 @timed
 def test_9_by_default_a_time_out_that_may_not_stop_the_motor_is_left_alone(connection: str) -> None:
     model = load_family(CONNECTIONS[connection].model, CONNECTIONS[connection].method)
-    if not model.key(Role.STOP_AT_TIMEOUT):
+    if not model.profile.timeout_conditions:
         pytest.skip('it always stops the motor')
     with Rig(connection, drive_timeout=AS_THE_DRIVE_CAN) as rig:
         rig.connect()
@@ -215,3 +216,243 @@ def test_9_a_stop_that_comes_while_the_time_out_is_set_is_no_later_and_undoes_it
         assert not rig.drive.following and not rig.turns
         rig.answer(rig.drive.disconnect(4.0))
         assert own_timeout(rig) == 0.0
+
+
+# --- a driver that was killed ---------------------------------------------------------------------
+
+
+def enable_and_kill(rig: Rig) -> None:
+    """Enable a drive whose motor an earlier driver may have left running, and kill the driver."""
+    rig.connect()
+    rig.wait_until(lambda: not rig.drive.stop_unconfirmed)
+    rig.enable()
+    assert own_timeout(rig) == 2.0
+    rig.kill()
+    rig.pass_time(0.5)
+    rig.begin()
+
+
+def end(rig: Rig) -> None:
+    """End the driver as a signal does."""
+    rig.answer(rig.drive.stop_for_good(4.0))
+    rig.answer(rig.drive.disconnect(4.0))
+
+
+@timed
+@pytest.mark.parametrize('found', [0.0, 6.0])
+@pytest.mark.parametrize('enabled_again', [False, True])
+def test_9_the_end_after_one_that_was_killed_leaves_the_time_out_as_the_first_found_it(
+    connection: str, found: float, enabled_again: bool
+) -> None:
+    with by_default(connection, found) as rig:
+        for _ in range(2):
+            enable_and_kill(rig)
+        rig.connect()
+        assert rig.notes.said(Cause.OWN_TIMEOUT_RECALLED, Severity.INFO)
+        if enabled_again:
+            rig.wait_until(lambda: not rig.drive.stop_unconfirmed)
+            rig.enable()
+            assert own_timeout(rig) == 2.0
+        end(rig)
+        assert own_timeout(rig) == found
+        rig.begin()
+        rig.connect()
+        assert not rig.notes.said(Cause.OWN_TIMEOUT_RECALLED)
+
+
+@pytest.mark.parametrize('connection', ['rtu', 'movitrac', 'described'])
+@pytest.mark.parametrize('changed_to', [0.0, 6.0])
+def test_9_a_time_out_that_the_owner_has_changed_since_is_the_owners(
+    connection: str, changed_to: float
+) -> None:
+    with by_default(connection, 8.0) as rig:
+        enable_and_kill(rig)
+        rig.far.set_from_keypad(rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT), changed_to)
+        rig.connect()
+        rig.wait_until(lambda: not rig.drive.stop_unconfirmed)
+        rig.enable()
+        assert own_timeout(rig) == 2.0
+        # in this session, too
+        rig.answer(rig.drive.stop())
+        rig.far.set_from_keypad(rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT), 9.0)
+        end(rig)
+        assert own_timeout(rig) == 9.0
+
+
+@pytest.mark.parametrize('connection', ['rtu', 'movitrac'])
+def test_9_a_time_out_that_the_owner_has_changed_and_an_enable_has_set_again_is_the_owners(
+    connection: str,
+) -> None:
+    with by_default(connection, 8.0) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        rig.answer(rig.drive.stop())
+        rig.far.set_from_keypad(rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT), 9.0)
+        rig.pass_time(15.0)
+        rig.enable()
+        assert own_timeout(rig) == 2.0
+        end(rig)
+        assert own_timeout(rig) == 9.0
+
+
+def test_9_a_time_out_that_a_setting_wants_stays_after_a_kill_as_after_an_end() -> None:
+    with by_default('rtu', 0.0) as rig:
+        enable_and_kill(rig)
+        rig.reset(drive_timeout=2.0)
+        rig.begin()
+        enable_and_kill(rig)
+        rig.reset(drive_timeout=AS_THE_DRIVE_CAN)
+        rig.begin()
+        rig.connect()
+        end(rig)
+        assert own_timeout(rig) == 2.0
+
+
+@pytest.mark.parametrize('connection', ['movitrac', 'described'])
+def test_9_where_the_bus_keeps_control_what_a_setting_wants_is_put_back_after_a_kill(
+    connection: str,
+) -> None:
+    with by_default(connection, 6.0) as rig:
+        rig.reset(drive_timeout=2.0)
+        rig.begin()
+        enable_and_kill(rig)
+        rig.connect()
+        end(rig)
+        assert own_timeout(rig) == 6.0
+
+
+def test_9_an_end_with_a_fault_leaves_the_time_out_to_the_next_end() -> None:
+    with by_default('rtu', 0.0) as rig:
+        rig.turn()
+        rig.far.trip(rig.a_fault)
+        rig.pass_time(1.0)
+        end(rig)
+        assert own_timeout(rig) == 2.0
+        rig.kill()
+        rig.far.faults.acknowledge()
+        rig.begin()
+        rig.connect()
+        end(rig)
+        assert own_timeout(rig) == 0.0
+
+
+def test_9_what_is_remembered_of_one_drive_is_not_put_back_in_another() -> None:
+    with by_default('rtu', 6.0, drives=2) as rig:
+        rig.connect()
+        rig.enable(1)
+        rig.kill()
+        rig.begin()
+        rig.far.set_from_keypad('serial.sio_tot', 5.0)
+        rig.fars[2].set_from_keypad('serial.sio_tot', 2.0)
+        rig.connect()
+        for drive in rig.drives.values():
+            rig.answer(drive.disconnect(4.0))
+        assert [far.peek('serial.sio_tot') for far in rig.fars.values()] == [5.0, 2.0]
+
+
+@timed
+def test_9_what_is_to_be_put_back_is_remembered_before_it_is_set(connection: str) -> None:
+    with by_default(connection, 6.0) as rig:
+        kept: list[Any] = []
+        write = rig.memory.write
+
+        def note(drive: str, borrowed: Any) -> Future[None]:
+            kept.append(dict(borrowed))
+            return write(drive, borrowed)
+
+        rig.memory.write = note  # type: ignore[method-assign]
+        rig.connect()
+        key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
+        sent: list[Any] = []
+
+        def meet(asked: str, data: bytes | None) -> None:
+            if asked == key and data is not None:
+                sent.append(kept[-1:])
+
+        rig.meet = meet
+        rig.enable()
+        end(rig)
+        assert sent == [[{key: (6.0, 2.0)}]] * 2
+        assert kept == [{key: (6.0, 2.0)}, {}]
+
+
+@pytest.mark.parametrize(('connection', 'by_serial'), [('rtu', True), ('classic', False)])
+def test_9_a_drive_is_known_by_its_serial_number_or_by_its_place(
+    connection: str, by_serial: bool
+) -> None:
+    memory = ProcessMemory()
+    memory.line = '/dev/ttyUSB0'
+    with by_default(connection, 0.0) as rig:
+        rig.memory = memory
+        rig.begin()
+        enable_and_kill(rig)
+    for line, recalled in (('/dev/ttyUSB1', by_serial), ('/dev/ttyUSB0', not by_serial)):
+        memory.line = line
+        with by_default(connection, 2.0) as rig:
+            rig.memory = memory
+            rig.begin()
+            rig.connect()
+            assert rig.notes.said(Cause.OWN_TIMEOUT_RECALLED) == recalled
+            end(rig)
+            assert own_timeout(rig) == (0.0 if recalled else 2.0)
+
+
+class Broken:
+    """A memory that keeps nothing, at once or after a while."""
+
+    line = ''
+
+    def __init__(self, error: OSError | None) -> None:
+        self._error = error
+
+    def _fail(self) -> Future[Any]:
+        future: Future[Any] = Future()
+        if self._error is not None:
+            future.set_exception(self._error)
+        return future
+
+    def read(self, drive: str) -> Future[Any]:
+        return self._fail()
+
+    def write(self, drive: str, borrowed: Any) -> Future[Any]:
+        return self._fail()
+
+
+@pytest.mark.parametrize('connection', ['rtu', 'movitrac', 'described'])
+@pytest.mark.parametrize('error', [OSError(30, 'Read-only file system'), None])
+def test_9_a_disk_that_keeps_nothing_prevents_no_enable_and_is_reported_once(
+    connection: str, error: OSError | None
+) -> None:
+    with by_default(connection, 0.0) as rig:
+        rig.memory = Broken(error)
+        rig.begin()
+        rig.connect()
+        for _ in range(2):
+            rig.enable()
+            assert own_timeout(rig) == 2.0
+            rig.answer(rig.drive.stop())
+        end(rig)
+        assert own_timeout(rig) == 0.0
+        key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
+        said = [one.text for one in rig.notes.events if says(one.text, Cause.NOT_REMEMBERED)]
+        assert len(said) == 1 and f'check {key}' in said[0], said
+
+
+class Slow(ProcessMemory):
+    """A memory that gives what it keeps, and takes for ever to keep more."""
+
+    def write(self, drive: str, borrowed: Any) -> Future[Any]:
+        return Future()
+
+
+def test_9_a_stop_does_not_wait_for_the_disk() -> None:
+    with by_default('rtu', 0.0) as rig:
+        rig.memory = Slow()
+        rig.begin()
+        rig.connect()
+        enabling = rig.drive.enable()
+        rig.pass_time(0.3)
+        assert not enabling.done()
+        begun = rig.clock.now
+        rig.answer(rig.drive.stop())
+        assert rig.clock.now - begun < 0.1 and not rig.drive.following
