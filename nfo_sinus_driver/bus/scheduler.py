@@ -15,9 +15,9 @@ import math
 from typing import Literal, NamedTuple
 
 from nfo_sinus_driver.bus.tasks import LatestValue, Priority, Task, Transfer
-from nfo_sinus_driver.link import LinkError, PortError, Refused
+from nfo_sinus_driver.link import LinkError, NotSent, PortError, Refused
 
-__all__ = ['BACKGROUND_SHARE', 'Scheduler', 'Waiting']
+__all__ = ['BACKGROUND_SHARE', 'EXCHANGE', 'Scheduler', 'Waiting']
 
 #: The share of the time that TELEMETRY and REFRESH get, each of them, when everything above wants
 #: more; of the time that set-points leave, for else these would take nearly all from the polls.
@@ -92,8 +92,8 @@ class Scheduler:
         self._owed = dict.fromkeys(_SHARES, 0.0)
         self._given: _Rank = _SLOT
         self._slot_went = False
-        #: The unit that was given a stop just now, and the one that did not answer it.
-        self._given_stop: int | None = None
+        #: The stop, or its read, that was given out just now, and the unit that did not answer one.
+        self._given_stop: Transfer | None = None
         self._unanswered: int | None = None
         #: Units that have not answered a stop since they last answered anything.
         self._unanswered_stops: set[int] = set()
@@ -127,8 +127,8 @@ class Scheduler:
             if entry is not None:
                 del self._queues[rank][entry]
                 self._given = rank
-                unit = None if isinstance(entry, LatestValue) else entry.transfer.unit
-                self._given_stop = unit if rank in _STOPS else None
+                transfer = None if isinstance(entry, LatestValue) else entry.transfer
+                self._given_stop = transfer if rank in _STOPS else None
                 return entry
         if self._unanswered is None:
             return None
@@ -160,9 +160,10 @@ class Scheduler:
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
         self._slot_went = self._given == _SLOT
-        unit = self._given_stop
-        self._unanswered = unit if unit is not None and self._is_silent(unit) else None
-        if self._unanswered is not None:
+        stop = self._given_stop
+        self._unanswered = stop.unit if stop is not None and self._is_silent(stop.unit) else None
+        if self._unanswered is not None and stop is not None and stop.data is not None:
+            # the stop behind a read that was not answered goes out at once
             self._unanswered_stops.add(self._unanswered)
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
@@ -240,6 +241,9 @@ _MUTE_STEP = 2.0
 _MUTE_LONGEST = 6.0
 #: The same where nothing was ever heard: opening it was in vain already, s.
 _MUTE_FROM_THE_START = 30.0
+#: In a longer silence another unit may have been put in the place of one, s: that is how long it
+#: takes to move the plug of the line from a drive to a spare one beside it that has power.
+EXCHANGE = 3.0
 
 
 class Silences:
@@ -272,10 +276,18 @@ class Silences:
         #: that did not.
         self._mute_since = math.inf
         self._opened = 0
+        #: When the port was opened that had been lost, s.
+        self.opened_at = -math.inf
+        #: When a silence ended that was long enough for an exchange: of the line, and of each unit.
+        self._line_since = -math.inf
+        self._unit_since: dict[int, float] = {}
 
     def note(self, unit: int, now: float, error: LinkError | None, seconds: float = 0.0) -> bool:
         """Note the outcome of a request that took ``seconds``; return whether the port carries."""
+        if isinstance(error, NotSent):
+            return False
         if error is None or error.responded or isinstance(error, Refused):
+            self._note_exchange(unit, now)
             pause = now - self._last_frame_at.get(unit, now)
             self._longest[unit] = max(self._longest.get(unit, 0.0), pause)
             self._last_frame_at[unit] = self._any_frame_at = now
@@ -291,8 +303,10 @@ class Silences:
             self._mute_since = min(self._mute_since, now)
         return False
 
-    def opened(self) -> None:
-        """Note that the port was opened, for the first time or again."""
+    def opened(self, now: float, *, lost: bool) -> None:
+        """Note that the port was opened; after it was lost, other units may be behind it."""
+        if lost:
+            self.opened_at = self._line_since = now
         self._opened += 1
         self._mute_since = math.inf
         # those that are missing may only have been cut off
@@ -320,6 +334,20 @@ class Silences:
         """Note that nothing was sent for so long, s, for the worker did not run."""
         self._since = {unit: since + seconds for unit, since in self._since.items()}
         self._mute_since += seconds
+
+    def _note_exchange(self, unit: int, now: float) -> None:
+        """Note that a silence ends in which a unit, or any, may have been exchanged."""
+        if self.lasts(unit, now) > EXCHANGE:
+            self._unit_since[unit] = now
+        if now - self._any_frame_at > EXCHANGE:
+            # this end may have stood still
+            self._line_since = now
+
+    def there_since(self, unit: int, now: float) -> float:
+        """Return since when a unit cannot have been exchanged; infinity if it may be by now."""
+        if max(self.lasts(unit, now), now - self._any_frame_at) > EXCHANGE:
+            return math.inf
+        return max(self._line_since, self._unit_since.get(unit, -math.inf))
 
     def is_silent(self, unit: int) -> bool:
         """Return whether a unit has not answered the last request to it."""

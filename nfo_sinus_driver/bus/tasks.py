@@ -138,16 +138,21 @@ async def inquire(unit: int, inquiry: Inquiry, priority: Priority) -> Identifica
     return inquiry.found
 
 
-async def set_up(unit: int, watch: Watch, priority: Priority, tries: int) -> str:
+async def set_up(
+    unit: int, watch: Watch, priority: Priority, tries: int, require_wanted: Callable[[], None]
+) -> str:
     """
     Have a unit watch this end of the line, each step a transaction; return by which means.
 
     :param tries: how often a step without an answer is tried: each may be done again.
+    :param require_wanted: as for :class:`Transfer`.
     """
     left = tries
     while not watch.done:
         try:
-            await Transfer(unit, _NOWHERE, priority, send=watch.step)
+            await Transfer(
+                unit, _NOWHERE, priority, send=watch.step, require_wanted=require_wanted
+            )
         except PortError:
             raise
         except LinkError:

@@ -212,17 +212,24 @@ class Bus:
     # --- for coroutines on the worker ---------------------------------------------------------
 
     def read(
-        self, unit: int, address: Address, priority: Priority, *, once: bool = False
+        self,
+        unit: int,
+        address: Address,
+        priority: Priority,
+        require_wanted: Callable[[], None] = lambda: None,
+        *,
+        once: bool = False,
     ) -> Awaitable[Reply]:
         """
         Read one parameter, one transaction at a time.
 
+        :param require_wanted: for a read that has an effect, in one transaction; as for a write.
         :param once: not again where the answer may be old, for reading it has an effect.
         """
         parts = self._link.parts(address)
         if len(parts) > 1:
             return consistent_read(unit, parts, priority)
-        return Transfer(unit, address, priority, once=once)
+        return Transfer(unit, address, priority, require_wanted=require_wanted, once=once)
 
     def write(
         self,
@@ -256,7 +263,13 @@ class Bus:
         return True
 
     def read_then_write(
-        self, unit: int, source: Address, address: Address, data: bytes, priority: Priority
+        self,
+        unit: int,
+        source: Address,
+        address: Address,
+        data: bytes,
+        priority: Priority,
+        require_wanted: Callable[[], None] = lambda: None,
     ) -> Transfer:
         """
         Read a parameter whose value is not needed, then write another: one turn, whatever was read.
@@ -265,22 +278,30 @@ class Bus:
         :raises LinkError: as for a write; ``maybe_done`` once the read was sent.
         """
         send = functools.partial(self._link.read_then_write, unit, source, address, data)
-        return Transfer(unit, address, priority, data, send)
+        return Transfer(unit, address, priority, data, send, require_wanted)
 
     def identify(self, unit: int, priority: Priority) -> Coroutine[Any, Any, Identification]:
         """Read the identity of a unit, each part once; what it does not give stays empty."""
         return inquire(unit, self._link.identify(unit), priority)
 
-    async def watch(self, unit: int, seconds: float, priority: Priority, tries: int) -> str:
+    async def watch(
+        self,
+        unit: int,
+        seconds: float,
+        priority: Priority,
+        tries: int,
+        require_wanted: Callable[[], None] = lambda: None,
+    ) -> str:
         """
         Have a unit watch the heartbeat or guarding, with a time-out, s; 0: no longer.
 
         :param tries: how often each step is tried.
+        :param require_wanted: called before each step, as for a write.
         :returns: by which means; ``''`` if it has none, or for 0.
         """
         supervision = self._link.supervision
         return '' if supervision is None else await set_up(
-            unit, supervision.watch(unit, seconds), priority, tries
+            unit, supervision.watch(unit, seconds), priority, tries, require_wanted
         )
 
     def sleep(self, seconds: float) -> Pause:
@@ -574,8 +595,8 @@ class Bus:
 
     def _open_when_due(self) -> None:
         """Open a port that is not open, or open and mute."""
-        now = self.now()
-        if self._port.is_open:
+        now, lost = self.now(), not self._port.is_open
+        if not lost:
             # ahead of the request that shows whether it helps
             if not self.silences.is_mute(now, max(self._lost_after.values(), default=math.inf)):
                 return
@@ -586,7 +607,7 @@ class Bus:
         self._port.open(now + REOPEN_PERIOD)
         if self._port.is_open:
             self.recorder.opened()
-            self.silences.opened()
+            self.silences.opened(self.now(), lost=lost)
 
     def _report_mute(self, seconds: float) -> None:
         """Report on change for how long no unit has answered, s; 0: one does."""

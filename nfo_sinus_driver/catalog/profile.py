@@ -404,6 +404,15 @@ class ControlMethod(abc.ABC):
         command.
         """
 
+    def remove_leftover(self) -> Steps[None]:
+        """
+        Take back a run command of an earlier session, in a drive that the bus does not control.
+
+        It would start the motor once the bus has control, whoever gives it. Here there is nothing
+        to be done: control is taken by a write of ours alone, and the stop is the next.
+        """
+        yield from ()
+
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor; control may be given back. Where it cannot be, stop as usual."""
         return self.stop(control_mode)
@@ -534,6 +543,9 @@ class Profile:
     :ivar names_itself: it reports who it is by Modbus functions 43 and 17.
     :ivar product: reads who it is, where parameters report that; :class:`NotPossible` if it is none
         of this family. ``None``: none reports it.
+    :ivar identify: parameters that tell its drives from those of other makers, and the values by
+        which they do.
+    :ivar vendor: how the name of its maker begins in function 43; ``''``: not known.
     :ivar told_by: a parameter that no other family has there; ``''``: there is none.
     :ivar writes_and_reads: it has Modbus function 23.
     :ivar releases: what its stop mode is where an ordinary stop releases the motor.
@@ -575,6 +587,8 @@ class Profile:
     broadcast_stop: Write | None = None
     names_itself: bool = False
     product: Callable[[], Steps[Product]] | None = None
+    identify: Mapping[str, Sequence[Value]] = field(default_factory=dict)
+    vendor: str = ''
     identified_by: str = ''
     writes_and_reads: bool = False
     releases: Value = ''

@@ -62,6 +62,11 @@ def notes(family: catalog.Family) -> list[str]:
     (method,) = profile.methods.values()
     if target.forward_only:
         found.append('it turns forward only: neither signed nor direction')
+    if not profile.identify:
+        found.append(
+            'nothing tells it from another drive with these registers: add identify, with a '
+            'register whose number its manual gives (type, size, software)'
+        )
     if not method.coasts:
         found.append('it has no coast: quick_stop is an ordinary stop, or a quick ramp')
     if not family.key(catalog.Role.COMMUNICATION_TIMEOUT):

@@ -8,12 +8,22 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from nfo_sinus_driver.bus import Bus, Priority
-from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.drive.drive import Drive
+from nfo_sinus_driver.drive.events import Cause, DriveError
 from nfo_sinus_driver.link import Address
 
 
-async def broadcast_stop(bus: Bus, models: Iterable[Family]) -> None:
-    """Release the motors of all drives of a line with a broadcast."""
+async def broadcast_stop(bus: Bus, drives: Iterable[Drive]) -> None:
+    """
+    Release the motors of all drives of a line with a broadcast.
+
+    :param drives: those of the line; only what stops a family counts of which one was recognised
+        since the port was opened.
+    :raises DriveError: none was, and nothing is written.
+    """
+    models = [drive.model for drive in drives if drive.params.recognition.since_port_opened]
+    if not models:
+        raise DriveError(Cause.NONE_RECOGNISED)
     everyone = bus.protocol.broadcast
     assert everyone is not None, 'the protocol has a broadcast'
     addressing = bus.protocol.addressing

@@ -287,6 +287,10 @@ class Commands:
         """Remove the run command and write set-point 0, ahead of all else on the bus."""
         await carry_out(self._method.stop(control_mode), self._params, Priority.STOP)
 
+    async def remove_leftover(self) -> None:
+        """Take back a run command of an earlier session, while the bus has no control."""
+        await carry_out(self._method.remove_leftover(), self._params, Priority.STOP)
+
     async def quick_stop(self, control_mode: str) -> None:
         """Do the quick stop of the drive, if it has one; it may release control."""
         await carry_out(self._method.quick_stop(control_mode), self._params, Priority.STOP)

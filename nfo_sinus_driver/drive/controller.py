@@ -11,7 +11,7 @@ leads. All of this runs on the bus.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 import contextlib
 import math
 
@@ -26,7 +26,7 @@ from nfo_sinus_driver.drive.diagnosis import (
     report_of,
     require_no_fault,
 )
-from nfo_sinus_driver.drive.drive_state import TIMEOUT, DriveState
+from nfo_sinus_driver.drive.drive_state import LOOK_PERIOD, TIMEOUT, DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.drive.following import Following
@@ -34,7 +34,7 @@ from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.starting import Prepare, StartSequence
 from nfo_sinus_driver.drive.stop_reason import StopReason, reason_of
 from nfo_sinus_driver.drive.stopping import StopSequence
-from nfo_sinus_driver.link import LinkError, Refused
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
 
 #: How long a stop at the end of a release may take at least, s.
 _LEAST_PATIENCE = 1.0
@@ -46,9 +46,17 @@ class Controller:
 
     A :class:`DriveError` says why a command was not carried out. A stop that the drive does not
     confirm is such an error, too; it is retried until confirmed.
+
+    :param look: as for :class:`StopSequence`.
     """
 
-    def __init__(self, state: DriveState, method: Commands, setpoint: Setpoint) -> None:
+    def __init__(
+        self,
+        state: DriveState,
+        method: Commands,
+        setpoint: Setpoint,
+        look: Callable[[], Awaitable[None]],
+    ) -> None:
         self._bus = state.bus
         self._state = state
         #: The commands of the drive, for a procedure too.
@@ -63,7 +71,7 @@ class Controller:
         self._enabling: Task | None = None
         self._access: ExclusiveAccess | None = None
         self._starting = StartSequence(state, method)
-        self._sequence = StopSequence(state, method, self._control)
+        self._sequence = StopSequence(state, method, self._control, look)
         self._following = Following(state, setpoint)
         #: A set-point that the drive refused: when, and why.
         self._refusal: tuple[float, Report] | None = None
@@ -106,6 +114,11 @@ class Controller:
     def commanded(self) -> bool:
         """Something that the driver has begun may drive the motor."""
         return self._control.commanded
+
+    @property
+    def stop_owed(self) -> bool:
+        """This driver may have run the motor, and has no confirmation that it stops."""
+        return self.commanded or self.stopping
 
     @property
     def procedure(self) -> str:
@@ -277,6 +290,7 @@ class Controller:
         :param why: needed where something may run the motor.
         :param patience: how long the drive may take to confirm it, s.
         """
+        await self._require_recognised(patience or 0.0)
         self._sequence.start(why)
         await self._sequence.wait_confirmed(patience or None)
         status = self._state.status
@@ -315,6 +329,7 @@ class Controller:
         """
         if not self.method.coasts:
             return Report(Cause.NO_QUICK_STOP, stop=await self.stop(why))
+        await self._require_recognised()
         may_run = self.may_run
         with self._sequence.external_stop(why):
             try:
@@ -349,6 +364,7 @@ class Controller:
         """
         if not self.method.stop_ramp:
             return Report(Cause.NO_RAPID_STOP, stop=await self.stop(why))
+        await self._require_recognised()
         with self._sequence.external_stop(why):
             with contextlib.suppress(LinkError, DriveError):
                 await self.method.rapid_stop(self._state.control_mode)
@@ -419,6 +435,7 @@ class Controller:
         :param prepare: runs before, while the bus has control.
         :raises DriveError: the drive does not confirm that it stops.
         """
+        await self._require_recognised()
         # a run command may be on its way, whatever has control now; and where the bus has it, one
         # may be active that an acknowledgement has not removed yet
         status = self._state.status
@@ -492,13 +509,37 @@ class Controller:
     def close(self, why: Report) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
         self.closed = True
-        if self.may_run:
+        if self.stop_owed or (self.may_run and self._state.params.recognition.holds):
             self._sequence.start(why)
+
+    async def _require_recognised(self, patience: float = 0.0) -> None:
+        """
+        Make sure that it is known what is to be stopped, where no stop of it is owed.
+
+        Of one that this driver may have run, the stop goes on until the drive is there again.
+
+        :param patience: how long to wait for one that does not answer, s.
+        :raises DriveError: nothing is written to it.
+        """
+        until = self._bus.now() + patience
+        while not self.stop_owed:
+            try:
+                await self._state.params.require_recognised()
+                return
+            except DriveError as error:
+                silent = isinstance(error.__cause__, (NoAnswer, DamagedAnswer))
+                if not silent or self._bus.now() >= until:
+                    raise
+            await self._bus.sleep(LOOK_PERIOD)
 
     # --- events of the drive ------------------------------------------------------------------
 
     async def stop_unexpected_run(self) -> None:
-        """Stop a motor that runs under bus control and was not enabled since."""
+        """
+        Stop a motor that runs under bus control and was not enabled since.
+
+        Where the bus has no control, take back what would run the motor once it has.
+        """
         state, status = self._state, self._state.status
         if await self.method.in_control(Priority.SERVICE):
             turns = status is not None and (status.runs_by_bus or abs(status.frequency) > 0)
@@ -507,10 +548,12 @@ class Controller:
                 found = state.report(Cause.FOUND_RUNNING)
                 state.notify(Severity.WARNING, found)
             self._sequence.restart(found)
-        elif self._lost_in_use and status is not None and not status.faulted:
-            why = state.report(Cause.CONTROL_LOST_WHILE_AWAY)
-            state.notify(Severity.WARNING, why)
-            self._control.explain(why)
+        else:
+            await self.method.remove_leftover()
+            if self._lost_in_use and status is not None and not status.faulted:
+                why = state.report(Cause.CONTROL_LOST_WHILE_AWAY)
+                state.notify(Severity.WARNING, why)
+                self._control.explain(why)
         self._lost_in_use = False
 
     def connected(self) -> None:

@@ -14,7 +14,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Statistics, Task
 from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
-from nfo_sinus_driver.drive.commands import Commands, carry_out, read_scales
+from nfo_sinus_driver.drive.commands import Commands, carry_out
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import explain
@@ -28,12 +28,13 @@ from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.parameters import Parameters, on_bus
 from nfo_sinus_driver.drive.poller import Poller, take_snapshot
 from nfo_sinus_driver.drive.procedure import Procedures
+from nfo_sinus_driver.drive.recognising import Recogniser
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import Listener, LogEntry, Snapshot
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
 from nfo_sinus_driver.drive.tuning import Tuned, Tuning
-from nfo_sinus_driver.link import LinkError, Refused
+from nfo_sinus_driver.link import LinkError
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
@@ -101,10 +102,17 @@ class Drive:
             lambda reply: self._poller.take_status(reply),
         )
         self._controller: Controller | None = None
-        if settings.method != 'monitor':
-            self._controller = Controller(self.state, Commands(self.state), self.setpoint)
+        commands = None if settings.method == 'monitor' else Commands(self.state)
+        self._recogniser = Recogniser(self.state, commands)
+        if commands is not None:
+            look = self._recogniser.look
+            self._controller = Controller(self.state, commands, self.setpoint, look)
         self._poller = Poller(
-            self.state, self.setpoint, self._controller, lambda: self._connect(retry=False)
+            self.state,
+            self.setpoint,
+            self._controller,
+            lambda: self._connect(retry=False),
+            lambda: self._recogniser.recognise(retry=False),
         )
         self._procedures = procedures = Procedures(self.state, self._controller)
         self.parameters = Parameters(
@@ -119,8 +127,6 @@ class Drive:
         self._tuning = Tuning(
             self.state, self.parameters, procedures, self._watchdog.require_set
         )
-        #: It has identified itself as one of this family.
-        self._recognised = False
         bus.on_restart(self._unit, self._poller.restarted)
         bus.require_sign_of_life(self._unit, settings.lost_after)
         #: The tasks that run while it is connected, and while it is active.
@@ -168,6 +174,16 @@ class Drive:
     def stop_unconfirmed(self) -> bool:
         """A stop was requested that the drive has not confirmed yet."""
         return self._controller is not None and self._controller.stopping
+
+    @property
+    def recognised(self) -> bool:
+        """It is known what is at its address; before, nothing is written there."""
+        return self.params.recognition.holds
+
+    @property
+    def stop_owed(self) -> bool:
+        """This driver may have run the motor, and has no confirmation that it stops."""
+        return self._controller is not None and self._controller.stop_owed
 
     @property
     def blocked_by_fault(self) -> bool:
@@ -369,7 +385,7 @@ class Drive:
         """Identify the drive, thoroughly with model and serial number; a motor runs on."""
         identity = await self.state.nameplate.identify()
         await self.state.nameplate.scales.read()
-        return await self._read_nameplate() if thoroughly else identity
+        return await self._recogniser.read_nameplate() if thoroughly else identity
 
     @on_bus
     async def read_status(self) -> InverterStatus:
@@ -461,28 +477,12 @@ class Drive:
         takes_control = state.model.profile.holds_control.get(self.params.protocol)
         if takes_control and not self.statistics.transactions:
             state.notify(Severity.WARNING, Cause.TAKES_CONTROL, why=takes_control)
-        try:
-            await state.nameplate.identify(retry=retry)
-        except Refused as error:
-            if error.code == Refused.BUSY:
-                raise
-            raise DriveError(
-                Cause.OTHER_MODEL, error=str(error), model=state.model.name
-            ) from error
-        if self._controller is not None:
-            self._controller.method.require_fitted()
-        # nothing is written to a drive of another family; one that was recognised is stopped first
-        if early := not self._recognised and state.model.profile.product is not None:
-            await self._read_nameplate()
-        await read_scales(state)
-        await state.read_control_mode()
-        await state.timeout.read()
-        state.require_fresh(await state.read_status(Priority.SERVICE))
+        named = await self._recogniser.recognise(retry=retry)
         if self._controller is not None:
             await self._controller.stop_unexpected_run()
             self._watchdog.connected()
-        if not early:
-            await self._read_nameplate()
+        if not named:
+            await self._recogniser.read_nameplate()
         await self._watchdog.recall()
         self._poller.connected()
         self.setpoint.connected()
@@ -494,16 +494,6 @@ class Drive:
         if self._controller is None and takes_control:
             state.notify(Severity.WARNING, Cause.HELD_BY_LINE, why=takes_control)
         self._watchdog.warn_if_unfit()
-
-    async def _read_nameplate(self) -> Identity:
-        """Read vendor, product and software (DriveError: it is of another family)."""
-        nameplate, read = self.state.nameplate, self.model.profile.product
-        self._recognised = False
-        if read is None:
-            return await nameplate.read_more()
-        identity = nameplate.take(await carry_out(read(), self.params, Priority.SERVICE))
-        self._recognised = True
-        return identity
 
     def _report_identity(self) -> None:
         state, profile, identity = self.state, self.model.profile, self.identity

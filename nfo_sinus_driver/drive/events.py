@@ -59,7 +59,19 @@ class Cause(enum.Enum):
     RESTARTED = 'the drive has started anew, as its boot-up message says: check its mains'
     TAKES_CONTROL = '{why}: a motor that the terminals run stops now'
     HELD_BY_LINE = 'only watched, and yet {why}: a motor that the terminals ran has stopped'
+    NOT_RECOGNISED = (
+        'it is not known what is at address {address} ({why}): nothing is written to it, no stop '
+        'either, which could start another drive. Check its mains and cable, and that it is the '
+        f'drive that the model or family says. {_EMERGENCY}'
+    )
+    NONE_RECOGNISED = (
+        'no stop was broadcast: no drive of this line was recognised since its port was opened'
+    )
     OTHER_MODEL = '{error}: every {model} has it; is this another model? {call.set_model}'
+    ANOTHER_DRIVE = 'this is no {title}: {why}; {call.set_model}'
+    MADE_BY = 'it says that {vendor} has made it'
+    IS_NOT = 'its {name} is {value}, and should be {values}'
+    CANNOT_BE = 'its {name} is {value}, which cannot be'
     NOT_THE_MODEL = '{drive} answers, but not as a {model} does ({why}): is --model right?'
     METHOD_NEEDS = (
         'this drive has no {names}, which control_method {method} needs: {call.set_method} '

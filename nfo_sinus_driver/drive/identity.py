@@ -92,6 +92,9 @@ class Nameplate:
         # any parameter will do that every drive has, in either dialect
         priority = Priority.SERVICE if retry else Priority.POLL
         await self._params.read(self._model.key_of_status, priority, retry=retry)
+        if self._params.in_block:
+            # the block has its layout, and the data of a drive that the PLC is set for
+            self._params.recognition.begin()
         await self._params.find_lacking()
         await self._find_mailbox()
         dialect = self._dialect
@@ -99,12 +102,12 @@ class Nameplate:
         self._be_older(dialect is not None and self._settings.classic_dialect == dialect.name)
         firmware_key = self._model.key(Role.FIRMWARE)
         if self.is_older or not self._params.reaches(firmware_key):
-            self.identity = Identity()
-            return self.identity
+            return self._note_versions()
         if dialect is not None and not await self._may_ask_firmware(dialect):
             if before is None:
                 # the newer firmware has all that the older one has
-                self.identity, self.is_older = Identity(), True
+                self._note_versions()
+                self.is_older = True
                 report = Report(
                     Cause.FIRMWARE_NOT_ASKED, before=dialect.before, dialect=dialect.name
                 )
@@ -120,10 +123,14 @@ class Nameplate:
             if dialect is None or self._settings.classic_dialect:
                 raise
             self._be_older(True)
-            self.identity = Identity()
-        else:
-            self._be_older(dialect is not None and firmware < dialect.before)
-            self.identity = Identity(firmware, int(motor))
+            return self._note_versions()
+        self._be_older(dialect is not None and firmware < dialect.before)
+        return self._note_versions(firmware, int(motor))
+
+    def _note_versions(self, firmware: float = math.nan, motor: int = 0) -> Identity:
+        """Take the versions that were read; the rest is read less often."""
+        known = self.identity or Identity()
+        self.identity = replace(known, firmware=firmware, motor_firmware=motor)
         return self.identity
 
     async def _find_mailbox(self) -> None:

@@ -5,12 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from fractions import Fraction
 
 from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Role, Value
 from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.drive.events import DriveError
+from nfo_sinus_driver.drive.recognition import Recognition
 from nfo_sinus_driver.link import (
     BY_MAILBOX,
     Address,
@@ -27,7 +29,7 @@ _BUSY_PERIOD = 0.05
 _BUSY_TRIES = 10
 #: How a drive answers that lacks the option card of a parameter, and how often until that is
 #: believed.
-_NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
+NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
 _DENIALS = 2
 #: How often an impossible value is read at most, until it is believed.
 _READINGS = 3
@@ -39,11 +41,15 @@ class ParameterAccess:
     """
     The parameters of one drive, for coroutines on the bus.
 
+    Nothing is written before the drive is recognised: what writes reads first what tells that.
+
     :param addressing: how they are addressed; ``''``: as the line does.
     :param block_address: the first register of their block, behind a PLC.
     :param retries: how often a request without an answer is sent again, where ``retry`` is true.
     :raises LinkError: reading or writing fails, as the link does.
+    :raises DriveError: nothing is written, for it is not known what is there.
     :raises ValueError: a value that the drive cannot have, or bytes that mean none.
+    :ivar recognition: whether that is known.
     """
 
     def __init__(
@@ -61,6 +67,8 @@ class ParameterAccess:
         self.now, self.sleep = bus.now, bus.sleep
         self._unit = unit
         self._retries = retries
+        self.recognition = Recognition(bus, unit, model.profile.enable_input)
+        self._recognise: Callable[[], Awaitable[None]] | None = None
         #: How many requests got no answer.
         self.unanswered = 0
         #: Impossible values that were read more than once.
@@ -161,7 +169,7 @@ class ParameterAccess:
             try:
                 await self.read_data(key, Priority.SERVICE)
             except Refused as error:
-                if error.code not in _NONE_SUCH:
+                if error.code not in NONE_SUCH:
                     raise
                 lacking.add(key)
         self._lacking = frozenset(lacking)
@@ -209,18 +217,32 @@ class ParameterAccess:
         """Read a parameter that is a number."""
         return self.number(key, await self.read_data(key, priority, retry=retry))
 
+    def recognise_by(self, recognise: Callable[[], Awaitable[None]]) -> None:
+        """Take what reads all that tells whether it is a drive of this family."""
+        self._recognise = recognise
+
+    async def require_recognised(self) -> None:
+        """Make sure that it is known what is there, by reading it if need be (DriveError: not)."""
+        if not self.recognition.holds and self._recognise is not None:
+            await self._recognise()
+        self.recognition.require()
+
     async def identify(self, priority: Priority) -> Identification:
         """Read the identity of the drive; what it does not give stays empty."""
         return await self._bus.identify(self._unit, priority)
 
     async def watch(self, seconds: float, priority: Priority) -> str:
         """Have the drive notice a silence of the line; see :meth:`Bus.watch`."""
-        return await self._bus.watch(self._unit, seconds, priority, 1 + self._retries)
+        if self._bus.supervised:
+            await self.require_recognised()
+        tries, require = 1 + self._retries, self.recognition.require
+        return await self._bus.watch(self._unit, seconds, priority, tries, require)
 
     async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges, once: an operator has requested it."""
         assert self.model[key].access is Access.ACKNOWLEDGE, key
-        reply = await self._ask(self.address(key), priority, None, retry=False, once=True)
+        address = self.address(key)
+        reply = await self._ask(address, priority, None, retry=False, has_effect=True)
         return self.value(key, reply.data)
 
     async def acknowledge_and_write(self, key: str, step: Write) -> None:
@@ -230,8 +252,10 @@ class ParameterAccess:
         :raises LinkError: the write was not answered, or refused, whether or not the reading was.
         """
         assert self.model[key].access is Access.ACKNOWLEDGE, key
+        await self.require_recognised()
+        place, require = self.address(key), self.recognition.require
         await self._bus.read_then_write(
-            self._unit, self.address(key), *self.target(step), Priority.STOP
+            self._unit, place, *self.target(step), Priority.STOP, require
         )
 
     async def write(
@@ -243,7 +267,7 @@ class ParameterAccess:
         self._own[step.key] = data
         try:
             await self._ask(address, priority, data, step.retry, require_wanted)
-        except Refused:
+        except (Refused, DriveError):
             self._own.pop(step.key, None)
             raise
 
@@ -279,7 +303,7 @@ class ParameterAccess:
         try:
             reply = await self._ask(address, priority, None, retry)
         except Refused as error:
-            if error.code in _NONE_SUCH and self.model[key].option:
+            if error.code in NONE_SUCH and self.model[key].option:
                 self._denials[key] = [*self._denials.get(key, ()), error][-_DENIALS:]
             raise
         self._denials.pop(key, None)
@@ -314,16 +338,28 @@ class ParameterAccess:
         retry: bool,
         require_wanted: Callable[[], None] = lambda: None,
         *,
-        once: bool = False,
+        has_effect: bool = False,
     ) -> Reply:
+        has_effect = has_effect or data is not None
+        # a mailbox is asked by a write to the registers of the PLC
+        if has_effect or (self.in_block and address.space in BY_MAILBOX):
+            await self.require_recognised()
+
+            def require() -> None:
+                self.recognition.require()
+                require_wanted()
+        else:
+            require = require_wanted
         tries = 1 + self._retries if retry else 1
         # a busy drive has done nothing; a stop that is sent once is repeated by its caller
         busy = 0 if not retry and priority <= Priority.LOOK else _BUSY_TRIES
         while True:
             try:
                 if data is None:
-                    return await self._bus.read(self._unit, address, priority, once=once)
-                return await self._bus.write(self._unit, address, data, priority, require_wanted)
+                    return await self._bus.read(
+                        self._unit, address, priority, require, once=has_effect
+                    )
+                return await self._bus.write(self._unit, address, data, priority, require)
             except (NoAnswer, DamagedAnswer) as error:
                 self.count(error)
                 tries -= 1

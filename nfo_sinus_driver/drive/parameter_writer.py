@@ -223,14 +223,14 @@ class ParameterWriter:
     async def _keep(self) -> None:
         """Have what was written take effect, and be kept, where that needs further writes."""
         for step in self._state.model.profile.after_write:
-            with contextlib.suppress(LinkError):
+            with contextlib.suppress(LinkError, DriveError):
                 await self._params.write(step, _SERVICE)
 
-    async def _send(self, key: str, data: bytes) -> LinkError | None:
+    async def _send(self, key: str, data: bytes) -> LinkError | DriveError | None:
         """Write; return why the drive may not have taken it, which only reading back shows."""
         try:
             await self._params.write_data(key, data, _SERVICE)
-        except LinkError as error:
+        except (LinkError, DriveError) as error:
             return error
         return None
 
@@ -292,7 +292,7 @@ class ParameterWriter:
         return f'{show(self.value(key, data))} {unit}'.rstrip()
 
     async def _why(
-        self, key: str, data: bytes, kept: bytes | None, error: LinkError | None
+        self, key: str, data: bytes, kept: bytes | None, error: LinkError | DriveError | None
     ) -> Report:
         if isinstance(error, Refused):
             return await self._refusal(key, data, error)

@@ -77,6 +77,7 @@ class Poller:
 
     :param controller: how it is commanded; ``None`` if this driver only reads.
     :param connect: connects to the drive again after it was lost.
+    :param recognise: reads what tells whether it is still the same, while it is connected.
     """
 
     def __init__(
@@ -85,6 +86,7 @@ class Poller:
         setpoint: Setpoint,
         controller: Controller | None,
         connect: Callable[[], Coroutine[Any, Any, None]],
+        recognise: Callable[[], Coroutine[Any, Any, object]],
     ) -> None:
         self._bus = state.bus
         self._unit = state.settings.address
@@ -93,6 +95,7 @@ class Poller:
         self._setpoint = setpoint
         self._controller = controller
         self._connect = connect
+        self._recognise = recognise
         self._task: Task | None = None
         self._keep_alive_task: Task | None = None
         #: Poll at full rate.
@@ -221,6 +224,9 @@ class Poller:
                     await self._poll()
                 else:
                     await self._read_status()
+                if not self._params.recognition.holds:
+                    # it was silent for long, or this driver stood still: is it still the same?
+                    await self._recognise()
                 self._failing_since = math.inf
             except (LinkError, DriveError) as error:
                 self._on_poll_failed(error)
@@ -522,6 +528,8 @@ class Poller:
         # these have been waited out, or cannot be
         at_once = isinstance(error, (PortError, NoData, Interrupted))
         at_once = at_once or _is(error, Cause.OLD_DATA)
+        another = isinstance(error, DriveError) and not self._params.recognition.holds
+        at_once = at_once or another
         if at_once or self._silent_for_long or unwatched:
             self._mark_lost(error)
 

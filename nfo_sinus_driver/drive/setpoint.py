@@ -15,7 +15,7 @@ from typing import NamedTuple
 from nfo_sinus_driver.bus import LatestValue, Priority, Task, Transfer
 from nfo_sinus_driver.catalog import Limits, SetpointTarget
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause, Report, Severity
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.link import Address, Interrupted, LinkError, NoAnswer, Refused, Reply
 
@@ -297,7 +297,7 @@ class Setpoint:
         request = self._request
         if self._target is None or not self._counts(request):
             return None
-        if not self._state.responsive:
+        if not (self._state.responsive and self._params.recognition.holds):
             self._waits_for_answer = True
             return None
         limited = self._accept(request)
@@ -445,7 +445,7 @@ class Setpoint:
                     continue
                 try:
                     await self._params.write(replace(step, retry=False), Priority.STOP)
-                except LinkError as error:
+                except (LinkError, DriveError) as error:
                     if isinstance(error, Refused) and not self._may_be_busy(error):
                         why = Report(Cause.SETPOINT_REFUSED, value=0.0, error=str(error))
                         self._refused(why)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 import contextlib
 import enum
 import math
@@ -67,13 +67,22 @@ class StopSequence:
 
     It begins with the event ``STOP``, and ends with ``STOPPED``. After each attempt before it
     dispatches ``FAULT_BLOCKS`` or ``FAULT_OVER``.
+
+    :param look: reads once what shows that a drive that was lost is there, and no other.
     """
 
-    def __init__(self, state: DriveState, method: Commands, control: Control) -> None:
+    def __init__(
+        self,
+        state: DriveState,
+        method: Commands,
+        control: Control,
+        look: Callable[[], Awaitable[None]],
+    ) -> None:
         self._bus = state.bus
         self._state = state
         self._method = method
         self._control = control
+        self._look = look
         #: The task that removes the run command, until that is confirmed.
         self._task: Task | None = None
         #: How many operations are stopping the motor by other means.
@@ -293,6 +302,8 @@ class StopSequence:
         reasons = self._reasons
         faulted = self._state.status is not None and self._state.status.faulted
         failure: LinkError | None = None
+        if not self._state.connected:
+            await self._find()
         try:
             await self._method.stop(control_mode)
             self._sent_at = min(self._sent_at, self._bus.now())
@@ -337,6 +348,22 @@ class StopSequence:
             return _Outcome.UNCLEAR
         over = isinstance(failure, Refused) and faulted and not status.faulted
         return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED
+
+    async def _find(self) -> None:
+        """
+        Find out whether a drive that was lost is there, before it is stopped.
+
+        Where nothing answers, its answers alone may be lost. So it is stopped all the same, as long
+        as no other can be in its place.
+
+        :raises LinkError: it does not answer, and another may be there.
+        :raises DriveError: another one is there.
+        """
+        try:
+            await self._look()
+        except (NoAnswer, DamagedAnswer):
+            if not self._state.params.recognition.holds:
+                raise
 
     def _needs_force(self, status: InverterStatus, failure: LinkError | None) -> bool:
         """Return whether an ordinary stop does not do: refused again, ignored or in vain."""

@@ -474,6 +474,10 @@ _REFUSALS = {
 }
 
 
+class NotSent(Refused):
+    """The link itself has refused a request: nothing was sent, and no drive has answered."""
+
+
 class NotReady(LinkError):
     """
     Requests to this unit must pause, so that no late answer is taken for the right one.

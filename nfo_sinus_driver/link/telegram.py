@@ -37,6 +37,7 @@ from nfo_sinus_driver.link.interface import (
     LinkError,
     NoData,
     NoPath,
+    NotSent,
     Refused,
     Reply,
 )
@@ -197,7 +198,7 @@ class Block:
             self._look()
             raise InProgress(self._now())
         if self._layout == 1:
-            raise Refused(Refused.ILLEGAL_ADDRESS, _NO_MAILBOX)
+            raise NotSent(Refused.ILLEGAL_ADDRESS, _NO_MAILBOX)
         by = self._mailbox if address.space == MAILBOX else self._by_address
         return by.access(address, data)
 
@@ -267,7 +268,7 @@ class Block:
             word, setpoint = struct.unpack('>HH', data)
             return (word, setpoint), part == NEXT
         if self._command is None:
-            raise Refused(Refused.DEVICE_FAILURE, _NO_CONTROL_WORD)
+            raise NotSent(Refused.DEVICE_FAILURE, _NO_CONTROL_WORD)
         word, _ = self._command
         value = int.from_bytes(data, 'big')
         if part == CLEAR:

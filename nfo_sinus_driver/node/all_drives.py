@@ -85,8 +85,10 @@ class AllDrives:
     def _broadcast(self) -> str:
         try:
             bus, drives = self._context.bus, self._context.drives
-            models = [managed.drive.model for managed in drives]
-            bus.run(broadcast_stop(bus, models), stops=True).result(_LONGEST_STOP)
+            stop = broadcast_stop(bus, [managed.drive for managed in drives])
+            bus.run(stop, stops=True).result(_LONGEST_STOP)
+        except DriveError as error:
+            return drives[0].wording.say(error)
         except Exception as error:
             return f'a stop for all could not be broadcast: {error}'
         return 'a stop for all was broadcast, which releases every motor; no drive confirms it'

@@ -25,7 +25,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_node_name import validate_node_name
 
-from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Cause, DriveError
 from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME, BusNode
 from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
@@ -149,7 +149,7 @@ class DriverProcess:
         for node, stop in _as_they_end(stops):
             if self._may_be_there(node) and not _confirmed(node, stop):
                 unconfirmed.append(node)
-            elif node.managed.drive.ever_responded:
+            elif node.managed.drive.ever_responded and _succeeded(stop):
                 # a silent one must not take the time in which others are released
                 releases[node.managed.drive.disconnect(_time_left(node, begun))] = node
         unconfirmed += [
@@ -184,21 +184,33 @@ def _as_they_end(futures: dict[Future[Any], DriveNode]) -> Iterator[tuple[DriveN
         yield futures[future], future
 
 
+def _succeeded(future: Future[Any]) -> bool:
+    return future.done() and future.exception() is None
+
+
 def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
-    """Log the outcome of a stop; false if it failed, unless the drive has never answered."""
-    log = node.get_logger()
+    """
+    Log the outcome of a stop; false if it failed.
+
+    Not where the drive has never answered, or where it is not known what is there and this driver
+    has run no motor of it: then it has none to stop.
+    """
+    log, drive = node.get_logger(), node.managed.drive
     try:
         answer = future.result(timeout=0)
     except FutureTimeoutError:
         log.error('the stop is NOT confirmed: the drive did not answer in time')
         return False
     except Exception as error:
-        if not node.managed.drive.ever_responded:
+        if not drive.ever_responded:
             log.warning('the drive has not answered yet: if its motor was left running, it runs on')
             return True
         # after any error, the other drives have to be waited for, too
         known = isinstance(error, DriveError)
         why = node.managed.wording.say(error) if known else f'error in the driver: {error!r}'
+        if known and error.cause is Cause.NOT_RECOGNISED and not drive.stop_owed:
+            log.warning(f'ending without a stop, which this driver owes no motor: {why}')
+            return True
         log.error(why)
         return False
     if answer is not None:

@@ -33,9 +33,10 @@ from nfo_sinus_driver.drive import (
 )
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.memory import Memory, ProcessMemory
-from nfo_sinus_driver.link import Address, Refused, Reply
+from nfo_sinus_driver.link import Address, LinkError, Refused, Reply
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from support import telegram_laws, trace_laws
+from support.recognition_law import RecognitionLaw
 from support.rig_line import Clock, Line
 from support.said import Said, said, says
 from support.variants import hardest, ramps, shipped
@@ -255,6 +256,7 @@ class Rig:
         self.asked: list[tuple[int, str, bytes | None]] = []
         self.acknowledged = 0
         self.memory: Memory = ProcessMemory()
+        self.unrecognised: list[str] = []
         self._broken: AssertionError | None = None
         self._program: Callable[[], None] | None = None
         self._program_at = 0.0
@@ -265,15 +267,21 @@ class Rig:
         self.link = self.line.link()
         self.notes_of = {address: Notes(self.clock) for address in self.fars}
         self.bus = Bus(self.link, now=self.clock.monotonic)
+        self.law = law = RecognitionLaw(self.unrecognised)
+        lose = self.bus._port.mark_lost
+
+        def lost(*why: Any) -> None:
+            law.port_lost()
+            lose(*why)
+
+        self.bus._port.mark_lost = lost  # type: ignore[method-assign]
         self.drives = {
             address: Drive(self.bus, settings, self.notes_of[address], self.memory)
             for address, settings in self._settings.items()
         }
         self._keys = {address: self._places(drive) for address, drive in self.drives.items()}
-        for name, is_write in (
-            ('read', False), ('write', True), ('write_and_read', True), ('read_then_write', False),
-        ):
-            setattr(self.link, name, self._met(getattr(self.link, name), is_write))
+        for name in ('read', 'write', 'write_and_read', 'read_then_write'):
+            setattr(self.link, name, self._met(getattr(self.link, name), name))
 
     def reset(self, **settings: Any) -> None:
         """Have the next driver begin with other settings of the first drive."""
@@ -288,6 +296,7 @@ class Rig:
         """End the driver, and judge what was on the line."""
         self.kill()
         found = self.violations()
+        assert not self.unrecognised, self.unrecognised
         acknowledged = [complaint for complaint in found if 'that acknowledges' in complaint]
         assert len(acknowledged) <= self.acknowledged, acknowledged
         assert len(found) == len(acknowledged), found
@@ -495,11 +504,26 @@ class Rig:
                     keys.setdefault(part[:3], key)
         return keys
 
-    def _met(self, call: Callable[..., Reply], is_write: bool) -> Callable[..., Reply]:
+    def _met(self, call: Callable[..., Reply], name: str) -> Callable[..., Reply]:
+        law = self.law
+
         def meet(unit: int, address: Address, *data: Any) -> Reply:
             key = self._keys.get(unit, {}).get(address[:3], '')
-            written = data[0] if is_write else None
+            written = data[0] if name in ('write', 'write_and_read') else None
             self.asked.append((unit, key, written))
+            if unit in self.fars:
+                law.asked(unit, address, writes=name != 'read', now=self.clock.now)
+            try:
+                reply = send(unit, address, key, written, *data)
+            except LinkError as error:
+                law.ended(unit, error, reads=False, now=self.clock.now)
+                raise
+            law.ended(unit, None, reads=name == 'read', now=self.clock.now)
+            return reply
+
+        def send(
+            unit: int, address: Address, key: str, written: bytes | None, *data: Any
+        ) -> Reply:
             wrong = self.meet(key, written)
             if wrong in ('refused', 'busy'):
                 self.line.go_to(self.clock.now + _TURN)

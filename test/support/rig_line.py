@@ -105,7 +105,7 @@ class Line:
         paced: bool = True,
         plc: Mapping[str, Any] | None = None,
     ) -> None:
-        end = endpoint(protocol, baud=baud or {'modbus_rtu': 57600}.get(protocol))
+        self._end = end = endpoint(protocol, baud=baud or {'modbus_rtu': 57600}.get(protocol))
         self.clock = clock
         options = {'boot_time': 0.2, **options}
         self.drives: dict[int, SimulatedDrive] = {
@@ -195,6 +195,17 @@ class Line:
     def unplug(self, *addresses: int) -> None:
         """Take drives off the line; all others are on it."""
         self.wire.stations = [one for one in self._stations if one.address not in addresses]
+
+    def exchange(self, model: str) -> SimulatedDrive:
+        """Put another drive in the place of the only one, switched on and at standstill."""
+        (address,) = self.drives
+        far = simulated_drive(model, address, boot_time=0.0)
+        far.step = 0.02
+        far.control_unit.set_to([(self._end.spoken, self._end.timing)])
+        far.advance_to(self.clock.now)
+        self.drives[address] = far
+        self._stations[:] = self.wire.stations = [far]
+        return far
 
     def _fate(self, frame: bytes) -> str | None:
         if self._protocol.name == 'canopen' and frame[:2] not in _ANSWERED:

@@ -263,7 +263,9 @@ class Description:
     :ivar registers: of each key of a command, set-point or parameter, its first register or coil.
     :ivar facts: the conditions of the status, by the names of the file.
     :ivar flags: faults that are bits, the gravest first.
+    :ivar identify: the parameters that tell it from other drives, and the numbers by which they do.
     :ivar holder: the parameter that reports who has control, and its values for the line.
+    :ivar stop_disturbs_local: a stop over the line stops a motor that keypad or terminals run.
     :ivar prepare_stops: no run command stands behind ``prepare``.
     :ivar keeps_run: the drive keeps its run command without power; ``None``: the file does not say.
     :ivar pole_pairs: of the motor; 0: not known.
@@ -284,9 +286,11 @@ class Description:
     setpoint: SetpointPlace
     run: Steps
     stop: Steps
+    identify: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     prepare: Steps = ()
     prepare_stops: bool = False
     keeps_run: bool | None = None
+    stop_disturbs_local: bool = False
     coast: Steps = ()
     quick_stop: Steps = ()
     reset: Steps = ()

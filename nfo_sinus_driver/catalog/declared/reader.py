@@ -38,6 +38,8 @@ from nfo_sinus_driver.catalog.status import Role
 SUFFIX = '.vfd.yaml'
 SETPOINT_KEY = 'line.setpoint'
 SETPOINT_READ_KEY = 'line.setpoint_read'
+#: With a number behind it.
+IDENTITY_KEY = 'line.identity'
 _MODES = {'Hz': 'Freque', 'rpm': 'Speed'}
 #: Where faults that are bits begin to be counted.
 _FLAGS_FROM = 100
@@ -96,6 +98,7 @@ class _Reader:
         measured, roles = self._measured()
         self._require_one_holder(control, settings)
         after_write = tuple(self._after_write(steps, commands))
+        identify = dict(self._identify())
         parameters = {**settings.parameters, **measured, **self._places.made}
         return Description(
             name=self._path.name.removesuffix(SUFFIX),
@@ -109,8 +112,10 @@ class _Reader:
             status=status,
             facts=facts,
             setpoint=setpoint,
+            identify=identify,
             **commands.lists(),
             keeps_run=root.flag('keeps_run') if 'keeps_run' in root else None,
+            stop_disturbs_local=control.flag('stop_disturbs_local'),
             after_write=after_write,
             requires=tuple(self._requires(control, settings)),
             holder=settings.holder(control.get('holder')),
@@ -121,7 +126,7 @@ class _Reader:
             flags=tuple((one.in_place(status), fault) for one, fault in flags),
             alarm=self._alarm(root.get('alarms')),
             timeout=self._timeout(settings),
-            defaults=settings.defaults,
+            defaults={**{key: one for key, (one, *_) in identify.items()}, **settings.defaults},
             pole_pairs=root.get('motor').integer('pole_pairs'),
             accel=settings.known(root.get('simulated').get('accel')),
             decel=settings.known(root.get('simulated').get('decel')),
@@ -291,6 +296,22 @@ class _Reader:
         return Direction(key, forward, reverse)
 
     # --- the rest ---
+
+    def _identify(self) -> Iterator[tuple[str, tuple[int, ...]]]:
+        for number, node in enumerate(self._root.get('identify').items, 1):
+            key = f'{IDENTITY_KEY}_{number}'
+            address = self._places.address(node, key)
+            made = internal(key, address, Access.READ)
+            printed = node['register'].scalar
+            self._places.made[key] = replace(made, name=f'register {printed}')
+            given = [node['value']] if 'value' in node else list(node.get('values').items)
+            values = tuple(one.scalar for one in given if isinstance(one.scalar, int))
+            if ('value' in node) is ('values' in node):
+                self._problems.add(node.line, 'identify needs value or values, one of both')
+            if not all(map(address.number.fits, values)):
+                self._problems.add(node.line, f'identify: {made.name} cannot carry that')
+            if values:
+                yield key, values
 
     def _measured(self) -> tuple[dict[str, Parameter], dict[Role, str]]:
         made: dict[str, Parameter] = {}

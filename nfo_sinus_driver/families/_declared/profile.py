@@ -110,6 +110,11 @@ class Declared(ControlMethod):
         if not drive.prepare_stops:
             yield from _carry_out(drive.stop, head=True)
 
+    def remove_leftover(self) -> Steps[None]:
+        """Write the stop, which takes a run bit back that would count once the line has control."""
+        if not self._drive.stop_disturbs_local:
+            yield from try_steps(_each(self._drive.stop, retry=True))
+
     def zero_setpoint(self, control_mode: str) -> Steps[None]:
         """Write set-point 0, and read it back where the drive reports it."""
         yield from self._setpoint.set_to_zero()
@@ -244,6 +249,7 @@ def profile_of(drive: Description) -> Profile:
         setpoints={drive.setpoint.mode: target},
         releases='' if drive.stop_mode is None else drive.stop_mode[1],
         in_charge=_in_charge,
+        identify=drive.identify,
         most={of_speed: most},
         start_settings=frozenset(one.key for one in drive.requires),
         line=drive.line.factory,

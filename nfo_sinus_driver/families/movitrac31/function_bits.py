@@ -151,6 +151,17 @@ class FunctionBits(ByLine):
         bits = yield from read_if_there(BITS)
         return bits is not None and bool(int(bits) & _DIRECTIONS)
 
+    def remove_leftover(self) -> Steps[None]:
+        """
+        Take back a direction, which would count once P841 is set to Remote control at the keypad.
+
+        Until then the bits do not count; with a fieldbus no manual says whose they are.
+        """
+        if (yield Read(CONTROL_MODE)) == words.FIELDBUS:
+            return
+        if (yield from self.has_run_command()):
+            yield from try_steps(take_direction())
+
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once, by controller inhibit; control is kept."""
         inhibit = Write(BITS, int(Bits.CONTROLLER_INHIBIT))

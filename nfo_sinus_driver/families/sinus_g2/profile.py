@@ -494,8 +494,9 @@ PROFILE = Profile(
     in_charge=_in_charge,
     # it works even on drives with a serial fault ([M0 §6.1.5], [C9])
     broadcast_stop=Write(MODE, Mode.STOP),
-    # functions 43, 17 and 23 ([M0 §6.2.3], [C57])
+    # functions 43, 17 and 23 ([M0 §6.2.3], [C57]); its vendor is object 00h of 43 [M0 §6.2.4]
     names_itself=True,
+    vendor='NFO',
     identified_by='fieldbus.sw_ver',
     writes_and_reads=True,
     releases='Release',

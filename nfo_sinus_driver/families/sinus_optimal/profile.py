@@ -221,5 +221,7 @@ PROFILE = Profile(
         'status.control_speed',
     ),
     in_charge=_in_charge,
+    # it has no function 43 [C57]: who answers it as another maker is none
+    vendor='NFO',
     most=MOST,
 )

@@ -39,7 +39,9 @@ class DeclaredVariant(Variant):
         'keeps', 'drops', text='what becomes of a run command in a fault'
     )
     in_local: str = choice(
-        'ignores', 'refuses', text='what it does with commands while the line has no control'
+        'ignores', 'refuses', 'keeps',
+        text='what it does with commands while the line has no control; keeps: they count once it '
+        'has',
     )
 
 
@@ -79,7 +81,7 @@ class DeclaredControlUnit(ControlUnit):
 
     def take(self, place: Place, word: int) -> None:
         """Take a word, or a coil, that is a command."""
-        if not self.obeys:
+        if not self.obeys and self.variant.in_local != 'keeps':
             if self.variant.in_local == 'refuses':
                 raise Refused(Reason.STATE, 'the line has no control')
             return

@@ -95,7 +95,7 @@ def test_an_entry_that_comes_in_meanwhile() -> None:
         assert [one.code for one in entries] == [12, 1, 2, 3, 4, 5]
 
         def trip_again(key: str, data: bytes | None) -> None:
-            rig.far.faults.log.insert(0, LogEntry(1 + len(rig.asked) % 12, 1234.4))
+            rig.far.faults.log.insert(0, LogEntry(12, 1234.4 + len(rig.asked)))
 
         rig.meet = trip_again
         assert Cause.LOG_CHANGES in rig.answer(rig.drive.error_log()).causes

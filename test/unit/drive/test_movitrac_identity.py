@@ -83,9 +83,12 @@ def test_one_that_was_exchanged_while_it_was_lost_is_not_connected_again() -> No
         rig.pass_time(4.0)
         rig.far.memory.put(TYPE, 500000)
         rig.line.mend()
+        rig.asked.clear()
         rig.pass_time(10.0)
-        # what may have followed this driver was commanded to stop, whatever it is
-        assert not rig.turns and not rig.drive.snapshot.connected
+        # what its function bits are is known of no other
+        assert not any(data for _, _, data in rig.asked) and not rig.drive.snapshot.connected
+        assert rig.drive.stop_unconfirmed and rig.notes.said(Cause.CANNOT_STOP, Severity.ERROR)
+        assert rig.notes.said(Cause.NOT_RECOGNISED)
         assert 'MOVIDYN 5000' in rig.answer(rig.drive.enable()) or not rig.drive.following
 
 

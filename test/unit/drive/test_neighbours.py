@@ -119,15 +119,16 @@ def test_a_stop_of_a_drive_that_is_lost_goes_out_at_once() -> None:
     with made(8) as rig:
         rig.connect()
         rig.line.unplug(8)
-        rig.pass_time(10.0)
+        rig.pass_time(2.5)
         sent, requested_at = len(rig.line.frames), rig.clock.now
         stop = rig.drives[8].stop()
-        rig.pass_time(0.5)
-        stops = [
-            one['last'] for one in rig.line.frames[sent:] if one['hex'].startswith('0806')
-        ]
-        # behind the transaction on the line, which may be one without a response
-        assert stops and stops[0] - requested_at < 0.3
+        rig.pass_time(1.0)
+        mine = [one for one in rig.line.frames[sent:] if one['hex'].startswith('08')]
+        looks = [one['last'] for one in mine if one['hex'].startswith('0803')]
+        stops = [one['last'] for one in mine if one['hex'].startswith('0806')]
+        # behind the transaction on the line, which may be one without a response; what is read
+        # first is one more, and another drive has a turn after it
+        assert looks[0] - requested_at < 0.3 and stops[0] - requested_at < 0.6
         assert 'NOT confirmed' in rig.answer(stop)
 
 
@@ -181,7 +182,7 @@ def test_a_drive_that_runs_is_polled_and_measured_as_always_while_another_is_rea
         seen = polls(rig, 1.5)
         assert not reading.done()
         assert seen[1] > 10
-        assert measured(rig)[1] - before[1] >= 2
+        assert measured(rig)[1] - before[1] >= 1
         assert seen[2] <= 2
         # a stop is confirmed as always
         requested_at = rig.clock.now

@@ -1,0 +1,148 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recognises a drive by what it answers; all of it only reads, on the bus alone."""
+
+from __future__ import annotations
+
+from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import InverterStatus, Role, Value
+from nfo_sinus_driver.drive.commands import Commands, carry_out, read_scales
+from nfo_sinus_driver.drive.diagnosis import explain_failure
+from nfo_sinus_driver.drive.drive_state import DriveState
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report
+from nfo_sinus_driver.drive.identity import Identity
+from nfo_sinus_driver.drive.parameter_access import NONE_SUCH
+from nfo_sinus_driver.link import LinkError, Refused
+
+#: An inverter status has one byte; firmware that is newer than the manual may have more of them.
+_LAST_CODE = 0xFF
+#: No firmware has this number: so answers what has no such register, or all bits set.
+_NO_FIRMWARE = (0.0, 100.0)
+
+
+class Recogniser:
+    """
+    Recognises one drive.
+
+    :param commands: what it is commanded by; ``None`` if this driver only reads.
+    """
+
+    def __init__(self, state: DriveState, commands: Commands | None) -> None:
+        self._state = state
+        self._params = state.params
+        self._profile = state.model.profile
+        self._commands = commands
+        self._params.recognise_by(self.require)
+
+    async def recognise(self, *, retry: bool = True) -> bool:
+        """
+        Read all that tells whether it is a drive of this family.
+
+        :param retry: as for :meth:`Nameplate.identify`.
+        :returns: whether its nameplate was read. One that was recognised before is stopped first,
+            and so is one that has none by which it could be told from another.
+        :raises LinkError: it does not answer.
+        :raises DriveError: it is another one.
+        """
+        state, profile = self._state, self._profile
+        tells = profile.identify or profile.product or profile.vendor
+        known = self._params.recognition.holds
+        named = bool(tells) and not known
+        try:
+            await state.nameplate.identify(retry=retry)
+            if self._commands is not None:
+                self._commands.require_fitted()
+            if named:
+                await self.read_nameplate()
+            await read_scales(state)
+            await state.read_control_mode()
+            await state.timeout.read()
+            status = await state.read_status(Priority.SERVICE)
+        except Refused as error:
+            raise self._meant(error) from error
+        state.require_fresh(status)
+        if not known:
+            # of one that is known, a word that no manual has keeps no stop back
+            self._require_possible(status)
+        self._params.recognition.begin()
+        return named
+
+    async def require(self) -> None:
+        """Recognise it before a write (DriveError: it is not known what is there)."""
+        try:
+            await self.recognise()
+        except (LinkError, DriveError) as error:
+            why = explain_failure(error, self._state)
+            raise self._params.recognition.error(why) from error
+
+    async def look(self) -> None:
+        """
+        Read once what only a drive of this family answers, before one that was lost is stopped.
+
+        :raises LinkError: it does not answer.
+        :raises DriveError: another one does.
+        """
+        key = next(iter(self._profile.identify), self._state.model.key_of_status)
+        try:
+            value = await self._params.read(key, Priority.LOOK, retry=False)
+        except Refused as error:
+            raise self._meant(error) from error
+        self._require_identity(key, value)
+
+    async def read_nameplate(self) -> Identity:
+        """Read who it says that it is (DriveError: it is another one)."""
+        for key in self._profile.identify:
+            self._require_identity(key, await self._params.read(key, Priority.SERVICE))
+        nameplate, product = self._state.nameplate, self._profile.product
+        if product is None:
+            identity = await nameplate.read_more()
+            # on CANopen it is a number, which no manual gives
+            by_name = self._params.protocol == 'modbus' and identity.vendor
+            if by_name and not identity.vendor.startswith(self._profile.vendor):
+                raise self._another(Report(Cause.MADE_BY, vendor=identity.vendor))
+            return identity
+        try:
+            return nameplate.take(await carry_out(product(), self._params, Priority.SERVICE))
+        except DriveError:
+            self._params.recognition.end()
+            raise
+
+    def _require_identity(self, key: str, value: Value) -> None:
+        values = self._profile.identify.get(key, (value,))
+        if value not in values:
+            name, shown = self._state.model[key].name, ' or '.join(map(str, values))
+            why = Report(Cause.IS_NOT, name=name, value=value, values=shown)
+            raise self._another(why)
+
+    def _require_possible(self, status: InverterStatus) -> None:
+        """Make sure that what was read can be of this family, where it has nothing better."""
+        profile, state = self._profile, self._state
+        if profile.identify or profile.product or self._params.in_block:
+            return
+        word, identity = status.word, state.nameplate.identity
+        if word is not None and not profile.status_word.may_say(word):
+            raise self._impossible(state.word_key, f'{word:04X}h')
+        if profile.status_word.code is None and status.code > _LAST_CODE:
+            raise self._impossible(state.model.key(Role.STATUS_CODE), str(status.code))
+        low, high = _NO_FIRMWARE
+        if identity is not None and (identity.firmware <= low or identity.firmware >= high):
+            firmware = f'{identity.firmware:.2f}'
+            raise self._impossible(state.model.key(Role.FIRMWARE), firmware)
+
+    def _impossible(self, key: str, value: str) -> DriveError:
+        name = self._state.model[key].name
+        return self._another(Report(Cause.CANNOT_BE, name=name, value=value))
+
+    def _another(self, why: Report) -> DriveError:
+        """Note that another drive answers; return the error for that."""
+        self._params.recognition.end()
+        return DriveError(Cause.ANOTHER_DRIVE, title=self._profile.title, why=why)
+
+    def _meant(self, error: Refused) -> LinkError | DriveError:
+        """Return what it means that the drive refuses what every one of its family has."""
+        if error.code == Refused.BUSY:
+            return error
+        if error.code in NONE_SUCH:
+            self._params.recognition.end()
+        return DriveError(Cause.OTHER_MODEL, error=str(error), model=self._state.model.name)
