@@ -51,8 +51,8 @@ class Setpoints:
         self._logged_idle = False
         self._warned_of_joint = False
         self._limit = LogLimit()
-        #: What has a stamp that is to come, as reported.
-        self._ahead: set[str] = set()
+        #: The last stamp was one that is to come, and that was reported.
+        self._was_ahead = False
         self._joint_command = node.resolve_topic_name('~/joint_command')
         context.subscribe(
             node,
@@ -88,7 +88,7 @@ class Setpoints:
             unit = _NAMES.get(message.unit, f'unit {message.unit}')
             self._ignore('unit', f'set-point in {unit} ignored: the control mode is {mode}')
             return
-        if self._is_of_now('set-point', message.header.stamp):
+        if self._is_of_now(message.header.stamp):
             self._take(message.value)
 
     def _on_joint_command(self, message: JointState) -> None:
@@ -116,15 +116,14 @@ class Setpoints:
         except ValueError as error:
             self._ignore('joint', f'joint command ignored: {error}')
             return
-        if self._is_of_now('joint command', message.header.stamp):
-            self._take(value)
+        self._take(value)
 
-    def _is_of_now(self, what: str, stamp: Time) -> bool:
+    def _is_of_now(self, stamp: Time) -> bool:
         """
         Return whether a stamp is within ``setpoint_timeout`` of the node's clock; 0 is now.
 
-        One that is to come would be fresh until then. It is the clock that is wrong, which is said
-        once for each topic, until a stamp is right again.
+        One that is to come would be fresh until then. It is the clock that is wrong, which is
+        reported once, until a stamp is right again.
         """
         timeout = self._managed.settings.setpoint_timeout
         # the type of the message can have moments that are none for rclpy
@@ -133,16 +132,17 @@ class Setpoints:
             return True
         age = (self._clock.now().nanoseconds - made) / 1e9
         if abs(age) <= timeout:
-            self._ahead.discard(what)
+            self._was_ahead = False
             return True
         if age > 0:
-            self._ignore(f'old {what}', f'{what} ignored: it was made {age:.1f} s ago')
-        elif what not in self._ahead and self._ignore(
-            f'{what} ahead',
-            f'{what} ignored: its stamp is {-age:.1f} s ahead of the clock of this node: set the '
-            'clocks of both computers alike by NTP, such as chrony, and use_sim_time of both nodes',
-        ):
-            self._ahead.add(what)
+            self._ignore('old', f'set-point ignored: it was made {age:.1f} s ago')
+        elif not self._was_ahead:
+            self._was_ahead = self._ignore(
+                'ahead',
+                f'set-point ignored: its stamp is {-age:.1f} s ahead of the clock of this node: '
+                'set the clocks of both computers alike by NTP, such as chrony, and use_sim_time '
+                'of both nodes',
+            )
         return False
 
     def _take(self, value: float) -> None:

@@ -348,7 +348,7 @@ LAWS = (
         'nfo_sinus_driver/node/setpoints.py',
         'if abs(age) <= timeout:',
         'if age <= timeout:',
-        ('test/ros/test_joint.py', '-k', 'ahead and setpoint_stamped'),
+        ('test/ros/test_joint.py', '-k', 'clock_that_is_ahead'),
     ),
     Mutant(
         8,

@@ -223,21 +223,16 @@ def stamped(client: Client, message: Any, ahead: float) -> Any:
     return message
 
 
-@pytest.mark.parametrize('topic', ['setpoint_stamped', 'joint_command'])
-def test_a_set_point_of_a_clock_that_is_ahead_is_ignored_and_that_is_said_once(
-    bench: Bench, topic: str
+def test_a_set_point_of_a_clock_that_is_ahead_is_ignored_and_that_is_reported_once(
+    bench: Bench,
 ) -> None:
-    mode = 'Speed' if topic == 'joint_command' else 'Freque'
-    simulator, client = start(bench, mode=mode)
+    simulator, client = start(bench)
     assert client.enable().success
 
     def message(ahead: float) -> Any:
-        if topic == 'joint_command':
-            turning = JointState(name=['nfo_sinus'], velocity=[_RADIANS * _TURNS])
-            return stamped(client, turning, ahead)
         return stamped(client, Setpoint(value=15.0, unit=Setpoint.HZ), ahead)
 
-    path = f'/nfo_sinus/{topic}'
+    path = '/nfo_sinus/setpoint_stamped'
     for ahead in (_HOUR, _DAY):
         with Publisher(client, path, message(ahead)):
             wait_until(lambda: _AHEAD in bench.log or turns(simulator), 'it says so')
@@ -262,16 +257,12 @@ def test_a_stamp_that_cannot_be_is_no_error_of_the_driver(bench: Bench) -> None:
     simulator, client = start(bench)
     assert client.enable().success
     for seconds, nanoseconds in _IMPOSSIBLE:
-        for topic, message in (
-            ('setpoint_stamped', Setpoint(value=15.0, unit=Setpoint.HZ)),
-            ('joint_command', JointState(name=['nfo_sinus'], velocity=[_RADIANS * _TURNS])),
-        ):
-            message.header.stamp.sec = seconds
-            message.header.stamp.nanosec = nanoseconds
-            with Publisher(client, f'/nfo_sinus/{topic}', message):
-                holds_for(1.0, lambda: not turns(simulator), 'it is not followed')
+        message = Setpoint(value=15.0, unit=Setpoint.HZ)
+        message.header.stamp.sec = seconds
+        message.header.stamp.nanosec = nanoseconds
+        with Publisher(client, '/nfo_sinus/setpoint_stamped', message):
+            holds_for(1.0, lambda: not turns(simulator), 'it is not followed')
     assert 'set-point ignored: it was made' in bench.log
-    assert 'joint command ignored: it was made' in bench.log
     # that there is no traceback, each test sees at its end
     fine = stamped(client, Setpoint(value=15.0, unit=Setpoint.HZ), 0.0)
     with Publisher(client, '/nfo_sinus/setpoint_stamped', fine):

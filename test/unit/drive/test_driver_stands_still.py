@@ -116,7 +116,8 @@ def test_nothing_old_is_published_after_that(connection: str) -> None:
             rig.line.stand_still(at, _STOOD)
             published: list[int] = []
             rig.line.later(
-                at + _STOOD, lambda rig=rig: published.append(len(rig.notes.snapshots))
+                at + _STOOD,
+                lambda rig=rig, published=published: published.append(len(rig.notes.snapshots)),
             )
             rig.pass_time(begins + _STOOD + 1.0)
             later = rig.notes.snapshots[published[0] :]
