@@ -95,7 +95,8 @@ def test_all_is_read_as_often_after_that(connection: str) -> None:
 
             before = asked()
             rig.line.stand_still(rig.clock.now + begins, _STOOD)
-            rig.pass_time(_STOOD + 0.2)
+            # after that each drive is recognised anew
+            rig.pass_time(_STOOD + 1.0)
             if rig.line.plc is not None:
                 # it has stopped them meanwhile
                 rig.pass_time(5.0)
