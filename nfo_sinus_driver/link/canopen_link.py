@@ -266,6 +266,7 @@ class CanopenLink:
     def open(self) -> None:
         """Open the port."""
         self._port.open()
+        self.supervision.opened()
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""

@@ -114,12 +114,17 @@ class CanopenSupervision:
         self._addressed.add(unit)
         self._commands |= writes
 
+    def opened(self) -> None:
+        """Note that the port was opened: nodes may have missed heartbeat and guarding for long."""
+        self._beat_due = self._listen_due = 0.0
+        for unit, guarding in self._guarded.items():
+            self._guarded[unit] = guarding._replace(due=0.0)
+
     def closed(self) -> None:
         """Note that the port is closed: heartbeat and guarding go on when it is open."""
         self._addressed.clear()
         self._restarted.clear()
         self._commands = False
-        self._beat_due = self._listen_due = 0.0
 
     def take_frames(self, frames: Sequence[Frame]) -> AbstractSet[int]:
         """Take what has come; return which nodes have restarted."""

@@ -183,6 +183,23 @@ def test_an_adapter_that_has_left_the_can_bus_is_taken_onto_it_again() -> None:
         assert rig.notes.said('adapter: A4, error warning, error passive, bus error')
 
 
+@pytest.mark.parametrize('watch', ['heartbeat', 'guarding'])
+@pytest.mark.parametrize('state', ['mute', 'bus_off'])
+def test_a_node_that_watches_the_driver_goes_on_watching_it(state: str, watch: str) -> None:
+    with Rig('canopen', options={'canopen_watch': watch}, drive_timeout=2.0) as rig:
+        rig.turn()
+        rig.line.state = state
+        rig.pass_time(1.9)
+        # before its time-out
+        assert not rig.turns and not rig.far.faults
+        rig.enable()
+        rig.pass_time(5.0)
+        assert rig.far.motor.frequency > 19
+        rig.kill()
+        rig.line.go_to(rig.clock.now + 5.0)
+        assert rig.far.faults and not rig.turns
+
+
 def test_what_takes_the_port_meanwhile_is_named() -> None:
     with Rig() as rig:
         rig.turn()
