@@ -192,8 +192,8 @@ LAWS = (
         3,
         'a Sinus H that ignores its stops is not released',
         'nfo_sinus_driver/families/sinus_h/profile.py',
-        'try_steps(one(method.begin(int(OFF & ~Control.NO_COAST_STOP))))',
-        'try_steps(one(method.begin(int(OFF))))',
+        'yield method.begin(int(OFF & ~Control.NO_COAST_STOP))',
+        'yield method.begin(int(OFF))',
         ('test/unit/drive/test_telegram1.py', '-k', 'ignores_its_stops'),
     ),
     Mutant(

@@ -10,6 +10,7 @@ import json
 import re
 import signal
 from typing import Any
+from unittest import mock
 
 from cli_bench import PATIENCE, QUICK, Bench, Done, MakeBench, wait_until
 import pytest
@@ -17,6 +18,7 @@ import pytest
 from nfo_sinus_driver.families.sinus_g2.words import Control
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 from nfo_sinus_driver.simulator.memory import Reason
+from nfo_sinus_driver.simulator.motor import Motor
 
 Nfo = Callable[..., Done]
 OVERLOAD, SIO_FAIL = 5, 14
@@ -173,6 +175,15 @@ def test_stop_that_is_not_confirmed(bench: Bench) -> None:
     assert 'the stop is NOT confirmed' in said + err
     assert 'ending WITHOUT a confirmed stop' in err
     assert bench.state()['driven']
+
+
+def test_stop_of_a_motor_whose_speed_stays_is_no_success(bench: Bench) -> None:
+    bench.run_by_bus()
+    with mock.patch.object(Motor, 'frequency', property(lambda _: 20.0)):
+        done = bench.run('stop', '--quick', '--json')
+    assert done.status == 1 and json.loads(done.out)['confirmed'] is False
+    assert 'the motor turns at 20 Hz and does not slow down' in done.err
+    assert 'ending WITHOUT a confirmed stop' in done.err
 
 
 def test_stop_of_a_drive_that_is_silent(bench: Bench) -> None:
