@@ -60,9 +60,9 @@ class Cause(enum.Enum):
     TAKES_CONTROL = '{why}: a motor that the terminals run stops now'
     HELD_BY_LINE = 'only watched, and yet {why}: a motor that the terminals ran has stopped'
     NOT_RECOGNISED = (
-        'it is not known what is at address {address} ({why}): nothing is written to it, no stop '
-        'either, which could start another drive. Check its mains and cable, and that it is the '
-        f'drive that the model or family says. {_EMERGENCY}'
+        'it is not known what is at address {address} ({why}): nothing is written there, no stop '
+        'either, which could start another drive. Use its {enable_input} if its motor turns; check '
+        'mains and cable, and that it is the drive that model or family says'
     )
     NONE_RECOGNISED = (
         'no stop was broadcast: no drive of this line was recognised since its port was opened'

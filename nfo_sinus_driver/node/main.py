@@ -64,6 +64,9 @@ _NOT_STARTED = (
     'runs on: use the enable input or the emergency stop'
 )
 
+#: The same of an end for one drive.
+_NOTHING_TO_STOP = 'ending without a stop, for this driver has run no motor here'
+
 #: What rclpy raises for ROS arguments that make no sense.
 _ARGUMENT_ERRORS = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
 
@@ -192,15 +195,19 @@ def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
     """
     Log the outcome of a stop; false if it failed.
 
-    Not where the drive has never answered, or where it is not known what is there and this driver
-    has run no motor of it: then it has none to stop.
+    It has not where the drive has never answered, or where it is not known what is there and this
+    driver has run no motor of it: then there is none to stop.
     """
     log, drive = node.get_logger(), node.managed.drive
+    owed = drive.stop_owed or drive.recognised
     try:
         answer = future.result(timeout=0)
     except FutureTimeoutError:
-        log.error('the stop is NOT confirmed: the drive did not answer in time')
-        return False
+        if owed or not drive.ever_responded:
+            log.error('the stop is NOT confirmed: the drive did not answer in time')
+            return False
+        log.warning(_NOTHING_TO_STOP)
+        return True
     except Exception as error:
         if not drive.ever_responded:
             log.warning('the drive has not answered yet: if its motor was left running, it runs on')
@@ -208,8 +215,8 @@ def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
         # after any error, the other drives have to be waited for, too
         known = isinstance(error, DriveError)
         why = node.managed.wording.say(error) if known else f'error in the driver: {error!r}'
-        if known and error.cause is Cause.NOT_RECOGNISED and not drive.stop_owed:
-            log.warning(f'ending without a stop, which this driver owes no motor: {why}')
+        if not owed and known and error.cause is Cause.NOT_RECOGNISED:
+            log.warning(f'{_NOTHING_TO_STOP}: {why}')
             return True
         log.error(why)
         return False
