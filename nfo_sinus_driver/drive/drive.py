@@ -102,7 +102,9 @@ class Drive:
             lambda reply: self._poller.take_status(reply),
         )
         self._controller: Controller | None = None
-        commands = None if settings.method == 'monitor' else Commands(self.state)
+        commands: Commands | None = None
+        if settings.method != 'monitor':
+            commands = Commands(self.state)
         self._recogniser = Recogniser(self.state, commands)
         if commands is not None:
             look = self._recogniser.look

@@ -348,8 +348,8 @@ HISTORIES = (
         (
             (
                 MAIN,
-                '            elif node.managed.drive.ever_responded:',
-                '            elif node.managed.drive.identity is not None:',
+                '            elif node.managed.drive.ever_responded and',
+                '            elif node.managed.drive.identity is not None and',
             ),
         ),
     ),

@@ -14,10 +14,12 @@ from mutant import (
     EVERY_STEP,
     G2,
     INTERFACE,
+    LEFTOVER,
     MAIN,
     NO_RESTART,
     NODE,
     PROFILE,
+    RECOGNITION,
     RTU_LINK,
     SEQUENCE,
     SETPOINT,
@@ -38,6 +40,8 @@ REVERSES = ('test/unit/drive/test_table_16.py', '-k', 'reverse_is_bit_13')
 #: A port that is open and passes nothing.
 SILENCES = 'nfo_sinus_driver/bus/scheduler.py'
 MUTE_PORT = 'test/unit/drive/test_mute_port.py'
+GATE = 'nfo_sinus_driver/drive/recognition.py'
+RECOGNISING = 'nfo_sinus_driver/drive/recognising.py'
 #: What the laws ask of a MOVITRAC alone.
 MOVITRAC_LAWS = 'test/unit/drive/test_movitrac_laws.py'
 
@@ -776,5 +780,95 @@ LAWS = (
         '        self._pause_ends = -math.inf\n\n    def hurry',
         '\n    def hurry',
         (MUTE_PORT, '-k', 'longest'),
+    ),
+    Mutant(
+        11,
+        'a drive that was not recognised is written to',
+        GATE,
+        '        if not self.holds:',
+        '        if False:',
+        (RECOGNITION, '-k', 'another_make or before_an_answer'),
+        also=((
+            'nfo_sinus_driver/drive/parameter_access.py',
+            '        if not self.recognition.holds and self._recognise is not None:',
+            '        if False:',
+        ),),
+    ),
+    Mutant(
+        11,
+        'what is recognised stays so in a long silence',
+        'nfo_sinus_driver/bus/scheduler.py',
+        '        if max(self.lasts(unit, now), now - self._any_frame_at) > EXCHANGE:',
+        '        if False:',
+        (RECOGNITION, '-k', 'answers_alone and rtu'),
+    ),
+    Mutant(
+        11,
+        'a drive that answers after a long silence is taken for the same',
+        'nfo_sinus_driver/bus/scheduler.py',
+        '        if self.lasts(unit, now) > EXCHANGE:\n            self._unit_since',
+        '        if False:\n            self._unit_since',
+        (RECOGNITION, '-k', 'no_loss'),
+        also=((
+            'nfo_sinus_driver/bus/scheduler.py',
+            '        if now - self._any_frame_at > EXCHANGE:',
+            '        if False:',
+        ),),
+    ),
+    Mutant(
+        11,
+        'a port that is opened anew has the same drives behind it',
+        'nfo_sinus_driver/bus/worker.py',
+        'self.silences.opened(self.now(), lost=lost)',
+        'self.silences.opened(self.now(), lost=False)',
+        (RECOGNITION, '-k', 'another_line'),
+    ),
+    Mutant(
+        11,
+        'a pause of the driver leaves what is recognised',
+        'nfo_sinus_driver/bus/scheduler.py',
+        '        if now - self._any_frame_at > EXCHANGE:',
+        '        if False:',
+        (RECOGNITION, '-k', 'stands_still'),
+    ),
+    Mutant(
+        11,
+        'firmware and status of another drive are taken for those of a G2',
+        RECOGNISING,
+        '        if not known:\n',
+        '        if False:\n',
+        (RECOGNITION, '-k', 'no_nfo_drive'),
+    ),
+    Mutant(
+        11,
+        'another maker is taken for ours',
+        RECOGNISING,
+        '            if by_name and not identity',
+        '            if False and not identity',
+        (RECOGNITION, '-k', 'another_maker'),
+    ),
+    Mutant(
+        11,
+        'what identifies a described drive is not asked for',
+        RECOGNISING,
+        '        if value not in values:',
+        '        if False:',
+        (RECOGNITION, '-k', 'all_its_registers'),
+    ),
+    Mutant(
+        3,
+        'a drive whose answers alone are lost is not stopped',
+        SEQUENCE,
+        '            if not self._state.params.recognition.holds:\n                raise',
+        '            raise',
+        (RECOGNITION, '-k', 'answers_alone and rtu'),
+    ),
+    Mutant(
+        2,
+        'a run command of an earlier session waits for the control of the line',
+        CONTROLLER,
+        '            await self.method.remove_leftover()\n',
+        '',
+        (LEFTOVER, '-k', 'delta_vfd_el or movitrac'),
     ),
 )

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A drive to which the stop of the driver's family is a run command is not started, whatever ends."""
+"""A drive to which the stop of another make is a run command is not started, whatever ends."""
 
 from __future__ import annotations
 

@@ -258,6 +258,35 @@ def test_no_object_writes_the_fields_of_another() -> None:
     assert sorted(foreign_writes(ast.parse(source))) == ['a.b', 'c.d', 'e.f', 'self.a.b']
 
 
+#: What sends a write, or what has an effect, of those who have a bus.
+SENDS = frozenset(('write', 'write_and_read', 'read_then_write', 'watch'))
+#: Who asks before whether the drive was recognised.
+GATES = ['drive/broadcast.py', 'drive/parameter_access.py', 'drive/setpoint.py']
+
+
+def sends(tree: ast.Module) -> bool:
+    """Whether a module has a bus write something."""
+    calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    return any(
+        isinstance(call, ast.Attribute)
+        and call.attr in SENDS
+        and ast.unparse(call.value).rpartition('.')[2].lstrip('_') == 'bus'
+        for call in calls
+    )
+
+
+def test_all_that_is_written_to_a_drive_passes_one_gate() -> None:
+    outside = ('bus', 'link', 'simulator')
+    found = [
+        path
+        for path, source in package_sources().items()
+        if room_of(path) not in outside and sends(ast.parse(source))
+    ]
+    assert found == GATES
+    assert sends(ast.parse('await self._state.bus.write(1, a, b)'))
+    assert not sends(ast.parse('await self._params.write(step); bus.read(1, a)'))
+
+
 def test_no_files_import_each_other_in_a_circle() -> None:
     assert circle(package_sources()) == []
     # what imports for types alone is found, too

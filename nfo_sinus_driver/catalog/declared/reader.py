@@ -308,8 +308,10 @@ class _Reader:
             values = tuple(one.scalar for one in given if isinstance(one.scalar, int))
             if ('value' in node) is ('values' in node):
                 self._problems.add(node.line, 'identify needs value or values, one of both')
-            if not all(map(address.number.fits, values)):
-                self._problems.add(node.line, f'identify: {made.name} cannot carry that')
+            for value in values:
+                if not address.number.fits(value):
+                    said = f'identify: {address.number.name} does not carry {value}'
+                    self._problems.add(node.line, said)
             if values:
                 yield key, values
 

@@ -382,6 +382,15 @@ BAD = {
         'address: 5', 'address: 5, protocol: modbus_ascii', 'write 7N1',
     ),
     'address 0': ('address: 5', 'address: 0', '1 at least'),
+    'an identity without a number': (
+        'control:', 'identify: [{register: 1}]\ncontrol:', 'value or values',
+    ),
+    'an identity with two': (
+        'control:', 'identify: [{register: 1, value: 2, values: [3]}]\ncontrol:', 'one of both',
+    ),
+    'an identity too great': (
+        'control:', 'identify: [{register: 1, value: 70000}]\ncontrol:', 'does not carry 70000',
+    ),
     'read-only time-out': ('{register: 32, factor: 0.1, unit: s}',
                            '{register: 32, factor: 0.1, unit: s, access: r}', 'access: rw'),
 }
@@ -399,6 +408,18 @@ def test_a_bad_file_is_refused_with_its_line_and_a_sentence(tmp_path: Path, name
     # all of them are named at once, at the right place
     line = int(re.findall(r', line (\d+):', '\n'.join(one for one in found if said in one))[0])
     assert 1 <= line <= text.count('\n') + 1
+
+
+def test_a_file_says_what_tells_its_drive_from_others(tmp_path: Path) -> None:
+    path = tmp_path / 'known.vfd.yaml'
+    second = '{register: 65, bits: [4, 7], values: [1, 2]}'
+    identify = f'identify: [{{register: 0x40, value: 7}}, {second}]'
+    path.write_text(GOOD.replace('control:', f'{identify}\ncontrol:'), encoding='utf-8')
+    family = load_family(str(path))
+    first, second = family.profile.identify
+    assert family.profile.identify == {first: (7,), second: (1, 2)}
+    assert (family[first].name, family[second].name) == ('register 64', 'register 65')
+    assert not {first, second} & {one.key for one in family.settings}
 
 
 def test_all_that_is_wrong_is_reported_at_once(tmp_path: Path) -> None:

@@ -34,6 +34,17 @@ def test_a_file_is_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert 'siemens_v20: Siemens SINAMICS V20' in said and 'sinus_g2: NFO Sinus G2' in said
 
 
+def test_what_tells_a_drive_from_others_is_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = tmp_path / 'known.vfd.yaml'
+    identify = 'identify: [{register: 40200, value: 1}]\ncontrol:'
+    known.write_text(Path(V20).read_text().replace('control:', identify))
+    for path, asked_for in ((V20, True), (str(known), False)):
+        assert main(['family', 'check', path]) == 0
+        assert ('add identify' in capsys.readouterr().out) is asked_for
+
+
 def test_a_forgotten_numbering_is_remarked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

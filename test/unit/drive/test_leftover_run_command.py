@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A run command of an earlier session, left in a drive under local control, starts nothing later."""
+"""A run command of an earlier session that is left in a local drive starts nothing later."""
 
 from __future__ import annotations
 
