@@ -15,10 +15,12 @@ from collections.abc import Iterator
 import contextlib
 import os
 from pathlib import Path
+import shutil
 import signal
 import sys
 import tempfile
 import time
+from typing import IO
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -28,11 +30,19 @@ from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.bench import Bench, handle_signals, own_domain
 from nfo_sinus_driver.demo.record import why_no_picture
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
-from nfo_sinus_driver.demo.sequence import HEADING, PATIENCE, DemoSequence, StepError
+from nfo_sinus_driver.demo.sequence import (
+    HEADING,
+    PATIENCE,
+    DemoSequence,
+    DomainTakenError,
+    StepError,
+)
 from nfo_sinus_driver.node.executor import spinning
 
 #: More often than by default, for a smooth curve.
 _DRIVER_SETTINGS = ('-p', 'telemetry_rate:=5.0')
+#: How many are tried before the demo fails because there is another driver in each.
+_DOMAINS = 3
 _INTERRUPTED = 130
 _REMARKS = {'title': 'Forward, backward, a fault, and on again', 'drive': 'simulated drive'}
 
@@ -48,24 +58,15 @@ def main() -> int:
         what = 'no plot' if bag else 'neither a bag nor a plot'
         print(f'There will be {what} of the run: {", ".join(missing)}', flush=True)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    with own_domain() as domain, tempfile.TemporaryFile() as log, Bench(log) as bench:
-        os.environ['ROS_DOMAIN_ID'] = str(domain)
+    with tempfile.TemporaryFile() as log:
         try:
-            print(bench.start_simulator())
-            with _sequence(bag) as sequence:
-                driver = bench.start_driver(*_DRIVER_SETTINGS)
-                print(HEADING, flush=True)
-                sequence.run(bench)
-                driver.send_signal(signal.SIGINT)
-                if driver.wait(PATIENCE) != 0:
-                    raise StepError('the driver did not end as it should')
+            _run_alone(bag, log)
         except (StepError, RecordingError, RuntimeError) as error:
             log.seek(0)
             print(f'\nWhat driver and simulator said:\n{log.read().decode()}', file=sys.stderr)
             print(f'FAILED: {error}', file=sys.stderr)
             return 1
         except KeyboardInterrupt:
-            handle_signals(signal.SIG_IGN)
             print('ended before the run was done', file=sys.stderr)
             return _INTERRUPTED
     print('The run is done: every step happened.')
@@ -78,6 +79,43 @@ def main() -> int:
         draw(bag, picture, '/nfo_sinus')
         print(f'Its picture: {picture}')
     return 0
+
+
+def _run_alone(bag: Path | None, log: IO[bytes]) -> None:
+    """
+    Go through the sequence in a ROS domain that no other driver is in.
+
+    :raises StepError: a step did not happen.
+    """
+    for attempts_left in reversed(range(_DOMAINS)):
+        with own_domain() as domain:
+            os.environ['ROS_DOMAIN_ID'] = str(domain)
+            try:
+                _run(bag, log)
+                return
+            except DomainTakenError as error:
+                if bag is not None:
+                    shutil.rmtree(bag)
+                if not attempts_left:
+                    raise
+                print(f'{error}: the demo begins again in another domain', flush=True)
+
+
+def _run(bag: Path | None, log: IO[bytes]) -> None:
+    with Bench(log) as bench:
+        try:
+            print(bench.start_simulator())
+            with _sequence(bag) as sequence:
+                driver = bench.start_driver(*_DRIVER_SETTINGS)
+                print(HEADING, flush=True)
+                sequence.run(bench)
+                driver.send_signal(signal.SIGINT)
+                if driver.wait(PATIENCE) != 0:
+                    raise StepError('the driver did not end as it should')
+        except KeyboardInterrupt:
+            # what the bench now ends is not cut short
+            handle_signals(signal.SIG_IGN)
+            raise
 
 
 @contextlib.contextmanager

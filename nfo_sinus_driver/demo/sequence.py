@@ -42,6 +42,10 @@ class StepError(Exception):
     """A step of the sequence did not happen."""
 
 
+class DomainTakenError(StepError):
+    """There is another driver in the ROS domain."""
+
+
 class DemoSequence(Node):
     """A client of the driver: it enables, runs, lets a fault happen, and prints what it sees."""
 
@@ -168,9 +172,9 @@ class DemoSequence(Node):
     def _look_around(self) -> None:
         # it takes up to some seconds until one hears of another, so this is never over
         if self.count_publishers('/nfo_sinus/status') > 1:
-            raise StepError(
-                'there is another driver in this ROS domain, and it may have a real motor: '
-                'start again, which takes another domain'
+            raise DomainTakenError(
+                f'there is another driver in ROS domain {self.context.get_domain_id()}, and it '
+                'may have a real motor'
             )
         if self._now() >= self._printed + _LINE_PERIOD:
             self._print()
