@@ -95,8 +95,8 @@ class Scheduler:
         #: The stop, or its read, that was given out just now, and the unit that did not answer one.
         self._given_stop: Transfer | None = None
         self._unanswered: int | None = None
-        #: Units that have not answered a stop since they last answered anything.
-        self._unanswered_stops: set[int] = set()
+        #: What units have not answered since they last answered anything: a stop (true), its read.
+        self._unanswered_stops: set[tuple[int, bool]] = set()
 
     def add(self, entry: LatestValue | Waiting) -> None:
         """Queue a slot or a transaction, behind its equals."""
@@ -162,9 +162,9 @@ class Scheduler:
         self._slot_went = self._given == _SLOT
         stop = self._given_stop
         self._unanswered = stop.unit if stop is not None and self._is_silent(stop.unit) else None
-        if self._unanswered is not None and stop is not None and stop.data is not None:
-            # the stop behind a read that was not answered goes out at once
-            self._unanswered_stops.add(self._unanswered)
+        if self._unanswered is not None and stop is not None:
+            # each by itself: the stop behind a read that was not answered goes out at once
+            self._unanswered_stops.add((stop.unit, stop.data is not None))
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
                 continue
@@ -219,7 +219,8 @@ class Scheduler:
             return _SLOT
         transfer = entry.transfer
         if not self._is_silent(transfer.unit):
-            self._unanswered_stops.discard(transfer.unit)
+            if self._unanswered_stops:
+                self._unanswered_stops -= {(transfer.unit, False), (transfer.unit, True)}
         elif transfer.priority in _READS:
             return _MISSING if self._is_missing(transfer.unit) else _RETRY
         elif self._is_repeated(transfer) and self._is_missing(transfer.unit):
@@ -227,7 +228,8 @@ class Scheduler:
         return transfer.priority
 
     def _is_repeated(self, transfer: Transfer) -> bool:
-        return transfer.priority <= Priority.LOOK and transfer.unit in self._unanswered_stops
+        before = (transfer.unit, transfer.data is not None)
+        return transfer.priority <= Priority.LOOK and before in self._unanswered_stops
 
 
 #: A unit that has been silent for so long counts as missing, s: short enough to spare the others,

@@ -177,6 +177,9 @@ class ControlSession(Listener):
         except DriveError as error:
             self.answer = error.report
             self.screen.say(f'{say(error)}: {_EMERGENCY}')
+            if error.cause is Cause.NOT_RECOGNISED and not self.drive.stop_owed:
+                # nothing was written to it, and no stop is on its way
+                return False
             return self.confirmed_late()
         return True
 

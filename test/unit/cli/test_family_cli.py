@@ -5,11 +5,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 import shutil
 
+from cli_bench import MakeBench
 import pytest
 from support.described import SHIPPED
+from support.recognition import other_make
 
 from nfo_sinus_driver.cli import families
 from nfo_sinus_driver.cli.main import main, parse
@@ -55,6 +58,7 @@ def test_a_forgotten_numbering_is_remarked(
         assert ('add numbering: 40001' in capsys.readouterr().out) is remarked
 
 
+<<<<<<< ours
 def test_whether_the_run_command_survives_a_power_cycle_is_asked_where_it_is_not_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -65,6 +69,21 @@ def test_whether_the_run_command_survives_a_power_cycle_is_asked_where_it_is_not
         assert ('add keeps_run' in capsys.readouterr().out) is (not said)
 
 
+||||||| base
+=======
+@pytest.mark.parametrize('words', [('run', '10', '--for', '1'), ('stop',), ('set', 'ramp.accel=7')])
+def test_a_drive_of_another_make_is_only_read(
+    make_bench: MakeBench, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: Sequence[str]
+) -> None:
+    bench = make_bench(model=other_make(tmp_path), serial_numbers=[])
+    delta = str(SHIPPED['delta_vfd_el'])
+    assert main(['--port', bench.simulator.port, '--family', delta, *words]) != 0
+    said = capsys.readouterr()
+    assert 'another model' in said.err and 'is confirmed' not in said.err
+    assert bench.writes() == [] and not bench.state()['run_command']
+
+
+>>>>>>> theirs
 def test_families_are_listed(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
