@@ -168,7 +168,7 @@ class StopSequence:
         else:
             self._tried_at = -math.inf
             self._begun_at = self._bus.now()
-            self._sent_at = math.inf
+            self._sent_at = self._forced_at = math.inf
             self._measured = None
             self._reasons += 1
             self._control.dispatch(ControlEvent.FAULT_OVER)
