@@ -533,9 +533,10 @@ class Drive:
 
     def _take_scale(self, change: Change) -> None:
         """Stop a motor whose set-points would mean another speed from now on."""
+        controller = self._controller
         is_used = self.state.nameplate.scales.found.get(change.key) == change.new
-        if self._controller is not None and not is_used:
-            self._controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
+        if controller is not None and controller.enabled and not is_used:
+            controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
 
     def _set_active(self, active: bool) -> None:
         self._bus.cancel(self._telemetry_task)

@@ -438,9 +438,11 @@ class Poller:
                 # it may be busy
                 continue
             now = scales.found[key]
-            if before not in (None, now) and self._controller:
+            controller = self._controller
+            # a start that is under way reads them itself
+            if before not in (None, now) and controller is not None and controller.enabled:
                 change = Change(key, before, now, state.model[key].unit)
-                self._controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
+                controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
 
     def _report_fault(self, status: InverterStatus, reported: bool) -> None:
         """Report on change that a fault is active, unless a stop because of it was reported."""

@@ -729,8 +729,8 @@ LAWS = (
         2,
         'a scale that is changed at the drive makes another speed of a set-point',
         WATCH,
-        '            if before not in (None, now) and self._controller:',
-        '            if False:',
+        '            if before not in (None, now) and controller',
+        '            if False and controller',
         ('test/unit/drive/test_scale_changes.py', '-k', 'at_standstill'),
     ),
     Mutant(
