@@ -58,7 +58,6 @@ def test_a_forgotten_numbering_is_remarked(
         assert ('add numbering: 40001' in capsys.readouterr().out) is remarked
 
 
-<<<<<<< ours
 def test_whether_the_run_command_survives_a_power_cycle_is_asked_where_it_is_not_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -69,8 +68,6 @@ def test_whether_the_run_command_survives_a_power_cycle_is_asked_where_it_is_not
         assert ('add keeps_run' in capsys.readouterr().out) is (not said)
 
 
-||||||| base
-=======
 @pytest.mark.parametrize('words', [('run', '10', '--for', '1'), ('stop',), ('set', 'ramp.accel=7')])
 def test_a_drive_of_another_make_is_only_read(
     make_bench: MakeBench, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: Sequence[str]
@@ -83,7 +80,6 @@ def test_a_drive_of_another_make_is_only_read(
     assert bench.writes() == [] and not bench.state()['run_command']
 
 
->>>>>>> theirs
 def test_families_are_listed(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
