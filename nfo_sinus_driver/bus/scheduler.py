@@ -22,7 +22,8 @@ __all__ = ['BACKGROUND_SHARE', 'EXCHANGE', 'Scheduler', 'Waiting']
 #: The share of the time that TELEMETRY and REFRESH get, each of them, when everything above wants
 #: more; of the time that set-points leave, for else these would take nearly all from the polls.
 BACKGROUND_SHARE = 1 / 6
-#: The same for all polls of units that do not answer: each of them may cost a whole time-out.
+#: The same for all polls and set-points of units that do not answer: each of them may cost a whole
+#: time-out.
 RETRY_SHARE = 1 / 2
 #: How much of its share each may be owed while it waits for it, s: what it earns by two requests
 #: without a response, when the time-out is that of the factory.
@@ -33,7 +34,7 @@ _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
 #: What only reads, and can wait for a unit that does not answer.
 _READS = (Priority.POLL, *_BACKGROUND)
 
-#: What is for a unit that did not answer the last request.
+#: Polls and set-points for a unit that did not answer the last request.
 _RETRY: Literal['retry'] = 'retry'
 #: What is for a unit that has been silent for long.
 _MISSING: Literal['missing'] = 'missing'
@@ -65,13 +66,14 @@ class Scheduler:
     stop the motor goes unnoticed: so after each of them something else has a turn, and the
     background's share is of the time between them.
 
-    A unit that does not answer keeps the line for a time-out with every poll. All of them together
-    have no more than their share of the time as long as any other waits. A stop that a unit does
+    A unit that does not answer keeps the line for a time-out with every poll, and with every
+    set-point but an urgent one. All of them together have no more than their share of the time as
+    long as any other waits. A stop that a unit does
     not answer is repeated at once, and after each of them another unit has a turn, too: the most
     urgent, whatever the others are owed.
 
-    Units that have been silent for long are missing. Reads from them, and stops that did not reach
-    them, wait until :meth:`take` may give them out, and then go ahead of other polls.
+    Units that have been silent for long are missing. Reads from them, set-points, and stops that
+    did not reach them, wait until :meth:`take` may give them out, and then go ahead of other polls.
 
     :param is_silent: whether a unit has not answered the last request.
     :param is_missing: whether it has been silent for long.
@@ -216,7 +218,10 @@ class Scheduler:
 
     def _rank(self, entry: LatestValue | Waiting) -> _Rank:
         if isinstance(entry, LatestValue):
-            return _SLOT
+            unit = entry.unit
+            if unit is None or not self._is_silent(unit) or entry.urgent():
+                return _SLOT
+            return _MISSING if self._is_missing(unit) else _RETRY
         transfer = entry.transfer
         if not self._is_silent(transfer.unit):
             if self._unanswered_stops:

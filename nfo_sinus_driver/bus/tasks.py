@@ -290,12 +290,16 @@ class LatestValue:
         ``None`` if there is nothing to write any more.
     :ivar done: called by the worker with the error, or ``None`` when the unit took it.
     :ivar answered: called after that with the answer of a unit that took it.
+    :ivar unit: whose it is; one that does not answer has a share of the time only.
+    :ivar urgent: returns whether it goes ahead all the same; called by any thread.
     """
 
     make: Callable[[], Transfer | None]
     done: Callable[[Transfer, LinkError | None], None]
     answered: Callable[[Reply], None] = lambda reply: None
+    unit: int | None = None
     pending: bool = False
+    urgent: Callable[[], bool] = lambda: False
 
     def ask(self) -> bool:
         """Mark it for writing; return whether that is new."""

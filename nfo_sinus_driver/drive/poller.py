@@ -22,7 +22,15 @@ from nfo_sinus_driver.drive.parameter_writer import Change
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.snapshot import NAN, NOT_MEASURED, Measured, Snapshot
-from nfo_sinus_driver.link import Interrupted, LinkError, NoData, PortError, Refused, Reply
+from nfo_sinus_driver.link import (
+    Interrupted,
+    LinkError,
+    NoAnswer,
+    NoData,
+    PortError,
+    Refused,
+    Reply,
+)
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
@@ -69,6 +77,38 @@ _SLOW_TURNS = 15
 #: poll to poll; else frequency and speed are both measured each time.
 _STEADY = 0.02
 _MODE_TURNS = 60
+#: The reads without which a poll fails, and anything in it.
+_STATUS, _MODE, _POLL = 'status', 'control mode', 'poll'
+
+
+class _Failures:
+    """
+    Since when each read of a poll has failed, s of one clock.
+
+    Failures of several reads, one after the other, are one: each began with the first of them.
+
+    :ivar newest: the last one.
+    """
+
+    def __init__(self) -> None:
+        self._since: dict[str, float] = {}
+        self._all_since = math.inf
+        self.newest: LinkError | DriveError = NoAnswer()
+
+    def note(self, what: str, now: float, error: LinkError | DriveError) -> None:
+        """Note that a read failed."""
+        self.newest = error
+        self._all_since = min(self._all_since, now)
+        self._since[what] = min(self._since.get(what, math.inf), self._all_since)
+
+    def lasts(self, what: str, now: float) -> float:
+        """Return for how long a read has failed, s; 0: it has not."""
+        return now - self._since.get(what, now)
+
+    def end(self, what: str) -> None:
+        """Note that a read was answered."""
+        self._since.pop(what, None)
+        self._all_since = math.inf
 
 
 class Poller:
@@ -102,8 +142,7 @@ class Poller:
         self.active = False
         #: The newest poll.
         self.snapshot = take_snapshot(state, setpoint)
-        #: Since when every poll failed, although the drive may have answered.
-        self._failing_since = math.inf
+        self._failures = _Failures()
         #: How often in a row it could not be connected to.
         self._failed_reconnects = 0
         #: When a value was last asked for, pauses of the worker aside, and how long it took, s:
@@ -194,8 +233,12 @@ class Poller:
 
     def _poll_soon(self) -> None:
         """Find out at once whether a drive responds that did not answer another request."""
-        if self._state.connected:
-            self.wake()
+        if not self._state.connected:
+            return
+        if self._fails_for_long(_STATUS):
+            # the read that waits for its turn would come too late
+            self._begin_anew(self._failures.newest)
+        self.wake()
 
     def read_mode_soon(self) -> None:
         """Read the control mode with the next poll: it may be another one now."""
@@ -205,7 +248,7 @@ class Poller:
     def connected(self) -> None:
         """Reset the counts of failures: the drive is connected."""
         self._bus.recorder.connected(self._unit)
-        self._failing_since = math.inf
+        self._failures = _Failures()
         self._failed_reconnects = 0
         self._complaint = None
         self._received = None
@@ -227,7 +270,7 @@ class Poller:
                 if not self._params.recognition.holds:
                     # it was silent for long, or this driver stood still: is it still the same?
                     await self._recognise()
-                self._failing_since = math.inf
+                self._failures.end(_POLL)
             except (LinkError, DriveError) as error:
                 self._on_poll_failed(error)
             except Exception as error:
@@ -386,7 +429,9 @@ class Poller:
                 code_for=self._code_holds,
             )
 
-        status = await self._insist(read)
+        while (status := await self._read(_STATUS, read)) is None:
+            # what was read before stays valid
+            continue
         if self._received is taken:
             self._received = None
         state.require_fresh(status)
@@ -401,16 +446,10 @@ class Poller:
         last, paused = self.snapshot.actual, self._bus.paused
         status = await self._read_status()
         rare = self._rare_is_due
-        if rare:
-            self._rare_read_at = self._bus.now()
-        if rare or self._may_start:
-            # it can only change at standstill
-            before = state.control_mode
-            mode = await self._insist(lambda: state.read_control_mode(self._priority, retry=False))
-            if mode != before and self._controller:
-                # before it is published: a set-point never has the unit of another mode
-                self._controller.on_status(status)
-            await self._check_scales(all_of_them=rare)
+        # it can only change at standstill
+        due = rare or self._may_start
+        if due and await self._read_mode(status) and await self._check_scales(all_of_them=rare):
+            self._rare_read_at = self._bus.now() if rare else self._rare_read_at
         actual = _ACTUAL.get(state.control_mode)
         steady = True
         if actual is not None:
@@ -424,8 +463,12 @@ class Poller:
             # else the status may be old: the next poll is due
             self._publish(status)
 
-    async def _check_scales(self, *, all_of_them: bool) -> None:
-        """Read what scales set-points, or any value, and stop the motor if that was changed."""
+    async def _check_scales(self, *, all_of_them: bool) -> bool:
+        """
+        Read what scales set-points, or any value, and stop the motor if that was changed.
+
+        :returns: whether each was answered.
+        """
         state, scales = self._state, self._state.nameplate.scales
         target = state.model.profile.setpoints.get(state.control_mode)
         keys = scales.keys if all_of_them else scales.of(target.key) if target else ()
@@ -433,16 +476,18 @@ class Poller:
             before = scales.found.get(key)
             read = functools.partial(scales.read_one, key, self._priority)
             try:
-                await self._insist(read)
+                now = await self._read(key, read)
             except Refused:
                 # it may be busy
                 continue
-            now = scales.found[key]
+            if now is None:
+                return False
             controller = self._controller
             # a start that is under way reads them itself
             if before not in (None, now) and controller is not None and controller.enabled:
                 change = Change(key, before, now, state.model[key].unit)
                 controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
+        return True
 
     def _report_fault(self, status: InverterStatus, reported: bool) -> None:
         """Report on change that a fault is active, unless a stop because of it was reported."""
@@ -459,53 +504,68 @@ class Poller:
         if role is state.turning.role and status and not math.isnan(status.frequency):
             # it came with the status
             return state.last_polled(role).value
-        value = await self._read_measured(role)
+        key = state.model.key(role)
+        try:
+            value = await self._read(key, lambda: state.measure(key, self._priority))
+        except (PortError, Interrupted):
+            # raised once only: the status that is read next would show a drive that was stopped
+            raise
+        except Refused:
+            value = NAN
+        except LinkError:
+            if self._silent_for_long:
+                raise
+            value = NAN
+        if value is None:
+            # the last one counts until the next poll
+            return state.last_polled(role).value
         state.polled(role, value)
         if role in state.model.roles:
             self._turn = self._running - self._requested_at
         return value
 
-    async def _read_measured(self, role: Role) -> float:
-        try:
-            key = self._state.model.key(role)
-            return await self._insist(lambda: self._state.measure(key, self._priority))
-        except (PortError, Interrupted):
-            # raised once only: the status that is read next would show a drive that was stopped
-            raise
-        except Refused:
-            return NAN
-        except LinkError:
-            if self._silent_for_long:
-                raise
-            return NAN
+    async def _read_mode(self, status: InverterStatus) -> bool:
+        """Read the control mode, and judge the status by it; return whether it was answered."""
+        state = self._state
+        before = state.control_mode
+        mode = await self._read(
+            _MODE, lambda: state.read_control_mode(self._priority, retry=False)
+        )
+        if mode not in (None, before) and self._controller:
+            # before it is published: a set-point never has the unit of another mode
+            self._controller.on_status(status)
+        return mode is not None
 
-    async def _insist(self, read: Callable[[], Awaitable[_T]]) -> _T:
+    async def _read(self, what: str, read: Callable[[], Awaitable[_T]]) -> _T | None:
         """
-        Repeat a read at once until the drive answers; what was read before it stays valid.
+        Do one read of a poll; return ``None`` if it was not answered, and may be repeated.
 
+        :param what: by which its failures are counted.
         :raises LinkError: the drive has been silent for too long, or has answered everything but
             this; it refuses; the port is gone; or the PLC has no valid data of it.
         """
-        failing_since = math.inf
-        while True:
-            asked_at, self._requested_at = self._bus.now(), self._running
-            try:
-                answer = await read()
-            except (PortError, Refused, Interrupted, NoData):
+        asked_at, self._requested_at = self._bus.now(), self._running
+        try:
+            answer = await read()
+        except (PortError, Refused, Interrupted, NoData):
+            raise
+        except LinkError as error:
+            self._state.unanswered()
+            self._check_silence(asked_at, self._bus.now())
+            # it began when the request was sent: before, it has only waited for its turn
+            self._failures.note(what, self._running - self._bus.took, error)
+            if self._silent_for_long or self._fails_for_long(what):
                 raise
-            except LinkError:
-                self._state.unanswered()
-                now = self._bus.now()
-                self._check_silence(asked_at, now)
-                failing_since = min(failing_since, now)
-                in_vain = now - failing_since >= self._state.settings.lost_after
-                if self._silent_for_long or in_vain:
-                    raise
-                self._bus.recorder.retry(self._unit)
-            else:
-                self._state.answered()
-                self._setpoint.answered()
-                return answer
+            self._bus.recorder.retry(self._unit)
+            return None
+        self._failures.end(what)
+        self._state.answered()
+        self._setpoint.answered()
+        return answer
+
+    def _fails_for_long(self, what: str) -> bool:
+        """Return whether a read has failed for ``lost_after``, whatever else was answered."""
+        return self._failures.lasts(what, self._running) >= self._state.settings.lost_after
 
     def _check_silence(self, asked_at: float, now: float) -> None:
         """Report a silence of more than one lost answer to what may have to stop the motor."""
@@ -515,7 +575,7 @@ class Poller:
             self._controller.silent(now - silences.last_frame_at(self._unit))
 
     def _on_poll_failed(self, error: LinkError | DriveError) -> None:
-        state, now = self._state, self._bus.now()
+        state = self._state
         state.unanswered()
         if not state.connected:
             self._failed_reconnects += 1
@@ -524,9 +584,9 @@ class Poller:
                 self._complaint = error.report
                 state.notify(Severity.ERROR, error.report)
             return
-        self._failing_since = min(self._failing_since, now)
+        self._failures.note(_POLL, self._running, error)
         # one that answers, but gives no status, cannot be watched either
-        unwatched = now - self._failing_since >= state.settings.lost_after
+        unwatched = any(map(self._fails_for_long, (_STATUS, _MODE, _POLL)))
         # these have been waited out, or cannot be
         at_once = isinstance(error, (PortError, NoData, Interrupted))
         at_once = at_once or _is(error, Cause.OLD_DATA)

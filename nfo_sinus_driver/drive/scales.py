@@ -77,12 +77,13 @@ class Scales:
         self._apply()
         return self.speed != before
 
-    async def read_one(self, key: str, priority: Priority) -> None:
-        """Read one of the :attr:`keys` anew, without retries, and take it."""
+    async def read_one(self, key: str, priority: Priority) -> float:
+        """Read one of the :attr:`keys` anew, without retries, take it, and return it."""
         value = await self._params.read_number(key, priority, retry=False)
         if value != self.found.get(key):
             self.found = {**self.found, key: value}
             self._apply()
+        return value
 
     @property
     def keys(self) -> tuple[str, ...]:

@@ -78,7 +78,14 @@ class Setpoint:
         self._params = state.params
         self._state = state
         self._refused = refused
-        self._slot = LatestValue(self._make, self._done, on_status)
+        self._slot = LatestValue(
+            self._make,
+            self._done,
+            on_status,
+            self._unit,
+            # a motor is to stand still, whether the drive answers or not
+            urgent=lambda: self._request.value == 0,
+        )
         self._combining = _Combining.GIVEN_UP
         #: The newest request; written by any thread, at once.
         self._request = _NONE
@@ -101,6 +108,8 @@ class Setpoint:
         #: The report of the set-point time-out, until set-points arrive again.
         self.timed_out: Report | None = None
         self._waits_for_answer = False
+        #: What was written last, and what of that was not answered; NaN: nothing.
+        self._sent = self._unanswered = NAN
         self._busy_since = math.inf
         self._clamp_reported = False
         #: The set-points that the drive may have had recently, and until when; newest last.
@@ -164,6 +173,7 @@ class Setpoint:
         self.expired = False
         self.timed_out = None
         self._waits_for_answer = False
+        self._unanswered = NAN
         self._busy_since = math.inf
         if follows:
             self._age_task = self._bus.spawn(self._watch_age())
@@ -283,24 +293,24 @@ class Setpoint:
         # beyond what the drive takes, rather than beyond what the user allows
         return max(-most, min(most, taken))
 
-    def _accept(self, request: Request) -> float:
-        """Note that a request counts; return its limited value."""
-        limited = self._limited(request)
+    def _accept(self, request: Request, limited: float) -> None:
+        """Note that a request counts, with its limited value."""
         self.clamped = limited != request.value
         self.expired = False
         if self.timed_out is not None:
             self.timed_out = None
             self._state.notify(Severity.INFO, Cause.SETPOINTS_AGAIN)
-        return limited
 
     def _make(self) -> Transfer | None:
         request = self._request
         if self._target is None or not self._counts(request):
             return None
-        if not (self._state.responsive and self._params.recognition.holds):
+        limited = self._limited(request)
+        unanswered = not self._state.responsive and limited == self._unanswered
+        if unanswered or not self._params.recognition.holds:
             self._waits_for_answer = True
             return None
-        limited = self._accept(request)
+        self._accept(request, limited)
         if self.clamped and not self._clamp_reported:
             self._report_limited(request.value, limited)
         self._clamp_reported = self.clamped
@@ -309,6 +319,7 @@ class Setpoint:
             return None
         # each of several writes has its own turn, and a newer set-point may come between
         address, data = due[0]
+        self._sent = limited
         self._may_have(self._decoded({**self._in_drive, address: data}))
         by_itself = len(due) > 1 or self._is_once(address)
         if by_itself or self._combining is _Combining.GIVEN_UP:
@@ -352,13 +363,16 @@ class Setpoint:
 
     def _take_note(self, address: Address, data: bytes) -> None:
         self._busy_since = math.inf
+        self._unanswered = NAN
         self._written[address] = data, self._bus.now()
         if len(self._written) == len(self._keys):
             self._has(self._decoded(self._in_drive))
 
     def _missed(self, error: LinkError, address: Address) -> None:
         """
-        Note that the set-point in the drive is unknown; it is written when the drive responds.
+        Note that the set-point in the drive is unknown.
+
+        It is written again when the drive responds, and a newer one at once.
 
         :param address: of several, the only one where that is so: it has the old or the new.
         """
@@ -366,6 +380,7 @@ class Setpoint:
         # take from its neighbours
         self._params.count(error)
         self._waits_for_answer = True
+        self._unanswered = self._sent
         if len(self._keys) > 1 and address in self._written:
             # the motor goes on in its direction, and need not be stopped first
             self._written[address] = self._written[address][0], -math.inf

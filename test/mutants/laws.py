@@ -42,6 +42,9 @@ SILENCES = 'nfo_sinus_driver/bus/scheduler.py'
 MUTE_PORT = 'test/unit/drive/test_mute_port.py'
 GATE = 'nfo_sinus_driver/drive/recognition.py'
 RECOGNISING = 'nfo_sinus_driver/drive/recognising.py'
+#: What is tested of a driver that stood still, and of a drive whose status cannot be read.
+STANDS_STILL = 'test/unit/drive/test_driver_stands_still.py'
+UNREADABLE = 'test/unit/drive/test_status_unreadable.py'
 #: What the laws ask of a MOVITRAC alone.
 MOVITRAC_LAWS = 'test/unit/drive/test_movitrac_laws.py'
 
@@ -870,5 +873,45 @@ LAWS = (
         '            await self.method.remove_leftover()\n',
         '',
         (LEFTOVER, '-k', 'delta_vfd_el or movitrac'),
+    ),
+    Mutant(
+        3,
+        'a pause of the driver is the time that an answer takes',
+        'nfo_sinus_driver/link/request_link.py',
+        '        return self._now.resumed_at <= self._sent_at',
+        '        return True',
+        (STANDS_STILL, '-k', 'as_often and rtu'),
+    ),
+    Mutant(
+        3,
+        'a stop waits for a link that only listens',
+        'nfo_sinus_driver/bus/worker.py',
+        '            self._stop_waits = True',
+        '            pass',
+        (STANDS_STILL, '-k', 'known_as_slow and rtu'),
+    ),
+    Mutant(
+        8,
+        'what was read before a pause of the driver counts after it',
+        'nfo_sinus_driver/bus/worker.py',
+        '                reply = transfer.without_old(reply)',
+        '                pass',
+        (STANDS_STILL, '-k', 'nothing_old and rtu'),
+    ),
+    Mutant(
+        3,
+        'a motor whose status cannot be read is not stopped',
+        WATCH,
+        'if self._silent_for_long or self._fails_for_long(what):',
+        'if self._silent_for_long:',
+        (UNREADABLE, '-k', 'silent_one and rtu'),
+    ),
+    Mutant(
+        3,
+        'the set-point 0 waits until the drive answers',
+        SETPOINT,
+        ' and limited == self._unanswered',
+        '',
+        (UNREADABLE, '-k', 'newer and rtu'),
     ),
 )

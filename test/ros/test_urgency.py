@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import itertools
+import signal
 import time
 
 from bench import FULL_RATE, Bench, wait_until
@@ -19,6 +21,9 @@ pytestmark = needs('states')
 _RESPONSE_TIMEOUT = 0.2
 _MARGIN = 0.02
 _TRIES = 15
+#: How often a driver is suspended, and for how long, s.
+_SUSPENSIONS = 4
+_SUSPENDED = 6.0
 
 
 def _asked(bench: Bench) -> list[tuple[float, Request | None]]:
@@ -95,3 +100,34 @@ def test_nothing_is_sent_between_a_stop_and_its_confirmation_but_its_own(bench: 
     last_run = max(number for number, request in enumerate(requests) if request == run)
     stop = requests.index(sequence[0], last_run)
     assert requests[stop : stop + len(sequence)] == sequence
+
+
+def test_a_stop_is_on_the_wire_at_once_after_the_driver_was_suspended(bench: Bench) -> None:
+    bench.simulator('--address', '1', '--address', '2')
+    parameters = bench.folder / 'two.yaml'
+    given = '{setpoint_timeout: 0.0, drive_timeout: 0.0, address: '
+    parameters.write_text(
+        'nfo_sinus_bus: {ros__parameters: {drives: [one, two]}}\n'
+        f'one: {{ros__parameters: {given}1}}}}\n'
+        f'two: {{ros__parameters: {given}2}}}}\n'
+    )
+    driver = bench.driver(*FULL_RATE, '--params-file', str(parameters))
+    one, two = bench.client('/one').connected(), bench.client('/two').connected()
+    assert two.enable().success
+    for _ in range(_SUSPENSIONS):
+        assert one.enable().success
+        before = len(_stops(bench))
+        driver.signal(signal.SIGSTOP)
+        try:
+            over = time.monotonic() + _SUSPENDED
+            wait_until(lambda over=over: time.monotonic() > over, 'its time')
+        finally:
+            driver.signal(signal.SIGCONT)
+        asked = time.monotonic()
+        # in the middle of what the driver does first
+        time.sleep(0.15)
+        assert one.call('stop').success
+        # the machine may be slow, but not as slow as that
+        assert _stops(bench)[before] - asked < _SUSPENDED / 2
+        sent = [at for at, _ in _asked(bench) if at > asked]
+        assert max(later - at for at, later in itertools.pairwise(sent)) < _SUSPENDED / 2
