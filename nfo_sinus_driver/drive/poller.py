@@ -564,8 +564,12 @@ class Poller:
         return answer
 
     def _fails_for_long(self, what: str) -> bool:
-        """Return whether a read has failed for ``lost_after``, whatever else was answered."""
-        return self._failures.lasts(what, self._running) >= self._state.settings.lost_after
+        """Return whether a read has failed for ``lost_after`` of a drive that answers others."""
+        frame_at = self._bus.silences.last_frame_at(self._unit)
+        failing = self._failures.lasts(what, self._running)
+        # a silent one has the time of its first answer besides: noise is shorter
+        answers = self._bus.now() - frame_at < failing
+        return answers and failing >= self._state.settings.lost_after
 
     def _check_silence(self, asked_at: float, now: float) -> None:
         """Report a silence of more than one lost answer to what may have to stop the motor."""
