@@ -150,6 +150,8 @@ class Poller:
         self._requested_at = self._turn = 0.0
         #: When was last read what changes rarely: the control mode, and the scales.
         self._rare_read_at = 0.0
+        #: Which of the scales that no set-point has was read last.
+        self._scale_turn = 0
         self._complaint: Report | None = None
         #: A status word that came with a set-point, and has not been checked yet.
         self._received: Reply | None = None
@@ -448,7 +450,7 @@ class Poller:
         rare = self._rare_is_due
         # it can only change at standstill
         due = rare or self._may_start
-        if due and await self._read_mode(status) and await self._check_scales(all_of_them=rare):
+        if due and await self._read_mode(status) and await self._check_scales(another=rare):
             self._rare_read_at = self._bus.now() if rare else self._rare_read_at
         actual = _ACTUAL.get(state.control_mode)
         steady = True
@@ -463,15 +465,20 @@ class Poller:
             # else the status may be old: the next poll is due
             self._publish(status)
 
-    async def _check_scales(self, *, all_of_them: bool) -> bool:
+    async def _check_scales(self, *, another: bool) -> bool:
         """
-        Read what scales set-points, or any value, and stop the motor if that was changed.
+        Read what scales set-points, and stop the motor if that was changed.
 
+        :param another: read one of the others, too, each in its turn.
         :returns: whether each was answered.
         """
         state, scales = self._state, self._state.nameplate.scales
         target = state.model.profile.setpoints.get(state.control_mode)
-        keys = scales.keys if all_of_them else scales.of(target.key) if target else ()
+        keys = scales.of(target.key) if target else ()
+        others = [key for key in scales.keys if key not in keys]
+        if another and others:
+            self._scale_turn = (self._scale_turn + 1) % len(others)
+            keys = (*keys, others[self._scale_turn])
         for key in keys:
             before = scales.found.get(key)
             read = functools.partial(scales.read_one, key, self._priority)
