@@ -117,7 +117,8 @@ bench-gate: setup ## fail where the driver is slower than its last release (ten 
 
 docs: .venv/docs/installed ## the documentation as a site, in site/; every link is checked
 	@echo '== docs: every page is made and in the contents, no link leads nowhere'
-	@.venv/docs/bin/sphinx-build -q -W --keep-going -b html -c docs . site
+	@# anew each time: what is wrong in a page is only said when the page is read
+	@.venv/docs/bin/sphinx-build -q -W -E --keep-going -b html -c docs . site
 	@echo 'site/index.html'
 
 parameters: setup ## write the tables of parameters in docs/ from those of the drives and nodes

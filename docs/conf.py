@@ -32,14 +32,17 @@ if not _BY_ROSDOC2:
 
 
 def _prepare(app, name, source):
-    """Give the index a table of contents for each group of it; links to no page become text."""
+    """Give the index a table of contents for each group of it; links to folders become text."""
     folder = (Path(app.srcdir) / name).parent
 
-    def without_page(link):
+    def without_folder(link):
         text, target = link.groups()
-        return link[0] if '://' in target or (folder / target).is_file() else text
+        path = folder / target
+        # rosdoc2 leaves out some of what is beside docs/; else Sphinx refuses what is not there
+        left_out = _BY_ROSDOC2 and '://' not in target and not path.exists()
+        return text if path.is_dir() or left_out else link[0]
 
-    source[0] = re.sub(r'(?<!!)\[([^]]+)\]\(([^)#\s]+)\)', without_page, source[0])
+    source[0] = re.sub(r'(?<!!)\[([^]]+)\]\(([^)#\s]+)\)', without_folder, source[0])
     if name != 'docs/README':
         return
     # the title of each group, and the rows of its table

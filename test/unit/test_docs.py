@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 import re
 import runpy
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -286,7 +287,22 @@ def test_the_site_has_every_page_that_is_in_the_index() -> None:
     linked = {(docs / file).resolve() for file, _ in links(read(docs / 'README.md'))}
     assert [path for path in linked if path not in made] == []
     assert all((docs / name).is_file() for name in conf['html_extra_path'])
+    assert re.search(r'sphinx-build -q -W -E ', read(ROOT / 'Makefile'))
     assert re.search(r'^all:.*\n(?:\t.*\n)*?\t.*\bdocs\b', read(ROOT / 'Makefile'), re.MULTILINE)
+
+
+def test_the_site_is_not_made_where_a_link_leads_nowhere() -> None:
+    # Sphinx refuses such a link; only rosdoc2, which leaves some pages out, is given its text
+    conf = ROOT / 'docs' / 'conf.py'
+    page = '[a](nowhere.md) [b](drives) [c](control.md) [d](https://example.org/x)'
+    for names, left in (
+        ({}, '[a](nowhere.md) b [c](control.md) [d](https://example.org/x)'),
+        ({'rosdoc2_settings': {}}, 'a b [c](control.md) [d](https://example.org/x)'),
+    ):
+        source = [page]
+        prepare = runpy.run_path(str(conf), init_globals=names)['_prepare']
+        prepare(SimpleNamespace(srcdir=ROOT), 'docs/monitor', source)
+        assert source == [left]
 
 
 def test_every_claim_of_the_quality_declaration_has_its_place_or_is_not_met() -> None:
