@@ -39,9 +39,10 @@ _T = TypeVar('_T')
 _INACTIVE_PERIOD = 0.5
 #: How often an idle one is polled at most while another one is read for the first time, s.
 _YIELDING_PERIOD = 2.0
-#: How often the control mode is read, and what scales values, while no motor at standstill may
-#: start by a set-point, s.
+#: How often the control mode is read, and what scales set-points, while no motor at standstill may
+#: start by one, s; and once in so many times what only scales measured values.
 _MODE_PERIOD = 1.0
+_ALL_SCALES = 10
 #: How often the status is read at least while the motor runs, s; and of a drive that keeps its run
 #: command without power: so two requests of the least time without it get no answer.
 _WATCH_PERIOD = 0.2
@@ -148,10 +149,9 @@ class Poller:
         #: When a value was last asked for, pauses of the worker aside, and how long it took, s:
         #: long, where the line is full.
         self._requested_at = self._turn = 0.0
-        #: When was last read what changes rarely: the control mode, and the scales.
+        #: When was last read what changes rarely: control mode and scales; and how often it was.
         self._rare_read_at = 0.0
-        #: Which of the scales that no set-point has was read last.
-        self._scale_turn = 0
+        self._rare_reads = 1
         self._complaint: Report | None = None
         #: A status word that came with a set-point, and has not been checked yet.
         self._received: Reply | None = None
@@ -254,7 +254,6 @@ class Poller:
         self._failed_reconnects = 0
         self._complaint = None
         self._received = None
-        self._rare_read_at = self._bus.now()
         self._state.forget_polled()
 
     async def _poll_repeatedly(self) -> None:
@@ -448,10 +447,13 @@ class Poller:
         last, paused = self.snapshot.actual, self._bus.paused
         status = await self._read_status()
         rare = self._rare_is_due
+        every = rare and self._rare_reads % _ALL_SCALES == 0
         # it can only change at standstill
         due = rare or self._may_start
-        if due and await self._read_mode(status) and await self._check_scales(another=rare):
-            self._rare_read_at = self._bus.now() if rare else self._rare_read_at
+        if due and await self._read_mode(status) and await self._check_scales(all_of_them=every):
+            if rare:
+                self._rare_read_at = self._bus.now()
+                self._rare_reads += 1
         actual = _ACTUAL.get(state.control_mode)
         steady = True
         if actual is not None:
@@ -465,20 +467,15 @@ class Poller:
             # else the status may be old: the next poll is due
             self._publish(status)
 
-    async def _check_scales(self, *, another: bool) -> bool:
+    async def _check_scales(self, *, all_of_them: bool) -> bool:
         """
-        Read what scales set-points, and stop the motor if that was changed.
+        Read what scales set-points, or any value, and stop the motor if that was changed.
 
-        :param another: read one of the others, too, each in its turn.
         :returns: whether each was answered.
         """
         state, scales = self._state, self._state.nameplate.scales
         target = state.model.profile.setpoints.get(state.control_mode)
-        keys = scales.of(target.key) if target else ()
-        others = [key for key in scales.keys if key not in keys]
-        if another and others:
-            self._scale_turn = (self._scale_turn + 1) % len(others)
-            keys = (*keys, others[self._scale_turn])
+        keys = scales.keys if all_of_them else scales.of(target.key) if target else ()
         for key in keys:
             before = scales.found.get(key)
             read = functools.partial(scales.read_one, key, self._priority)

@@ -434,8 +434,6 @@ def test_a_motor_that_others_run_shows_and_is_left_alone(press: str) -> None:
 def test_current_limit_is_no_stop() -> None:
     # its code stands in for the one that says who runs the motor
     with Rig('classic v5.0').turn() as rig:
-        # what the ramp has shown is reported again after this
-        rig.pass_time(11.0)
         rig.far.motor.load = 6.0
         rig.pass_time(3.0)
         status = rig.drive.snapshot.status
