@@ -89,7 +89,7 @@ class Bus:
         self._awake = threading.Event()
         #: A stop has come in since the inbox was emptied last.
         self._stop_waits = False
-        link.stop_waits = lambda: self._stop_waits
+        link.end_listening_if(lambda: self._stop_waits)
         #: Which units do not answer, for coroutines on the worker.
         self.silences = Silences()
         self._scheduler = Scheduler(

@@ -64,7 +64,7 @@ _NOT_STARTED = (
     'runs on: use the enable input or the emergency stop'
 )
 
-#: The same of an end for one drive.
+#: The same where a drive of another kind answers.
 _NOTHING_TO_STOP = 'ending without a stop, for this driver has run no motor here'
 
 #: What rclpy raises for ROS arguments that make no sense.
@@ -195,19 +195,15 @@ def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
     """
     Log the outcome of a stop; false if it failed.
 
-    It has not where the drive has never answered, or where it is not known what is there and this
-    driver has run no motor of it: then there is none to stop.
+    It has not where the drive has never answered, or where another one answers than is configured,
+    and this driver has run no motor here.
     """
     log, drive = node.get_logger(), node.managed.drive
-    owed = drive.stop_owed or drive.recognised
     try:
         answer = future.result(timeout=0)
     except FutureTimeoutError:
-        if owed or not drive.ever_responded:
-            log.error('the stop is NOT confirmed: the drive did not answer in time')
-            return False
-        log.warning(_NOTHING_TO_STOP)
-        return True
+        log.error('the stop is NOT confirmed: the drive did not answer in time')
+        return False
     except Exception as error:
         if not drive.ever_responded:
             log.warning('the drive has not answered yet: if its motor was left running, it runs on')
@@ -215,7 +211,8 @@ def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
         # after any error, the other drives have to be waited for, too
         known = isinstance(error, DriveError)
         why = node.managed.wording.say(error) if known else f'error in the driver: {error!r}'
-        if not owed and known and error.cause is Cause.NOT_RECOGNISED:
+        another = known and error.cause is Cause.NOT_RECOGNISED and not drive.stop_owed
+        if another and isinstance(error.__cause__, DriveError):
             log.warning(f'{_NOTHING_TO_STOP}: {why}')
             return True
         log.error(why)
