@@ -450,10 +450,11 @@ class Poller:
         every = rare and self._rare_reads % _ALL_SCALES == 0
         # it can only change at standstill
         due = rare or self._may_start
-        if due and await self._read_mode(status) and await self._check_scales(all_of_them=every):
-            if rare:
-                self._rare_read_at = self._bus.now()
-                self._rare_reads += 1
+        answered = due and await self._read_mode(status)
+        answered = answered and await self._check_scales(all_of_them=every)
+        if rare and answered:
+            self._rare_read_at = self._bus.now()
+            self._rare_reads += 1
         actual = _ACTUAL.get(state.control_mode)
         steady = True
         if actual is not None:

@@ -247,6 +247,10 @@ class CanopenLink:
         self._shapes = ObjectShapes()
         self.supervision = CanopenSupervision(port, now, self._take, self.read, self.write)
 
+    def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
+        """Wait for no more than the answer to the request that was sent, where a stop waits."""
+        self.stop_waits = stop_waits
+
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> CanopenLink:
         """

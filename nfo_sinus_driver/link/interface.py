@@ -275,14 +275,18 @@ class Link(Protocol):
     :ivar protocol: that of the line.
     :ivar remarks: what it has noticed.
     :ivar clock: the clock of that thread, for what else it waits for, too.
-    :ivar stop_waits: returns whether a stop waits for the line, and is set by that thread: then a
-        link waits for no more than the answer to the request that it has sent.
     """
 
     protocol: LineProtocol
     remarks: Remarks
     clock: ThreadClock
-    stop_waits: Callable[[], bool]
+
+    def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
+        """
+        Wait for no more than the answer to the request that was sent, where a stop waits.
+
+        :param stop_waits: returns whether one does.
+        """
 
     @property
     def supervision(self) -> Supervision | None:

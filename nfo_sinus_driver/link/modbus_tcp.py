@@ -151,6 +151,10 @@ class TcpLink(ModbusLink):
         self._blocks = telegram.Blocks(self._ask, now)
         self.remarks = Remarks()
 
+    def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
+        """Wait for no more than the answer to the request that was sent, where a stop waits."""
+        self.stop_waits = stop_waits
+
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> TcpLink:
         """Return the link to a gateway; of the settings only the ``response_timeout`` counts."""

@@ -151,6 +151,10 @@ class RequestLink(ABC, Generic[_Request]):
         #: When the last request had been sent.
         self._sent_at = 0.0
 
+    def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
+        """Wait for no more than the answer to the request that was sent, where a stop waits."""
+        self.stop_waits = stop_waits
+
     @classmethod
     def on_port(cls: type[_Self], port: str, settings: LineSettings) -> _Self:
         """Return the link on a port; a ValueError says what is no port."""

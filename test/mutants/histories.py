@@ -72,7 +72,7 @@ HISTORIES = (
         '        self._control.since = float("inf")\n        if False:\n            turns',
         G2_CONTROL,
         # a poll would find it, too
-        ((CONTROLLER, '            reason = Report(Cause.RUNS_UNASKED)\n', '            pass\n'),),
+        ((CONTROLLER, '            return Report(Cause.RUNS_UNASKED)\n', '            pass\n'),),
     ),
     Mutant(
         2,
@@ -319,7 +319,11 @@ HISTORIES = (
         '        if False:\n',
         STOP_CONFIRMED,
         # a status from before the stop is waited out, too
-        ((SEQUENCE, '            self._sent_at = math.inf\n            self._reasons += 1\n', ''),),
+        ((
+            SEQUENCE,
+            '            self._sent_at = self._forced_at = math.inf\n            self._measured = None\n',
+            '',
+        ),),
     ),
     Mutant(
         2,

@@ -161,7 +161,7 @@ LAWS = (
         '        self._control.since = float("inf")\n        if False:\n            turns',
         (NO_RESTART, '-k', 'restarted_driver'),
         # a poll would find it, too
-        ((CONTROLLER, '            reason = Report(Cause.RUNS_UNASKED)\n', '            pass\n'),),
+        ((CONTROLLER, '            return Report(Cause.RUNS_UNASKED)\n', '            pass\n'),),
     ),
     Mutant(
         2,

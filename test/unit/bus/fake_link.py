@@ -10,7 +10,7 @@ import contextlib
 import math
 import threading
 import time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from support.addresses import packed, register
 
@@ -68,6 +68,9 @@ class FakeLink:
         self.resync_reads: dict[int, tuple[Address, ...]] = {}
         self._condition = threading.Condition()
         self._hold = self._holds = False
+
+    def end_listening_if(self, stop_waits: Any) -> None:
+        pass
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:

@@ -46,6 +46,9 @@ class FarEnd:
         self.writes: list[tuple[int, int]] = []
         self.reads: list[int] = []
 
+    def end_listening_if(self, stop_waits: Any) -> None:
+        pass
+
     def was_read(self, number: int) -> None:
         """Do what time has brought; a drive may have more to do."""
 
