@@ -321,7 +321,8 @@ HISTORIES = (
         # a status from before the stop is waited out, too
         ((
             SEQUENCE,
-            '            self._sent_at = self._forced_at = math.inf\n            self._measured = None\n',
+            '            self._sent_at = self._forced_at = math.inf\n'
+            '            self._measured = None\n',
             '',
         ),),
     ),
