@@ -101,8 +101,6 @@ class Bus:
         self._tasks: set[Task] = set()
         #: For coroutines on the worker to count in.
         self.recorder = Recorder(now)
-        #: How long the last transaction has kept the line, s; for coroutines on the worker.
-        self.took = 0.0
         #: How many coroutines read parameters all the time; they share the time for it.
         self._refreshing = 0
         #: The units whose settings are read for the first time, and those for which that was begun.
@@ -585,7 +583,7 @@ class Bus:
 
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = self.now()
-        self.took = seconds = now - started - self._note_pause()
+        seconds = now - started - self._note_pause()
         answered = unit != self.protocol.broadcast
         if answered and self.silences.note(unit, now, error, seconds):
             self._report_mute(0.0)

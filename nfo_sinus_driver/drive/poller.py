@@ -78,6 +78,8 @@ _SLOW_TURNS = 15
 #: poll to poll; else frequency and speed are both measured each time.
 _STEADY = 0.02
 _MODE_TURNS = 60
+#: How often a read beside the status is tried in one poll.
+_TRIES = 3
 #: The reads without which a poll fails, and anything in it.
 _STATUS, _MODE, _POLL = 'status', 'control mode', 'poll'
 
@@ -86,7 +88,8 @@ class _Failures:
     """
     Since when each read of a poll has failed, s of one clock.
 
-    Failures of several reads, one after the other, are one: each began with the first of them.
+    Failures of several reads, one after the other, are one: each began with the first of them,
+    when its answer failed to come, as a silence does.
 
     :ivar newest: the last one.
     """
@@ -430,7 +433,7 @@ class Poller:
                 code_for=self._code_holds,
             )
 
-        while (status := await self._read(_STATUS, read)) is None:
+        while (status := await self._try(_STATUS, read)) is None:
             # what was read before stays valid
             continue
         if self._received is taken:
@@ -449,11 +452,11 @@ class Poller:
         rare = self._rare_is_due
         every = rare and self._rare_reads % _ALL_SCALES == 0
         # it can only change at standstill
-        due = rare or self._may_start
+        due, started = rare or self._may_start, self._bus.now()
         answered = due and await self._read_mode(status)
         answered = answered and await self._check_scales(all_of_them=every)
         if rare and answered:
-            self._rare_read_at = self._bus.now()
+            self._rare_read_at = started
             self._rare_reads += 1
         actual = _ACTUAL.get(state.control_mode)
         steady = True
@@ -543,7 +546,21 @@ class Poller:
 
     async def _read(self, what: str, read: Callable[[], Awaitable[_T]]) -> _T | None:
         """
-        Do one read of a poll; return ``None`` if it was not answered, and may be repeated.
+        Do one read of a poll, again at once if need be; ``None``: the next poll has to.
+
+        However seldom the polls, noise is no loss; and however bad a value, the status is read.
+
+        :param what: by which its failures are counted.
+        :raises LinkError: as for :meth:`_try`.
+        """
+        for _ in range(_TRIES):
+            if (answer := await self._try(what, read)) is not None:
+                return answer
+        return None
+
+    async def _try(self, what: str, read: Callable[[], Awaitable[_T]]) -> _T | None:
+        """
+        Do one read of a poll, once; return ``None`` if it was not answered, and may be repeated.
 
         :param what: by which its failures are counted.
         :raises LinkError: the drive has been silent for too long, or has answered everything but
@@ -557,8 +574,7 @@ class Poller:
         except LinkError as error:
             self._state.unanswered()
             self._check_silence(asked_at, self._bus.now())
-            # it began when the request was sent: before, it has only waited for its turn
-            self._failures.note(what, self._running - self._bus.took, error)
+            self._failures.note(what, self._running, error)
             if self._silent_for_long or self._fails_for_long(what):
                 raise
             self._bus.recorder.retry(self._unit)
@@ -569,12 +585,8 @@ class Poller:
         return answer
 
     def _fails_for_long(self, what: str) -> bool:
-        """Return whether a read has failed for ``lost_after`` of a drive that answers others."""
-        frame_at = self._bus.silences.last_frame_at(self._unit)
-        failing = self._failures.lasts(what, self._running)
-        # a silent one has the time of its first answer besides: noise is shorter
-        answers = self._bus.now() - frame_at < failing
-        return answers and failing >= self._state.settings.lost_after
+        """Return whether a read has failed for ``lost_after``, whatever else was answered."""
+        return self._failures.lasts(what, self._running) >= self._state.settings.lost_after
 
     def _check_silence(self, asked_at: float, now: float) -> None:
         """Report a silence of more than one lost answer to what may have to stop the motor."""
