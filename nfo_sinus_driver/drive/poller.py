@@ -78,8 +78,9 @@ _SLOW_TURNS = 15
 #: poll to poll; else frequency and speed are both measured each time.
 _STEADY = 0.02
 _MODE_TURNS = 60
-#: How often a read beside the status is tried in one poll.
-_TRIES = 3
+#: How often a read beside the status is tried in one poll: what the driver has to know, and what it
+#: measures, which did not fail just before.
+_TRIES, _MEASURED_TRIES = 3, 2
 #: The reads without which a poll fails, and anything in it.
 _STATUS, _MODE, _POLL = 'status', 'control mode', 'poll'
 
@@ -484,7 +485,7 @@ class Poller:
             before = scales.found.get(key)
             read = functools.partial(scales.read_one, key, self._priority)
             try:
-                now = await self._read(key, read)
+                now = await self._read(key, read, _TRIES)
             except Refused:
                 # it may be busy
                 continue
@@ -514,7 +515,8 @@ class Poller:
             return state.last_polled(role).value
         key = state.model.key(role)
         try:
-            value = await self._read(key, lambda: state.measure(key, self._priority))
+            tries = 1 if self._failures.lasts(key, self._running) else _MEASURED_TRIES
+            value = await self._read(key, lambda: state.measure(key, self._priority), tries)
         except (PortError, Interrupted):
             # raised once only: the status that is read next would show a drive that was stopped
             raise
@@ -537,14 +539,14 @@ class Poller:
         state = self._state
         before = state.control_mode
         mode = await self._read(
-            _MODE, lambda: state.read_control_mode(self._priority, retry=False)
+            _MODE, lambda: state.read_control_mode(self._priority, retry=False), _TRIES
         )
         if mode not in (None, before) and self._controller:
             # before it is published: a set-point never has the unit of another mode
             self._controller.on_status(status)
         return mode is not None
 
-    async def _read(self, what: str, read: Callable[[], Awaitable[_T]]) -> _T | None:
+    async def _read(self, what: str, read: Callable[[], Awaitable[_T]], tries: int) -> _T | None:
         """
         Do one read of a poll, again at once if need be; ``None``: the next poll has to.
 
@@ -553,7 +555,7 @@ class Poller:
         :param what: by which its failures are counted.
         :raises LinkError: as for :meth:`_try`.
         """
-        for _ in range(_TRIES):
+        for _ in range(tries):
             if (answer := await self._try(what, read)) is not None:
                 return answer
         return None

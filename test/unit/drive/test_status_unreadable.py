@@ -159,7 +159,7 @@ def test_a_status_is_read_as_often_while_a_measured_value_cannot_be(connection: 
         rig.looked = lambda: times.append(state.status.at)
         rig.pass_time(4.0)
         seen = sorted(set(times))
-        assert max(two - one for one, two in itertools.pairwise(seen)) <= 3 * timeout(rig)
+        assert max(two - one for one, two in itertools.pairwise(seen)) <= 5 * timeout(rig)
         assert rig.drive.following
 
 
@@ -173,7 +173,7 @@ def test_a_control_mode_that_cannot_be_read_is_a_loss() -> None:
         # it is read once a second
         assert took <= 1.0 + 1.0 + _POLL + 2 * timeout(rig)
         seen = sorted(set(times))
-        assert max(two - one for one, two in itertools.pairwise(seen)) <= 2 * timeout(rig)
+        assert max(two - one for one, two in itertools.pairwise(seen)) <= 4 * timeout(rig)
 
 
 def test_set_points_of_a_drive_that_is_unplugged_leave_the_line_to_others() -> None:
