@@ -70,7 +70,7 @@ def test_one_impossible_value_stops_nothing_and_is_not_published(connection: str
         for role, data in IMPOSSIBLE.items():
             spoiler = Spoiler(rig, role, data, 1)
             if spoiler.key in polled:
-                rig.pass_time(1.2)
+                rig.pass_time(2.5)
                 assert not spoiler.left
             spoiler.left = 0
         found = rig.notes.snapshots[before:]
