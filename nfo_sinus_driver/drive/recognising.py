@@ -46,7 +46,7 @@ class Recogniser:
         :raises DriveError: it is another one.
         """
         state, profile = self._state, self._profile
-        tells = profile.identify or profile.product or profile.vendor
+        tells = profile.identify or profile.product
         known = self._params.recognition.holds
         named = bool(tells) and not known
         try:

@@ -20,7 +20,7 @@ _STOOD, _SHORT = 5.0, 2.5
 _LATER = 0.15
 _AT_ONCE = 0.05
 #: How long it takes to recognise a drive anew, s.
-_RECOGNISED = 0.6
+_RECOGNISED = 1.0
 #: The moments at which it begins, within the time of some transactions, s; all that are tried.
 _MOMENTS = (0.004, 0.011, 0.018, 0.027, 0.039)
 _ALL_MOMENTS = tuple(0.003 * n for n in range(20))
