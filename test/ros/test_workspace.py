@@ -150,7 +150,9 @@ def test_the_changelog_has_the_form_that_the_tools_of_a_release_read(folder: Pat
     lists = [one for content in versions.values() for one in content]
     assert len(lists) == len([content for content in versions.values() if content])
     bullets = sum(len(one.bullets) for one in lists)
-    assert bullets == len(re.findall(r'^\* ', text, re.MULTILINE))
+    # what is forthcoming has no version yet
+    released = text[text.index(f'\n{VERSION} (') :]
+    assert bullets == len(re.findall(r'^\* ', released, re.MULTILINE))
 
 
 @pytest.mark.parametrize(
