@@ -65,8 +65,8 @@ class Controller:
         #: Called on the bus after a stop was begun, with the reason.
         self._on_stop: Callable[[Report], None] = lambda _: None
         self._control = Control(self._bus.now, self._changed, self._notify_stop)
-        #: The driver ends: the motor is stopped, and nothing can start it any more.
-        self.closed = False
+        #: Since when nothing can start the motor any more, for the driver ends, s.
+        self._closed_at = math.inf
         #: The task that enables, to be cancelled; the procedure that excludes others and an enable.
         self._enabling: Task | None = None
         self._access: ExclusiveAccess | None = None
@@ -105,10 +105,20 @@ class Controller:
         return self._control.blocked
 
     @property
+    def stop_waits(self) -> bool:
+        """A stop is written until it is confirmed, or it is not clear whether the motor stops."""
+        return self._sequence.waits
+
+    @property
     def stop_overdue(self) -> bool:
         """A stop was not confirmed in time, or not at all, and no fault keeps the motor still."""
         unclear = self._sequence.unclear is not None and not self.commanded
         return unclear or self._sequence.overdue
+
+    @property
+    def closed(self) -> bool:
+        """The driver ends: the motor is stopped, and nothing can start it any more."""
+        return self._closed_at < math.inf
 
     @property
     def commanded(self) -> bool:
@@ -293,6 +303,10 @@ class Controller:
         await self._require_recognised(patience or 0.0)
         self._sequence.start(why)
         await self._sequence.wait_confirmed(patience or None)
+        return await self._stopped()
+
+    async def _stopped(self) -> Report:
+        """Return how a motor stops, or what else the drive shows, once its stop is confirmed."""
         status = self._state.status
         if self.blocked_by_fault:
             return self._state.report(Cause.STOP_BLOCKED)
@@ -440,15 +454,18 @@ class Controller:
         # may be active that an acknowledgement has not removed yet
         status = self._state.status
         may_run = self.commanded or self.stopping or (status is not None and status.from_bus)
+        # at an end that has stopped it, one more would go ahead of the stops of other drives
+        owed = self.stop_owed or self.stop_overdue
+        ended = self._control.stopped_at >= self._closed_at and not owed
         # no client can enable it until the motor stands still
         with self._sequence.external_stop(why):
-            return await self._release(timeout, prepare, may_run=may_run)
+            stop = self._stopped if ended else self.stop
+            stopped = await stop() if may_run else None
+            if not await self.method.in_control(Priority.SERVICE):
+                return stopped or Report(Cause.NOT_IN_CONTROL)
+            return await self._release(timeout, prepare, stopped or await stop())
 
-    async def _release(self, timeout: float, prepare: Prepare, *, may_run: bool) -> Report:
-        stopped = await self.stop() if may_run else None
-        if not await self.method.in_control(Priority.SERVICE):
-            return stopped or Report(Cause.NOT_IN_CONTROL)
-        stopped = stopped or await self.stop()
+    async def _release(self, timeout: float, prepare: Prepare, stopped: Report) -> Report:
         if self.blocked_by_fault:
             raise DriveError(self._state.report(Cause.RELEASE_BLOCKED))
         stands = await self._await_standstill(timeout)
@@ -508,7 +525,7 @@ class Controller:
 
     def close(self, why: Report) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
-        self.closed = True
+        self._closed_at = self._bus.now()
         if self.stop_owed or (self.may_run and self._state.params.recognition.holds):
             self._sequence.start(why)
 

@@ -188,6 +188,11 @@ class Drive:
         return self._controller is not None and self._controller.stop_owed
 
     @property
+    def stop_waits(self) -> bool:
+        """A stop is written until it is confirmed, or it is not clear whether the motor stops."""
+        return self._controller is not None and self._controller.stop_waits
+
+    @property
     def blocked_by_fault(self) -> bool:
         """A fault keeps the motor still, and the drive refuses a stop until it is over."""
         return self._controller is not None and self._controller.blocked_by_fault

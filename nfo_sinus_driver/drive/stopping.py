@@ -121,6 +121,11 @@ class StopSequence:
         return self._measured is not None and abs(self._measured.frequency) > _STANDSTILL
 
     @property
+    def waits(self) -> bool:
+        """A stop is written until the drive confirms it, or it is not clear whether it does."""
+        return self._task is not None or self.unclear is not None
+
+    @property
     def overdue(self) -> bool:
         """A stop was not confirmed in time, and no fault keeps the motor still."""
         waiting = self._task is not None and not self._control.blocked
@@ -178,21 +183,29 @@ class StopSequence:
         """
         Wait until the drive has confirmed that it stops, or a fault keeps the motor still.
 
-        :param patience: how long to wait, s; by default not for a drive that is lost. Within it the
+        :param patience: how long to wait, s; by default not for a drive that is lost. It begins
+            with the first answer, or after as long again where none comes before. Within it the
             motor is stopped by force, if need be.
         :raises DriveError: it does not in time; the sequence goes on.
         """
         task = self._task
-        if patience is not None:
-            self._force_at = min(self._force_at, self._bus.now() + patience / 2)
-        deadline = self._bus.now() + (drive_state.TIMEOUT if patience is None else patience)
+        begun = started = self._bus.now()
         while task is not None and not await self._bus.join(task, drive_state.LOOK_PERIOD):
             if self._control.blocked:
                 return
             # waiting for a lost drive keeps the others waiting, with the same result
             tried = self._tried_at > -math.inf
-            lost = patience is None and not self._state.connected and tried
-            if lost or self._bus.now() > deadline:
+            if patience is None:
+                late = self._bus.now() > begun + drive_state.TIMEOUT
+                late = late or (tried and not self._state.connected)
+            else:
+                if self._state.connected and not tried:
+                    # where a line has many to stop, its turn is yet to come
+                    started = min(self._bus.now(), begun + patience)
+                else:
+                    self._force_at = min(self._force_at, started + patience / 2)
+                late = self._bus.now() > started + patience
+            if late:
                 raise DriveError(Cause.STOP_UNCONFIRMED, why=self._unconfirmed)
         if task is not None and task.future.exception() is not None:
             raise DriveError(Cause.STOP_UNCONFIRMED_AT_END)

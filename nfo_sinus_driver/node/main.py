@@ -149,14 +149,17 @@ class DriverProcess:
         self._bus_node.get_logger().info(f'{why}: stopping the motors')
         unconfirmed: list[DriveNode] = []
         releases: dict[Future[Any], DriveNode] = {}
-        for node, stop in _as_they_end(stops):
+        # the turn of one may come only after that of all others
+        longest = 2 * max(node.managed.settings.shutdown_timeout for node in self._drives)
+        for node, stop in _as_they_end(stops, longest):
             if self._may_be_there(node) and not _confirmed(node, stop):
                 unconfirmed.append(node)
             elif node.managed.drive.ever_responded and _succeeded(stop):
                 # a silent one must not take the time in which others are released
                 releases[node.managed.drive.disconnect(_time_left(node, begun))] = node
+        left = max(0.0, begun + longest - time.monotonic())
         unconfirmed += [
-            node for node, release in _as_they_end(releases) if not _confirmed(node, release)
+            node for node, release in _as_they_end(releases, left) if not _released(node, release)
         ]
         for node in unconfirmed:
             node.get_logger().error(
@@ -175,12 +178,13 @@ def _time_left(node: DriveNode, begun: float) -> float:
     return max(0.0, begun + node.managed.settings.shutdown_timeout - time.monotonic())
 
 
-def _as_they_end(futures: dict[Future[Any], DriveNode]) -> Iterator[tuple[DriveNode, Future[Any]]]:
+def _as_they_end(
+    futures: dict[Future[Any], DriveNode], seconds: float
+) -> Iterator[tuple[DriveNode, Future[Any]]]:
     """Yield nodes with their futures as these end; at last those that have not ended in time."""
     waiting = set(futures)
-    longest = max((one.managed.settings.shutdown_timeout for one in futures.values()), default=0.0)
     with contextlib.suppress(FutureTimeoutError):
-        for future in as_completed(futures, longest + _LAST_ANSWER):
+        for future in as_completed(futures, seconds + _LAST_ANSWER):
             waiting.remove(future)
             yield futures[future], future
     for future in waiting:
@@ -219,6 +223,28 @@ def _confirmed(node: DriveNode, future: Future[Any]) -> bool:
         return False
     if answer is not None:
         log.info(node.managed.wording.say(answer))
+    return True
+
+
+def _released(node: DriveNode, future: Future[Any]) -> bool:
+    """
+    Log the outcome of a release; false if the motor may run.
+
+    Its stop was confirmed before. What is not put back in time leaves no motor running, unless the
+    stop has to be written again.
+    """
+    if _succeeded(future) or node.managed.drive.stop_waits:
+        return _confirmed(node, future)
+    error = future.exception() if future.done() else None
+    why = 'there was no time left for it'
+    if error is not None:
+        known = isinstance(error, DriveError)
+        why = node.managed.wording.say(error) if known else f'error in the driver: {error!r}'
+    node.get_logger().warning(
+        'the stop is confirmed, but control of the drive is not released, and what was set for '
+        f'this run (drive_timeout) may not be put back: {why}; if time was short, raise '
+        'shutdown_timeout'
+    )
     return True
 
 

@@ -1,0 +1,64 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The end of a driver with many drives, on a line that takes long to stop them all."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from typing import Any
+
+import pytest
+from support.rig import Rig
+
+#: How long each may take, s; all of them take longer on such a line.
+_PATIENCE = 4.0
+_SCMD = 'fieldbus.scmd'
+_SLOW = {'baud': 1200}
+#: So many that the stops of all take longer than that, but less than twice as long.
+_DRIVES = {'rtu': 6, 'ascii': 4}
+
+
+def _end(rig: Rig) -> dict[int, Future[Any]]:
+    """End as the node does: stop all at once, and release each as soon as it is stopped."""
+    until = rig.clock.monotonic() + _PATIENCE
+    stops = {at: drive.stop_for_good(_PATIENCE) for at, drive in rig.drives.items()}
+    releases: dict[int, Future[Any]] = {}
+
+    def go_on() -> bool:
+        for at, stop in stops.items():
+            if at not in releases and stop.done() and stop.exception() is None:
+                left = max(until - rig.clock.monotonic(), 0.0)
+                releases[at] = rig.drives[at].disconnect(left)
+        return all(stop.done() for stop in stops.values())
+
+    rig.wait_until(go_on)
+    go_on()
+    for stop in stops.values():
+        rig.result(stop)
+    return releases
+
+
+@pytest.mark.parametrize('connection', _DRIVES)
+def test_each_is_stopped_before_one_is_released(connection: str) -> None:
+    with Rig(connection, drives=_DRIVES[connection], line=_SLOW, poll_rate=0.2) as rig:
+        rig.turn()
+        rig.asked.clear()
+        releases = _end(rig)
+        for release in releases.values():
+            rig.answer(release)
+        stops = [at for at, key, data in rig.asked if key == _SCMD and data is not None]
+        assert sorted(stops) == sorted(rig.drives), 'one stop is written to each'
+        assert not rig.turns
+        for drive in rig.drives.values():
+            assert not drive.stop_owed and not drive.stop_waits
+
+
+def test_a_drive_that_is_cut_off_ends_the_wait_for_it() -> None:
+    with Rig(drives=2) as rig:
+        rig.turn()
+        rig.meet = lambda key, data: 'unheard'
+        stop = rig.drive.stop_for_good(_PATIENCE)
+        begun = rig.clock.monotonic()
+        assert 'NOT confirmed' in rig.answer(stop)
+        assert rig.clock.monotonic() - begun < _PATIENCE + 1.0
