@@ -235,7 +235,7 @@ class _Run:
         return 'it was stopped'
 
     def _end(self, why: str, signal: str) -> bool:
-        """Stop the motor and release control; true when all of it was confirmed."""
+        """Stop the motor and release control; true when the stop is confirmed."""
         if self._drive.identity is None:
             return True
         control, confirmed = self._control, False
@@ -246,8 +246,9 @@ class _Run:
                 control.screen.say(say(stop))
                 # whoever ended it so is in a hurry, or not there any more
                 hurry = signal not in ('', 'SIGINT') or control.screen.gone
-                confirmed = control.give_back(_SHUTDOWN_TIMEOUT if hurry else math.inf)
-                if confirmed and control.answer != stop:
+                given_back = control.give_back(_SHUTDOWN_TIMEOUT if hurry else math.inf)
+                confirmed = not self._drive.stop_waits
+                if given_back and control.answer != stop:
                     control.screen.say(say(control.answer))
         finally:
             if self._options.json:

@@ -79,7 +79,7 @@ def _stop(control: ControlSession, options: argparse.Namespace) -> tuple[bool, s
     if not options.json:
         control.screen.say(how)
     if not control.give_back():
-        return False, f'{how}, but control was not released'
+        return not control.drive.stop_waits, f'{how}, but control was not released'
     return True, say(control.answer)
 
 

@@ -356,3 +356,18 @@ def test_an_exit_with_a_dead_line_says_that_the_stop_is_not_confirmed(bench: Ben
         driver.signal(signal.SIGINT)
         assert driver.wait() == 1
     wait_until(lambda: 'NOT confirmed' in driver.text, 'the log says why')
+
+
+def test_an_exit_that_cannot_release_a_drive_whose_stop_is_confirmed_says_only_that(
+    bench: Bench,
+) -> None:
+    drive = bench.simulator(*bench.drives.ramps(10))
+    driver = bench.driver('-p', 'shutdown_timeout:=2.0')
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        driver.signal(signal.SIGTERM)
+        wait_until(lambda: 'stopping: ' in driver.text, 'it ramps down')
+        drive.inject('silence', 60.0)
+        assert driver.wait() == 0, driver.text
+    assert 'the stop is confirmed, but control of the drive is not released' in driver.text
+    assert 'WITHOUT a confirmed stop' not in driver.text
