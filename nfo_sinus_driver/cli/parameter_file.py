@@ -12,9 +12,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Iterator, Mapping
+import contextlib
 from dataclasses import dataclass, field
 from decimal import Decimal
 import difflib
+import os
 from pathlib import Path
 import re
 import sys
@@ -76,12 +78,16 @@ def write_file(name: str, text: str) -> None:
         sys.stdout.flush()
         return
     path = Path(name)
-    partial = path.with_name(f'{path.name}.part')
+    partial = path.with_name(f'{path.name}.{os.urandom(8).hex()}.part')
     try:
         if not path.exists() or path.is_file():
             # an older file is replaced by a whole one, or not at all
-            partial.write_text(text, encoding='utf-8')
-            partial.replace(path)
+            with contextlib.ExitStack() as undo:
+                file = undo.enter_context(partial.open('x', encoding='utf-8'))
+                undo.callback(partial.unlink, missing_ok=True)
+                file.write(text)
+                file.close()
+                partial.replace(path)
         else:
             path.write_text(text, encoding='utf-8')
     except OSError as error:

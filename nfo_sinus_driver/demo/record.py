@@ -26,7 +26,6 @@ import rclpy
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 import rclpy.utilities
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
@@ -35,6 +34,7 @@ from nfo_sinus_driver.demo.bench import handle_signals
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
 from nfo_sinus_driver.demo.type_definitions import name_of
 from nfo_sinus_driver.node.executor import spinning
+from nfo_sinus_driver.node.start import init_ros
 from nfo_sinus_driver.version import VERSION
 
 #: When it is time to say that there is no driver, s.
@@ -65,7 +65,7 @@ def main(args: Sequence[str] | None = None) -> int:
     handle_signals(signal.default_int_handler)
     try:
         drives = _record(bag, options, given)
-    except RecordingError as error:
+    except (RecordingError, ValueError) as error:
         print(f'record: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -148,7 +148,7 @@ def _explain(bag: Path, drives: Sequence[str]) -> int:
 def _record(bag: Path, options: argparse.Namespace, arguments: Sequence[str]) -> list[str]:
     """Record on a thread of its own until the end; return the drives."""
     with contextlib.ExitStack() as stack:
-        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        init_ros(arguments)
         stack.callback(rclpy.try_shutdown)
         drives = _drives_of_graph() if options.all else [options.drive or '/nfo_sinus']
         # nothing is received any more when the bag is closed

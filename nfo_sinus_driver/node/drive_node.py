@@ -32,7 +32,7 @@ from nfo_sinus_driver.node.other_lines import OtherLines, is_elsewhere, stop_of
 from nfo_sinus_driver.node.overrides import did_you_mean
 from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.reporter import Reporter
-from nfo_sinus_driver.node.scale import Scale, require_scale
+from nfo_sinus_driver.node.scale import Scale, require_factors
 from nfo_sinus_driver.node.setpoints import Setpoints
 from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.wording import NodeError, Wording
@@ -81,8 +81,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         family = overrides_of(self).get('family')
         known = with_factory_address(DRIVE_SETTINGS, None if family is None else family.value)
         values = declare(self, known)
-        _require_gear_ratio(values)
-        require_scale(values)
+        require_factors(values)
         joint = Joint(
             lambda: self.get_parameter('joint_name').value or self.get_name(),
             lambda: self.get_parameter('gear_ratio').value,
@@ -303,8 +302,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             return self.managed.settings
         values = dataclasses.asdict(self.managed.settings)
         del values['retries']
-        _require_gear_ratio(changed)
-        require_scale(changed)
+        require_factors(changed)
         self._require_same_scale(changed)
         # not read_only for rclpy, so that a dump can be loaded
         autostart = self.get_parameter('autostart').value
@@ -345,8 +343,3 @@ class DriveNode(LifecycleNodeMixin, Node):
     def _take_settings(self, parameters: list[Parameter]) -> None:
         self.managed.change_settings(self._settings_with(parameters))
         self._other_lines.follow()
-
-
-def _require_gear_ratio(values: Mapping[str, object]) -> None:
-    if values.get('gear_ratio') == 0:
-        raise ValueError('gear_ratio 0: motor turns per turn of the shaft, never 0')

@@ -22,7 +22,6 @@ from typing import Any
 import rclpy
 from rclpy.exceptions import InvalidNodeNameException, ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_node_name import validate_node_name
 
 from nfo_sinus_driver.drive import Cause, DriveError
@@ -40,6 +39,7 @@ from nfo_sinus_driver.node.overrides import (
     unknown_nodes,
     unknown_parameters,
 )
+from nfo_sinus_driver.node.start import init_ros
 from nfo_sinus_driver.signals import ENDING, HeldSignals, OtherProcess, signal_name
 
 #: Threads that callbacks of one drive may keep waiting: one for each of its callback groups, but
@@ -319,7 +319,7 @@ def _run(
         starters = [] if parent is None else [parent]
         if pid is not None:
             starters.append(_starter(pid))
-        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        init_ros(arguments)
         process = DriverProcess(arguments, single_name)
     except (ParameterException, ValueError, *_ARGUMENT_ERRORS) as error:
         text = ' '.join(str(error).split())

@@ -29,13 +29,13 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.utilities import get_default_context
 from std_srvs.srv import Trigger
 
 from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE, ROSOUT
+from nfo_sinus_driver.node.start import init_ros
 from nfo_sinus_driver.version import VERSION
 from nfo_sinus_driver.view import show, why_unavailable
 from nfo_sinus_driver.view.picture import (
@@ -432,7 +432,11 @@ def main(args: list[str] | None = None) -> int:
         return 2
     # ROS would print across the view
     logging = ['--ros-args', '--disable-stdout-logs', '--']
-    rclpy.init(args=[*given, *logging], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        init_ros([*given, *logging])
+    except ValueError as error:
+        print(f'monitor: {error}', file=sys.stderr)
+        return 2
     source = GraphSource(get_default_context(), options.namespaces)
     try:
         show(source)

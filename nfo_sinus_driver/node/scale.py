@@ -6,7 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-import math
+
+#: What speeds are multiplied or divided by.
+_FACTORS = ('scale', 'gear_ratio')
+#: No machine has more, and no speed becomes infinite by it, or 0.
+_MOST = 1e9
 
 
 class Scale:
@@ -39,10 +43,12 @@ class Scale:
         return self._unit() or unit_of_drive
 
 
-def require_scale(values: Mapping[str, object]) -> None:
-    """Make sure that these settings have a valid scale, if they have one."""
-    factor = values.get('scale')
-    if isinstance(factor, float) and (factor == 0 or not math.isfinite(factor)):
-        raise ValueError(
-            f'scale {factor:g}: how much of the unit 1 Hz (1 rpm, 1 %) of the drive is, never 0'
-        )
+def require_factors(values: Mapping[str, object]) -> None:
+    """Make sure that these settings have valid factors of speed, as far as they have them."""
+    for name in _FACTORS:
+        factor = values.get(name)
+        if isinstance(factor, float) and not 1 / _MOST <= abs(factor) <= _MOST:
+            raise ValueError(
+                f'{name} {factor:g}: a factor of speed is between {1 / _MOST:g} and {_MOST:g}, or '
+                'as much below 0, never 0'
+            )

@@ -297,8 +297,10 @@ def test_newest_valid_set_point_counts_whichever_topic_it_came_from(bench: Bench
     assert abs(simulator.state()['frequency'] + 5.0) < 0.1
 
 
-def test_gear_ratio_of_nothing_is_refused(bench: Bench) -> None:
+def test_factors_that_make_no_speed_are_refused(bench: Bench) -> None:
     _, client = start(bench)
-    result = client.set_parameters(gear_ratio=0.0)
-    assert not result.successful
-    assert 'never 0' in result.reason
+    for name in ('gear_ratio', 'scale'):
+        for factor in (0.0, math.nan, math.inf, -math.inf, 1e308, 1e-308):
+            result = client.set_parameters(**{name: factor})
+            assert not result.successful
+            assert name in result.reason and 'never 0' in result.reason

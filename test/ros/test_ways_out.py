@@ -93,6 +93,13 @@ def test_a_driver_that_ends_with_no_process_does_not_start(bench: Bench, given: 
     assert 'cannot start: --end-with' in driver.text
 
 
+def test_a_driver_without_a_folder_for_its_log_says_what_to_do(bench: Bench) -> None:
+    nowhere = ('env', '-u', 'ROS_LOG_DIR', '-u', 'ROS_HOME', 'HOME=/proc/nowhere')
+    driver = bench.bare_driver(through=nowhere)
+    assert driver.wait() == 2
+    assert 'cannot start: ROS has no folder for its logs, set ROS_LOG_DIR' in driver.text
+
+
 def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(1, 60))
     driver = bench.driver('-p', 'shutdown_timeout:=1.0')

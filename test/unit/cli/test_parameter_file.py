@@ -5,13 +5,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from hypothesis import given, settings, strategies as st
 import pytest
 import yaml
 
 from nfo_sinus_driver.catalog import Parameter, Value, load_family
 from nfo_sinus_driver.cli.console import CliError
-from nfo_sinus_driver.cli.parameter_file import HEADER, format_file, parse_file
+from nfo_sinus_driver.cli.parameter_file import HEADER, format_file, parse_file, write_file
 
 G2 = load_family('sinus_g2')
 
@@ -30,6 +32,21 @@ def values_of(parameter: Parameter) -> st.SearchStrategy[Value]:
 EVERYTHING = st.fixed_dictionaries(
     {parameter.key: values_of(parameter) for parameter in G2.settings}
 )
+
+
+def test_a_file_is_never_written_through_a_link_that_was_there(tmp_path: Path) -> None:
+    other = tmp_path / 'other'
+    other.write_text('mine')
+    for name in ('drive.yaml', 'drive.yaml.part'):
+        (tmp_path / name).symlink_to(other)
+    write_file(str(tmp_path / 'drive.yaml'), 'new')
+    assert other.read_text() == 'mine'
+    assert (tmp_path / 'drive.yaml').read_text() == 'new'
+    # and what cannot be written whole leaves nothing
+    with pytest.raises(UnicodeEncodeError):
+        write_file(str(tmp_path / 'drive.yaml'), '\ud800')
+    assert (tmp_path / 'drive.yaml').read_text() == 'new'
+    assert {one.name for one in tmp_path.iterdir()} == {'other', 'drive.yaml', 'drive.yaml.part'}
 
 
 @settings(max_examples=40, deadline=None)
