@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 import contextlib
+import functools
 import math
 import signal
 import time
@@ -164,10 +165,15 @@ class Drive:
         self._status_at = -math.inf
         node.create_subscription(DriveStatus, f'{name}/status', self._on_status, STATUS_QOS)
         node.create_subscription(InvSt, f'{name}/inv_st', self._on_inv_st, INV_ST_QOS)
+        self._node = node
         self._setpoint = node.create_publisher(Float32, f'{name}/setpoint', SETPOINT_QOS)
         self.enable = node.create_client(SetBool, f'{name}/enable')
-        self.stop = node.create_client(Trigger, f'{name}/stop')
         self.fault_ack = node.create_client(Trigger, f'{name}/fault_ack')
+
+    @functools.cached_property
+    def stop(self) -> Client:
+        """The service that stops the motor; there is no client of it before it is needed."""
+        return self._node.create_client(Trigger, f'{self.name}/stop')
 
     def send(self, setpoint: float) -> None:
         """Publish a set-point, in the unit of the drive's control mode; negative is reverse."""
@@ -194,7 +200,8 @@ class Drive:
         if self.status.fault:
             return f'{self.name}: the drive has a fault'
         if not self.status.enabled:
-            return f'{self.name}: not enabled, or stopped by another client'
+            why = self.status.stop_text or 'it was not enabled'
+            return f'{self.name}: {why}'
         return ''
 
     def _on_status(self, status: DriveStatus) -> None:
@@ -226,7 +233,7 @@ def find(node: ControlNode, drives: Iterable[Drive], *clients: Client) -> str:
             return missing(f'{drive.name}: no driver runs there, or the drive does not respond')
         if drive.status.control_mode != DriveStatus.FREQUE:
             return f'{drive.name}: its set-points are in {drive.status.unit}, not in Hz'
-        clients = (*clients, drive.enable, drive.stop, drive.fault_ack)
+        clients = (*clients, drive.enable, drive.fault_ack)
     for client in clients:
         if not node.spin_until(client.service_is_ready, FIND_TIMEOUT):
             return missing(f'there is no service {client.srv_name}')

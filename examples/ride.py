@@ -77,7 +77,7 @@ def follow(
 def ride(node: ControlNode, arguments: argparse.Namespace) -> bool:
     """Do all of it; tell whether it went to its end and the stop is confirmed."""
     drive = Drive(node, arguments.drive)
-    problem = find(node, [drive]) or clear_fault(node, drive, arguments.acknowledge)
+    problem = find(node, [drive], drive.stop) or clear_fault(node, drive, arguments.acknowledge)
     if problem:
         node.get_logger().error(problem)
         return False

@@ -138,7 +138,7 @@ def test_runs_that_end_early_leave_the_motor_stopped(bench: Bench) -> None:
     runs(process, drive, 20.0)
     assert bench.client().call('stop').success
     assert process.wait() == 1, process.text
-    assert 'stopped by another client' in process.text
+    assert '/nfo_sinus: a stop was requested: /nfo_sinus/stop' in process.text, process.text
     stands(drive)
     # nothing confirms the stop
     process = ride(bench)
@@ -207,7 +207,7 @@ def test_a_conveyor_stops_all_when_one_drops_out(bench: Bench) -> None:
         stands(drives, 1)
         return process
 
-    process = dropped_out(lambda: right.enable(False), '/right: not enabled')
+    process = dropped_out(lambda: right.enable(False), '/right: a disable was requested')
     assert _NOT_CONFIRMED not in process.text
     stands(drives, 2)
 
@@ -319,7 +319,7 @@ def test_a_robot_follows_twists_and_stops_when_they_end_or_a_wheel_does(bench: B
         runs(process, drives, hertz(_TRACK / 2), 2)
         assert client.call('stop').success
         assert process.wait() == 1, process.text
-    assert '/left: not enabled, or stopped by another client' in process.text
+    assert '/left: a stop was requested: /left/stop called by ' in process.text, process.text
     assert not bench.drives.commanded(drives.state(2))
     stands(drives, 2)
 

@@ -13,6 +13,9 @@ import re
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').rglob('*.md')))
 
+#: What may stand before a command; those that need no ROS are run without it.
+_BEFORE = re.compile(r'^(\$|tools/run|ros2 run nfo_sinus_driver(?= (nfo-sinus|simulator) )) ')
+
 
 @dataclass(frozen=True)
 class Typed:
@@ -46,7 +49,7 @@ def _of(page: Path) -> Iterator[Typed]:
     for number, line in enumerate(page.read_text(encoding='utf-8').splitlines(), 1):
         if not (line.startswith('    ') or whole):
             continue
-        text = re.sub(r'^(\$|tools/run) ', '', line.strip())
+        text = _BEFORE.sub('', line.strip())
         if not text:
             continue
         began = began if whole else number
