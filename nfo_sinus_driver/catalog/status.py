@@ -149,7 +149,8 @@ class StatusWord:
         other: whether it turns is for the frequency alone to show.
     :ivar frequency_beside: the frequency comes in the telegram of the status word, and is read with
         every status.
-    :ivar tells_sign: frequency and speed are measured without a sign; REVERSE reports it.
+    :ivar sizes: which of frequency and speed are measured without a sign; REVERSE reports it, or,
+        where no bit means that, nothing does.
     """
 
     state: Callable[[int], State]
@@ -162,7 +163,7 @@ class StatusWord:
     by_frequency: bool = False
     only_frequency: bool = False
     frequency_beside: bool = False
-    tells_sign: bool = False
+    sizes: frozenset[Role] = frozenset()
 
     def may_say(self, word: int) -> bool:
         """Return whether a status word is one of those that the manual knows."""

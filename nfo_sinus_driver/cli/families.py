@@ -62,6 +62,12 @@ def notes(family: catalog.Family) -> list[str]:
     (method,) = profile.methods.values()
     if target.forward_only:
         found.append('it turns forward only: neither signed nor direction')
+    if profile.status_word.sizes and not catalog.Fact.REVERSE & profile.status_word.valid:
+        found.append(
+            'its frequency has no sign, and nothing reports the direction: the status shows the '
+            'direction commanded, and no value while others command. Add reverse to status (the '
+            'sign of another register will do: {register: R, bit: 15}), or a type with a sign'
+        )
     if not profile.identify:
         found.append(
             'nothing tells it from another drive with these registers: add identify, with a '

@@ -26,6 +26,7 @@ from nfo_sinus_driver.catalog import (
 )
 from nfo_sinus_driver.catalog.inverter_status import NO_CODE
 from nfo_sinus_driver.drive.communication_timeout import CommunicationTimeout
+from nfo_sinus_driver.drive.direction import Direction
 from nfo_sinus_driver.drive.events import Cause, DriveError, Event, Report, Severity
 from nfo_sinus_driver.drive.identity import Nameplate
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
@@ -98,6 +99,8 @@ class DriveState:
             settings.own_parameters,
         )
         self.turning = _turning(self.model)
+        #: Which way the motor turns, where the drive does not report that.
+        self.direction = Direction()
         method = settings.method_class
         #: How long after the driver's last message a PLC stops the drive, s; 0: no PLC.
         self.plc_time = method.plc_time
@@ -489,14 +492,31 @@ class DriveState:
         data = await self.params.read_data(key, priority, retry=retry)
         value = self.params.number(key, data)
         if not self.params.is_odd(key):
-            turns = self.model.role_of.get(key) in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
-            return status.signed(value) if turns and status is not None else value
+            return self._signed(self.model.role_of.get(key), value, status)
         if key not in self._reported_impossible:
             self._reported_impossible.add(key)
             unit = self.model[key].unit
             shown = f'{value:g} {unit}'.rstrip()
             self.notify(Severity.WARNING, Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
         return math.nan
+
+    def _signed(self, role: Role | None, value: float, status: InverterStatus | None) -> float:
+        """Return a measured value with the sign that the drive reports, or that is commanded."""
+        word = self.model.profile.status_word
+        if role not in word.sizes:
+            return value
+        if Fact.REVERSE in word.valid:
+            # standstill has no direction
+            return 0.0 - value if status is not None and Fact.REVERSE in status.facts else value
+        if role is self.turning.role:
+            self.direction.take(value * self.turning.hertz, self.bus.now())
+        return self.direction.of(value)
+
+    def shown(self, role: Role | None, value: float) -> float:
+        """Return what is published of a measured value; NaN where its direction is not known."""
+        word = self.model.profile.status_word
+        known = role not in word.sizes or Fact.REVERSE in word.valid or self.direction.known
+        return value if known or value == 0 else math.nan
 
     @property
     def measured_keys(self) -> tuple[str, ...]:

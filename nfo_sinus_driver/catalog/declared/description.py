@@ -148,6 +148,11 @@ class SetpointPlace:
     signed: bool = False
     direction: Direction | None = None
 
+    @property
+    def reverses(self) -> bool:
+        """A set-point may turn the motor in reverse."""
+        return self.signed or self.direction is not None
+
 
 @dataclass(frozen=True)
 class Fault:

@@ -5,10 +5,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from nfo_sinus_driver.catalog import Kind, Role
+from nfo_sinus_driver.catalog import Kind, Role, to_words
 from nfo_sinus_driver.catalog.declared import STATUS_KEY, Description, drive_number
 from nfo_sinus_driver.simulator._declared.orders import Place, orders_of
 from nfo_sinus_driver.simulator._declared.status import Wish, compose
@@ -181,11 +182,28 @@ class DeclaredControlUnit(ControlUnit):
         for order in self._orders.values():
             if order.shows is not None:
                 wishes.append((order.shows, True, _AWAITED))
+        mask = fixed = 0
+        for shift, word in self._measured_words():
+            mask, fixed = mask | 0xFFFF << shift, fixed | word << shift
         codes = drive.codes
-        if codes is None:
-            return compose(tuple(wishes), 0, 0)
-        number = self._number(fault) if is_fault else codes.none
-        return compose(tuple(wishes), codes.mask, number << codes.shift)
+        if codes is not None:
+            number = self._number(fault) if is_fault else codes.none
+            mask, fixed = mask | codes.mask, fixed | number << codes.shift
+        return compose(tuple(wishes), mask, fixed)
+
+    def _measured_words(self) -> Iterator[tuple[int, int]]:
+        """Yield the words of frequency and speed that stand in the status, and at which bit."""
+        status = self._drive.status
+        for role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED):
+            key = self._drive.roles.get(role, '')
+            raw = self.show(key) if key and not status.coils else None
+            if raw is None:
+                continue
+            address = self._drive.parameters[key].at('modbus')
+            words = to_words(address.number.encode(raw))
+            for register, word in enumerate(words, address.index):
+                if register in status.registers:
+                    yield status.shift(register), word
 
     def _number(self, code: int) -> int:
         return _UNNAMED if code in self._flags else drive_number(code)
