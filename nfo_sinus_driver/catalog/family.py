@@ -362,6 +362,8 @@ def _described(path: str) -> Family:
     profile = importlib.import_module(f'{_FAMILIES}._declared.profile').profile_of(drive)
     codes = declared.status_codes(drive)
     unlisted = codes[declared.Code.FAULT]
+    # its number is its name
+    unlisted = replace(unlisted, meanings=unlisted.meanings - {Meaning.UNNAMED})
     return Family(drive.name, drive.parameters, drive.roles, codes, {}, profile, unlisted)
 
 

@@ -570,6 +570,7 @@ class Profile:
     :ivar timeout_conditions: the parameters on which it depends that the motor stops when its own
         time-out is over, each with the values by which it does, first the one to be written; where
         there is none, the motor stops.
+    :ivar fault_code: gives the status code of what the parameter reports that names a fault.
     :ivar after_write: what makes settings take effect that were written, or keeps them.
     :ivar pole_pairs: of the motor, where no parameter reports them; 0: not known.
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
@@ -608,6 +609,7 @@ class Profile:
     refusals: Mapping[int, str] = field(default_factory=dict)
     busy: frozenset[int] = frozenset()
     timeout_conditions: Mapping[str, Sequence[Value]] = field(default_factory=dict)
+    fault_code: Callable[[int], int] = int
     after_write: Sequence[Write] = ()
     pole_pairs: int = 0
     keeps_run: bool | None = None

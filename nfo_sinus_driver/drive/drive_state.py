@@ -32,7 +32,7 @@ from nfo_sinus_driver.drive.identity import Nameplate
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED, Listener, Measured
-from nfo_sinus_driver.link import LinkError, PortError, Refused, Reply
+from nfo_sinus_driver.link import LinkError, NoAnswer, PortError, Refused, Reply
 
 _log = logging.getLogger(__name__)
 
@@ -183,6 +183,7 @@ class DriveState:
         alarmed = before is not None and word != before.word and alarming(half)
         priority = Priority.LOOK if alarmed else priority
         if self.model.profile.status_word.code is not None:
+            half = await self._with_fault_code(half, before, priority)
             status = await self._with_control(half, priority, retry)
             return await self._with_frequency(status, priority, retry)
         last = self.status
@@ -220,6 +221,30 @@ class DriveState:
         status = InverterStatus(at, word, code, self.model, code_at=at)
         return self._with_control_as_before(status)
 
+    async def _with_fault_code(
+        self, status: InverterStatus, before: InverterStatus | None, priority: Priority
+    ) -> InverterStatus:
+        """Name a fault that has just come, so that its first report has the name; one try."""
+        key = self.model.key(Role.FAULT_CODE)
+        has_come = before is None or before.code != status.code
+        if not (has_come and status.means(Meaning.UNNAMED) and self.params.reaches(key)):
+            return status
+        if self.params.by_mailbox(key):
+            # that takes several transactions, and a stop does not wait for them
+            return status
+        try:
+            self.name(status.code, await self.read_fault_code(priority))
+        except (Refused, NoAnswer):
+            return status
+        assert status.word is not None
+        return self.status_of_word(status.word, status.at)
+
+    async def read_fault_code(self, priority: Priority) -> int:
+        """Read which fault or alarm it is that the status word does not name; one try."""
+        key = self.model.key(Role.FAULT_CODE)
+        number = await self.params.read_number(key, priority, retry=False)
+        return self.model.profile.fault_code(int(number))
+
     @property
     def unnamed(self) -> int:
         """The code of the fault or alarm that the status word does not name; 0: there is none."""
@@ -230,9 +255,11 @@ class DriveState:
         return code if Meaning.UNNAMED in self.model.status_code(code).meanings else 0
 
     def name(self, unnamed: int, code: int) -> None:
-        """Take the name of a fault or an alarm that the status word does not name."""
+        """Take the name of a fault or alarm that the status word does not name; 0: it has none."""
         is_one = self.model.status_code(code).kind is not Kind.STATUS
-        self._named = (unnamed, code) if is_one and code in self.model.status_codes else None
+        # where all codes are the drive's own numbers, one that is not listed names it, too
+        names = code in self.model.status_codes or (code and self.model.unlisted is not None)
+        self._named = (unnamed, code) if is_one and names else None
 
     @property
     def named(self) -> bool:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from nfo_sinus_driver.catalog.parameter import Parameter, Value
+from nfo_sinus_driver.catalog.parameter import Address, Parameter, Value
 from nfo_sinus_driver.catalog.status import Role
 
 #: Status codes that say what the drive does; faults with such a number are moved behind.
@@ -168,23 +168,22 @@ class Fault:
 @dataclass(frozen=True)
 class FaultCodes:
     """
-    The number of a fault in the status word.
+    Where the number of a fault stands.
 
     :ivar mask: its bits; :ivar shift: the lowest of them.
     :ivar none: the number that means none.
+    :ivar in_status: it is a part of the status word; else it is a register of its own, which is
+        read where the status reports a fault.
     """
 
     mask: int
     shift: int
     none: int
+    in_status: bool
 
-    def number(self, status: int) -> int:
-        """Return the number that a status word has."""
-        return (status & self.mask) >> self.shift
-
-    def code(self, status: int) -> int:
-        """Return the status code of the fault that a status word has; 0 if it has none."""
-        number = self.number(status)
+    def code(self, word: int) -> int:
+        """Return the status code of the fault that a word has; 0 if it has none."""
+        number = (word & self.mask) >> self.shift
         return 0 if number == self.none else status_code(number)
 
 
@@ -194,11 +193,17 @@ class StatusPlace:
     Where the status stands; it is read as one number, the first register in its highest bits.
 
     :ivar registers: as they stand in it, or one coil for each bit, the lowest first.
-    :ivar coils: they are coils.
+    :ivar coils: they are coils; :ivar inputs: input registers, which function 04 reads.
     """
 
     registers: Sequence[int]
     coils: bool = False
+    inputs: bool = False
+
+    def holds(self, address: Address) -> bool:
+        """Return whether what stands at an address is a part of it."""
+        same = (address.space == 'input') is self.inputs and not self.coils
+        return same and address.index in self.registers
 
     def shift(self, register: int) -> int:
         """Return at which bit a register, or a coil, begins."""

@@ -20,6 +20,8 @@ _SIGN = 0x8000
 #: The group of all that commands the drive and reports its status.
 _FIELDBUS = 'Fieldbus'
 STATUS_KEY = 'line.status'
+#: The number of the fault, where it stands in no register of the status.
+FAULT_KEY = 'line.fault'
 _TYPES = {
     'uint16': 'uint16_be', 'int16': 'sint16_be', 'bcd16': 'bcd16', 'bcd32': 'bcd32',
     'uint32': 'uint32_be', 'int32': 'sint32_be',
@@ -61,6 +63,8 @@ class Places:
         self._coil_numbering = file.get('line').integer('coil_numbering')
         self._line = line
         self._status_register = file.get('status').get('register')
+        #: The status is read by function 04.
+        self._inputs = file.get('status').text('table') == 'input'
         self.made: dict[str, Parameter] = {}
         self.registers = Registers(problems)
 
@@ -121,7 +125,7 @@ class Places:
         number = self.coil(place) if coil else self.register(place)
         # a whole word may be a value as well, and its highest bit the sign of one
         if mask not in (WORD, _SIGN):
-            space = 'coil' if coil else 'register'
+            space = 'coil' if coil else self._status_space
             self.registers.take(Use.BITS, what, node.line, space, number)
         return PlacedCondition(number, coil, mask, values, inverted, node.line)
 
@@ -191,6 +195,10 @@ class Places:
         return key
 
     @property
+    def _status_space(self) -> str:
+        return 'input' if self._inputs else self._writes
+
+    @property
     def _writes(self) -> str:
         return 'register' if 6 in self._line.write else 'register_16'
 
@@ -199,12 +207,10 @@ class Places:
             address = Address('modbus', space, index, None, codec_of(codec), Fraction(1), '')
             self.made[key] = internal(key, address, Access.READ_WRITE)
 
-    def status(
-        self, conditions: Iterable[PlacedCondition], block: Node, registers: Iterable[int]
-    ) -> StatusPlace:
+    def status(self, conditions: Iterable[PlacedCondition], block: Node) -> StatusPlace:
         """Return where the status stands, with a parameter that reads it as one."""
         found = list(conditions)
-        wanted = {one.register for one in found} | set(registers)
+        wanted = {one.register for one in found}
         if any(one.coil for one in found):
             return self._coils(found, block)
         if 'register' in block:
@@ -233,9 +239,11 @@ class Places:
         first, *others = blocks
         sub_index = others[0][0] if others else None
         codec = codec_of(f'uint{16 * min(count, _MOST_OF_STATUS)}_be')
-        address = Address('modbus', 'register', first[0], sub_index, codec, Fraction(1), '')
+        address = Address(
+            'modbus', self._status_space, first[0], sub_index, codec, Fraction(1), ''
+        )
         self.made[STATUS_KEY] = internal(STATUS_KEY, address, Access.READ)
-        return StatusPlace(tuple(one for run in blocks for one in run))
+        return StatusPlace(tuple(one for run in blocks for one in run), inputs=self._inputs)
 
     def _coils(self, conditions: Sequence[PlacedCondition], block: Node) -> StatusPlace:
         if not all(one.coil for one in conditions):

@@ -27,7 +27,14 @@ from nfo_sinus_driver.catalog.declared.description import (
     status_code,
 )
 from nfo_sinus_driver.catalog.declared.parameter_table import with_parameters
-from nfo_sinus_driver.catalog.declared.places import WORD, PlacedCondition, Places, internal
+from nfo_sinus_driver.catalog.declared.places import (
+    FAULT_KEY,
+    STATUS_KEY,
+    WORD,
+    PlacedCondition,
+    Places,
+    internal,
+)
 from nfo_sinus_driver.catalog.declared.registers import Use
 from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters, with_scale
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
@@ -44,7 +51,7 @@ _MODES = {'Hz': 'Freque', 'rpm': 'Speed'}
 #: Where faults that are bits begin to be counted.
 _FLAGS_FROM = 100
 _MOST_FAULTS = 64
-_OF_STATUS = ('register', 'block')
+_OF_STATUS = ('register', 'block', 'table')
 
 
 def read(path: Path) -> Description:
@@ -70,7 +77,7 @@ class _Reader:
         self._path = path
         self._root = root
         self._problems = problems
-        self._line = _line(root.get('line'))
+        self._line = self._line_defaults(root.get('line'))
         self._require_format()
         self._places = Places(root, self._line, problems)
         self._conditions: dict[str, PlacedCondition] = {}
@@ -79,18 +86,18 @@ class _Reader:
         """Return what the file says; what is wrong goes to the problems."""
         root, control = self._root, self._root['control']
         settings = Settings(root, self._places, self._problems)
-        flags = list(self._flags())
+        faults = dict(self._faults(root.get('faults')))
+        flags = list(self._flags(faults))
         self._conditions = dict(self._facts())
         steps = StepReader(root, self._places, settings, self._problems)
-        codes_at = self._codes_register()
         running = [one for name, one in self._conditions.items() if name == 'running']
         of_flags = (one for one, _ in flags)
         conditions = [*running, *self._conditions.values(), *of_flags, *steps.awaited()]
-        registers = [] if codes_at is None else [codes_at]
-        status = self._places.status(conditions, root['status'].get('block'), registers)
+        status = self._places.status(conditions, root['status'].get('block'))
         facts = {name: one.in_place(status) for name, one in self._conditions.items()}
         self._require_apart(facts)
         steps.use(status)
+        codes = self._codes(root.get('faults'), status)
         setpoint = self._setpoint(settings)
         commands = Commands(
             control, steps, setpoint.direction, self._places.made, self._problems
@@ -121,8 +128,8 @@ class _Reader:
             holder=settings.holder(control.get('holder')),
             stop_mode=self._stop_mode(control.get('stop_mode'), settings),
             enable_input=control.text('enable_input', 'enable input').removeprefix('the '),
-            codes=self._codes(codes_at, status),
-            faults={fault.code: fault for fault in self._faults(root.get('faults'))},
+            codes=codes,
+            faults=faults,
             flags=tuple((one.in_place(status), fault) for one, fault in flags),
             alarm=self._alarm(root.get('alarms')),
             timeout=self._timeout(settings),
@@ -130,6 +137,18 @@ class _Reader:
             pole_pairs=root.get('motor').integer('pole_pairs'),
             accel=settings.known(root.get('simulated').get('accel')),
             decel=settings.known(root.get('simulated').get('decel')),
+        )
+
+    def _line_defaults(self, node: Node) -> LineDefaults:
+        write = {6: (6,), 16: (16,)}.get(node.integer('write'), (6, 16))
+        texts = self._numbered(node.get('exceptions'))
+        busy = [one.scalar for one in node.get('busy').items]
+        return LineDefaults(
+            node.text('protocol', LineDefaults.protocol), node.integer('baud_rate'),
+            node.text('char_format'), node.integer('address'), node.text('check'), write,
+            node.integer('most_registers', 123),
+            {code: str(text.scalar) for code, text in texts},
+            frozenset(one for one in busy if isinstance(one, int)),
         )
 
     def _require_format(self) -> None:
@@ -178,52 +197,67 @@ class _Reader:
 
     # --- faults ---
 
-    def _codes_register(self) -> int | None:
-        node = self._root.get('faults')
+    def _codes(self, node: Node, status: StatusPlace) -> FaultCodes | None:
         if 'register' not in node:
             if 'codes' in node:
                 self._problems.add(node.line, 'faults has codes, but no register that tells them')
             return None
-        register = self._places.register(node['register'])
-        if 'bits' not in node:
-            line = node['register'].line
-            self._places.registers.take(Use.FAULT, 'the fault', line, 'register', register)
-        return register
+        none, places = node.integer('none'), self._places
+        address = places.address(node, 'the fault', use=Use.FAULT)
+        if status.holds(address):
+            low, high = 0, 15
+            if 'bits' in node:
+                low, high = (int(one.scalar or 0) for one in node['bits'].items)
+            shift = status.shift(address.index) + low
+            bits = max(high - low + 1, 0)
+            return FaultCodes(((1 << bits) - 1) << shift, shift, none, in_status=True)
+        places.made[FAULT_KEY] = internal(FAULT_KEY, address, Access.READ)
+        return FaultCodes(address.number.maximum, 0, none, in_status=False)
 
-    def _codes(self, register: int | None, status: StatusPlace) -> FaultCodes | None:
-        if register is None or status.coils:
-            return None
-        node = self._root['faults']
-        low, high = 0, 15
-        if 'bits' in node:
-            low, high = (int(one.scalar or 0) for one in node['bits'].items)
-            if not low <= high < 16:
-                self._problems.add(node['bits'].line, f'a register has no bits {low} to {high}')
-                return None
-        shift = status.shift(register) + low
-        mask = ((1 << high - low + 1) - 1) << shift
-        return FaultCodes(mask, shift, node.integer('none'))
-
-    def _faults(self, node: Node) -> Iterator[Fault]:
+    def _faults(self, node: Node) -> Iterator[tuple[int, Fault]]:
         none = node.integer('none')
-        for text, fault in node.get('codes').mapping.items():
+        for number, fault in self._numbered(node.get('codes')):
+            if number == none or number > WORD:
+                self._problems.add(
+                    fault.line, f'fault {fault.name} cannot be: {none} means no fault'
+                )
+            code = status_code(number)
+            yield code, _fault(fault, code)
+
+    def _numbered(self, node: Node) -> Iterator[tuple[int, Node]]:
+        """Yield what stands under numbers; one that stands twice, be it in two forms, is wrong."""
+        lines: dict[int, int] = {}
+        for text, one in node.mapping.items():
             try:
                 number = number_of(text)
             except ValueError as error:
-                self._problems.add(fault.line, f'{error}: write it without zeros in front')
+                self._problems.add(one.line, f'{error}: write it without zeros in front')
                 continue
-            if number == none or number > WORD:
-                self._problems.add(fault.line, f'fault {text} cannot be: {none} means no fault')
-            yield _fault(fault, status_code(number))
+            if number in lines:
+                self._problems.add(
+                    one.line, f'{text} stands in line {lines[number]} already: remove one of both'
+                )
+            lines[number] = one.line
+            yield number, one
 
-    def _flags(self) -> Iterator[tuple[PlacedCondition, Fault]]:
+    def _flags(self, faults: Mapping[int, Fault]) -> Iterator[tuple[PlacedCondition, Fault]]:
         flags = self._root.get('faults').get('flags')
         if len(flags.items) > _MOST_FAULTS:
             self._problems.add(flags.line, f'faults has more than {_MOST_FAULTS} flags')
+        taken = dict(faults)
         for number, node in enumerate(flags.items):
-            condition = self._places.condition(node, f'fault flag {node.text("text")!r}')
+            text, code = node.text('text'), node.integer('code', _FLAGS_FROM + number)
+            condition = self._places.condition(node, f'fault flag {text!r}')
+            fault = _fault(node, status_code(code))
+            other = taken.setdefault(fault.code, fault)
+            if other is not fault:
+                self._problems.add(
+                    node.line,
+                    f'the faults {text!r} and {other.text!r} have the code {code}: give the flag '
+                    'one that no other has (code: 301)',
+                )
             if condition is not None:
-                yield condition, _fault(node, status_code(_FLAGS_FROM + number))
+                yield condition, fault
 
     def _alarm(self, node: Node) -> Fault:
         usual = Description.alarm
@@ -317,7 +351,9 @@ class _Reader:
 
     def _measured(self) -> tuple[dict[str, Parameter], dict[Role, str]]:
         made: dict[str, Parameter] = {}
-        roles: dict[Role, str] = {Role.STATUS_WORD: 'line.status'}
+        roles: dict[Role, str] = {Role.STATUS_WORD: STATUS_KEY}
+        if FAULT_KEY in self._places.made:
+            roles[Role.FAULT_CODE] = FAULT_KEY
         for name, node in self._root.get('measured').mapping.items():
             role, key = Role(name), f'measured.{name}'
             address = self._places.address(node, name)
@@ -397,17 +433,3 @@ def _fault(node: Node, code: int) -> Fault:
 def _float(node: Node) -> float | None:
     found = node.scalar
     return float(found) if isinstance(found, (int, Fraction)) else None
-
-
-def _line(node: Node) -> LineDefaults:
-    write = {6: (6,), 16: (16,)}.get(node.integer('write'), (6, 16))
-    exceptions = {
-        int(code, 0): str(text.scalar) for code, text in node.get('exceptions').mapping.items()
-        if not (code.startswith('0') and code.isdecimal() and code != '0')
-    }
-    busy = frozenset(one.scalar for one in node.get('busy').items if isinstance(one.scalar, int))
-    return LineDefaults(
-        node.text('protocol', LineDefaults.protocol), node.integer('baud_rate'),
-        node.text('char_format'), node.integer('address'), node.text('check'), write,
-        node.integer('most_registers', 123), exceptions, busy,
-    )

@@ -258,6 +258,7 @@ def profile_of(drive: Description) -> Profile:
         timeout_conditions={} if drive.timeout is None else drive.timeout.conditions,
         pole_pairs=drive.pole_pairs,
         keeps_run=drive.keeps_run,
+        fault_code=int if drive.codes is None else drive.codes.code,
         after_write=tuple(Write(step.key, step.raw) for step in drive.after_write),
         line_check=dict.fromkeys(('modbus_rtu', 'modbus_tcp'), drive.line.shown)
         if drive.line.shown

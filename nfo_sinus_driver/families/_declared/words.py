@@ -156,7 +156,8 @@ def _fault(drive: Description, word: int) -> int:
     for condition, fault in drive.flags:
         if condition.holds(word):
             return fault.code
-    return (drive.codes.code(word) if drive.codes is not None else 0) or Code.FAULT
+    codes = drive.codes
+    return (codes.code(word) if codes is not None and codes.in_status else 0) or Code.FAULT
 
 
 def is_remote(drive: Description, word: int) -> bool:

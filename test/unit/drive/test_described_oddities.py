@@ -114,6 +114,7 @@ ODD: dict[str, dict[str, Any]] = {
             'most': 60, 'signed': True,
         },
     },
+    'a status of input registers': {'status': {**PLAIN['status'], 'table': 'input'}},
     'a fault far away': {'faults': {'register': 900, 'codes': {1: {'text': 'hot'}}}},
     'faults as bits': {
         'faults': {
