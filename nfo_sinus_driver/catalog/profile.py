@@ -207,6 +207,11 @@ class SetpointTarget:
         return 0.0 if self.forward_only else -self.most
 
     @property
+    def has_sign(self) -> bool:
+        """What is written to it has the sign of the set-point; else it is a size."""
+        return True
+
+    @property
     def written_once(self) -> frozenset[str]:
         """The parameters that are not written again as long as the same stands in the drive."""
         return frozenset()

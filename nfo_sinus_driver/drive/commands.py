@@ -158,6 +158,7 @@ async def read_limits(state: DriveState, control_mode: str) -> profile.Limits:
         return limits
     # with another scale a word may not hold all that the drive takes
     least, most, _ = state.params.limits(target.key)
+    least = least if target.has_sign else -most
     return replace(limits, least=max(limits.least, least), most=min(limits.most, most))
 
 

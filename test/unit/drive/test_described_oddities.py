@@ -163,6 +163,21 @@ ODD: dict[str, dict[str, Any]] = {
             'limit.maximum': {'register': 40, 'factor': 0.1, 'unit': 'Hz', 'default': 55},
         },
     },
+    'a size in parts of a parameter': {
+        'setpoint': {
+            'register': 11, 'factor': '1/10000', 'scaled_by': 'limit.maximum',
+            'limit': 'limit.maximum', 'unit': 'Hz', 'most': 60,
+            'direction': {'register': 12, 'forward': 1, 'reverse': 2},
+        },
+        'status': {**PLAIN['status'], 'reverse': {'bit': 1}},
+        'measured': {
+            'actual_frequency': {'register': 22, 'factor': '1/10000', 'scaled_by': 'limit.maximum'},
+        },
+        'parameters': {
+            **PLAIN['parameters'],
+            'limit.maximum': {'register': 40, 'factor': 0.1, 'unit': 'Hz', 'default': 55},
+        },
+    },
     'a parameter tells who has control': {
         'control': {
             **PLAIN['control'],
