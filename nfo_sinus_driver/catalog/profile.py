@@ -615,7 +615,7 @@ class Profile:
     busy: frozenset[int] = frozenset()
     timeout_conditions: Mapping[str, Sequence[Value]] = field(default_factory=dict)
     fault_code: Callable[[int], int] = int
-    after_write: Sequence[Write] = ()
+    after_write: Sequence[Write | Wait] = ()
     pole_pairs: int = 0
     keeps_run: bool | None = None
 

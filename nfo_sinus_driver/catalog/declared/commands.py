@@ -148,7 +148,10 @@ class StepReader:
 
     def _await(self, node: Node, name: str) -> Step | None:
         if name in (*_AT_ONCE, 'after_write'):
-            self._problems.add(node.line, f'{name} waits for nothing: a stop is never delayed')
+            why = 'it does not wait for a status' if name == 'after_write' else (
+                'a stop is never delayed'
+            )
+            self._problems.add(node.line, f'{name} cannot have until: {why}')
             return None
         condition = self._awaited.get(id(node))
         within = node.number('within')
@@ -199,7 +202,7 @@ class Commands:
         self._lists = {name: reader.read(control.get(name), name) for name in NAMES}
         self._run = self._left_by('run')
         for name in NAMES:
-            self._check_pauses(name)
+            self.check_pauses(name, self._lists[name], control.get(name).line)
         for name in ('stop', 'coast', 'quick_stop'):
             if name in control:
                 self._check_stop(name)
@@ -298,17 +301,14 @@ class Commands:
                 'would turn: write its register, and leave it out of the parameters',
             )
 
-    def _check_pauses(self, name: str) -> None:
-        pauses = [step.seconds for step in self._lists[name] if isinstance(step, Pause)]
+    def check_pauses(self, name: str, steps: Steps, line: int) -> None:
+        """Make sure that a list does not pause for too long."""
+        pauses = [step.seconds for step in steps if isinstance(step, Pause)]
         most = _LONGEST_PAUSE if name in _AT_ONCE else _LONGEST
         if sum(pauses) > most:
-            self._problems.add(
-                self._control[name].line, f'{name} pauses for more than {most:g} s in all'
-            )
-        if name in _AT_ONCE and self._lists[name] and isinstance(self._lists[name][0], Pause):
-            self._problems.add(
-                self._control[name].line, f'{name} begins with a pause: a stop is never delayed'
-            )
+            self._problems.add(line, f'{name} pauses for more than {most:g} s in all')
+        if name in _AT_ONCE and steps and isinstance(steps[0], Pause):
+            self._problems.add(line, f'{name} begins with a pause: a stop is never delayed')
 
     def _check_direction(self) -> None:
         """See to it that run leaves the direction that it is said to: forward."""

@@ -305,7 +305,7 @@ class Description:
     quick_stop: Steps = ()
     reset: Steps = ()
     release: Steps = ()
-    after_write: Sequence[Put] = ()
+    after_write: Sequence[Put | Pause] = ()
     requires: Sequence[Requirement] = ()
     holder: tuple[str, tuple[Value, ...]] | None = None
     stop_mode: tuple[str, Value] | None = None

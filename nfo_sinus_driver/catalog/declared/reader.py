@@ -19,6 +19,7 @@ from nfo_sinus_driver.catalog.declared.description import (
     Fault,
     FaultCodes,
     LineDefaults,
+    Pause,
     Put,
     Requirement,
     SetpointPlace,
@@ -370,15 +371,18 @@ class _Reader:
                 if value is not None:
                     yield Requirement(key, value, node.flag('write'), node.text('text'))
 
-    def _after_write(self, steps: StepReader, commands: Commands) -> Iterator[Put]:
+    def _after_write(self, steps: StepReader, commands: Commands) -> Iterator[Put | Pause]:
         node = self._root.get('after_write')
         listed = steps.read(node, 'after_write')
         commands.require_no_run('after_write', listed, node.line)
+        commands.check_pauses('after_write', listed, node.line)
         for step in listed:
-            if isinstance(step, Put):
+            if isinstance(step, (Put, Pause)):
                 yield step
             else:
-                self._problems.add(node.line, 'after_write takes steps with value, values or on')
+                self._problems.add(
+                    node.line, 'after_write takes steps with value, values, on or wait'
+                )
 
     @staticmethod
     def _stop_mode(node: Node, settings: Settings) -> tuple[str, Value] | None:

@@ -103,9 +103,13 @@ class Declared(ControlMethod):
         """
         drive = self._drive
         yield from try_steps(_carry_out(drive.stop))
+        changed = False
         for one in drive.requires:
-            if one.write:
+            if one.write and (yield Read(one.key)) != one.value:
                 yield Write(one.key, one.value, stored=True)
+                changed = True
+        if changed:
+            yield from try_steps(_each(drive.after_write, retry=True))
         yield from _carry_out(drive.prepare)
         if not drive.prepare_stops:
             yield from _carry_out(drive.stop, head=True)
@@ -259,7 +263,10 @@ def profile_of(drive: Description) -> Profile:
         pole_pairs=drive.pole_pairs,
         keeps_run=drive.keeps_run,
         fault_code=int if drive.codes is None else drive.codes.code,
-        after_write=tuple(Write(step.key, step.raw) for step in drive.after_write),
+        after_write=tuple(
+            Wait(step.seconds) if isinstance(step, Pause) else Write(step.key, step.raw)
+            for step in drive.after_write
+        ),
         line_check=dict.fromkeys(('modbus_rtu', 'modbus_tcp'), drive.line.shown)
         if drive.line.shown
         else {},
