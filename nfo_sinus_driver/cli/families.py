@@ -49,7 +49,7 @@ def check(name: str) -> bool:
         return False
     profile = family.profile
     put(f'{name}: {profile.title}, {len(family.settings)} settings')
-    for note in notes(family) if catalog.is_described(model) else ():
+    for note in (*family.unused, *notes(family)) if catalog.is_described(model) else ():
         put(f'  {note}')
     return True
 

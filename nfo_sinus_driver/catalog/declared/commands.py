@@ -34,8 +34,12 @@ _LONGEST_PAUSE = 0.5
 _LONGEST = 3.0
 #: How long it is waited for a condition where nothing is said, s.
 _WITHIN = 1.0
-#: What each kind of step has beside where it goes.
-_KINDS = ('value', 'values', 'set', 'clear', 'on', 'to', 'wait', 'until')
+#: What each kind of step has.
+_KINDS = {
+    'value': {'register', 'value'}, 'values': {'register', 'values'},
+    'set': {'register', 'set', 'clear'}, 'clear': {'register', 'set', 'clear'},
+    'on': {'coil', 'on'}, 'to': {'parameter', 'to'}, 'wait': {'wait'}, 'until': {'until', 'within'},
+}
 
 
 class StepReader:
@@ -72,9 +76,7 @@ class StepReader:
 
     def _step(self, node: Node, name: str) -> Step | None:
         kinds = [kind for kind in _KINDS if kind in node]
-        if kinds in (['set'], ['clear'], ['set', 'clear']):
-            return self._change(node, name)
-        if len(kinds) != 1:
+        if not kinds or not set(node.mapping) <= _KINDS[kinds[0]]:
             self._problems.add(
                 node.line,
                 f'a step of {name} does one thing: value, values, set and clear, on, to, wait or '
@@ -82,13 +84,14 @@ class StepReader:
             )
             return None
         make = {
-            'value': self._put, 'values': self._put_several, 'on': self._switch,
-            'to': self._assign, 'wait': self._pause, 'until': self._await,
+            'value': self._put, 'values': self._put_several, 'set': self._change,
+            'clear': self._change, 'on': self._switch, 'to': self._assign, 'wait': self._pause,
+            'until': self._await,
         }
         return make[kinds[0]](node, name)
 
     def _place(self, node: Node, name: str) -> Node | None:
-        if 'register' in node and 'coil' not in node and 'parameter' not in node:
+        if 'register' in node:
             return node['register']
         self._problems.add(node.line, f'a step of {name} needs a register to write to')
         return None
@@ -97,14 +100,14 @@ class StepReader:
         place = self._place(node, name)
         if place is None:
             return None
-        word = self._word(node['value'])
+        word = node.integer('value') & WORD
         return Put(self._places.word(name, place, word), word)
 
     def _put_several(self, node: Node, name: str) -> Step | None:
         place = self._place(node, name)
         if place is None:
             return None
-        words = [self._word(one) for one in node['values'].items]
+        words = [int(one.scalar or 0) & WORD for one in node['values'].items]
         if len(words) > 1 and 16 not in self._places.functions:
             self._problems.add(
                 node.line, f'{name} writes several registers, and the line has no function 16'
@@ -129,7 +132,7 @@ class StepReader:
         return Change(self._places.word(name, place, bits | cleared), bits, cleared)
 
     def _switch(self, node: Node, name: str) -> Step | None:
-        if 'coil' not in node or 'register' in node:
+        if 'coil' not in node:
             self._problems.add(node.line, f'a step of {name} needs the coil that is on or off')
             return None
         return Put(self._places.coil_key(name, node['coil']), int(node.flag('on')))
@@ -157,12 +160,6 @@ class StepReader:
         within = node.number('within')
         seconds = _WITHIN if within is None else float(within)
         return Await(condition.in_place(self._status), seconds) if condition is not None else None
-
-    def _word(self, node: Node) -> int:
-        raw = node.scalar if isinstance(node.scalar, int) else 0
-        if not -0x8000 <= raw <= WORD:
-            self._problems.add(node.line, f'{raw} is no word of one register')
-        return raw & WORD
 
 
 #: A register or a coil as it is sent, and whether it is a coil; or a parameter.

@@ -281,6 +281,7 @@ class Description:
     :ivar pole_pairs: of the motor; 0: not known.
     :ivar stop_mode: the parameter that says how it stops, and its value for coasting.
     :ivar defaults: with what value a parameter leaves the factory, by key.
+    :ivar unused: which keys of the file have no effect, a sentence each.
     """
 
     name: str
@@ -319,6 +320,7 @@ class Description:
     pole_pairs: int = 0
     accel: str = ''
     decel: str = ''
+    unused: Sequence[str] = ()
 
     @property
     def tells_control(self) -> bool:

@@ -268,6 +268,10 @@ class Places:
     ) -> Address:
         """Return where a value stands."""
         factor = self._factor(node, what)
+        if 'coil' in node and 'register' in node:
+            self._problems.add(
+                node.line, f'{what} names a register and a coil: remove one of both'
+            )
         if 'coil' in node:
             coil = self.coil(node['coil'])
             self.registers.take(use, what, node.line, 'coil', coil)

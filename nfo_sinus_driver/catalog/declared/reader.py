@@ -37,7 +37,8 @@ from nfo_sinus_driver.catalog.declared.places import (
     internal,
 )
 from nfo_sinus_driver.catalog.declared.registers import Use
-from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters, with_scale
+from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters
+from nfo_sinus_driver.catalog.declared.unused import unused
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
 from nfo_sinus_driver.catalog.parameter import Access, Parameter, Value
 from nfo_sinus_driver.catalog.status import Role
@@ -103,7 +104,7 @@ class _Reader:
         commands = Commands(
             control, steps, setpoint.direction, self._places.made, self._problems
         )
-        measured, roles = self._measured()
+        measured, roles = self._measured(settings)
         self._require_one_holder(control, settings)
         after_write = tuple(self._after_write(steps, commands))
         identify = dict(self._identify())
@@ -138,6 +139,7 @@ class _Reader:
             pole_pairs=root.get('motor').integer('pole_pairs'),
             accel=settings.known(root.get('simulated').get('accel')),
             decel=settings.known(root.get('simulated').get('decel')),
+            unused=unused(root, self._problems),
         )
 
     def _line_defaults(self, node: Node) -> LineDefaults:
@@ -203,7 +205,7 @@ class _Reader:
             if 'codes' in node:
                 self._problems.add(node.line, 'faults has codes, but no register that tells them')
             return None
-        none, places = node.integer('none'), self._places
+        none, places = node.integer('none') & WORD, self._places
         address = places.address(node, 'the fault', use=Use.FAULT)
         if status.holds(address):
             low, high = 0, 15
@@ -350,7 +352,7 @@ class _Reader:
             if values:
                 yield key, values
 
-    def _measured(self) -> tuple[dict[str, Parameter], dict[Role, str]]:
+    def _measured(self, settings: Settings) -> tuple[dict[str, Parameter], dict[Role, str]]:
         made: dict[str, Parameter] = {}
         roles: dict[Role, str] = {Role.STATUS_WORD: STATUS_KEY}
         if FAULT_KEY in self._places.made:
@@ -359,7 +361,7 @@ class _Reader:
             role, key = Role(name), f'measured.{name}'
             address = self._places.address(node, name)
             parameter = internal(key, address, Access.READ, _UNITS.get(name, ''))
-            made[key] = with_scale(node, parameter)
+            made[key] = settings.scaled(node, parameter)
             roles[role] = key
         return made, roles
 
