@@ -17,14 +17,11 @@ _FALL, _WITHIN, _RISE = 0.1, 1.0, 0.5
 
 
 class Direction:
-    """
-    The direction of one motor, as commanded.
-
-    :ivar commanded: the set-point that the drive has, in any unit; NaN: the driver commands none.
-    """
+    """The direction of one motor, as commanded."""
 
     def __init__(self) -> None:
-        self.commanded = NAN
+        #: The set-point that the drive has, in any unit; NaN: the driver commands none.
+        self._commanded = NAN
         self._way = NAN
         #: Of a motor whose direction is to change: its least frequency, and since when.
         self._least = (math.inf, math.inf)
@@ -34,10 +31,14 @@ class Direction:
         """A motor that turns does so by a command of the driver."""
         return not math.isnan(self._way)
 
+    def command(self, setpoint: float) -> None:
+        """Note the set-point that the drive has, in any unit; NaN: the driver commands none."""
+        self._commanded = setpoint
+
     def take(self, size: float, now: float) -> None:
         """Take what was measured, Hz, and when, s of the clock of the bus."""
         # set-point 0 is in no direction: the motor stops in that which it has
-        wanted = math.copysign(1.0, self.commanded) if abs(self.commanded) > 0 else NAN
+        wanted = math.copysign(1.0, self._commanded) if abs(self._commanded) > 0 else NAN
         least, since = self._least
         if size < _STANDSTILL or not self.known:
             self._turns(wanted)
