@@ -166,6 +166,12 @@ class InverterStatus:
         return self.state is State.OPERATION_ENABLED
 
     @property
+    def may_run(self) -> bool:
+        """It runs, or it stands where a run command shows only while the motor turns."""
+        hidden = self.model.profile.status_word.runs_by_turning
+        return self.runs or (hidden and self.state is State.READY_TO_SWITCH_ON)
+
+    @property
     def runs_by_bus(self) -> bool:
         """The motor is driven on a command that came over the bus."""
         return self.runs and self.from_bus

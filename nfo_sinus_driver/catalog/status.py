@@ -149,6 +149,8 @@ class StatusWord:
         other: whether it turns is for the frequency alone to show.
     :ivar frequency_beside: the frequency comes in the telegram of the status word, and is read with
         every status.
+    :ivar runs_by_turning: a run command shows only while the motor turns: at set-point 0 an enabled
+        drive says the same as one without.
     :ivar sizes: which of frequency and speed are measured without a sign; REVERSE reports it, or,
         where no bit means that, nothing does.
     """
@@ -163,6 +165,7 @@ class StatusWord:
     by_frequency: bool = False
     only_frequency: bool = False
     frequency_beside: bool = False
+    runs_by_turning: bool = False
     sizes: frozenset[Role] = frozenset()
 
     def may_say(self, word: int) -> bool:

@@ -68,6 +68,12 @@ def notes(family: catalog.Family) -> list[str]:
             'direction commanded, and no value while others command. Add reverse to status (the '
             'sign of another register will do: {register: R, bit: 15}), or a type with a sign'
         )
+    if profile.status_word.runs_by_turning:
+        found.append(
+            'its status shows a run only while the motor turns: that an enable has been carried '
+            'out shows with the first set-point that is not 0; use a bit that says so, if there is '
+            'one'
+        )
     if not profile.identify:
         found.append(
             'nothing tells it from another drive with these registers: add identify, with a '

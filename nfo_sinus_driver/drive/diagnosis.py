@@ -96,7 +96,7 @@ def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -
     elif state.left_alone:
         # not every drive shows a fault after its time-out, and some then run on
         cause = Cause.DRIVER_PAUSED
-    elif not status.runs:
+    elif not status.may_run:
         cause = Cause.STOPPED_BY_ITSELF
     elif state.model.profile.keeps_run and state.unheard:
         cause = Cause.MAY_HAVE_RESTARTED

@@ -120,6 +120,10 @@ class Cause(enum.Enum):
         'the drive stays in standby: its {enable_input} is not active: close it, or its safety '
         'contact'
     )
+    STAYS_IN_STANDBY = (
+        'the drive stays in standby after the run command ({status}): check its enable input, and '
+        'whether it takes the run command from the line'
+    )
     START_FAULTED = 'the drive did not start: {status}'
     NOT_STARTED = 'the drive does not start: {status}'
     STOPPED_WHILE_ENABLING = 'it was stopped while it was being enabled'

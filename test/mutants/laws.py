@@ -914,4 +914,20 @@ LAWS = (
         '',
         (UNREADABLE, '-k', 'newer and rtu'),
     ),
+    Mutant(
+        2,
+        'a motor that stands against its set-points goes on where only its turning shows a run',
+        'nfo_sinus_driver/drive/following.py',
+        'elif self._stands(frequency, measured.at):',
+        'elif False:',
+        ('test/unit/drive/test_runs_by_frequency.py', '-k', 'stands_against or never_turns'),
+    ),
+    Mutant(
+        2,
+        'a size counts as forward, so that a fall behind a silence is not noticed in reverse',
+        'nfo_sinus_driver/drive/direction.py',
+        'return size * self._way if self.known and size else size',
+        'return size',
+        ('test/unit/drive/test_described_direction.py', '-k', 'starts_anew'),
+    ),
 )

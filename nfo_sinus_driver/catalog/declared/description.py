@@ -310,7 +310,7 @@ class Description:
     requires: Sequence[Requirement] = ()
     holder: tuple[str, tuple[Value, ...]] | None = None
     stop_mode: tuple[str, Value] | None = None
-    enable_input: str = 'enable input'
+    enable_input: str = ''
     codes: FaultCodes | None = None
     faults: Mapping[int, Fault] = field(default_factory=dict)
     flags: Sequence[tuple[Condition, Fault]] = ()

@@ -129,7 +129,7 @@ class _Reader:
             requires=tuple(self._requires(control, settings)),
             holder=settings.holder(control.get('holder')),
             stop_mode=self._stop_mode(control.get('stop_mode'), settings),
-            enable_input=control.text('enable_input', 'enable input').removeprefix('the '),
+            enable_input=control.text('enable_input').removeprefix('the '),
             codes=codes,
             faults=faults,
             flags=tuple((one.in_place(status), fault) for one, fault in flags),

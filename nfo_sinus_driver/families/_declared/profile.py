@@ -246,7 +246,8 @@ def profile_of(drive: Description) -> Profile:
         holders = {one: Holder.BUS if one in values else Holder.LOCAL for one in labels}
     return Profile(
         title=drive.title,
-        enable_input=drive.enable_input,
+        enable_input=drive.enable_input or Profile.enable_input,
+        has_enable_input=bool(drive.enable_input) or 'enable_missing' in drive.facts,
         status_word=words_of(drive),
         holders=holders,
         methods={METHOD: type('Control', (Declared,), members)},

@@ -80,10 +80,22 @@ def words_of(drive: Description) -> Words:
         by_state={},
         code=functools.partial(_code, drive),
         by_frequency=Role.ACTUAL_FREQUENCY in drive.roles and 'stopping' not in drive.facts,
+        runs_by_turning=_runs_by_turning(drive),
         sizes=_sizes(drive),
         facts_of=facts,
         unless=drive.facts.get('local'),
     )
+
+
+def _runs_by_turning(drive: Description) -> bool:
+    """Return whether the motor runs by the register of its frequency or speed."""
+    status, bits = drive.status, drive.facts['running'].mask
+    for role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED):
+        measured = drive.parameters.get(drive.roles.get(role, ''))
+        place = measured.at('modbus') if measured is not None else None
+        if place is not None and status.holds(place) and bits >> status.shift(place.index) & 0xFFFF:
+            return True
+    return False
 
 
 def _sizes(drive: Description) -> frozenset[Role]:

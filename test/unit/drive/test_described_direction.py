@@ -15,6 +15,7 @@ from test_described_oddities import PLAIN, described
 
 from nfo_sinus_driver.catalog import Fact, Role, load_family
 from nfo_sinus_driver.cli.families import notes
+from nfo_sinus_driver.drive import Cause
 
 _FREQUENCY, _SPEED = 'measured.actual_frequency', 'measured.actual_speed'
 SIZE = {'actual_frequency': {'register': 22, 'factor': 0.1}}
@@ -131,3 +132,20 @@ def test_check_reports_what_tells_no_direction(tmp_path: Path) -> None:
     assert not found(measured=SIZE, setpoint=forward)
     for path in SHIPPED.values():
         assert not any(said in note for note in notes(load_family(str(path)))), path
+
+
+@pytest.mark.parametrize('frequency', [20.0, -20.0])
+def test_a_motor_that_starts_anew_after_a_silence_is_stopped_in_either_direction(
+    tmp_path: Path, frequency: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ramps = {'ramp.accel': 5.0, 'ramp.decel': 5.0}
+    with DescribedRig(described(tmp_path, measured=SIZE), parameters=ramps) as rig:
+        rig.connect()
+        rig.enable()
+        rig.follow(frequency)
+        # it keeps its run command, which its file does not say
+        monkeypatch.setattr(rig.far.control_unit, 'restart', lambda: None)
+        rig.far.power_cycle(0.6)
+        rig.pass_time(1.5)
+        assert rig.notes.said(Cause.SLOWER_AFTER_SILENCE), rig.notes.events
+        assert not rig.drive.following and not rig.turns
