@@ -143,8 +143,9 @@ def test_a_motor_that_starts_anew_after_a_silence_is_stopped_in_either_direction
         rig.connect()
         rig.enable()
         rig.follow(frequency)
-        # it keeps its run command, which its file does not say
-        monkeypatch.setattr(rig.far.control_unit, 'restart', lambda: None)
+        motor = rig.far.motor
+        # it keeps its run command, which its file does not say, and the motor is braked meanwhile
+        monkeypatch.setattr(rig.far.control_unit, 'restart', lambda: setattr(motor, 'rotor', 0.0))
         rig.far.power_cycle(0.6)
         rig.pass_time(1.5)
         assert rig.notes.said(Cause.SLOWER_AFTER_SILENCE), rig.notes.events
