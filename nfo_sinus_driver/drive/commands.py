@@ -116,8 +116,9 @@ async def carry_out(
             if not (onward or isinstance(error, Refused)):
                 raise
             if not await _was_written(step, params, priority, error):
-                refusal = Refusal(str(error))
-                refusal.__cause__ = error
+                named = error.naming() if isinstance(error, Refused) else error
+                refusal = Refusal(str(named))
+                refusal.__cause__ = named
         if isinstance(step, profile.Write):
             written_at = params.now()
 

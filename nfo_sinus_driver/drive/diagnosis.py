@@ -47,7 +47,7 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
     if isinstance(error, NoAnswer):
         behind = f' ({error.hint})' if error.hint else ''
         return Report(Cause.NO_RESPONSE, address=address, behind=behind, check=check)
-    return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error))
+    return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error), check=check)
 
 
 def explain_failure(error: LinkError | DriveError, state: DriveState) -> Report:

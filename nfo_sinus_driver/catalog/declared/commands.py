@@ -76,6 +76,11 @@ class StepReader:
 
     def _step(self, node: Node, name: str) -> Step | None:
         kinds = [kind for kind in _KINDS if kind in node]
+        if 'coil' in node and 'value' in node:
+            self._problems.add(
+                node.line, f'a step of {name} writes a value to a coil: say on: true or on: false'
+            )
+            return None
         if not kinds or not set(node.mapping) <= _KINDS[kinds[0]]:
             self._problems.add(
                 node.line,

@@ -35,6 +35,7 @@ from nfo_sinus_driver.catalog.declared.places import (
     PlacedCondition,
     Places,
     internal,
+    place_of,
 )
 from nfo_sinus_driver.catalog.declared.registers import Use
 from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters
@@ -148,9 +149,9 @@ class _Reader:
         busy = [one.scalar for one in node.get('busy').items]
         return LineDefaults(
             node.text('protocol', LineDefaults.protocol), node.integer('baud_rate'),
-            node.text('char_format'), node.integer('address'), node.text('check'), write,
+            node.text('char_format'), node.integer('address'), _sentence(node, 'check'), write,
             node.integer('most_registers', 123),
-            {code: str(text.scalar) for code, text in texts},
+            {code: str(text.scalar).rstrip(' .;:') for code, text in texts},
             frozenset(one for one in busy if isinstance(one, int)),
         )
 
@@ -214,7 +215,9 @@ class _Reader:
             shift = status.shift(address.index) + low
             bits = max(high - low + 1, 0)
             return FaultCodes(((1 << bits) - 1) << shift, shift, none, in_status=True)
-        places.made[FAULT_KEY] = internal(FAULT_KEY, address, Access.READ)
+        places.made[FAULT_KEY] = internal(
+            FAULT_KEY, place_of(node, 'fault'), address, Access.READ
+        )
         return FaultCodes(address.number.maximum, 0, none, in_status=False)
 
     def _faults(self, node: Node) -> Iterator[tuple[int, Fault]]:
@@ -264,8 +267,8 @@ class _Reader:
 
     def _alarm(self, node: Node) -> Fault:
         usual = Description.alarm
-        text = node.text('text', usual.text)
-        return Fault(0, text, usual.description, node.text('remedy', usual.remedy))
+        text = _sentence(node, 'text', usual.text)
+        return Fault(0, text, usual.description, _sentence(node, 'remedy', usual.remedy))
 
     # --- set-point ---
 
@@ -277,7 +280,10 @@ class _Reader:
         access = Access.WRITE if write_only or 'read_register' in node else Access.READ_WRITE
         unit, most = node.text('unit'), node.number('most') or Fraction(1)
         made = self._places.made
-        made[SETPOINT_KEY] = settings.scaled(node, internal(SETPOINT_KEY, address, access, unit))
+        name = place_of(node, 'set-point')
+        made[SETPOINT_KEY] = settings.scaled(
+            node, internal(SETPOINT_KEY, name, address, access, unit)
+        )
         read_key = '' if write_only else SETPOINT_KEY
         if 'read_register' in node:
             read_key = SETPOINT_READ_KEY
@@ -285,7 +291,10 @@ class _Reader:
             count = address.codec.size // 2
             self._places.registers.take(Use.VALUE, what, line, 'register', index, count)
             shifted = replace(address, index=index)
-            made[read_key] = settings.scaled(node, internal(read_key, shifted, Access.READ, unit))
+            name = f'set-point (register {node["read_register"].written})'
+            made[read_key] = settings.scaled(
+                node, internal(read_key, name, shifted, Access.READ, unit)
+            )
         codec, carried = address.number, most / address.factor
         if carried > codec.maximum and 'scaled_by' not in node:
             self._problems.add(
@@ -338,9 +347,8 @@ class _Reader:
         for number, node in enumerate(self._root.get('identify').items, 1):
             key = f'{IDENTITY_KEY}_{number}'
             address = self._places.address(node, key)
-            made = internal(key, address, Access.READ)
-            printed = node['register'].scalar
-            self._places.made[key] = replace(made, name=f'register {printed}')
+            name = f'register {node["register"].written}'
+            self._places.made[key] = internal(key, name, address, Access.READ)
             given = [node['value']] if 'value' in node else list(node.get('values').items)
             values = tuple(one.scalar for one in given if isinstance(one.scalar, int))
             if ('value' in node) is ('values' in node):
@@ -360,7 +368,8 @@ class _Reader:
         for name, node in self._root.get('measured').mapping.items():
             role, key = Role(name), f'measured.{name}'
             address = self._places.address(node, name)
-            parameter = internal(key, address, Access.READ, _UNITS.get(name, ''))
+            unit = _UNITS.get(name, '')
+            parameter = internal(key, place_of(node, name), address, Access.READ, unit)
             made[key] = settings.scaled(node, parameter)
             roles[role] = key
         return made, roles
@@ -371,7 +380,7 @@ class _Reader:
             if key:
                 value = settings.value(key, node['value'])
                 if value is not None:
-                    yield Requirement(key, value, node.flag('write'), node.text('text'))
+                    yield Requirement(key, value, node.flag('write'), _sentence(node, 'text'))
 
     def _after_write(self, steps: StepReader, commands: Commands) -> Iterator[Put | Pause]:
         node = self._root.get('after_write')
@@ -432,8 +441,14 @@ _UNITS = {
 
 def _fault(node: Node, code: int) -> Fault:
     return Fault(
-        code, node.text('text'), node.text('description'), node.text('remedy'), node.flag('line')
+        code, _sentence(node, 'text'), _sentence(node, 'description'), _sentence(node, 'remedy'),
+        node.flag('line'),
     )
+
+
+def _sentence(node: Node, key: str, default: str = '') -> str:
+    """Return a text that becomes a part of a sentence: without its full stop."""
+    return node.text(key, default).rstrip(' .;:')
 
 
 def _float(node: Node) -> float | None:

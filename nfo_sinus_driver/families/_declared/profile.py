@@ -89,10 +89,12 @@ class Declared(ControlMethod):
             word = int((yield Read(STATUS_KEY)))
             if not is_remote(drive, word) and drive.facts['running'].holds(word):
                 raise NotPossible('keypad or terminals run the motor: stop it there')
+        missing = []
         for one in drive.requires:
             if not one.write and (found := (yield Read(one.key))) != one.value:
-                todo = one.text or f'set {one.key} to {one.value}'
-                raise NotPossible(f'{one.key} is {found}, so the line has no control: {todo}')
+                missing.append(f'{one.key} is {found} ({one.text or f"set it to {one.value}"})')
+        if missing:
+            raise NotPossible(f'the line has no control: {", ".join(missing)}')
 
     def take_control(self) -> Steps[None]:
         """
@@ -268,7 +270,7 @@ def profile_of(drive: Description) -> Profile:
             Wait(step.seconds) if isinstance(step, Pause) else Write(step.key, step.raw)
             for step in drive.after_write
         ),
-        line_check=dict.fromkeys(('modbus_rtu', 'modbus_tcp'), drive.line.shown)
+        line_check=dict.fromkeys(('modbus_rtu', 'modbus_ascii', 'modbus_tcp'), drive.line.shown)
         if drive.line.shown
         else {},
     )

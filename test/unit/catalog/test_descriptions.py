@@ -513,7 +513,7 @@ def test_a_file_says_what_tells_its_drive_from_others(tmp_path: Path) -> None:
     family = load_family(str(path))
     first, second = family.profile.identify
     assert family.profile.identify == {first: (7,), second: (1, 2)}
-    assert (family[first].name, family[second].name) == ('register 64', 'register 65')
+    assert (family[first].name, family[second].name) == ('register 0x40', 'register 65')
     assert not {first, second} & {one.key for one in family.settings}
 
 
