@@ -93,7 +93,7 @@ LAWS = (
         2,
         'a lost RUN input does not end the following of set-points',
         ADVICE,
-        '    elif not status.runs:\n        cause =',
+        '    elif not status.may_run:\n        cause =',
         '    elif False:\n        cause =',
         (NO_RESTART, '-k', 'run_input'),
     ),
