@@ -32,6 +32,11 @@ class DirectedTarget(SetpointTarget):
     reverse: int = 0
 
     @property
+    def has_sign(self) -> bool:
+        """A size is written, and the direction beside it."""
+        return False
+
+    @property
     def written_once(self) -> frozenset[str]:
         """The direction: a set-point that is written again leaves it out."""
         return frozenset((self.direction,))

@@ -11,7 +11,7 @@ More folders are found where the search path of that package, its ``__path__``, 
 
 from __future__ import annotations
 
-from collections.abc import Collection, ItemsView, Iterator, Mapping, ValuesView
+from collections.abc import Collection, ItemsView, Iterator, Mapping, Sequence, ValuesView
 from dataclasses import dataclass, replace
 from fractions import Fraction
 import functools
@@ -78,6 +78,7 @@ class Family(Mapping[str, Parameter]):
     :ivar error_logs: where its error log stands, by protocol; empty where no manual says.
     :ivar profile: how it is commanded, and what is to be known of it beside its tables.
     :ivar unlisted: what any other status code means; ``None``: nothing is known of it.
+    :ivar unused: what the file of a described drive says without any effect.
     """
 
     name: str
@@ -87,6 +88,7 @@ class Family(Mapping[str, Parameter]):
     error_logs: Mapping[str, ErrorLogArea]
     profile: Profile
     unlisted: StatusCode | None = None
+    unused: Sequence[str] = ()
 
     def __getitem__(self, key: str) -> Parameter:
         return self.parameters[key]
@@ -362,7 +364,11 @@ def _described(path: str) -> Family:
     profile = importlib.import_module(f'{_FAMILIES}._declared.profile').profile_of(drive)
     codes = declared.status_codes(drive)
     unlisted = codes[declared.Code.FAULT]
-    return Family(drive.name, drive.parameters, drive.roles, codes, {}, profile, unlisted)
+    # its number is its name
+    unlisted = replace(unlisted, meanings=unlisted.meanings - {Meaning.UNNAMED})
+    return Family(
+        drive.name, drive.parameters, drive.roles, codes, {}, profile, unlisted, drive.unused
+    )
 
 
 @functools.cache

@@ -89,7 +89,8 @@ class InverterStatus:
     def facts(self) -> Fact:
         """What the drive says of itself; only those in :attr:`valid` count."""
         if self.word is not None:
-            return self.model.profile.status_word.facts(self.word, self.listed.kind)
+            facts = self.model.profile.status_word.facts(self.word, self.listed.kind)
+            return facts | Fact.REVERSE if self._has_sign and self.frequency < 0 else facts
         facts = Fact.OPERATION_ENABLED if self._driven_by_code else Fact(0)
         if self._from_bus_by_code:
             facts |= Fact.NETWORK_CONTROL
@@ -101,8 +102,16 @@ class InverterStatus:
     def valid(self) -> Fact:
         """What the drive can say of itself at all."""
         if self.word is not None:
-            return self.model.profile.status_word.valid
+            valid = self.model.profile.status_word.valid
+            return valid | Fact.REVERSE if self._has_sign else valid
         return Fact.OPERATION_ENABLED | Fact.NETWORK_CONTROL | Fact.FAULT | Fact.ALARM
+
+    @property
+    def _has_sign(self) -> bool:
+        """The sign of the frequency reports the direction, and no bit of the word does."""
+        word = self.model.profile.status_word
+        signed = not math.isnan(self.frequency) and not word.sizes
+        return signed and Fact.REVERSE not in word.valid
 
     @functools.cached_property
     def kind(self) -> Kind:
@@ -157,6 +166,12 @@ class InverterStatus:
         return self.state is State.OPERATION_ENABLED
 
     @property
+    def may_run(self) -> bool:
+        """It runs, or it stands where a run command shows only while the motor turns."""
+        hidden = self.model.profile.status_word.runs_by_turning
+        return self.runs or (hidden and self.state is State.READY_TO_SWITCH_ON)
+
+    @property
     def runs_by_bus(self) -> bool:
         """The motor is driven on a command that came over the bus."""
         return self.runs and self.from_bus
@@ -198,12 +213,6 @@ class InverterStatus:
     def by_frequency(self) -> bool:
         """Its word goes on saying that the motor runs while that ramps to a stop."""
         return self.model.profile.status_word.by_frequency
-
-    def signed(self, size: float) -> float:
-        """Return a measured frequency or speed with its sign, where the word has to report that."""
-        tells_sign = self.model.profile.status_word.tells_sign
-        # standstill has no direction
-        return 0.0 - size if tells_sign and Fact.REVERSE in self.facts else size
 
     @property
     def tuning(self) -> bool:

@@ -207,6 +207,11 @@ class SetpointTarget:
         return 0.0 if self.forward_only else -self.most
 
     @property
+    def has_sign(self) -> bool:
+        """What is written to it has the sign of the set-point; else it is a size."""
+        return True
+
+    @property
     def written_once(self) -> frozenset[str]:
         """The parameters that are not written again as long as the same stands in the drive."""
         return frozenset()
@@ -533,6 +538,7 @@ class Profile:
 
     :ivar title: what its maker calls it.
     :ivar enable_input: what its manual calls the input that lets the motor run, with its terminal.
+    :ivar has_enable_input: it is known to have one.
     :ivar status_word: what its status word means.
     :ivar holders: who has control, by the value of the control source.
     :ivar methods: the ways to command it, by name; the first one is the usual one.
@@ -570,6 +576,7 @@ class Profile:
     :ivar timeout_conditions: the parameters on which it depends that the motor stops when its own
         time-out is over, each with the values by which it does, first the one to be written; where
         there is none, the motor stops.
+    :ivar fault_code: gives the status code of what the parameter reports that names a fault.
     :ivar after_write: what makes settings take effect that were written, or keeps them.
     :ivar pole_pairs: of the motor, where no parameter reports them; 0: not known.
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
@@ -584,6 +591,7 @@ class Profile:
     setpoints: Mapping[str, SetpointTarget]
     in_charge: Callable[[Status | None], Steps[str]]
     enable_input: str = 'enable input'
+    has_enable_input: bool = True
     broadcast_stop: Write | None = None
     names_itself: bool = False
     product: Callable[[], Steps[Product]] | None = None
@@ -608,7 +616,8 @@ class Profile:
     refusals: Mapping[int, str] = field(default_factory=dict)
     busy: frozenset[int] = frozenset()
     timeout_conditions: Mapping[str, Sequence[Value]] = field(default_factory=dict)
-    after_write: Sequence[Write] = ()
+    fault_code: Callable[[int], int] = int
+    after_write: Sequence[Write | Wait] = ()
     pole_pairs: int = 0
     keeps_run: bool | None = None
 

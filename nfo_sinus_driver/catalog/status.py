@@ -149,7 +149,10 @@ class StatusWord:
         other: whether it turns is for the frequency alone to show.
     :ivar frequency_beside: the frequency comes in the telegram of the status word, and is read with
         every status.
-    :ivar tells_sign: frequency and speed are measured without a sign; REVERSE reports it.
+    :ivar runs_by_turning: a run command shows only while the motor turns: at set-point 0 an enabled
+        drive says the same as one without.
+    :ivar sizes: which of frequency and speed are measured without a sign; REVERSE reports it, or,
+        where no bit means that, nothing does.
     """
 
     state: Callable[[int], State]
@@ -162,7 +165,8 @@ class StatusWord:
     by_frequency: bool = False
     only_frequency: bool = False
     frequency_beside: bool = False
-    tells_sign: bool = False
+    runs_by_turning: bool = False
+    sizes: frozenset[Role] = frozenset()
 
     def may_say(self, word: int) -> bool:
         """Return whether a status word is one of those that the manual knows."""

@@ -49,7 +49,7 @@ def check(name: str) -> bool:
         return False
     profile = family.profile
     put(f'{name}: {profile.title}, {len(family.settings)} settings')
-    for note in notes(family) if catalog.is_described(model) else ():
+    for note in (*family.unused, *notes(family)) if catalog.is_described(model) else ():
         put(f'  {note}')
     return True
 
@@ -62,6 +62,18 @@ def notes(family: catalog.Family) -> list[str]:
     (method,) = profile.methods.values()
     if target.forward_only:
         found.append('it turns forward only: neither signed nor direction')
+    if profile.status_word.sizes and not catalog.Fact.REVERSE & profile.status_word.valid:
+        found.append(
+            'its frequency has no sign, and nothing reports the direction: the status shows the '
+            'direction commanded, and no value while others command. Add reverse to status (the '
+            'sign of another register will do: {register: R, bit: 15}), or a type with a sign'
+        )
+    if profile.status_word.runs_by_turning:
+        found.append(
+            'its status shows a run only while the motor turns: that an enable has been carried '
+            'out shows with the first set-point that is not 0; use a bit that says so, if there is '
+            'one'
+        )
     if not profile.identify:
         found.append(
             'nothing tells it from another drive with these registers: add identify, with a '

@@ -116,8 +116,9 @@ async def carry_out(
             if not (onward or isinstance(error, Refused)):
                 raise
             if not await _was_written(step, params, priority, error):
-                refusal = Refusal(str(error))
-                refusal.__cause__ = error
+                named = error.naming() if isinstance(error, Refused) else error
+                refusal = Refusal(str(named))
+                refusal.__cause__ = named
         if isinstance(step, profile.Write):
             written_at = params.now()
 
@@ -158,6 +159,7 @@ async def read_limits(state: DriveState, control_mode: str) -> profile.Limits:
         return limits
     # with another scale a word may not hold all that the drive takes
     least, most, _ = state.params.limits(target.key)
+    least = least if target.has_sign else -most
     return replace(limits, least=max(limits.least, least), most=min(limits.most, most))
 
 

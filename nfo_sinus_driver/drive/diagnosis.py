@@ -47,7 +47,7 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
     if isinstance(error, NoAnswer):
         behind = f' ({error.hint})' if error.hint else ''
         return Report(Cause.NO_RESPONSE, address=address, behind=behind, check=check)
-    return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error))
+    return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error), check=check)
 
 
 def explain_failure(error: LinkError | DriveError, state: DriveState) -> Report:
@@ -96,7 +96,7 @@ def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -
     elif state.left_alone:
         # not every drive shows a fault after its time-out, and some then run on
         cause = Cause.DRIVER_PAUSED
-    elif not status.runs:
+    elif not status.may_run:
         cause = Cause.STOPPED_BY_ITSELF
     elif state.model.profile.keeps_run and state.unheard:
         cause = Cause.MAY_HAVE_RESTARTED

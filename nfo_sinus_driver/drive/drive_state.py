@@ -26,12 +26,13 @@ from nfo_sinus_driver.catalog import (
 )
 from nfo_sinus_driver.catalog.inverter_status import NO_CODE
 from nfo_sinus_driver.drive.communication_timeout import CommunicationTimeout
+from nfo_sinus_driver.drive.direction import Direction
 from nfo_sinus_driver.drive.events import Cause, DriveError, Event, Report, Severity
 from nfo_sinus_driver.drive.identity import Nameplate
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED, Listener, Measured
-from nfo_sinus_driver.link import LinkError, PortError, Refused, Reply
+from nfo_sinus_driver.link import LinkError, NoAnswer, PortError, Refused, Reply
 
 _log = logging.getLogger(__name__)
 
@@ -98,6 +99,8 @@ class DriveState:
             settings.own_parameters,
         )
         self.turning = _turning(self.model)
+        #: Which way the motor turns, where the drive does not report that.
+        self.direction = Direction()
         method = settings.method_class
         #: How long after the driver's last message a PLC stops the drive, s; 0: no PLC.
         self.plc_time = method.plc_time
@@ -180,6 +183,7 @@ class DriveState:
         alarmed = before is not None and word != before.word and alarming(half)
         priority = Priority.LOOK if alarmed else priority
         if self.model.profile.status_word.code is not None:
+            half = await self._with_fault_code(half, before, priority)
             status = await self._with_control(half, priority, retry)
             return await self._with_frequency(status, priority, retry)
         last = self.status
@@ -217,6 +221,30 @@ class DriveState:
         status = InverterStatus(at, word, code, self.model, code_at=at)
         return self._with_control_as_before(status)
 
+    async def _with_fault_code(
+        self, status: InverterStatus, before: InverterStatus | None, priority: Priority
+    ) -> InverterStatus:
+        """Name a fault that has just come, so that its first report has the name; one try."""
+        key = self.model.key(Role.FAULT_CODE)
+        has_come = before is None or before.code != status.code
+        if not (has_come and status.means(Meaning.UNNAMED) and self.params.reaches(key)):
+            return status
+        if self.params.by_mailbox(key):
+            # that takes several transactions, and a stop does not wait for them
+            return status
+        try:
+            self.name(status.code, await self.read_fault_code(priority))
+        except (Refused, NoAnswer):
+            return status
+        assert status.word is not None
+        return self.status_of_word(status.word, status.at)
+
+    async def read_fault_code(self, priority: Priority) -> int:
+        """Read which fault or alarm it is that the status word does not name; one try."""
+        key = self.model.key(Role.FAULT_CODE)
+        number = await self.params.read_number(key, priority, retry=False)
+        return self.model.profile.fault_code(int(number))
+
     @property
     def unnamed(self) -> int:
         """The code of the fault or alarm that the status word does not name; 0: there is none."""
@@ -227,9 +255,11 @@ class DriveState:
         return code if Meaning.UNNAMED in self.model.status_code(code).meanings else 0
 
     def name(self, unnamed: int, code: int) -> None:
-        """Take the name of a fault or an alarm that the status word does not name."""
+        """Take the name of a fault or alarm that the status word does not name; 0: it has none."""
         is_one = self.model.status_code(code).kind is not Kind.STATUS
-        self._named = (unnamed, code) if is_one and code in self.model.status_codes else None
+        # where all codes are the drive's own numbers, one that is not listed names it, too
+        names = code in self.model.status_codes or (code and self.model.unlisted is not None)
+        self._named = (unnamed, code) if is_one and names else None
 
     @property
     def named(self) -> bool:
@@ -489,14 +519,31 @@ class DriveState:
         data = await self.params.read_data(key, priority, retry=retry)
         value = self.params.number(key, data)
         if not self.params.is_odd(key):
-            turns = self.model.role_of.get(key) in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
-            return status.signed(value) if turns and status is not None else value
+            return self._signed(self.model.role_of.get(key), value, status)
         if key not in self._reported_impossible:
             self._reported_impossible.add(key)
             unit = self.model[key].unit
             shown = f'{value:g} {unit}'.rstrip()
             self.notify(Severity.WARNING, Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
         return math.nan
+
+    def _signed(self, role: Role | None, value: float, status: InverterStatus | None) -> float:
+        """Return a measured value with the sign that the drive reports, or that is commanded."""
+        word = self.model.profile.status_word
+        if role not in word.sizes:
+            return value
+        if Fact.REVERSE in word.valid:
+            # standstill has no direction
+            return 0.0 - value if status is not None and Fact.REVERSE in status.facts else value
+        if role is self.turning.role:
+            self.direction.take(value * self.turning.hertz, self.bus.now())
+        return self.direction.of(value)
+
+    def shown(self, role: Role | None, value: float) -> float:
+        """Return what is published of a measured value; NaN where its direction is not known."""
+        word = self.model.profile.status_word
+        known = role not in word.sizes or Fact.REVERSE in word.valid or self.direction.known
+        return value if known or value == 0 else math.nan
 
     @property
     def measured_keys(self) -> tuple[str, ...]:

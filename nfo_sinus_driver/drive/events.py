@@ -46,7 +46,7 @@ class Cause(enum.Enum):
     NO_RESPONSE = 'no response from address {address}{behind}: check in this order: {check}'
     NO_VALID_ANSWER = (
         'what comes from address {address} is no answer ({error}): check baud rate and parity, '
-        'that no other master is on the line, and the wiring'
+        'that no other master is on the line, and in this order: {check}'
     )
     TOO_LATE = 'no answer within {timeout:g} s'
     LOST = 'lost: {why}; retrying'
@@ -67,7 +67,7 @@ class Cause(enum.Enum):
     NONE_RECOGNISED = (
         'no stop was broadcast: no drive of this line was recognised since its port was opened'
     )
-    OTHER_MODEL = '{error}: every {model} has it; is this another model? {call.set_model}'
+    OTHER_MODEL = '{error}: every {model} has {what}; is this another model? {call.set_model}'
     ANOTHER_DRIVE = 'this is no {title}: {why}; {call.set_model}'
     MADE_BY = 'it says that {vendor} has made it'
     IS_NOT = 'its {name} is {value}, and should be {values}'
@@ -119,6 +119,10 @@ class Cause(enum.Enum):
     NO_RUN_INPUT = (
         'the drive stays in standby: its {enable_input} is not active: close it, or its safety '
         'contact'
+    )
+    STAYS_IN_STANDBY = (
+        'the drive stays in standby after the run command ({status}): check its enable input, and '
+        'whether it takes the run command from the line'
     )
     START_FAULTED = 'the drive did not start: {status}'
     NOT_STARTED = 'the drive does not start: {status}'

@@ -51,13 +51,13 @@ class FaultNamer:
             await state.bus.sleep(_WAIT)
 
     async def _name(self, unnamed: int) -> None:
-        state, key = self._state, self._state.model.key(Role.FAULT_CODE)
-        if not state.params.reaches(key):
+        state = self._state
+        if not state.params.reaches(state.model.key(Role.FAULT_CODE)):
             return
         try:
-            code = await state.params.read_number(key, Priority.POLL, retry=False)
+            code = await state.read_fault_code(Priority.POLL)
         except LinkError:
             # the poll reports it if the drive is lost
             return
         if state.unnamed == unnamed:
-            state.name(unnamed, int(code))
+            state.name(unnamed, code)

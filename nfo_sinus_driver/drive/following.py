@@ -18,6 +18,9 @@ _FALL = 0.04
 _FALLS_WITHIN = 5.0
 #: A slower motor stands still, or its frequency fluctuates, Hz.
 _STANDSTILL = 0.5
+#: How long a motor may stand against its set-points where no status shows whether it has a run
+#: command, s: at the slowest ramp of 600 s it has begun to turn by then.
+_STANDS_FOR = 2.0
 #: From here on a motor counts as turning backwards, Hz: slip and measuring errors show less.
 _BACKWARDS = 2.0
 #: How long a drive may take to begin to follow another set-point, s.
@@ -62,6 +65,8 @@ class Following:
         #: The direction of all recent set-points; 0: none, or both.
         self._direction = 0
         self._wrong_polls = 0
+        #: Since when the motor stands, s.
+        self._stands_since = math.inf
         #: The speed from which the drive slows it down, below its set-points.
         self._falls_from = 0.0
         self._reported = False
@@ -80,6 +85,8 @@ class Following:
         cause = None
         if self._goes_on(frequency, measured.at):
             cause = Cause.NOT_SLOWER_AFTER_TIME_OUT
+        elif self._stands(frequency, measured.at):
+            cause = Cause.STOPPED_BY_ITSELF
         elif role is not None and self._turns_back(frequency, measured.at, least, most):
             cause = Cause.TURNS_BACKWARDS
         elif role is not None and self._goes_to_a_stop(actual.value, least, most, unit):
@@ -96,6 +103,21 @@ class Following:
             self._after_expiry = _Fall()
             return False
         return self._after_expiry.take(abs(frequency), at)
+
+    def _stands(self, frequency: float, at: float) -> bool:
+        """
+        Return whether it stands against all recent set-points, where only its turning shows a run.
+
+        A motor that passes standstill on its way to the other direction stands for a moment.
+        """
+        status = self._state.status
+        if status is None or status.runs or not status.may_run or frequency != 0:
+            self._stands_since = math.inf
+            return False
+        self._stands_since = min(self._stands_since, at)
+        least, most = self._setpoint.range_since(at - _STANDS_FOR)
+        wanted = max(least, -most) * self._state.turning.hertz
+        return wanted > _STANDSTILL and at - self._stands_since > _STANDS_FOR
 
     def _turns_back(self, frequency: float, at: float, least: float, most: float) -> bool:
         """

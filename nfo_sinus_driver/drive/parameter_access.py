@@ -267,7 +267,10 @@ class ParameterAccess:
         self._own[step.key] = data
         try:
             await self._ask(address, priority, data, step.retry, require_wanted)
-        except (Refused, DriveError):
+        except Refused as error:
+            self._own.pop(step.key, None)
+            raise self._named(error, step.key) from None
+        except DriveError:
             self._own.pop(step.key, None)
             raise
 
@@ -305,7 +308,7 @@ class ParameterAccess:
         except Refused as error:
             if error.code in NONE_SUCH and self.model[key].option:
                 self._denials[key] = [*self._denials.get(key, ()), error][-_DENIALS:]
-            raise
+            raise self._named(error, key) from None
         self._denials.pop(key, None)
         before = self._odd.pop(key, None)
         readings = 1
@@ -317,6 +320,10 @@ class ParameterAccess:
             reply = await self._ask(address, priority, None, retry)
             readings += 1
         return reply
+
+    def _named(self, refusal: Refused, key: str) -> Refused:
+        parameter = self.model[key]
+        return refusal.of(parameter.key if parameter.is_setting else parameter.name)
 
     def count(self, error: LinkError) -> None:
         """Count a request that got no answer, of this object or another."""

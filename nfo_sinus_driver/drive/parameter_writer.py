@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from nfo_sinus_driver.bus import Cancelled, Priority
 from nfo_sinus_driver.catalog import Family, Role, Value
+from nfo_sinus_driver.catalog.profile import Wait
 from nfo_sinus_driver.drive.diagnosis import explain_failure, report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
@@ -223,6 +224,9 @@ class ParameterWriter:
     async def _keep(self) -> None:
         """Have what was written take effect, and be kept, where that needs further writes."""
         for step in self._state.model.profile.after_write:
+            if isinstance(step, Wait):
+                await self._state.bus.sleep(step.seconds)
+                continue
             with contextlib.suppress(LinkError, DriveError):
                 await self._params.write(step, _SERVICE)
 

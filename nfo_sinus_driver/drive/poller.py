@@ -448,7 +448,8 @@ class Poller:
 
     async def _poll(self) -> None:
         state = self._state
-        last, paused = self.snapshot.actual, self._bus.paused
+        last = state.last_polled(_ACTUAL.get(state.control_mode)).value
+        paused = self._bus.paused
         status = await self._read_status()
         rare = self._rare_is_due
         every = rare and self._rare_reads % _ALL_SCALES == 0
@@ -639,7 +640,8 @@ class Poller:
             # a command has read a newer one: the drive may be enabled since, its fault acknowledged
             status = state.status
         frequency, speed = (state.last_polled(role) for role in _BASIC)
-        actual = state.last_polled(_ACTUAL.get(state.control_mode)).value
+        role = _ACTUAL.get(state.control_mode)
+        actual = state.shown(role, state.last_polled(role).value)
         stop = None if self._controller is None else self._controller.stopped_for
         self.snapshot = take_snapshot(
             state, self._setpoint, status, frequency, speed, actual, stop
@@ -680,9 +682,9 @@ def take_snapshot(
         remedy=code.remedy,
         kind=status.kind,
         requires_ack=code.requires_ack,
-        frequency=frequency.value,
+        frequency=state.shown(Role.ACTUAL_FREQUENCY, frequency.value),
         frequency_at=frequency.at,
-        speed=speed.value,
+        speed=state.shown(Role.ACTUAL_SPEED, speed.value),
         speed_at=speed.at,
         actual=actual,
         stop=stop,

@@ -145,4 +145,5 @@ class Recogniser:
             return error
         if error.code in NONE_SUCH:
             self._params.recognition.end()
-        return DriveError(Cause.OTHER_MODEL, error=str(error), model=self._state.model.name)
+        name, what = self._state.model.name, error.what or 'it'
+        return DriveError(Cause.OTHER_MODEL, error=str(error), model=name, what=what)

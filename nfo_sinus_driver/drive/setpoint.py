@@ -168,6 +168,7 @@ class Setpoint:
                 self._keys[address] = step.key
                 self._written[address] = data, self.following_since
         self.commanded = 0.0 if follows else NAN
+        self._state.direction.command(self.commanded)
         self._had = [(0.0, math.inf)]
         self.clamped = self._clamp_reported = False
         self.expired = False
@@ -182,6 +183,7 @@ class Setpoint:
         """Follow no more set-points."""
         self.following_since = math.inf
         self.commanded = NAN
+        self._state.direction.command(NAN)
         self.clamped = False
         if self._age_task is not None:
             self._bus.cancel(self._age_task)
@@ -219,6 +221,7 @@ class Setpoint:
 
     def _may_have(self, value: float) -> None:
         """Note that the drive may have a set-point from now on; NaN: it is not known which."""
+        self._state.direction.command(value)
         value = 0.0 if math.isnan(value) else value
         oldest = self._bus.now() - _REMEMBERED
         self._had = [one for one in self._had if one[1] >= oldest]

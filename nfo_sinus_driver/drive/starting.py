@@ -110,7 +110,7 @@ class StartSequence:
         await self._method.run(self._await_start)
         run_at = self._state.bus.now()
         # behind a PLC a status from before the run command is shown for a while
-        await self._await_start(lambda now: now.runs and now.at > run_at)
+        await self._await_start(lambda now: now.may_run and now.at > run_at)
 
     async def _await_status(self, wanted: Callable[[InverterStatus], bool]) -> None:
         """Wait for a step that every drive makes soon."""
@@ -127,10 +127,15 @@ class StartSequence:
             if Fact.RUN_INPUT_MISSING in status.facts:
                 raise DriveError(state.report(Cause.NO_RUN_INPUT))
             if await step.is_over(status):
-                cause = Cause.NO_RUN_INPUT if status.standby else Cause.NOT_STARTED
-                raise DriveError(state.report(cause))
+                raise DriveError(state.report(self._why_not_started(status)))
             await state.bus.sleep(drive_state.LOOK_PERIOD)
         self._deadline += step.added
+
+    def _why_not_started(self, status: InverterStatus) -> Cause:
+        if not status.standby:
+            return Cause.NOT_STARTED
+        has_one = self._state.model.profile.has_enable_input
+        return Cause.NO_RUN_INPUT if has_one else Cause.STAYS_IN_STANDBY
 
     async def take_control(self, control_mode: str) -> None:
         """

@@ -63,7 +63,8 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
         if denied[key] >= _DENIALS or not state.nameplate.has(key):
             return
         try:
-            values[key] = await state.measure(key, Priority.TELEMETRY)
+            value = await state.measure(key, Priority.TELEMETRY)
+            values[key] = state.shown(state.model.role_of.get(key), value)
             denied[key] = 0
         except Refused as error:
             values[key] = NAN
@@ -83,8 +84,8 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
                 first = False
                 by_role = {role: values.get(key_of(role), NAN) for role in (*FAST, *SLOW)}
                 # these two are polled anyway
-                by_role[Role.ACTUAL_FREQUENCY] = state.frequency
-                by_role[Role.ACTUAL_SPEED] = state.speed
+                for role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED):
+                    by_role[role] = state.shown(role, state.last_polled(role).value)
                 by_key = {key: values[key] for key in named}
                 state.note_measured(by_key)
                 state.listener.on_telemetry(Telemetry(state.bus.now(), by_role, by_key))

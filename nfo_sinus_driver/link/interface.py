@@ -442,6 +442,7 @@ class Refused(LinkError):
 
     :ivar code: the Modbus exception code, or on other protocols the one that means the same; those
         from ``SETTINGS_CONFLICT`` on are not of Modbus.
+    :ivar what: what was requested, in the words of the drive; ``''``: not said.
     """
 
     heard = True
@@ -457,12 +458,24 @@ class Refused(LinkError):
     #: The output stage has to be off.
     RELEASE_NEEDED = 0x101
 
-    def __init__(self, code: int, reason: str = '') -> None:
+    def __init__(self, code: int, reason: str = '', what: str = '') -> None:
         self.code = code
+        self.what = what
+        self._reason = reason
         #: What an operator may look up, for the end of a sentence.
         self.behind = f': {reason}' if reason else f' (exception {code})'
         text = _REFUSALS.get(code, 'the drive refused')
         super().__init__(reason or f'{text} (exception {code})')
+
+    def of(self, what: str) -> Refused:
+        """Return the same refusal, of something that is named."""
+        return Refused(self.code, self._reason, what)
+
+    def naming(self) -> Refused:
+        """Return the same refusal, whose text says what it is that the drive does not have."""
+        if self.code != self.ILLEGAL_ADDRESS or self._reason or not self.what:
+            return self
+        return Refused(self.code, f'the drive has no {self.what} (exception {self.code})')
 
 
 _REFUSALS = {

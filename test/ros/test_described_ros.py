@@ -105,7 +105,7 @@ def test_a_family_that_is_none_is_refused_with_what_to_do(bench: Bench, tmp_path
     bad = tmp_path / 'bad.vfd.yaml'
     bad.write_text(SHIPPED['siemens_v20'].read_text().replace('bit: 2', 'bit: 3'))
     assert bench.driver('-p', f'family:={bad}', through=('env',)).wait() == 2
-    assert 'line 41: fault and running mean the same bits' in bench.log, bench.log
+    assert 'line 39: fault and running mean the same bits' in bench.log, bench.log
 
 
 def test_the_command_families_lists_it(bench: Bench, file: Path) -> None:

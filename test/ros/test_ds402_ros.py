@@ -37,7 +37,8 @@ def test_a_run_by_the_drive_profile_alone(bench: Bench) -> None:
         assert (status.control_mode, status.unit) == (DriveStatus.SPEED, 'rpm')
         assert status.state == DriveStatus.OPERATION_ENABLED
         assert status.valid & DriveStatus.VALID_NETWORK_CONTROL and status.network_control
-        assert not status.valid & DriveStatus.VALID_REVERSE
+        # no bit of it says so: the sign of the speed does
+        assert status.valid & DriveStatus.VALID_REVERSE and status.reverse
         drive.inject('fault', OVERVOLTAGE)
         client.wait_for('status', lambda status: status.fault, 'the fault')
         drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)

@@ -47,6 +47,11 @@ SLICE = 0.02
 _SENDING_PERIOD = 0.1
 #: How long a drive takes to refuse something, s.
 _TURN = 0.005
+_REFUSALS = {
+    'refused': Refused.DEVICE_FAILURE,
+    'busy': Refused.BUSY,
+    'none such': Refused.ILLEGAL_ADDRESS,
+}
 
 
 @dataclass(frozen=True)
@@ -195,7 +200,8 @@ class Rig:
     :ivar looked: called whenever something may have happened; an ``AssertionError`` of it ends the
         test, at the next :meth:`pass_time`, for a driver survives everything.
     :ivar meet: called with each request before it is sent, the parameter and what is written to it
-        (``None``: it is read); what it returns goes wrong: ``refused``, ``busy``, ``unheard``,
+        (``None``: it is read); what it returns goes wrong: ``refused``, ``busy``, ``none such``,
+        ``unheard``,
         ``drop`` (carried out, not answered), ``damage``, ``double``, ``delay``, or ``ignored``.
     :ivar asked: every request, as ``meet`` has it, and its drive; what is read before a write in
         one piece stands as two.
@@ -525,9 +531,9 @@ class Rig:
             unit: int, address: Address, key: str, written: bytes | None, *data: Any
         ) -> Reply:
             wrong = self.meet(key, written)
-            if wrong in ('refused', 'busy'):
+            if wrong in _REFUSALS:
                 self.line.go_to(self.clock.now + _TURN)
-                raise Refused(Refused.BUSY if wrong == 'busy' else Refused.DEVICE_FAILURE)
+                raise Refused(_REFUSALS[wrong])
             if wrong == 'ignored':
                 self.line.go_to(self.clock.now + _TURN)
                 return Reply(b'', self.clock.now)

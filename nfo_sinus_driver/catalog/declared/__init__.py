@@ -17,12 +17,13 @@ from nfo_sinus_driver.catalog.declared.description import (
     Steps,
     drive_number,
 )
-from nfo_sinus_driver.catalog.declared.places import STATUS_KEY
+from nfo_sinus_driver.catalog.declared.places import FAULT_KEY, STATUS_KEY
 from nfo_sinus_driver.catalog.declared.reader import SUFFIX, read
 from nfo_sinus_driver.catalog.declared.tables import Code, status_codes
 from nfo_sinus_driver.catalog.declared.yaml_file import DescriptionError
 
 __all__ = [
+    'FAULT_KEY',
     'STATUS_KEY',
     'SUFFIX',
     'Assign',

@@ -34,8 +34,12 @@ _LONGEST_PAUSE = 0.5
 _LONGEST = 3.0
 #: How long it is waited for a condition where nothing is said, s.
 _WITHIN = 1.0
-#: What each kind of step has beside where it goes.
-_KINDS = ('value', 'values', 'set', 'clear', 'on', 'to', 'wait', 'until')
+#: What each kind of step has.
+_KINDS = {
+    'value': {'register', 'value'}, 'values': {'register', 'values'},
+    'set': {'register', 'set', 'clear'}, 'clear': {'register', 'set', 'clear'},
+    'on': {'coil', 'on'}, 'to': {'parameter', 'to'}, 'wait': {'wait'}, 'until': {'until', 'within'},
+}
 
 
 class StepReader:
@@ -72,9 +76,12 @@ class StepReader:
 
     def _step(self, node: Node, name: str) -> Step | None:
         kinds = [kind for kind in _KINDS if kind in node]
-        if kinds in (['set'], ['clear'], ['set', 'clear']):
-            return self._change(node, name)
-        if len(kinds) != 1:
+        if 'coil' in node and 'value' in node:
+            self._problems.add(
+                node.line, f'a step of {name} writes a value to a coil: say on: true or on: false'
+            )
+            return None
+        if not kinds or not set(node.mapping) <= _KINDS[kinds[0]]:
             self._problems.add(
                 node.line,
                 f'a step of {name} does one thing: value, values, set and clear, on, to, wait or '
@@ -82,13 +89,14 @@ class StepReader:
             )
             return None
         make = {
-            'value': self._put, 'values': self._put_several, 'on': self._switch,
-            'to': self._assign, 'wait': self._pause, 'until': self._await,
+            'value': self._put, 'values': self._put_several, 'set': self._change,
+            'clear': self._change, 'on': self._switch, 'to': self._assign, 'wait': self._pause,
+            'until': self._await,
         }
         return make[kinds[0]](node, name)
 
     def _place(self, node: Node, name: str) -> Node | None:
-        if 'register' in node and 'coil' not in node and 'parameter' not in node:
+        if 'register' in node:
             return node['register']
         self._problems.add(node.line, f'a step of {name} needs a register to write to')
         return None
@@ -97,14 +105,14 @@ class StepReader:
         place = self._place(node, name)
         if place is None:
             return None
-        word = self._word(node['value'])
+        word = node.integer('value') & WORD
         return Put(self._places.word(name, place, word), word)
 
     def _put_several(self, node: Node, name: str) -> Step | None:
         place = self._place(node, name)
         if place is None:
             return None
-        words = [self._word(one) for one in node['values'].items]
+        words = [int(one.scalar or 0) & WORD for one in node['values'].items]
         if len(words) > 1 and 16 not in self._places.functions:
             self._problems.add(
                 node.line, f'{name} writes several registers, and the line has no function 16'
@@ -129,7 +137,7 @@ class StepReader:
         return Change(self._places.word(name, place, bits | cleared), bits, cleared)
 
     def _switch(self, node: Node, name: str) -> Step | None:
-        if 'coil' not in node or 'register' in node:
+        if 'coil' not in node:
             self._problems.add(node.line, f'a step of {name} needs the coil that is on or off')
             return None
         return Put(self._places.coil_key(name, node['coil']), int(node.flag('on')))
@@ -148,18 +156,15 @@ class StepReader:
 
     def _await(self, node: Node, name: str) -> Step | None:
         if name in (*_AT_ONCE, 'after_write'):
-            self._problems.add(node.line, f'{name} waits for nothing: a stop is never delayed')
+            why = 'it does not wait for a status' if name == 'after_write' else (
+                'a stop is never delayed'
+            )
+            self._problems.add(node.line, f'{name} cannot have until: {why}')
             return None
         condition = self._awaited.get(id(node))
         within = node.number('within')
         seconds = _WITHIN if within is None else float(within)
         return Await(condition.in_place(self._status), seconds) if condition is not None else None
-
-    def _word(self, node: Node) -> int:
-        raw = node.scalar if isinstance(node.scalar, int) else 0
-        if not -0x8000 <= raw <= WORD:
-            self._problems.add(node.line, f'{raw} is no word of one register')
-        return raw & WORD
 
 
 #: A register or a coil as it is sent, and whether it is a coil; or a parameter.
@@ -199,7 +204,7 @@ class Commands:
         self._lists = {name: reader.read(control.get(name), name) for name in NAMES}
         self._run = self._left_by('run')
         for name in NAMES:
-            self._check_pauses(name)
+            self.check_pauses(name, self._lists[name], control.get(name).line)
         for name in ('stop', 'coast', 'quick_stop'):
             if name in control:
                 self._check_stop(name)
@@ -298,17 +303,14 @@ class Commands:
                 'would turn: write its register, and leave it out of the parameters',
             )
 
-    def _check_pauses(self, name: str) -> None:
-        pauses = [step.seconds for step in self._lists[name] if isinstance(step, Pause)]
+    def check_pauses(self, name: str, steps: Steps, line: int) -> None:
+        """Make sure that a list does not pause for too long."""
+        pauses = [step.seconds for step in steps if isinstance(step, Pause)]
         most = _LONGEST_PAUSE if name in _AT_ONCE else _LONGEST
         if sum(pauses) > most:
-            self._problems.add(
-                self._control[name].line, f'{name} pauses for more than {most:g} s in all'
-            )
-        if name in _AT_ONCE and self._lists[name] and isinstance(self._lists[name][0], Pause):
-            self._problems.add(
-                self._control[name].line, f'{name} begins with a pause: a stop is never delayed'
-            )
+            self._problems.add(line, f'{name} pauses for more than {most:g} s in all')
+        if name in _AT_ONCE and steps and isinstance(steps[0], Pause):
+            self._problems.add(line, f'{name} begins with a pause: a stop is never delayed')
 
     def _check_direction(self) -> None:
         """See to it that run leaves the direction that it is said to: forward."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from nfo_sinus_driver.catalog.parameter import Parameter, Value
+from nfo_sinus_driver.catalog.parameter import Address, Parameter, Value
 from nfo_sinus_driver.catalog.status import Role
 
 #: Status codes that say what the drive does; faults with such a number are moved behind.
@@ -148,6 +148,11 @@ class SetpointPlace:
     signed: bool = False
     direction: Direction | None = None
 
+    @property
+    def reverses(self) -> bool:
+        """A set-point may turn the motor in reverse."""
+        return self.signed or self.direction is not None
+
 
 @dataclass(frozen=True)
 class Fault:
@@ -163,23 +168,22 @@ class Fault:
 @dataclass(frozen=True)
 class FaultCodes:
     """
-    The number of a fault in the status word.
+    Where the number of a fault stands.
 
     :ivar mask: its bits; :ivar shift: the lowest of them.
     :ivar none: the number that means none.
+    :ivar in_status: it is a part of the status word; else it is a register of its own, which is
+        read where the status reports a fault.
     """
 
     mask: int
     shift: int
     none: int
+    in_status: bool
 
-    def number(self, status: int) -> int:
-        """Return the number that a status word has."""
-        return (status & self.mask) >> self.shift
-
-    def code(self, status: int) -> int:
-        """Return the status code of the fault that a status word has; 0 if it has none."""
-        number = self.number(status)
+    def code(self, word: int) -> int:
+        """Return the status code of the fault that a word has; 0 if it has none."""
+        number = (word & self.mask) >> self.shift
         return 0 if number == self.none else status_code(number)
 
 
@@ -189,11 +193,17 @@ class StatusPlace:
     Where the status stands; it is read as one number, the first register in its highest bits.
 
     :ivar registers: as they stand in it, or one coil for each bit, the lowest first.
-    :ivar coils: they are coils.
+    :ivar coils: they are coils; :ivar inputs: input registers, which function 04 reads.
     """
 
     registers: Sequence[int]
     coils: bool = False
+    inputs: bool = False
+
+    def holds(self, address: Address) -> bool:
+        """Return whether what stands at an address is a part of it."""
+        same = (address.space == 'input') is self.inputs and not self.coils
+        return same and address.index in self.registers
 
     def shift(self, register: int) -> int:
         """Return at which bit a register, or a coil, begins."""
@@ -271,6 +281,7 @@ class Description:
     :ivar pole_pairs: of the motor; 0: not known.
     :ivar stop_mode: the parameter that says how it stops, and its value for coasting.
     :ivar defaults: with what value a parameter leaves the factory, by key.
+    :ivar unused: which keys of the file have no effect, a sentence each.
     """
 
     name: str
@@ -295,11 +306,11 @@ class Description:
     quick_stop: Steps = ()
     reset: Steps = ()
     release: Steps = ()
-    after_write: Sequence[Put] = ()
+    after_write: Sequence[Put | Pause] = ()
     requires: Sequence[Requirement] = ()
     holder: tuple[str, tuple[Value, ...]] | None = None
     stop_mode: tuple[str, Value] | None = None
-    enable_input: str = 'enable input'
+    enable_input: str = ''
     codes: FaultCodes | None = None
     faults: Mapping[int, Fault] = field(default_factory=dict)
     flags: Sequence[tuple[Condition, Fault]] = ()
@@ -309,6 +320,7 @@ class Description:
     pole_pairs: int = 0
     accel: str = ''
     decel: str = ''
+    unused: Sequence[str] = ()
 
     @property
     def tells_control(self) -> bool:

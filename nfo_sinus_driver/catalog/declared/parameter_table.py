@@ -117,7 +117,8 @@ class _Table:
                 self._problems.add(line, f'when is {text!r}: choose one of {", ".join(_WHEN)}')
             return Node(_WHEN.get(text), line, key)
         is_text = schema.schema()['$defs']['parameter']['properties'][key].get('type') == 'string'
-        return Node(text if is_text else scalar_of(text, line, self._problems), line, key)
+        scalar = text if is_text else scalar_of(text, line, self._problems)
+        return Node(scalar, line, key, written=text)
 
     def _labels(self, text: str, line: int) -> Iterator[tuple[str, Node]]:
         pairs = [one.partition('=') for one in text.split('|')]

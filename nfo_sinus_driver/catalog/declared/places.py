@@ -20,6 +20,8 @@ _SIGN = 0x8000
 #: The group of all that commands the drive and reports its status.
 _FIELDBUS = 'Fieldbus'
 STATUS_KEY = 'line.status'
+#: The number of the fault, where it stands in no register of the status.
+FAULT_KEY = 'line.fault'
 _TYPES = {
     'uint16': 'uint16_be', 'int16': 'sint16_be', 'bcd16': 'bcd16', 'bcd32': 'bcd32',
     'uint32': 'uint32_be', 'int32': 'sint32_be',
@@ -61,7 +63,11 @@ class Places:
         self._coil_numbering = file.get('line').integer('coil_numbering')
         self._line = line
         self._status_register = file.get('status').get('register')
+        #: The status is read by function 04.
+        self._inputs = file.get('status').text('table') == 'input'
         self.made: dict[str, Parameter] = {}
+        #: Registers as the file has them, by the number that is sent.
+        self._written: dict[int, str] = {}
         self.registers = Registers(problems)
 
     @property
@@ -78,7 +84,13 @@ class Places:
 
     def register(self, node: Node) -> int:
         """Return the register as it is sent."""
-        return self._sent(node, self._numbering, 'register')
+        sent = self._sent(node, self._numbering, 'register')
+        self._written.setdefault(sent, node.written)
+        return sent
+
+    def written(self, register: int) -> str:
+        """Return a register as the file has it, or would have it."""
+        return self._written.get(register) or str(register + self._numbering)
 
     def coil(self, node: Node) -> int:
         """Return the coil as it is sent."""
@@ -121,7 +133,7 @@ class Places:
         number = self.coil(place) if coil else self.register(place)
         # a whole word may be a value as well, and its highest bit the sign of one
         if mask not in (WORD, _SIGN):
-            space = 'coil' if coil else 'register'
+            space = 'coil' if coil else self._status_space
             self.registers.take(Use.BITS, what, node.line, space, number)
         return PlacedCondition(number, coil, mask, values, inverted, node.line)
 
@@ -179,7 +191,7 @@ class Places:
             use = Use.COMMAND if word else Use.ZERO
             self.registers.take(use, what, node.line, 'register', number)
         key = f'line.r{register:04x}' + (f'_{count}' if count > 1 else '')
-        self._make(key, self._writes, register, f'uint{16 * count}_be')
+        self._make(key, self._writes, register, f'uint{16 * count}_be', f'register {node.written}')
         return key
 
     def coil_key(self, what: str, node: Node) -> str:
@@ -187,24 +199,26 @@ class Places:
         coil = self.coil(node)
         self.registers.take(Use.COMMAND, what, node.line, 'coil', coil)
         key = f'line.coil_{coil}'
-        self._make(key, 'coil', coil, 'uint8')
+        self._make(key, 'coil', coil, 'uint8', f'coil {node.written}')
         return key
+
+    @property
+    def _status_space(self) -> str:
+        return 'input' if self._inputs else self._writes
 
     @property
     def _writes(self) -> str:
         return 'register' if 6 in self._line.write else 'register_16'
 
-    def _make(self, key: str, space: str, index: int, codec: str) -> None:
+    def _make(self, key: str, space: str, index: int, codec: str, name: str) -> None:
         if key not in self.made:
             address = Address('modbus', space, index, None, codec_of(codec), Fraction(1), '')
-            self.made[key] = internal(key, address, Access.READ_WRITE)
+            self.made[key] = internal(key, name, address, Access.READ_WRITE)
 
-    def status(
-        self, conditions: Iterable[PlacedCondition], block: Node, registers: Iterable[int]
-    ) -> StatusPlace:
+    def status(self, conditions: Iterable[PlacedCondition], block: Node) -> StatusPlace:
         """Return where the status stands, with a parameter that reads it as one."""
         found = list(conditions)
-        wanted = {one.register for one in found} | set(registers)
+        wanted = {one.register for one in found}
         if any(one.coil for one in found):
             return self._coils(found, block)
         if 'register' in block:
@@ -223,7 +237,8 @@ class Places:
         if not blocks:
             return StatusPlace((0,))
         if len(blocks) > 2 or len(blocks[0]) > 1 < len(blocks) or count > _MOST_OF_STATUS:
-            where = ', '.join(f'{run[0]:04X}h to {run[-1]:04X}h' for run in blocks)
+            ends = (sorted({run[0], run[-1]}) for run in blocks)
+            where = ', '.join(' to '.join(map(self.written, both)) for both in ends)
             self._problems.add(
                 block.line,
                 f'the status stands at {where}: registers in one row, and one register elsewhere, '
@@ -233,9 +248,12 @@ class Places:
         first, *others = blocks
         sub_index = others[0][0] if others else None
         codec = codec_of(f'uint{16 * min(count, _MOST_OF_STATUS)}_be')
-        address = Address('modbus', 'register', first[0], sub_index, codec, Fraction(1), '')
-        self.made[STATUS_KEY] = internal(STATUS_KEY, address, Access.READ)
-        return StatusPlace(tuple(one for run in blocks for one in run))
+        address = Address(
+            'modbus', self._status_space, first[0], sub_index, codec, Fraction(1), ''
+        )
+        name = f'status (register {self.written(first[0])})'
+        self.made[STATUS_KEY] = internal(STATUS_KEY, name, address, Access.READ)
+        return StatusPlace(tuple(one for run in blocks for one in run), inputs=self._inputs)
 
     def _coils(self, conditions: Sequence[PlacedCondition], block: Node) -> StatusPlace:
         if not all(one.coil for one in conditions):
@@ -249,7 +267,8 @@ class Places:
             self._problems.add(block.line, 'the coils of the status are more than 32 apart')
         codec = codec_of(f'uint{count}_le')
         address = Address('modbus', 'coil', first, None, codec, Fraction(1), '')
-        self.made[STATUS_KEY] = internal(STATUS_KEY, address, Access.READ)
+        name = f'status (coil {first + self._coil_numbering})'
+        self.made[STATUS_KEY] = internal(STATUS_KEY, name, address, Access.READ)
         registers = [one.register for one in conditions]
         return StatusPlace((*range(first, first + count), *registers), coils=True)
 
@@ -260,6 +279,10 @@ class Places:
     ) -> Address:
         """Return where a value stands."""
         factor = self._factor(node, what)
+        if 'coil' in node and 'register' in node:
+            self._problems.add(
+                node.line, f'{what} names a register and a coil: remove one of both'
+            )
         if 'coil' in node:
             coil = self.coil(node['coil'])
             self.registers.take(use, what, node.line, 'coil', coil)
@@ -330,9 +353,15 @@ def runs(numbers: Sequence[int]) -> list[list[int]]:
     return found
 
 
-def internal(key: str, address: Address, access: Access, unit: str = '') -> Parameter:
+def place_of(node: Node, what: str) -> str:
+    """Return the name of a value, with the register or coil as the file has it."""
+    kind = 'coil' if 'coil' in node else 'register'
+    return f'{what} ({kind} {node.get(kind).written})'
+
+
+def internal(key: str, name: str, address: Address, access: Access, unit: str = '') -> Parameter:
     """Return a parameter that is no setting."""
     group = {'measured': 'Status'}.get(key.partition('.')[0], _FIELDBUS)
     return Parameter(
-        key=key, name=key, group=group, addresses={'modbus': address}, access=access, unit=unit
+        key=key, name=name, group=group, addresses={'modbus': address}, access=access, unit=unit
     )

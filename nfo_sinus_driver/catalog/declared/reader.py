@@ -19,6 +19,7 @@ from nfo_sinus_driver.catalog.declared.description import (
     Fault,
     FaultCodes,
     LineDefaults,
+    Pause,
     Put,
     Requirement,
     SetpointPlace,
@@ -27,9 +28,18 @@ from nfo_sinus_driver.catalog.declared.description import (
     status_code,
 )
 from nfo_sinus_driver.catalog.declared.parameter_table import with_parameters
-from nfo_sinus_driver.catalog.declared.places import WORD, PlacedCondition, Places, internal
+from nfo_sinus_driver.catalog.declared.places import (
+    FAULT_KEY,
+    STATUS_KEY,
+    WORD,
+    PlacedCondition,
+    Places,
+    internal,
+    place_of,
+)
 from nfo_sinus_driver.catalog.declared.registers import Use
-from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters, with_scale
+from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters
+from nfo_sinus_driver.catalog.declared.unused import unused
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
 from nfo_sinus_driver.catalog.parameter import Access, Parameter, Value
 from nfo_sinus_driver.catalog.status import Role
@@ -44,7 +54,7 @@ _MODES = {'Hz': 'Freque', 'rpm': 'Speed'}
 #: Where faults that are bits begin to be counted.
 _FLAGS_FROM = 100
 _MOST_FAULTS = 64
-_OF_STATUS = ('register', 'block')
+_OF_STATUS = ('register', 'block', 'table')
 
 
 def read(path: Path) -> Description:
@@ -70,7 +80,7 @@ class _Reader:
         self._path = path
         self._root = root
         self._problems = problems
-        self._line = _line(root.get('line'))
+        self._line = self._line_defaults(root.get('line'))
         self._require_format()
         self._places = Places(root, self._line, problems)
         self._conditions: dict[str, PlacedCondition] = {}
@@ -79,23 +89,23 @@ class _Reader:
         """Return what the file says; what is wrong goes to the problems."""
         root, control = self._root, self._root['control']
         settings = Settings(root, self._places, self._problems)
-        flags = list(self._flags())
+        faults = dict(self._faults(root.get('faults')))
+        flags = list(self._flags(faults))
         self._conditions = dict(self._facts())
         steps = StepReader(root, self._places, settings, self._problems)
-        codes_at = self._codes_register()
         running = [one for name, one in self._conditions.items() if name == 'running']
         of_flags = (one for one, _ in flags)
         conditions = [*running, *self._conditions.values(), *of_flags, *steps.awaited()]
-        registers = [] if codes_at is None else [codes_at]
-        status = self._places.status(conditions, root['status'].get('block'), registers)
+        status = self._places.status(conditions, root['status'].get('block'))
         facts = {name: one.in_place(status) for name, one in self._conditions.items()}
         self._require_apart(facts)
         steps.use(status)
+        codes = self._codes(root.get('faults'), status)
         setpoint = self._setpoint(settings)
         commands = Commands(
             control, steps, setpoint.direction, self._places.made, self._problems
         )
-        measured, roles = self._measured()
+        measured, roles = self._measured(settings)
         self._require_one_holder(control, settings)
         after_write = tuple(self._after_write(steps, commands))
         identify = dict(self._identify())
@@ -120,9 +130,9 @@ class _Reader:
             requires=tuple(self._requires(control, settings)),
             holder=settings.holder(control.get('holder')),
             stop_mode=self._stop_mode(control.get('stop_mode'), settings),
-            enable_input=control.text('enable_input', 'enable input').removeprefix('the '),
-            codes=self._codes(codes_at, status),
-            faults={fault.code: fault for fault in self._faults(root.get('faults'))},
+            enable_input=control.text('enable_input').removeprefix('the '),
+            codes=codes,
+            faults=faults,
             flags=tuple((one.in_place(status), fault) for one, fault in flags),
             alarm=self._alarm(root.get('alarms')),
             timeout=self._timeout(settings),
@@ -130,6 +140,19 @@ class _Reader:
             pole_pairs=root.get('motor').integer('pole_pairs'),
             accel=settings.known(root.get('simulated').get('accel')),
             decel=settings.known(root.get('simulated').get('decel')),
+            unused=unused(root, self._problems),
+        )
+
+    def _line_defaults(self, node: Node) -> LineDefaults:
+        write = {6: (6,), 16: (16,)}.get(node.integer('write'), (6, 16))
+        texts = self._numbered(node.get('exceptions'))
+        busy = [one.scalar for one in node.get('busy').items]
+        return LineDefaults(
+            node.text('protocol', LineDefaults.protocol), node.integer('baud_rate'),
+            node.text('char_format'), node.integer('address'), _sentence(node, 'check'), write,
+            node.integer('most_registers', 123),
+            {code: str(text.scalar).rstrip(' .;:') for code, text in texts},
+            frozenset(one for one in busy if isinstance(one, int)),
         )
 
     def _require_format(self) -> None:
@@ -178,57 +201,74 @@ class _Reader:
 
     # --- faults ---
 
-    def _codes_register(self) -> int | None:
-        node = self._root.get('faults')
+    def _codes(self, node: Node, status: StatusPlace) -> FaultCodes | None:
         if 'register' not in node:
             if 'codes' in node:
                 self._problems.add(node.line, 'faults has codes, but no register that tells them')
             return None
-        register = self._places.register(node['register'])
-        if 'bits' not in node:
-            line = node['register'].line
-            self._places.registers.take(Use.FAULT, 'the fault', line, 'register', register)
-        return register
+        none, places = node.integer('none') & WORD, self._places
+        address = places.address(node, 'the fault', use=Use.FAULT)
+        if status.holds(address):
+            low, high = 0, 15
+            if 'bits' in node:
+                low, high = (int(one.scalar or 0) for one in node['bits'].items)
+            shift = status.shift(address.index) + low
+            bits = max(high - low + 1, 0)
+            return FaultCodes(((1 << bits) - 1) << shift, shift, none, in_status=True)
+        places.made[FAULT_KEY] = internal(
+            FAULT_KEY, place_of(node, 'fault'), address, Access.READ
+        )
+        return FaultCodes(address.number.maximum, 0, none, in_status=False)
 
-    def _codes(self, register: int | None, status: StatusPlace) -> FaultCodes | None:
-        if register is None or status.coils:
-            return None
-        node = self._root['faults']
-        low, high = 0, 15
-        if 'bits' in node:
-            low, high = (int(one.scalar or 0) for one in node['bits'].items)
-            if not low <= high < 16:
-                self._problems.add(node['bits'].line, f'a register has no bits {low} to {high}')
-                return None
-        shift = status.shift(register) + low
-        mask = ((1 << high - low + 1) - 1) << shift
-        return FaultCodes(mask, shift, node.integer('none'))
-
-    def _faults(self, node: Node) -> Iterator[Fault]:
+    def _faults(self, node: Node) -> Iterator[tuple[int, Fault]]:
         none = node.integer('none')
-        for text, fault in node.get('codes').mapping.items():
+        for number, fault in self._numbered(node.get('codes')):
+            if number == none or number > WORD:
+                self._problems.add(
+                    fault.line, f'fault {fault.name} cannot be: {none} means no fault'
+                )
+            code = status_code(number)
+            yield code, _fault(fault, code)
+
+    def _numbered(self, node: Node) -> Iterator[tuple[int, Node]]:
+        """Yield what stands under numbers; one that stands twice, be it in two forms, is wrong."""
+        lines: dict[int, int] = {}
+        for text, one in node.mapping.items():
             try:
                 number = number_of(text)
             except ValueError as error:
-                self._problems.add(fault.line, f'{error}: write it without zeros in front')
+                self._problems.add(one.line, f'{error}: write it without zeros in front')
                 continue
-            if number == none or number > WORD:
-                self._problems.add(fault.line, f'fault {text} cannot be: {none} means no fault')
-            yield _fault(fault, status_code(number))
+            if number in lines:
+                self._problems.add(
+                    one.line, f'{text} stands in line {lines[number]} already: remove one of both'
+                )
+            lines[number] = one.line
+            yield number, one
 
-    def _flags(self) -> Iterator[tuple[PlacedCondition, Fault]]:
+    def _flags(self, faults: Mapping[int, Fault]) -> Iterator[tuple[PlacedCondition, Fault]]:
         flags = self._root.get('faults').get('flags')
         if len(flags.items) > _MOST_FAULTS:
             self._problems.add(flags.line, f'faults has more than {_MOST_FAULTS} flags')
+        taken = dict(faults)
         for number, node in enumerate(flags.items):
-            condition = self._places.condition(node, f'fault flag {node.text("text")!r}')
+            text, code = node.text('text'), node.integer('code', _FLAGS_FROM + number)
+            condition = self._places.condition(node, f'fault flag {text!r}')
+            fault = _fault(node, status_code(code))
+            other = taken.setdefault(fault.code, fault)
+            if other is not fault:
+                self._problems.add(
+                    node.line,
+                    f'the faults {text!r} and {other.text!r} have the code {code}: give the flag '
+                    'one that no other has (code: 301)',
+                )
             if condition is not None:
-                yield condition, _fault(node, status_code(_FLAGS_FROM + number))
+                yield condition, fault
 
     def _alarm(self, node: Node) -> Fault:
         usual = Description.alarm
-        text = node.text('text', usual.text)
-        return Fault(0, text, usual.description, node.text('remedy', usual.remedy))
+        text = _sentence(node, 'text', usual.text)
+        return Fault(0, text, usual.description, _sentence(node, 'remedy', usual.remedy))
 
     # --- set-point ---
 
@@ -240,7 +280,10 @@ class _Reader:
         access = Access.WRITE if write_only or 'read_register' in node else Access.READ_WRITE
         unit, most = node.text('unit'), node.number('most') or Fraction(1)
         made = self._places.made
-        made[SETPOINT_KEY] = settings.scaled(node, internal(SETPOINT_KEY, address, access, unit))
+        name = place_of(node, 'set-point')
+        made[SETPOINT_KEY] = settings.scaled(
+            node, internal(SETPOINT_KEY, name, address, access, unit)
+        )
         read_key = '' if write_only else SETPOINT_KEY
         if 'read_register' in node:
             read_key = SETPOINT_READ_KEY
@@ -248,7 +291,10 @@ class _Reader:
             count = address.codec.size // 2
             self._places.registers.take(Use.VALUE, what, line, 'register', index, count)
             shifted = replace(address, index=index)
-            made[read_key] = settings.scaled(node, internal(read_key, shifted, Access.READ, unit))
+            name = f'set-point (register {node["read_register"].written})'
+            made[read_key] = settings.scaled(
+                node, internal(read_key, name, shifted, Access.READ, unit)
+            )
         codec, carried = address.number, most / address.factor
         if carried > codec.maximum and 'scaled_by' not in node:
             self._problems.add(
@@ -301,9 +347,8 @@ class _Reader:
         for number, node in enumerate(self._root.get('identify').items, 1):
             key = f'{IDENTITY_KEY}_{number}'
             address = self._places.address(node, key)
-            made = internal(key, address, Access.READ)
-            printed = node['register'].scalar
-            self._places.made[key] = replace(made, name=f'register {printed}')
+            name = f'register {node["register"].written}'
+            self._places.made[key] = internal(key, name, address, Access.READ)
             given = [node['value']] if 'value' in node else list(node.get('values').items)
             values = tuple(one.scalar for one in given if isinstance(one.scalar, int))
             if ('value' in node) is ('values' in node):
@@ -315,14 +360,17 @@ class _Reader:
             if values:
                 yield key, values
 
-    def _measured(self) -> tuple[dict[str, Parameter], dict[Role, str]]:
+    def _measured(self, settings: Settings) -> tuple[dict[str, Parameter], dict[Role, str]]:
         made: dict[str, Parameter] = {}
-        roles: dict[Role, str] = {Role.STATUS_WORD: 'line.status'}
+        roles: dict[Role, str] = {Role.STATUS_WORD: STATUS_KEY}
+        if FAULT_KEY in self._places.made:
+            roles[Role.FAULT_CODE] = FAULT_KEY
         for name, node in self._root.get('measured').mapping.items():
             role, key = Role(name), f'measured.{name}'
             address = self._places.address(node, name)
-            parameter = internal(key, address, Access.READ, _UNITS.get(name, ''))
-            made[key] = with_scale(node, parameter)
+            unit = _UNITS.get(name, '')
+            parameter = internal(key, place_of(node, name), address, Access.READ, unit)
+            made[key] = settings.scaled(node, parameter)
             roles[role] = key
         return made, roles
 
@@ -332,17 +380,20 @@ class _Reader:
             if key:
                 value = settings.value(key, node['value'])
                 if value is not None:
-                    yield Requirement(key, value, node.flag('write'), node.text('text'))
+                    yield Requirement(key, value, node.flag('write'), _sentence(node, 'text'))
 
-    def _after_write(self, steps: StepReader, commands: Commands) -> Iterator[Put]:
+    def _after_write(self, steps: StepReader, commands: Commands) -> Iterator[Put | Pause]:
         node = self._root.get('after_write')
         listed = steps.read(node, 'after_write')
         commands.require_no_run('after_write', listed, node.line)
+        commands.check_pauses('after_write', listed, node.line)
         for step in listed:
-            if isinstance(step, Put):
+            if isinstance(step, (Put, Pause)):
                 yield step
             else:
-                self._problems.add(node.line, 'after_write takes steps with value, values or on')
+                self._problems.add(
+                    node.line, 'after_write takes steps with value, values, on or wait'
+                )
 
     @staticmethod
     def _stop_mode(node: Node, settings: Settings) -> tuple[str, Value] | None:
@@ -390,24 +441,16 @@ _UNITS = {
 
 def _fault(node: Node, code: int) -> Fault:
     return Fault(
-        code, node.text('text'), node.text('description'), node.text('remedy'), node.flag('line')
+        code, _sentence(node, 'text'), _sentence(node, 'description'), _sentence(node, 'remedy'),
+        node.flag('line'),
     )
+
+
+def _sentence(node: Node, key: str, default: str = '') -> str:
+    """Return a text that becomes a part of a sentence: without its full stop."""
+    return node.text(key, default).rstrip(' .;:')
 
 
 def _float(node: Node) -> float | None:
     found = node.scalar
     return float(found) if isinstance(found, (int, Fraction)) else None
-
-
-def _line(node: Node) -> LineDefaults:
-    write = {6: (6,), 16: (16,)}.get(node.integer('write'), (6, 16))
-    exceptions = {
-        int(code, 0): str(text.scalar) for code, text in node.get('exceptions').mapping.items()
-        if not (code.startswith('0') and code.isdecimal() and code != '0')
-    }
-    busy = frozenset(one.scalar for one in node.get('busy').items if isinstance(one.scalar, int))
-    return LineDefaults(
-        node.text('protocol', LineDefaults.protocol), node.integer('baud_rate'),
-        node.text('char_format'), node.integer('address'), node.text('check'), write,
-        node.integer('most_registers', 123), exceptions, busy,
-    )

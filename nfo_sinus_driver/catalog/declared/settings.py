@@ -48,11 +48,6 @@ class Settings:
         address = self._places.address(node, key, writable=writable)
         parameter = self._parameter(key, node, access)
         self.parameters[key] = self.scaled(node, replace(parameter, addresses={'modbus': address}))
-        if 'write_register' in node:
-            self._problems.add(
-                node['write_register'].line,
-                f'{key}: a setting is written where it is read; one that is not needs Python',
-            )
         self._check(key, node)
         self._take_role(key, node)
         default = node.get('default')
@@ -155,19 +150,12 @@ class Settings:
 
     def scaled(self, node: Node, parameter: Parameter) -> Parameter:
         """Return a parameter with the scale and the empty value that a node gives it."""
-        found = with_scale(node, parameter)
-        if found.scale and found.scale not in self._root.get('parameters'):
+        none, scale = node.get('none').scalar, node.text('scaled_by')
+        if scale and scale not in self._root.get('parameters'):
             self._problems.add(
-                node['scaled_by'].line, f'{found.scale} is none of the parameters: add it there'
+                node['scaled_by'].line, f'{scale} is none of the parameters: add it there'
             )
-        return found
-
-
-def with_scale(node: Node, parameter: Parameter) -> Parameter:
-    """Return a parameter with the scale and the empty value that a node gives it, unchecked."""
-    none = node.get('none').scalar
-    scale = node.text('scaled_by')
-    return replace(parameter, scale=scale, none=none if isinstance(none, int) else None)
+        return replace(parameter, scale=scale, none=none if isinstance(none, int) else None)
 
 
 def role_parameters(root: Node) -> Mapping[Role, str]:

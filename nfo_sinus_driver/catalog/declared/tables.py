@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 import enum
 
 from nfo_sinus_driver.catalog.declared.description import STATES, Description, Fault
@@ -54,8 +55,12 @@ def status_codes(drive: Description) -> Mapping[int, StatusCode]:
         int(Code.FAULT), 'Fault', 'A fault that the file of the drive does not list',
         'Look at its keypad which one it is, and remove its cause',
     )
+    named = drive.codes is not None and not drive.codes.in_status
     faults = [*drive.faults.values(), *(fault for _, fault in drive.flags), unlisted]
     codes = [_of_state(drive, code) for code in _TEXTS] + [_of_fault(drive, one) for one in faults]
+    if named:
+        # its number stands elsewhere
+        codes[-1] = replace(codes[-1], meanings=codes[-1].meanings | {Meaning.UNNAMED})
     return {one.code: one for one in codes}
 
 

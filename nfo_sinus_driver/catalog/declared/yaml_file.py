@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 import contextlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 import math
 from pathlib import Path
@@ -82,12 +82,14 @@ class Node:
     :ivar line: the first one is 1.
     :ivar name: the key or the number under which it stands, for messages.
     :ivar path: the file where it stands, if that is another one than that of what is around it.
+    :ivar written: a scalar as the file has it.
     """
 
     content: Mapping[str, Node] | Sequence[Node] | Scalar
     line: int
     name: str = ''
     path: Path | None = None
+    written: str = ''
 
     @property
     def mapping(self) -> Mapping[str, Node]:
@@ -212,7 +214,7 @@ class _Converter:
         if isinstance(node, yaml.SequenceNode):
             items = [self.node(one, f'{name}', depth + 1) for one in node.value]
             return Node(items, line, name)
-        return Node(self._scalar(node, line), line, name)
+        return Node(self._scalar(node, line), line, name, written=str(node.value))
 
     def _pairs(self, node: yaml.MappingNode, depth: int) -> Iterator[tuple[str, Node]]:
         seen: dict[str, int] = {}
@@ -228,7 +230,7 @@ class _Converter:
                 )
             seen[name] = line
             made = self.node(value, name, depth + 1)
-            yield name, Node(made.content, line if made.json_type != 'object' else made.line, name)
+            yield name, replace(made, line=line if made.json_type != 'object' else made.line)
 
     def _scalar(self, node: yaml.Node, line: int) -> Scalar:
         text = str(node.value)

@@ -89,10 +89,12 @@ class Declared(ControlMethod):
             word = int((yield Read(STATUS_KEY)))
             if not is_remote(drive, word) and drive.facts['running'].holds(word):
                 raise NotPossible('keypad or terminals run the motor: stop it there')
+        missing = []
         for one in drive.requires:
             if not one.write and (found := (yield Read(one.key))) != one.value:
-                todo = one.text or f'set {one.key} to {one.value}'
-                raise NotPossible(f'{one.key} is {found}, so the line has no control: {todo}')
+                missing.append(f'{one.key} is {found} ({one.text or f"set it to {one.value}"})')
+        if missing:
+            raise NotPossible(f'the line has no control: {", ".join(missing)}')
 
     def take_control(self) -> Steps[None]:
         """
@@ -103,9 +105,13 @@ class Declared(ControlMethod):
         """
         drive = self._drive
         yield from try_steps(_carry_out(drive.stop))
+        changed = False
         for one in drive.requires:
-            if one.write:
+            if one.write and (yield Read(one.key)) != one.value:
                 yield Write(one.key, one.value, stored=True)
+                changed = True
+        if changed:
+            yield from try_steps(_each(drive.after_write, retry=True))
         yield from _carry_out(drive.prepare)
         if not drive.prepare_stops:
             yield from _carry_out(drive.stop, head=True)
@@ -242,7 +248,8 @@ def profile_of(drive: Description) -> Profile:
         holders = {one: Holder.BUS if one in values else Holder.LOCAL for one in labels}
     return Profile(
         title=drive.title,
-        enable_input=drive.enable_input,
+        enable_input=drive.enable_input or Profile.enable_input,
+        has_enable_input=bool(drive.enable_input) or 'enable_missing' in drive.facts,
         status_word=words_of(drive),
         holders=holders,
         methods={METHOD: type('Control', (Declared,), members)},
@@ -258,8 +265,12 @@ def profile_of(drive: Description) -> Profile:
         timeout_conditions={} if drive.timeout is None else drive.timeout.conditions,
         pole_pairs=drive.pole_pairs,
         keeps_run=drive.keeps_run,
-        after_write=tuple(Write(step.key, step.raw) for step in drive.after_write),
-        line_check=dict.fromkeys(('modbus_rtu', 'modbus_tcp'), drive.line.shown)
+        fault_code=int if drive.codes is None else drive.codes.code,
+        after_write=tuple(
+            Wait(step.seconds) if isinstance(step, Pause) else Write(step.key, step.raw)
+            for step in drive.after_write
+        ),
+        line_check=dict.fromkeys(('modbus_rtu', 'modbus_ascii', 'modbus_tcp'), drive.line.shown)
         if drive.line.shown
         else {},
     )

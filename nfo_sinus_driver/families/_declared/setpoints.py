@@ -49,9 +49,8 @@ def target_of(place: SetpointPlace) -> Target:
     """Return where set-points go that a file describes."""
     nominal = math.inf if place.nominal is None else place.nominal
     if place.direction is None:
-        forward_only = not place.signed
         return Target(
-            place.key, place.most, forward_only=forward_only, nominal=nominal, place=place
+            place.key, place.most, forward_only=not place.reverses, nominal=nominal, place=place
         )
     way = place.direction
     return SizeAndDirection(

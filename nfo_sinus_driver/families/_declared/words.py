@@ -74,18 +74,40 @@ class Words(StatusWord):
 def words_of(drive: Description) -> Words:
     """Return what the status of a drive means."""
     facts = tuple((drive.facts[name], fact) for name, fact in _FACTS.items() if name in drive.facts)
-    measured = drive.parameters.get(drive.roles.get(Role.ACTUAL_FREQUENCY, ''))
-    unsigned = measured is not None and not measured.at('modbus').number.signed
     return Words(
         state=functools.partial(_state, drive),
         by_bit={},
         by_state={},
         code=functools.partial(_code, drive),
-        by_frequency=measured is not None and 'stopping' not in drive.facts,
-        tells_sign='reverse' in drive.facts and unsigned,
+        by_frequency=Role.ACTUAL_FREQUENCY in drive.roles and 'stopping' not in drive.facts,
+        runs_by_turning=_runs_by_turning(drive),
+        sizes=_sizes(drive),
         facts_of=facts,
         unless=drive.facts.get('local'),
     )
+
+
+def _runs_by_turning(drive: Description) -> bool:
+    """Return whether the motor runs by the register of its frequency or speed."""
+    status, bits = drive.status, drive.facts['running'].mask
+    for role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED):
+        measured = drive.parameters.get(drive.roles.get(role, ''))
+        place = measured.at('modbus') if measured is not None else None
+        if place is not None and status.holds(place) and bits >> status.shift(place.index) & 0xFFFF:
+            return True
+    return False
+
+
+def _sizes(drive: Description) -> frozenset[Role]:
+    """Return which of frequency and speed have no sign; the speed may follow from the other."""
+    found: set[Role] = set()
+    if not ('reverse' in drive.facts or drive.setpoint.reverses):
+        return frozenset()
+    for role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED):
+        measured = drive.parameters.get(drive.roles.get(role, ''))
+        if found if measured is None else not measured.at('modbus').number.signed:
+            found.add(role)
+    return frozenset(found)
 
 
 def _state(drive: Description, word: int) -> State:
@@ -146,7 +168,8 @@ def _fault(drive: Description, word: int) -> int:
     for condition, fault in drive.flags:
         if condition.holds(word):
             return fault.code
-    return (drive.codes.code(word) if drive.codes is not None else 0) or Code.FAULT
+    codes = drive.codes
+    return (codes.code(word) if codes is not None and codes.in_status else 0) or Code.FAULT
 
 
 def is_remote(drive: Description, word: int) -> bool:

@@ -25,7 +25,7 @@ from __future__ import annotations
 import enum
 import functools
 
-from nfo_sinus_driver.catalog.status import Fact, State, StatusWord
+from nfo_sinus_driver.catalog.status import Fact, Role, State, StatusWord
 
 #: P841, who controls the drive.
 STANDARD = 'Standard'
@@ -172,5 +172,5 @@ STATUS_WORD = StatusWord(
     shown=0xFFFF,
     # it goes on saying Enable, or Normal stop, whatever the motor does
     by_frequency=True,
-    tells_sign=True,
+    sizes=frozenset((Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)),
 )

@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from nfo_sinus_driver.catalog import Kind, Role
-from nfo_sinus_driver.catalog.declared import STATUS_KEY, Description, drive_number
+from nfo_sinus_driver.catalog import Kind, Role, to_words
+from nfo_sinus_driver.catalog.declared import FAULT_KEY, STATUS_KEY, Description, drive_number
 from nfo_sinus_driver.simulator._declared.orders import Place, orders_of
 from nfo_sinus_driver.simulator._declared.status import Wish, compose
 from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
@@ -134,6 +135,8 @@ class DeclaredControlUnit(ControlUnit):
         """Return status, read-back and what is measured without a sign."""
         if key == STATUS_KEY:
             return self.status_word
+        if key == FAULT_KEY:
+            return self.fault_number()
         if key == self._drive.setpoint.read_key != self._drive.setpoint.key:
             return self.memory.raw(self._drive.setpoint.key)
         parameter = self._drive.parameters[key]
@@ -181,14 +184,35 @@ class DeclaredControlUnit(ControlUnit):
         for order in self._orders.values():
             if order.shows is not None:
                 wishes.append((order.shows, True, _AWAITED))
+        mask = fixed = 0
+        for shift, word in self._measured_words():
+            mask, fixed = mask | 0xFFFF << shift, fixed | word << shift
         codes = drive.codes
-        if codes is None:
-            return compose(tuple(wishes), 0, 0)
-        number = self._number(fault) if is_fault else codes.none
-        return compose(tuple(wishes), codes.mask, number << codes.shift)
+        if codes is not None and codes.in_status:
+            mask, fixed = mask | codes.mask, fixed | self.fault_number() << codes.shift
+        return compose(tuple(wishes), mask, fixed)
 
-    def _number(self, code: int) -> int:
-        return _UNNAMED if code in self._flags else drive_number(code)
+    def fault_number(self) -> int:
+        """Return what the register of the fault has."""
+        codes, fault = self._drive.codes, self.faults.shown
+        assert codes is not None
+        if not self.faults:
+            return codes.none
+        return _UNNAMED if fault in self._flags else drive_number(fault)
+
+    def _measured_words(self) -> Iterator[tuple[int, int]]:
+        """Yield the words of frequency and speed that stand in the status, and at which bit."""
+        status = self._drive.status
+        for role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED):
+            key = self._drive.roles.get(role, '')
+            raw = self.show(key) if key and not status.coils else None
+            if raw is None:
+                continue
+            address = self._drive.parameters[key].at('modbus')
+            words = to_words(address.number.encode(raw))
+            for register, word in enumerate(words, address.index):
+                if register in status.registers:
+                    yield status.shift(register), word
 
     @property
     def _flags(self) -> list[int]:

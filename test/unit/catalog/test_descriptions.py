@@ -20,6 +20,7 @@ import yaml
 from nfo_sinus_driver.catalog import Role, load_family
 from nfo_sinus_driver.catalog.declared import DescriptionError, read, schema
 from nfo_sinus_driver.catalog.declared.yaml_file import load
+from nfo_sinus_driver.cli.families import check
 
 #: A drive in which nothing is wrong.
 GOOD = """
@@ -274,7 +275,31 @@ BAD = {
     'missing register': ('setpoint: {register: 11, ', 'setpoint: {', "needs 'register'"),
     'register out of range': ('{register: 10, value: 1}', '{register: 70000, value: 1}', 'be sent'),
     'register below the numbering': ('write: 6', 'numbering: 40001, write: 6', 'cannot be sent'),
-    'a word too wide': ('{register: 10, value: 1}', '{register: 10, value: 70000}', 'no word'),
+    'a word too wide': (
+        '{register: 10, value: 1}', '{register: 10, value: 70000}', '65535 at most',
+    ),
+    'a status too wide': ('bit: 3}', 'value: 0x10008}', '65535 at most'),
+    'a direction too wide': (
+        'signed: true}', 'direction: {register: 10, forward: 1, reverse: 65538}}', '65535 at most',
+    ),
+    'a pause at a register': (
+        '{wait: 0.1}', '{wait: 0.1, register: 10}', 'does one thing',
+    ),
+    'a register beside a parameter': (
+        'run: [{register: 10, value: 1}]',
+        'run: [{register: 10, value: 1}, {parameter: ramp.accel, to: 5, register: 12}]',
+        'does one thing',
+    ),
+    'a value in a register and a coil': (
+        '{register: 22, type', '{register: 22, coil: 3, type', 'remove one of both',
+    ),
+    'a measured value scaled by nothing': (
+        'actual_frequency: {', 'actual_frequency: {scaled_by: motor.frequency, ',
+        'none of the parameters',
+    ),
+    'a register to write beside one to read': (
+        '{register: 30,', '{register: 30, write_register: 33,', 'is no key of',
+    ),
     'factor 0': ('signed: true}', 'signed: true}', ''),
     'factor none': ('factor: 0.1, unit: Hz', 'factor: 0, unit: Hz', 'more than 0'),
     'a factor that is text': ('factor: 0.1, unit: Hz', 'factor: ten, unit: Hz', 'a fraction'),
@@ -410,6 +435,76 @@ def test_a_bad_file_is_refused_with_its_line_and_a_sentence(tmp_path: Path, name
     assert 1 <= line <= text.count('\n') + 1
 
 
+#: What is replaced by what, and which key has no effect then.
+WITHOUT_EFFECT = {
+    'a quick stop beside a coast': (
+        '  reset:',
+        '  coast: [{register: 10, value: 4}]\n  quick_stop: [{register: 10, value: 2}]\n  reset:',
+        'quick_stop',
+    ),
+    'a limit of a wait': (
+        'run: [{', 'run: [{until: {bit: 1}, within: 0.5}, {', 'within',
+    ),
+    'a stop that disturbs nothing': ('  run:', '  stop_disturbs_local: true\n  run:',
+                                     'stop_disturbs_local'),
+    'the text of no alarm': ('\nfaults:', '\nalarms: {text: Hot}\nfaults:', 'alarms'),
+    'what is no fault, nowhere': (
+        'faults:\n  register: 21\n  codes: {1: {text: hot, remedy: Let it cool}}',
+        'faults: {none: 3}', 'none',
+    ),
+    'a block of coils': (
+        'status:\n  register: 20\n  running: {bit: 0}\n  fault: {bit: 3}',
+        'status:\n  block: {register: 20, count: 2}\n  running: {coil: 0}\n  fault: {coil: 3}',
+        'block',
+    ),
+    'the speed of a line without one': (
+        'address: 5', 'address: 5, protocol: modbus_tcp', 'baud_rate',
+    ),
+    'the type of a coil': (
+        '  ramp.accel:', '  other.coil: {coil: 3, type: int16}\n  ramp.accel:', 'type',
+    ),
+    'when what is read may be written': (
+        'factor: 0.1, unit: s}\ntimeout', 'factor: 0.1, unit: s}\n  other.value: {register: 40, '
+        'access: r, while_running: false}\ntimeout', 'while_running',
+    ),
+    'the range of choices': ('choices: {0', 'maximum: 3, choices: {0', 'maximum'),
+    'what follows a change of nothing': (
+        '\nparameters:', '\nafter_write: [{register: 50, value: 1}]\nparameters:', 'after_write',
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', WITHOUT_EFFECT)
+def test_check_names_what_has_no_effect(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old, new, key = WITHOUT_EFFECT[name]
+    assert old in GOOD
+    text = GOOD.replace(old, new, 1)
+    if key == 'after_write':
+        text = re.sub(r'(?s)\nparameters:.*', '\n', text)
+        text = text.replace('  requires:\n    - {parameter: source.command, value: Bus}\n', '')
+    path = tmp_path / 'made_up.vfd.yaml'
+    path.write_text(text, encoding='utf-8')
+    assert check(str(path))
+    said = [one for one in capsys.readouterr().out.splitlines() if 'has no effect' in one]
+    (line,) = re.findall(rf'line (\d+): {key} has no effect: ', '\n'.join(said))
+    assert key in text.splitlines()[int(line) - 1]
+
+
+def test_all_keys_of_the_good_one_and_of_shipped_files_have_an_effect(tmp_path: Path) -> None:
+    (tmp_path / 'good.vfd.yaml').write_text(GOOD, encoding='utf-8')
+    for path in (tmp_path / 'good.vfd.yaml', *SHIPPED.values()):
+        assert not read(path).unused
+
+
+def test_registers_may_be_printed_from_400001(tmp_path: Path) -> None:
+    text = re.sub(r'register: (\d+)', lambda found: f'register: {400001 + int(found[1])}', GOOD)
+    text = text.replace('write: 6', 'numbering: 400001, write: 6')
+    assert complaints(tmp_path, text) == []
+    assert read(tmp_path / 'made_up.vfd.yaml').status.registers == (20,)
+
+
 def test_a_file_says_what_tells_its_drive_from_others(tmp_path: Path) -> None:
     path = tmp_path / 'known.vfd.yaml'
     second = '{register: 65, bits: [4, 7], values: [1, 2]}'
@@ -418,7 +513,7 @@ def test_a_file_says_what_tells_its_drive_from_others(tmp_path: Path) -> None:
     family = load_family(str(path))
     first, second = family.profile.identify
     assert family.profile.identify == {first: (7,), second: (1, 2)}
-    assert (family[first].name, family[second].name) == ('register 64', 'register 65')
+    assert (family[first].name, family[second].name) == ('register 0x40', 'register 65')
     assert not {first, second} & {one.key for one in family.settings}
 
 

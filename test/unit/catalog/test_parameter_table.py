@@ -182,7 +182,7 @@ _CELLS = st.one_of(
     st.sampled_from(['4-7', '7-4', '4-', '4-99', '||', '=', 'init', 'firmware']),
     st.text(max_size=6),
 )
-_EXTRA = st.sampled_from(['type', 'order', 'table', 'none', 'write_register', 'x', 'when'])
+_EXTRA = st.sampled_from(['type', 'order', 'table', 'none', 'x', 'when'])
 
 
 @settings(max_examples=300, deadline=None)

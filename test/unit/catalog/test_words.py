@@ -13,7 +13,16 @@ import pytest
 from support.addresses import packed
 from support.places import MSG_DEFS
 
-from nfo_sinus_driver.catalog import Fact, Family, Kind, Meaning, State, families, load_family
+from nfo_sinus_driver.catalog import (
+    Fact,
+    Family,
+    Kind,
+    Meaning,
+    Role,
+    State,
+    families,
+    load_family,
+)
 from nfo_sinus_driver.families.movitrac31 import words as movitrac
 from nfo_sinus_driver.families.sinus_g2 import words as g2
 from nfo_sinus_driver.families.sinus_optimal import words as optimal
@@ -409,7 +418,8 @@ def test_facts_of_the_movitrac() -> None:
         # reverse is the bit that is clear
         assert tells.facts(word_of(number), Kind.STATUS) == facts | Fact.REVERSE, number
     assert Fact.REVERSE in tells.valid
-    assert (tells.shown, tells.by_frequency, tells.tells_sign) == (0xFFFF, True, True)
+    assert (tells.shown, tells.by_frequency) == (0xFFFF, True)
+    assert tells.sizes == {Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED}
 
 
 @pytest.mark.parametrize('name', families())

@@ -28,7 +28,7 @@ def test_a_file_is_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert 'Siemens SINAMICS V20, 4 settings' in (said := capsys.readouterr().out)
     assert 'no time-out of its own' in said
     assert main(['family', 'check', V20, str(bad)]) == 1
-    assert f'{bad}, line 41: fault and running mean the same bits' in capsys.readouterr().out
+    assert f'{bad}, line 39: fault and running mean the same bits' in capsys.readouterr().out
     assert main(['family', 'check', str(tmp_path / 'none.vfd.yaml')]) == 1
     assert 'no such file' in capsys.readouterr().out
     # as --family takes it

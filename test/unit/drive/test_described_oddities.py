@@ -114,6 +114,7 @@ ODD: dict[str, dict[str, Any]] = {
             'most': 60, 'signed': True,
         },
     },
+    'a status of input registers': {'status': {**PLAIN['status'], 'table': 'input'}},
     'a fault far away': {'faults': {'register': 900, 'codes': {1: {'text': 'hot'}}}},
     'faults as bits': {
         'faults': {
@@ -156,6 +157,21 @@ ODD: dict[str, dict[str, Any]] = {
         'setpoint': {
             'register': 11, 'type': 'int16', 'factor': '1/10000', 'scaled_by': 'limit.maximum',
             'limit': 'limit.maximum', 'unit': 'Hz', 'most': 60, 'signed': True,
+        },
+        'parameters': {
+            **PLAIN['parameters'],
+            'limit.maximum': {'register': 40, 'factor': 0.1, 'unit': 'Hz', 'default': 55},
+        },
+    },
+    'a size in parts of a parameter': {
+        'setpoint': {
+            'register': 11, 'factor': '1/10000', 'scaled_by': 'limit.maximum',
+            'limit': 'limit.maximum', 'unit': 'Hz', 'most': 60,
+            'direction': {'register': 12, 'forward': 1, 'reverse': 2},
+        },
+        'status': {**PLAIN['status'], 'reverse': {'bit': 1}},
+        'measured': {
+            'actual_frequency': {'register': 22, 'factor': '1/10000', 'scaled_by': 'limit.maximum'},
         },
         'parameters': {
             **PLAIN['parameters'],
@@ -329,6 +345,46 @@ def test_what_makes_a_setting_take_effect_is_written_after_it(tmp_path: Path) ->
         rig.result(rig.drive.parameters.change({'ramp.accel': 7.0}))
         written = [key for _, key, data in rig.asked if data is not None]
         assert written[-2:] == ['ramp.accel', 'line.r0032']
+
+
+def test_a_drive_may_need_time_before_a_setting_is_made_to_take_effect(tmp_path: Path) -> None:
+    after = [
+        {'wait': 0.2}, {'register': 50, 'value': 1}, {'wait': 0.05}, {'register': 50, 'value': 0},
+    ]
+    with DescribedRig(described(tmp_path, after_write=after)) as rig:
+        rig.connect(parameters=True)
+        at: dict[str, list[float]] = {}
+
+        def meet(key: str, data: bytes | None) -> None:
+            if data is not None:
+                at.setdefault(key, []).append(rig.clock.now)
+
+        rig.meet = meet
+        rig.result(rig.drive.parameters.change({'ramp.accel': 7.0}))
+        enter = at['line.r0032']
+        assert 0.2 <= enter[0] - at['ramp.accel'][-1] < 0.4
+        assert 0.05 <= enter[1] - enter[0] < 0.2
+        rig.enable()
+        rig.follow(20.0)
+
+
+def test_what_is_written_by_an_enable_takes_effect_too(tmp_path: Path) -> None:
+    parameters = {
+        **PLAIN['parameters'],
+        'source.command': {'register': 51, 'choices': {0: 'Keypad', 1: 'Net'}, 'default': 'Keypad'},
+        'serial.timeout': {'register': 52, 'factor': 0.1, 'unit': 's', 'default': 0},
+    }
+    requires = [{'parameter': 'source.command', 'value': 'Net', 'write': True}]
+    file = described(
+        tmp_path, after_write=[{'register': 50, 'value': 1}], parameters=parameters,
+        control={**PLAIN['control'], 'requires': requires}, timeout={'parameter': 'serial.timeout'},
+    )
+    with DescribedRig(file, drive_timeout=2.0) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        written = [key for _, key, data in rig.asked if data is not None]
+        for key in ('source.command', 'serial.timeout'):
+            assert written[written.index(key) + 1] == 'line.r0032', written
 
 
 def test_a_change_at_the_keypad_is_said_and_one_of_the_driver_is_not(tmp_path: Path) -> None:

@@ -77,7 +77,8 @@ def test_status_and_direction_are_those_of_the_motor(connection: str) -> None:
             # of a G2, pulses enabled is no stop [C111]
             assert status is not None and status.state is State.OPERATION_ENABLED
             assert Fact.OPERATION_ENABLED in status.valid & status.facts
-            if Fact.REVERSE in status.valid and turns:
+            assert Fact.REVERSE in status.valid
+            if turns:
                 assert (Fact.REVERSE in status.facts) == (turns < 0)
         assert rig.notes.said('set-point -15 is limited to 0') == (connection == SINUS_H)
         assert math.isnan(rig.drive.snapshot.speed)

@@ -151,7 +151,7 @@ PROFILE = Profile(
         code=lambda word: word >> 16,
         shown=0xFFFF,
         by_frequency=True,
-        tells_sign=True,
+        sizes=frozenset((Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)),
     ),
     holders=_HOLDERS,
     methods={'function_bits': FunctionBits},
