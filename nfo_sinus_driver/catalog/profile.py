@@ -140,6 +140,12 @@ class Wait:
     seconds: float
 
 
+#: Follows a bit that rises to acknowledge, before it falls: a drive that takes its word only now
+#: and then has to find it [C117].
+FAULT_GONE = Hold(
+    lambda status: status.state not in (State.FAULTED, State.FAULT_REACTION_ACTIVE), 1.0
+)
+
 Step = Read | Write | Acknowledge | AcknowledgeThenWrite | Until | Hold | Wait
 Steps = Generator[Step, Any, _T]
 

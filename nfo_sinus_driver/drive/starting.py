@@ -127,7 +127,10 @@ class StartSequence:
             if Fact.RUN_INPUT_MISSING in status.facts:
                 raise DriveError(state.report(Cause.NO_RUN_INPUT))
             if await step.is_over(status):
-                cause = Cause.NO_RUN_INPUT if status.standby else Cause.NOT_STARTED
+                # one that reports its RUN input reports that it is active [C90]
+                unreported = Fact.RUN_INPUT_MISSING not in status.valid
+                missing = status.standby and unreported
+                cause = Cause.NO_RUN_INPUT if missing else Cause.NOT_STARTED
                 raise DriveError(state.report(cause))
             await state.bus.sleep(drive_state.LOOK_PERIOD)
         self._deadline += step.added
