@@ -196,6 +196,8 @@ class SetpointTarget:
         value itself; infinite where it is unknown.
     :ivar ends: the two parameters between which the drive takes set-points, if it has such.
     :ivar older_most: as ``most``, of the family's :class:`OlderDialect`.
+    :ivar followed: the parameter that reports what the drive follows, whoever gave it; ``''``:
+        :attr:`key` does.
     """
 
     key: str
@@ -206,6 +208,7 @@ class SetpointTarget:
     nominal: str | float = math.inf
     ends: tuple[str, str] | None = None
     older_most: float = math.inf
+    followed: str = ''
 
     @property
     def least(self) -> float:

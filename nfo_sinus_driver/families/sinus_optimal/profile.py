@@ -51,8 +51,12 @@ _HOLDERS: Mapping[Value, Holder] = {
     Mode.BUS: Holder.BUS,
 }
 _SETPOINTS = {
-    'Freque': SetpointTarget('fieldbus.input_freq_setpoint', 150.0),
-    'Speed': SetpointTarget('fieldbus.input_speed_setpoint', 9000.0),
+    'Freque': SetpointTarget(
+        'fieldbus.input_freq_setpoint', 150.0, followed='status.control_freq'
+    ),
+    'Speed': SetpointTarget(
+        'fieldbus.input_speed_setpoint', 9000.0, followed='status.control_speed'
+    ),
 }
 _READY = Control.BUS_CONTROL
 _ENABLED = _READY | Control.ENABLE
