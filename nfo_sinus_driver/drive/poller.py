@@ -464,7 +464,8 @@ class Poller:
             self._rare_reads += 1
         actual = _ACTUAL.get(state.control_mode)
         steady = True
-        if actual is not None:
+        # the mailbox of a PLC is too slow for a poll
+        if actual is not None and not self._params.by_mailbox(state.model.key(actual)):
             now = await self._measure(actual)
             steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
         for role in _BASIC:

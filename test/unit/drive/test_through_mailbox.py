@@ -209,6 +209,41 @@ def test_torque_and_current_of_a_sinus_h_come_with_its_longer_telegram() -> None
         assert math.isnan(rig.notes.telemetry[-1].values[Role.ACTUAL_TORQUE])
 
 
+def test_current_torque_and_voltages_of_a_g2_come_by_the_mailbox_one_each_time() -> None:
+    # P1119 to P1123 and P1128 [M0 table 9]
+    keys = [f'status.{name}' for name in ('u_rms', 'i_rms', 'p_out', 'pf', 'dc_link', 'trq_act')]
+    with Rig(G2) as rig:
+        rig.turn()
+        rig.far.motor.load = 0.5
+        rig.pass_time(10.0)
+        measured = rig.notes.telemetry[-1].values
+        motor = rig.far.motor
+        assert measured[Role.OUTPUT_CURRENT] == pytest.approx(motor.current, abs=0.1)
+        assert measured[Role.ACTUAL_TORQUE] == pytest.approx(100 * motor.torque, abs=2.0)
+        for role in (Role.OUTPUT_VOLTAGE, Role.OUTPUT_POWER, Role.POWER_FACTOR):
+            assert measured[role] > 0, role
+        assert measured[Role.DC_LINK_VOLTAGE] > 500
+        asked = len(rig.asked)
+        rig.pass_time(10.0)
+        key_of = {key for _, key, _ in rig.asked[asked:]}
+        assert key_of >= set(keys)
+        # each is several transactions of a PLC that has other work
+        times = [rig.notes.telemetry[-1].at - one.at for one in rig.notes.telemetry[-12:]]
+        assert max(times) < 8.0
+        assert rig.drive.following
+
+
+def test_torque_by_the_mailbox_is_in_no_poll() -> None:
+    with Rig(G2, telemetry_rate=0.0, poll_rate=10.0) as rig:
+        rig.far.memory.set('control.mode', 'Torque')
+        rig.connect()
+        rig.pass_time(3.0)
+        asked = len(rig.asked)
+        rig.pass_time(3.0)
+        assert not [key for _, key, _ in rig.asked[asked:] if key == 'status.trq_act']
+        assert rig.drive.state.control_mode == 'Torque'
+
+
 # --- parameters by a user's own addresses ---------------------------------------------------------
 
 
