@@ -582,6 +582,8 @@ class Profile:
     :ivar after_write: what makes settings take effect that were written, or keeps them.
     :ivar pole_pairs: of the motor, where no parameter reports them; 0: not known.
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
+    :ivar spelled: by parameter, what a tool shows beside a number that the display of the drive
+        shows otherwise; ``''``: nothing.
     :ivar keeps_run: it keeps its run command without power, and runs again when it is back;
         ``None``: no manual says.
     """
@@ -619,6 +621,7 @@ class Profile:
     timeout_conditions: Mapping[str, Sequence[Value]] = field(default_factory=dict)
     after_write: Sequence[Write] = ()
     pole_pairs: int = 0
+    spelled: Mapping[str, Callable[[int], str]] = field(default_factory=dict)
     keeps_run: bool | None = None
 
     def seen_by(self, method: str) -> Profile:
