@@ -35,8 +35,9 @@ class ErrorLogArea:
     :ivar entries: how many every drive has.
     :ivar limit: how many some drives have; beyond ``entries`` stop at code 0 or a refusal [C4].
     :ivar sub_stride: from the sub-index of an entry to that of the next older one, which all stand
-        at :attr:`first`; the newest is the fault that is active, and empty while none is. ``None``:
-        entries have no sub-index.
+        at :attr:`first`; the newest is the fault that is active, and empty while none is. What
+        stands between are the faults that came before it was acknowledged, the next one first;
+        code 0 ends them. ``None``: entries have no sub-index.
     :ivar elsewhere: where the newest entry stands if there is none at ``first``; ``None``: nowhere.
     :ivar codec: how the bytes of an entry are read.
     :ivar factor: of entries that are a code alone: the code of one raw count.
@@ -91,11 +92,20 @@ class ErrorLogArea:
             raise IndexError(f'the error log has {self.limit} entries, not {entry + 1}')
         return self.first + self.stride * entry
 
-    def place(self, entry: int) -> tuple[str, int, int | None, int]:
-        """Return where a link finds an entry: space, index, sub-index and size in bytes."""
+    @property
+    def messages(self) -> int:
+        """How many faults an entry may have."""
+        return self.sub_stride or 1
+
+    def place(self, entry: int, message: int = 0) -> tuple[str, int, int | None, int]:
+        """
+        Return where a link finds an entry: space, index, sub-index and size in bytes.
+
+        :param message: which of its faults, 0 being the first.
+        """
         index = self.address(entry)
         # on Classic the high word has the next id
         sub_index = index + 1 if self.space == 'id' else None
         if self.sub_stride is not None:
-            sub_index = self.sub_stride * entry
+            sub_index = self.sub_stride * entry + message
         return self.space, index, sub_index, self.codec.size

@@ -20,7 +20,7 @@ import math
 from pathlib import Path
 
 from nfo_sinus_driver.catalog import table
-from nfo_sinus_driver.catalog.codec import Number, codec_of
+from nfo_sinus_driver.catalog.codec import BitField, Number, codec_of
 from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.own_parameters import own_parameter
 from nfo_sinus_driver.catalog.parameter import Access, Address, Parameter, Value
@@ -35,6 +35,12 @@ _UNHURRIED = frozenset(
         Role.FIRMWARE,
         Role.MOTOR_FIRMWARE,
         Role.CONTROL_MODE,
+        Role.ACTUAL_TORQUE,
+        Role.OUTPUT_VOLTAGE,
+        Role.OUTPUT_CURRENT,
+        Role.OUTPUT_POWER,
+        Role.POWER_FACTOR,
+        Role.DC_LINK_VOLTAGE,
         Role.MOTOR_TEMPERATURE,
         Role.PT1000_TEMPERATURE,
         Role.OPERATING_TIME,
@@ -513,9 +519,11 @@ def _address(row: table.Row) -> Address:
 def _what_it_takes(row: tuple[str, Address]) -> Iterator[str]:
     key, address = row
     yield f'{key} on {address.protocol}'
+    # some bits of a number may have a name of their own beside it
+    bits = address.codec.name if isinstance(address.codec, BitField) else ''
     for numbers in address.occupied:
         shown = '.'.join(f'{number:04X}h' for number in numbers)
-        yield f'{address.protocol} {address.space} {shown}'
+        yield f'{address.protocol} {address.space} {shown} {bits}'.rstrip()
 
 
 def _parameter(row: table.Row, addresses: Mapping[str, Address]) -> Parameter:

@@ -140,6 +140,12 @@ class Wait:
     seconds: float
 
 
+#: Follows a bit that rises to acknowledge, before it falls: a drive that takes its word only now
+#: and then has to find it [C117].
+FAULT_GONE = Hold(
+    lambda status: status.state not in (State.FAULTED, State.FAULT_REACTION_ACTIVE), 1.0
+)
+
 Step = Read | Write | Acknowledge | AcknowledgeThenWrite | Until | Hold | Wait
 Steps = Generator[Step, Any, _T]
 
@@ -190,6 +196,8 @@ class SetpointTarget:
         value itself; infinite where it is unknown.
     :ivar ends: the two parameters between which the drive takes set-points, if it has such.
     :ivar older_most: as ``most``, of the family's :class:`OlderDialect`.
+    :ivar followed: the parameter that reports what the drive follows, whoever gave it; ``''``:
+        :attr:`key` does.
     """
 
     key: str
@@ -200,6 +208,7 @@ class SetpointTarget:
     nominal: str | float = math.inf
     ends: tuple[str, str] | None = None
     older_most: float = math.inf
+    followed: str = ''
 
     @property
     def least(self) -> float:
@@ -580,6 +589,8 @@ class Profile:
     :ivar after_write: what makes settings take effect that were written, or keeps them.
     :ivar pole_pairs: of the motor, where no parameter reports them; 0: not known.
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
+    :ivar spelled: by parameter, what a tool shows beside a number that the display of the drive
+        shows otherwise; ``''``: nothing.
     :ivar keeps_run: it keeps its run command without power, and runs again when it is back;
         ``None``: no manual says.
     """
@@ -619,6 +630,7 @@ class Profile:
     fault_code: Callable[[int], int] = int
     after_write: Sequence[Write | Wait] = ()
     pole_pairs: int = 0
+    spelled: Mapping[str, Callable[[int], str]] = field(default_factory=dict)
     keeps_run: bool | None = None
 
     def seen_by(self, method: str) -> Profile:

@@ -106,7 +106,7 @@ class List(Verb):
             _put_values(wanted, values)
             return 0
         rows = [
-            (f'  {key}', shown(values[key], parameter.unit), parameter.description)
+            (f'  {key}', _spelled(drive, parameter, values[key]), parameter.description)
             for key, parameter in wanted.items()
         ]
         group = ''
@@ -138,7 +138,7 @@ class Get(Verb):
         if options.json:
             _put_values(wanted, values)
             return 0
-        put_columns([(key, shown(values[key], wanted[key].unit)) for key in wanted])
+        put_columns([(key, _spelled(drive, wanted[key], values[key])) for key in wanted])
         return 0
 
 
@@ -205,6 +205,14 @@ def _put_values(wanted: Mapping[str, Parameter], values: Mapping[str, Value]) ->
     """Print parameters with their units, for a script."""
     shown_ = {key: {'value': values[key], 'unit': wanted[key].unit} for key in wanted}
     put(as_json(shown_, indent=2))
+
+
+def _spelled(drive: OfflineDrive, parameter: Parameter, value: Value) -> str:
+    """Return a value with its unit, and as the display of the drive shows it."""
+    text = shown(value, parameter.unit)
+    spell = drive.model.profile.spelled.get(parameter.key)
+    spelled = spell(int(value)) if spell is not None else ''
+    return f'{text} ({spelled})' if spelled else text
 
 
 def _of_group(drive: OfflineDrive, name: str) -> dict[str, Parameter]:

@@ -566,9 +566,11 @@ class DriveState:
 
     @property
     def own_setpoint(self) -> float:
-        """The set-point that the drive reports, in the unit of its control mode; NaN if none."""
+        """The set-point that the drive follows, in the unit of its control mode; NaN if none."""
         target = self.model.profile.setpoints.get(self.control_mode)
-        return math.nan if target is None else self._measured.get(target.key, math.nan)
+        if target is None:
+            return math.nan
+        return self._measured.get(target.followed or target.key, math.nan)
 
     def last_polled(self, role: Role | None) -> Measured:
         """Return what a poll has measured last; the speed may follow from the frequency."""

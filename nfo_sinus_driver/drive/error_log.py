@@ -77,8 +77,8 @@ class ErrorLog:
         area = self.area
         entries = await self._read(min(most or area.entries, area.limit), 0, Priority.POLL)
         if not area.timed:
-            return tuple([await self._with_readings(*found) for found in enumerate(entries)])
-        return self.decode(entries, await self.read_time(Priority.POLL))
+            return tuple([await self._with_readings(*found) for found in entries])
+        return self.decode([entry for _, entry in entries], await self.read_time(Priority.POLL))
 
     async def _with_readings(self, number: int, entry: int) -> LogEntry:
         """Return what an entry without a time says, and what the drive has kept of it."""
@@ -92,7 +92,17 @@ class ErrorLog:
                 continue
         code = self.area.code(entry)
         text = self.area.unknown(entry) or self._state.nameplate.text_of(code)
-        return LogEntry(code, text, readings=tuple(kept))
+        return LogEntry(code, text, readings=(*await self._also(number), *kept))
+
+    async def _also(self, number: int) -> list[str]:
+        """Return what else has happened before the fault of an entry was acknowledged."""
+        found: list[str] = []
+        for message in range(1, self.area.messages):
+            code = self.area.code(await self._entry(number, Priority.POLL, message))
+            if not code:
+                break
+            found.append(f'also {code} {self._state.nameplate.text_of(code)}')
+        return found
 
     def _shown(self, key: str, data: bytes) -> str:
         """Return a value that the drive has kept with an entry; a bit field in hexadecimal."""
@@ -108,7 +118,7 @@ class ErrorLog:
         :param known: the newest one so far; 0 if there was none, ``None`` for only the newest.
         """
         limit = 1 if known is None else self.area.entries
-        return await self._read(limit, known or 0, priority)
+        return [entry for _, entry in await self._read(limit, known or 0, priority)]
 
     async def read_time(self, priority: Priority) -> float:
         """Read the operating time, h, which shows whether the drive was off meanwhile."""
@@ -172,8 +182,12 @@ class ErrorLog:
             raise DriveError(Cause.LOG_UNDOCUMENTED, model=self._state.model.name)
         return self._moved or self._state.model.error_logs[self._params.protocol]
 
-    async def _read(self, limit: int, known: int, priority: Priority) -> list[int]:
-        """Read the entries down to a known one; again if one comes in meanwhile."""
+    async def _read(self, limit: int, known: int, priority: Priority) -> list[tuple[int, int]]:
+        """
+        Read the entries down to a known one; again if one comes in meanwhile.
+
+        :returns: the number of each, too.
+        """
         area = self.area
         for _ in range(_READINGS):
             entries = await self._read_down(area, limit, known, priority)
@@ -184,9 +198,9 @@ class ErrorLog:
 
     async def _read_down(
         self, area: ErrorLogArea, limit: int, known: int, priority: Priority
-    ) -> list[int]:
+    ) -> list[tuple[int, int]]:
         """Read entries until one is empty or known, or until there are no more."""
-        found: list[int] = []
+        found: list[tuple[int, int]] = []
         for number in range(area.limit):
             try:
                 entry = await self._entry(number, priority)
@@ -199,15 +213,15 @@ class ErrorLog:
                 continue
             if not area.code(entry) or entry == known:
                 break
-            found.append(entry)
+            found.append((number, entry))
             if len(found) == limit:
                 break
         return found
 
-    async def _entry(self, number: int, priority: Priority) -> int:
+    async def _entry(self, number: int, priority: Priority, message: int = 0) -> int:
         area = self.area
         try:
-            return await self._entry_of(area, number, priority)
+            return await self._entry_of(area, number, priority, message)
         except Refused as error:
             if number or area.elsewhere is None or error.code != Refused.ILLEGAL_ADDRESS:
                 raise
@@ -219,10 +233,12 @@ class ErrorLog:
             self._moved = area
             return entry
 
-    async def _entry_of(self, area: ErrorLogArea, number: int, priority: Priority) -> int:
+    async def _entry_of(
+        self, area: ErrorLogArea, number: int, priority: Priority, message: int = 0
+    ) -> int:
         # no client waits for what is read in the background, so it is not retried at once
         data = await self._params.read_from(
-            Address(*area.place(number)), priority, retry=priority <= Priority.POLL
+            Address(*area.place(number, message)), priority, retry=priority <= Priority.POLL
         )
         return area.codec.decode(data)
 

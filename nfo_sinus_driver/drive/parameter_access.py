@@ -156,7 +156,8 @@ class ParameterAccess:
 
     def by_mailbox(self, key: str) -> bool:
         """Return whether a parameter is reached by the mailbox of a PLC, which is slow."""
-        return self.in_block and self.model[key].at(self.protocol).space in BY_MAILBOX
+        there = self.in_block and self.is_addressable(key)
+        return there and self.model[key].at(self.protocol).space in BY_MAILBOX
 
     def use_mailbox(self, has_mailbox: bool) -> None:
         """Note whether parameters are reached by the mailbox of the PLC."""

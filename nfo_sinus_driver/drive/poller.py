@@ -150,6 +150,8 @@ class Poller:
         self._failures = _Failures()
         #: How often in a row it could not be connected to.
         self._failed_reconnects = 0
+        #: A PLC answers that has no new data from the drive.
+        self._behind_plc = False
         #: When a value was last asked for, pauses of the worker aside, and how long it took, s:
         #: long, where the line is full.
         self._requested_at = self._turn = 0.0
@@ -319,7 +321,8 @@ class Poller:
             strikes_in = frame_at + state.timeout.seconds - self._bus.now()
             if strikes_in > 0:
                 pause = min(pause, max(strikes_in - _LAST_CHANCE, _SHORTEST_PAUSE))
-            return pause
+            # the life counter goes on, else the PLC takes the driver for dead
+            return min(pause, self._period) if self._behind_plc else pause
         pause = polled_at + self._period - self._bus.now()
         # however low the poll rate, a motor that runs is watched, and so is one whose run
         # command may still be active, for it would start when its fault ends
@@ -462,7 +465,8 @@ class Poller:
             self._rare_reads += 1
         actual = _ACTUAL.get(state.control_mode)
         steady = True
-        if actual is not None:
+        # the mailbox of a PLC is too slow for a poll
+        if actual is not None and not self._params.by_mailbox(state.model.key(actual)):
             now = await self._measure(actual)
             steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
         for role in _BASIC:
@@ -601,6 +605,7 @@ class Poller:
     def _on_poll_failed(self, error: LinkError | DriveError) -> None:
         state = self._state
         state.unanswered()
+        self._behind_plc = isinstance(error, NoData) or _is(error, Cause.OLD_DATA)
         if not state.connected:
             self._failed_reconnects += 1
             if isinstance(error, DriveError) and error.report != self._complaint:
@@ -612,8 +617,7 @@ class Poller:
         # one that answers, but gives no status, cannot be watched either
         unwatched = any(map(self._fails_for_long, (_STATUS, _MODE, _POLL)))
         # these have been waited out, or cannot be
-        at_once = isinstance(error, (PortError, NoData, Interrupted))
-        at_once = at_once or _is(error, Cause.OLD_DATA)
+        at_once = self._behind_plc or isinstance(error, (PortError, Interrupted))
         another = isinstance(error, DriveError) and not self._params.recognition.holds
         at_once = at_once or another
         if at_once or self._silent_for_long or unwatched:

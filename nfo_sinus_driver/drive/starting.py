@@ -132,7 +132,8 @@ class StartSequence:
         self._deadline += step.added
 
     def _why_not_started(self, status: InverterStatus) -> Cause:
-        if not status.standby:
+        # one that reports its RUN input reports that it is active [C90]
+        if not status.standby or Fact.RUN_INPUT_MISSING in status.valid:
             return Cause.NOT_STARTED
         has_one = self._state.model.profile.has_enable_input
         return Cause.NO_RUN_INPUT if has_one else Cause.STAYS_IN_STANDBY

@@ -14,7 +14,7 @@ from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.snapshot import NAN, Telemetry
 from nfo_sinus_driver.link import LinkError, Refused
 
-#: Read every time.
+#: Read every time, but by the mailbox of a PLC, which has other work.
 FAST = (
     Role.OUTPUT_VOLTAGE,
     Role.OUTPUT_CURRENT,
@@ -53,8 +53,10 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
     #: By key: what was measured, and how often in a row the drive has denied it.
     values: dict[str, float] = {}
     denied: Counter[str] = Counter()
+    by_mailbox = [role for role in FAST if state.params.by_mailbox(key_of(role))]
+    fast = [role for role in FAST if role not in by_mailbox]
     # the first time all are read, so that the first message is whole
-    due = deque(SLOW)
+    due = deque((*by_mailbox, *SLOW))
     first = True
 
     async def measure(key: str) -> None:
@@ -76,7 +78,7 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
         rate = state.settings.telemetry_rate
         if rate and state.connected and state.responsive and not yields():
             try:
-                roles = (*FAST, *due) if first else (*FAST, due[0])
+                roles = (*fast, *due) if first else (*fast, due[0])
                 named = state.measured_keys
                 for key in dict.fromkeys((*map(key_of, roles), *named)):
                     await measure(key)

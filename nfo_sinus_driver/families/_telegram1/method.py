@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from nfo_sinus_driver.catalog.profile import (
+    FAULT_GONE,
     ControlMethod,
     Hold,
     Holder,
@@ -45,7 +46,7 @@ SETPOINT = 'telegram.setpoint'
 #: What the PLC says of the data, above ZSW1.
 RELEASED = 1 << 17
 FAULT_ACK = 1 << 7
-#: How long a word is given to reach the drive, and a fault to go by it, s.
+#: How long a word is given to reach the drive, s.
 _TAKEN_IN = 1.0
 
 NOT_RELEASED = 190
@@ -181,13 +182,9 @@ class Telegram1(ControlMethod):
         yield begin(self.ready)
         yield Hold(lambda status: True, _TAKEN_IN)
         yield begin(self.ready | FAULT_ACK)
-        yield Hold(self._without_fault, _TAKEN_IN)
+        yield FAULT_GONE
         yield begin(self.ready)
         return ''
-
-    @staticmethod
-    def _without_fault(status: Status) -> bool:
-        return status.state not in (State.FAULTED, State.FAULT_REACTION_ACTIVE)
 
 
 def begin(word: int, *, retry: bool = True) -> Write:

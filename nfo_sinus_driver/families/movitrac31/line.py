@@ -18,6 +18,7 @@ from typing import ClassVar
 
 from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import (
+    FAULT_GONE,
     ControlMethod,
     Holder,
     Limits,
@@ -153,6 +154,8 @@ class ByLine(ControlMethod):
             write = Write(BITS, int(bits))
             with contextlib.nullcontext() if remote_control else contextlib.suppress(Refusal):
                 yield write
+                if bits:
+                    yield FAULT_GONE
         if not remote_control and int((yield Read(STATUS_WORD))) & words.FAULT:
             raise NotPossible(
                 'P841 is not Remote control, and the drive ignores function bits: reset it at the '

@@ -13,6 +13,7 @@ from nfo_sinus_driver.catalog.profile import NotPossible, Product, Read, Refusal
 _TYPE = 'status.inverter_type'
 _OUTPUT_STAGE = 'status.output_stage'
 _SOFTWARE = 'special.software_system'
+_FIELDBUS = 'special.eprom_fieldbus'
 #: Index 271: this family; and what speaks the same protocol, with other parameters.
 _OURS = 'MOVITRAC 31..'
 _OTHERS = ('MOVITRAC 3000', 'MOVIDYN 5000')
@@ -44,7 +45,9 @@ def read_product() -> Steps[Product]:
         )
     size = yield from read_if_there(_OUTPUT_STAGE)
     software = yield from read_if_there(_SOFTWARE)
-    number = '' if software is None else _part_number(int(software))
+    number = ''
+    if software is not None:
+        number = part_number(int(software)) or f'P810 {int(software):08X}h'
     if type_ is None:
         return Product(software=number)
     listed = type_ == _OURS
@@ -60,10 +63,14 @@ def _model(size: Value | None) -> str:
     return f'MOVITRAC {size}' if listed else f'{_OURS} (output stage {size})'
 
 
-def _part_number(word: int) -> str:
-    digits = f'{word:08X}'
-    found = _PART_NUMBER.fullmatch(digits)
+def part_number(word: int) -> str:
+    """Return the part number of a software, such as 821 123 4.11; ``''`` if it is none."""
+    found = _PART_NUMBER.fullmatch(f'{word:08X}')
     if found is None:
-        return f'P810 {digits}h'
+        return ''
     first, second, major, minor = found.groups()
     return f"8{first} {second} {major.replace('A', 'X')}.{minor}"
+
+
+#: P810 and P812.
+SPELLED = {_SOFTWARE: part_number, _FIELDBUS: part_number}

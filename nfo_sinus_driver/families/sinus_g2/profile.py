@@ -15,6 +15,7 @@ from typing import ClassVar
 
 from nfo_sinus_driver.catalog.directed import with_direction
 from nfo_sinus_driver.catalog.profile import (
+    FAULT_GONE,
     Acknowledge,
     AcknowledgeThenWrite,
     ControlMethod,
@@ -342,7 +343,11 @@ class DriveControl(_G2):
         without a direction from there to DISABLE, which shows as SHUTDOWN does ([M0 table 16],
         [C37]).
         """
-        yield Until(lambda status: status.state in (State.READY_TO_SWITCH_ON, State.STOPPING))
+        startable = (State.READY_TO_SWITCH_ON, State.STOPPING)
+        yield Until(
+            lambda status: status.state in startable
+            and bool((status.word or 0) & words.Status.CTRL_FROM_NET)
+        )
         switched_on = self._ready | Control.SWITCH_ON
         yield Write(CONTROL_WORD, switched_on, retry=False)
         yield Until(lambda status: status.state in (State.SWITCHED_ON, State.STOPPING))
@@ -429,6 +434,8 @@ class DriveControl(_G2):
         try:
             for add in (Control(0), Control.RESET_MALFUNCTION, Control(0)):
                 yield from self._change(~(_RUN | Control.RESET_MALFUNCTION), add)
+                if add:
+                    yield FAULT_GONE
         except Refusal:
             if (yield from self.remove(control_mode)) is not Removal.COMMAND:
                 # refused while the cause of the fault lasts: the status will tell

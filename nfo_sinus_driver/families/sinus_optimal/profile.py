@@ -15,6 +15,7 @@ from typing import ClassVar
 
 from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import (
+    FAULT_GONE,
     ControlMethod,
     Holder,
     Procedure,
@@ -27,6 +28,7 @@ from nfo_sinus_driver.catalog.profile import (
     Status,
     Steps,
     Until,
+    Wait,
     Write,
     one,
     try_steps,
@@ -49,11 +51,23 @@ _HOLDERS: Mapping[Value, Holder] = {
     Mode.BUS: Holder.BUS,
 }
 _SETPOINTS = {
-    'Freque': SetpointTarget('fieldbus.input_freq_setpoint', 150.0),
-    'Speed': SetpointTarget('fieldbus.input_speed_setpoint', 9000.0),
+    'Freque': SetpointTarget(
+        'fieldbus.input_freq_setpoint', 150.0, followed='status.control_freq'
+    ),
+    'Speed': SetpointTarget(
+        'fieldbus.input_speed_setpoint', 9000.0, followed='status.control_speed'
+    ),
 }
 _READY = Control.BUS_CONTROL
+_ENABLED = _READY | Control.ENABLE
 _RUN = Control.SWITCH_ON
+#: Where control is handed to the bus, and Enable is taken; [M1] does not say what of a motor that
+#: is enabled already.
+_ENABLES = words.Status.READY | words.Status.ENABLED
+#: The motor is driven, be it to a stop.
+_DRIVEN = words.Status.SWITCHED_ON | words.Status.STOPPING
+#: How long the drive is given for a step that no status shows, s; [M1] prints no time.
+_UNSHOWN = 0.2
 
 
 class ModeSmode(ModeScmd):
@@ -135,31 +149,50 @@ class DriveControl(ControlMethod):
 
     def take_control(self) -> Steps[None]:
         """
-        Take control with neither Enable nor Switch on.
+        Take control without Switch on; a motor that still ramps keeps Enable [C109].
 
-        Who lost it to keypad or terminals has to ask anew: the bit may still stand in the word.
+        Where Enable is taken away the drive has to show that, too: else what it has shown before
+        would be taken for the answer to the Enable that follows. Who lost control to keypad or
+        terminals has to ask anew, for the bit may still stand in the word.
         """
-        if not (yield from self.in_control()):
+        shown = int((yield Read(STATUS_WORD)))
+        from_bus = bool(shown & words.Status.CONTROL_FROM_BUS)
+        word = int((yield Read(CONTROL_WORD)))
+        asked = bool(word & Control.BUS_CONTROL)
+        ramps = from_bus and bool(shown & _DRIVEN) and bool(word & Control.ENABLE)
+        ready = _ENABLED if ramps else _READY
+        if asked and not from_bus:
             yield Write(CONTROL_WORD, Control(0))
-        yield Write(CONTROL_WORD, _READY)
+            yield Wait(_UNSHOWN)
+        yield Write(CONTROL_WORD, ready)
+        if from_bus and not asked:
+            # by MODE: no status shows when the bit is taken
+            yield Wait(_UNSHOWN)
+
+        def is_taken(status: Status) -> bool:
+            shown = status.word or 0
+            released = ramps or not shown & words.Status.ENABLED
+            return bool(shown & words.Status.CONTROL_FROM_BUS) and released
+
+        yield Until(is_taken)
 
     def zero_setpoint(self, control_mode: str) -> Steps[None]:
         """Do nothing: the reference is none of ours."""
         yield from ()
 
     def run(self) -> Steps[None]:
-        """Enable, then switch on, when the drive shows that it is enabled."""
-        enabled = _READY | Control.ENABLE
-        yield Write(CONTROL_WORD, enabled)
+        """Enable when the drive is ready for it, and switch on when it shows that."""
+        yield Until(lambda status: bool((status.word or 0) & _ENABLES))
+        yield Write(CONTROL_WORD, _ENABLED)
         yield Until(lambda status: bool((status.word or 0) & words.Status.ENABLED))
-        yield Write(CONTROL_WORD, enabled | _RUN, retry=False)
+        yield Write(CONTROL_WORD, _ENABLED | _RUN, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
         """Reset Switch on, and leave the other bits to who has control."""
         yield from self._stop_by(self._switch_off(retry=False))
 
     def _switch_off(self, *, retry: bool = True) -> Steps[None]:
-        word = int(_READY | Control.ENABLE)
+        word = int(_ENABLED)
         try:
             word = int((yield Read(CONTROL_WORD, retry=retry)))
         except Refusal:
@@ -192,8 +225,12 @@ class DriveControl(ControlMethod):
         """Acknowledge a fault by one rising edge of bit 7 [M1]."""
         word = int((yield Read(CONTROL_WORD)))
         low = word & ~(Control.FAULT_ACK | _RUN)
-        for written in (low, low | Control.FAULT_ACK, low):
-            yield Write(CONTROL_WORD, written)
+        yield Write(CONTROL_WORD, low)
+        if word & Control.FAULT_ACK:
+            yield Wait(_UNSHOWN)
+        yield Write(CONTROL_WORD, low | Control.FAULT_ACK)
+        yield FAULT_GONE
+        yield Write(CONTROL_WORD, low)
         return ''
 
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import Annotated, Literal
 
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
-from nfo_sinus_driver.catalog.codec import SignedBcd, codec_of
+from nfo_sinus_driver.catalog.codec import BitField, SignedBcd, codec_of
 from nfo_sinus_driver.simulator import movitrac
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
@@ -109,7 +109,12 @@ class Server(movitrac.Server):
         #: The first half-byte of a negative number [C70].
         self._sign = int(self._unit.variant.negative_sign, 16)
         self.any_address = self._unit.variant.interface == 'rs232'
-        self._by_index = {one.at(_PROTOCOL).index: one for one in drive.memory.model.values()}
+        #: What stands there as a whole; some bits of it may have a name of their own.
+        self._by_index = {
+            one.at(_PROTOCOL).index: one
+            for one in drive.memory.model.values()
+            if not isinstance(one.at(_PROTOCOL).codec, BitField)
+        }
 
     def enquiry(self, index: int) -> bytes:
         """Return the bytes of a parameter; a negative number has a sign in place of a digit."""

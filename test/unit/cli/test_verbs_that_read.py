@@ -468,3 +468,19 @@ def test_an_optimal(make_bench: Callable[..., Bench]) -> None:
     done = bench.run('scan', '--addresses', '1', '--model', 'sinus_g2')
     assert done.status == 0 and 'no sinus_g2?' in done.out
     assert bench.writes() == []
+
+
+def test_part_numbers_of_a_movitrac_are_those_of_its_display(
+    make_bench: Callable[..., Bench],
+) -> None:
+    # P810 and P812 [M4 §4]
+    bench = make_bench(
+        model='movitrac31', protocol='movitrac', serial_numbers=[], option_card='ffi'
+    )
+    with bench.simulator.lock:
+        bench.drive().memory.put('special.eprom_fieldbus', 0x21123A11)
+    shown = bench.run('get', 'special.software_system', 'special.eprom_fieldbus').out
+    assert [line.split(None, 1)[1].strip() for line in shown.splitlines()] == [
+        '554841105 (821 123 4.11)', '554842641 (821 123 X.11)'
+    ]
+    assert '554841105 (821 123 4.11)' in bench.run('list', '--group', 'special').out

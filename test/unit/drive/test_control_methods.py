@@ -118,7 +118,7 @@ def test_each_step_of_the_optimal_is_confirmed_before_the_next(
         rig.meet = note
         rig.enable()
         assert confirmed == [
-            (0, 0), (0x4000, 0), (0x4008, FROM_BUS), (0x4009, FROM_BUS | ENABLED)
+            (0x4000, 0), (0x4008, FROM_BUS), (0x4009, FROM_BUS | ENABLED)
         ]
 
 

@@ -74,13 +74,29 @@ def test_the_usual_ones_of_every_model_are_measured_values_of_it(model: str) -> 
         assert {*family.profile.measured} <= {parameter.key for parameter in family.measured}
 
 
-@pytest.mark.parametrize('connection', ['rtu', 'optimal'])
-def test_a_monitored_drive_reports_the_setpoint_of_another_master(connection: str) -> None:
-    with Rig(connection, control_method='monitor').connect() as rig:
+def test_a_monitored_drive_reports_the_setpoint_of_another_master() -> None:
+    with Rig(control_method='monitor').connect() as rig:
         target = rig.drive.model.profile.setpoints['Freque'].key
         rig.far.memory.set(target, 12.5)
         rig.pass_time(1.5)
         assert rig.notes.snapshots[-1].setpoint == pytest.approx(12.5)
+
+
+@pytest.mark.parametrize(('mode', 'setpoint'), [('Freque', 25.0), ('Speed', 750.0)])
+def test_a_monitored_optimal_reports_the_setpoint_that_it_follows(
+    mode: str, setpoint: float
+) -> None:
+    # that of its terminals here, and not the one that was written last over the bus [C53]
+    with Rig(
+        'optimal',
+        parameters={'control.mode': mode},
+        control_method='monitor',
+        expected_control_mode=mode,
+    ).connect() as rig:
+        rig.far.memory.set(rig.drive.model.profile.setpoints[mode].key, 12)
+        rig.far.control_unit.press('ext')
+        rig.pass_time(1.5)
+        assert rig.notes.snapshots[-1].setpoint == pytest.approx(setpoint)
 
 
 def test_what_is_only_read_is_kept_up_beside_the_settings() -> None:

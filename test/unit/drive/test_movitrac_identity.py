@@ -11,6 +11,7 @@ from movitrac import make, succeeded
 import pytest
 from support.rig import Rig
 
+from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.drive import Cause, DriveError, Identity, Severity
 
 TYPE, SIZE = 'status.inverter_type', 'status.output_stage'
@@ -98,3 +99,19 @@ def test_a_stop_asks_nothing_of_the_type() -> None:
         rig.asked.clear()
         assert succeeded(rig, rig.drive.stop())
         assert not {TYPE, SIZE, SOFTWARE} & {key for _, key, _ in rig.asked}
+
+
+@pytest.mark.parametrize(('card', 'x20', 'x21'), [
+    ('none', 'None', 'None'), ('fio', 'FIO', 'None'), ('ffi', 'FF. (Fieldbus)', 'None'),
+    ('fen', 'None', 'FEN'), ('fpi', 'None', 'FPI'),
+])
+def test_option_cards_are_named_as_the_manual_names_them(card: str, x20: str, x21: str) -> None:
+    # P050 and P051 are bytes 1 and 2 of index 237
+    with make(options={'option_card': card}) as rig:
+        rig.connect()
+        params = rig.drive.params
+        named = [
+            rig.result(rig.bus.run(params.read(f'status.option_{place}', Priority.SERVICE)))
+            for place in ('x20', 'x21')
+        ]
+        assert named == [x20, x21]

@@ -121,6 +121,40 @@ NAMED = {
 }
 
 
+@every_family
+@pytest.mark.parametrize('lose', [cut_fieldbus, None], ids=['fieldbus', 'telegrams stand still'])
+def test_life_counter_goes_on_while_only_the_drive_is_lost(
+    connection: str, lose: Callable[[Rig, float], None] | None
+) -> None:
+    # else the watchdog of the PLC takes the driver for dead
+    with Rig(connection) as rig:
+        rig.turn()
+        channel = channel_of(rig)
+        counts = {channel.block.registers()[10]}
+        alive: list[bool] = []
+
+        def look() -> None:
+            counts.add(channel.block.registers()[10])
+            alive.append(channel.program.ros_alive)
+
+        rig.looked = look
+        if lose is not None:
+            lose(rig, 10.0)
+        else:
+            # the PLC goes on, and the drive's telegrams are as they were
+            channel.exchange = lambda now: setattr(channel, 'exchanged', False)  # type: ignore
+            channel.program.drive_time = 60.0
+            rig.pass_time(10.0)
+            del channel.exchange
+        assert not rig.drive.state.connected
+        assert all(alive)
+        rig.looked = lambda: None
+        # at the rate of the polls
+        assert len(counts) > 0.7 * 10.0 * rig.drive.settings.poll_rate
+        rig.wait_until(lambda: rig.drive.state.connected)
+        rig.assert_only_enable_helps()
+
+
 def complaint(connection: str, exchange: float, levels: bool, loss: str) -> str:
     """Return what is wrong after a loss; ``''`` if nothing is."""
     options = LEVELS[connection] if levels else {}

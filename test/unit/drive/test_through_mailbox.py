@@ -14,9 +14,11 @@ from support.rig import Rig
 from support.said import raises
 from support.telegram_laws import COMMANDS, words
 
+from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Access, Role, load_family
 from nfo_sinus_driver.drive import Cause, DriveSettings, Severity
 from nfo_sinus_driver.simulator.memory import Reason, Refused
+from nfo_sinus_driver.simulator.parameter_channel import ParameterEntry
 
 G2, SINUS_H = 'telegram1 g2, mailbox', 'telegram1 sinus_h, mailbox'
 ACCEL = 'control.accel'
@@ -139,7 +141,11 @@ def test_the_error_log_is_read_and_watched() -> None:
 @pytest.mark.parametrize(('code', 'text', 'remedy'), [
     (11, 'Overcurrent Trip', 'Lengthen the acceleration time'),
     (35, 'Lost Command', 'Check the PLC'),
-    (64, 'Internal Comm Error', 'seat of the module'),
+    (
+        64,
+        'Internal Communication Error between the Inverter and the Option Card',
+        'seat of the module',
+    ),
 ])
 def test_a_trip_of_a_sinus_h_is_named_with_its_remedy(code: int, text: str, remedy: str) -> None:
     with Rig(SINUS_H) as rig:
@@ -153,6 +159,38 @@ def test_a_trip_of_a_sinus_h_is_named_with_its_remedy(code: int, text: str, reme
         rig.pass_time(0.5)
         assert [one.code for one in rig.result(rig.drive.error_log())] == [code]
         assert rig.result(rig.drive.error_log(1))[0].code == code
+
+
+def test_every_message_of_a_fault_situation_of_a_sinus_h_is_in_the_log() -> None:
+    # eight situations of eight messages [M3 §9]
+    with Rig(SINUS_H) as rig:
+        rig.connect()
+        for code in (12, 11, 64):
+            rig.far.trip(code)
+        (entry,) = rig.result(rig.drive.error_log())
+        assert entry.code == 12
+        assert entry.readings == (
+            'also 11 Overcurrent Trip',
+            'also 64 Internal Communication Error between the Inverter and the Option Card',
+        )
+        channel = rig.line.plc.channels[1].server.parameters
+        for situation, messages in ((0, (0,)), (1, (12, 11)), (2, (33,))):
+            for message in range(8):
+                code = dict(enumerate(messages)).get(message, 0)
+                channel.entries[947, 8 * situation + message] = ParameterEntry(
+                    lambda code=code: code
+                )
+        shown = [(one.code, one.readings) for one in rig.result(rig.drive.error_log())]
+        assert shown[:2] == [(12, ('also 11 Overcurrent Trip',)), (33, ())]
+
+
+def test_the_version_of_a_sinus_h_module_is_the_number_that_it_shows() -> None:
+    # "102" is version 1.2 [M3 §8], and no 1.02
+    with Rig(SINUS_H) as rig:
+        rig.connect()
+        params = rig.drive.params
+        task = rig.bus.run(params.read('profidrive.version', Priority.SERVICE))
+        assert rig.result(task) == 102
 
 
 def test_torque_and_current_of_a_sinus_h_come_with_its_longer_telegram() -> None:
@@ -169,6 +207,41 @@ def test_torque_and_current_of_a_sinus_h_come_with_its_longer_telegram() -> None
         rig.turn()
         rig.pass_time(2.0)
         assert math.isnan(rig.notes.telemetry[-1].values[Role.ACTUAL_TORQUE])
+
+
+def test_current_torque_and_voltages_of_a_g2_come_by_the_mailbox_one_each_time() -> None:
+    # P1119 to P1123 and P1128 [M0 table 9]
+    keys = [f'status.{name}' for name in ('u_rms', 'i_rms', 'p_out', 'pf', 'dc_link', 'trq_act')]
+    with Rig(G2) as rig:
+        rig.turn()
+        rig.far.motor.load = 0.5
+        rig.pass_time(10.0)
+        measured = rig.notes.telemetry[-1].values
+        motor = rig.far.motor
+        assert measured[Role.OUTPUT_CURRENT] == pytest.approx(motor.current, abs=0.1)
+        assert measured[Role.ACTUAL_TORQUE] == pytest.approx(100 * motor.torque, abs=2.0)
+        for role in (Role.OUTPUT_VOLTAGE, Role.OUTPUT_POWER, Role.POWER_FACTOR):
+            assert measured[role] > 0, role
+        assert measured[Role.DC_LINK_VOLTAGE] > 500
+        asked = len(rig.asked)
+        rig.pass_time(10.0)
+        key_of = {key for _, key, _ in rig.asked[asked:]}
+        assert key_of >= set(keys)
+        # each is several transactions of a PLC that has other work
+        times = [rig.notes.telemetry[-1].at - one.at for one in rig.notes.telemetry[-12:]]
+        assert max(times) < 8.0
+        assert rig.drive.following
+
+
+def test_torque_by_the_mailbox_is_in_no_poll() -> None:
+    with Rig(G2, telemetry_rate=0.0, poll_rate=10.0) as rig:
+        rig.far.memory.set('control.mode', 'Torque')
+        rig.connect()
+        rig.pass_time(3.0)
+        asked = len(rig.asked)
+        rig.pass_time(3.0)
+        assert not [key for _, key, _ in rig.asked[asked:] if key == 'status.trq_act']
+        assert rig.drive.state.control_mode == 'Torque'
 
 
 # --- parameters by a user's own addresses ---------------------------------------------------------

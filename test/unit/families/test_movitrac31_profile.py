@@ -16,7 +16,7 @@ import pytest
 from support.steps import REFUSED, play
 
 from nfo_sinus_driver.catalog import Holder, Limits, NotPossible, Refusal, Removal, load_family
-from nfo_sinus_driver.catalog.profile import Read, Write
+from nfo_sinus_driver.catalog.profile import FAULT_GONE, Read, Write
 from nfo_sinus_driver.drive.snapshot import InverterStatus
 from nfo_sinus_driver.families.movitrac31 import words
 
@@ -321,13 +321,16 @@ def acknowledged(*script: tuple[Any, Any], closed: int = CLOSED_43) -> object:
 def test_a_fault_is_acknowledged_by_an_edge_without_run_bits() -> None:
     cleared = (Write(BITS, 0), None), *SIZE_0
     for late in (None, REFUSED):
-        edge = (Write(BITS, RESET), late), (Write(BITS, 0), late)
+        # its word is taken now and then: the bit stands until the fault is gone
+        held = () if late else ((FAULT_GONE, True),)
+        edge = (Write(BITS, RESET), late), *held, (Write(BITS, 0), late)
         elsewhere = *cleared, (Read(MODE), STANDARD), *edge
         acknowledged(*elsewhere, (Read(WORD), 0x00010000))
         with pytest.raises(NotPossible, match='P841 is not Remote control'):
             acknowledged(*elsewhere, (Read(WORD), 0x2D010000))
     mine = *cleared, (Read(MODE), REMOTE)
-    assert acknowledged(*mine, (Write(BITS, RESET), None), (Write(BITS, 0), None)) == ''
+    held = (Write(BITS, RESET), None), (FAULT_GONE, True), (Write(BITS, 0), None)
+    assert acknowledged(*mine, *held) == ''
     with pytest.raises(Refusal):
         acknowledged(*mine, (Write(BITS, RESET), REFUSED))
 

@@ -9,7 +9,14 @@ import pytest
 from support.steps import REFUSED, Wait, play, status
 
 from nfo_sinus_driver.catalog import Holder, NotPossible, Refusal, Removal, State, load_family
-from nfo_sinus_driver.catalog.profile import Acknowledge, AcknowledgeThenWrite, Read, Write
+from nfo_sinus_driver.catalog.profile import (
+    FAULT_GONE,
+    Acknowledge,
+    AcknowledgeThenWrite,
+    Read,
+    Step,
+    Write,
+)
 from nfo_sinus_driver.families.sinus_g2.ds402.words import STATUS_WORD, error_text, state_of
 
 G2, DS402 = load_family('sinus_g2'), load_family('sinus_g2', 'ds402')
@@ -29,10 +36,10 @@ ZEROED = ((Write(TARGET, 0.0), None), (Read(TARGET), 0))
 NO_ERROR = (Read(ERROR), 0)
 
 
-def edge(answer: object = None) -> tuple[tuple[Write, object], ...]:
+def edge(answer: object = None) -> tuple[tuple[Step, object], ...]:
     """Return bit 7 rising, without voltage, and what the drive answers to that."""
-    words = (NO_VOLTAGE, RESET, NO_VOLTAGE)
-    return tuple((Write(WORD, word, retry=False), answer) for word in words)
+    low, high = (Write(WORD, word, retry=False) for word in (NO_VOLTAGE, RESET))
+    return (low, answer), (high, answer), (FAULT_GONE, True), (low, answer)
 
 
 def test_it_shares_the_tables_and_has_roles_of_its_own() -> None:
@@ -81,7 +88,12 @@ def test_what_error_code_says() -> None:
 def test_control_is_taken_without_a_run_command_and_not_while_it_tunes() -> None:
     shutdown = (Write(WORD, SHUTDOWN), None)
     play(METHOD.take_control(), (Read(MODE), BUS), FROM_BUS, shutdown)
-    play(METHOD.take_control(), (Read(MODE), STOP), LOCAL, (Write(MODE, BUS), None), shutdown)
+    remote = Wait(status(word=REMOTE), not_by=[status(), status(word=0x0040)])
+    for answer in (None, REFUSED):
+        # before the bus has control it may not be processed, and what stood may count then
+        first = (Write(WORD, SHUTDOWN, head=True), answer)
+        taken = (Write(MODE, BUS), None), first, (remote, None)
+        play(METHOD.take_control(), (Read(MODE), STOP), LOCAL, *taken, shutdown)
     with pytest.raises(NotPossible, match='Inhibit'):
         play(METHOD.take_control(), (Read(MODE), INHIBIT))
     holders = (Holder.INHIBITED, Holder.NOBODY, Holder.LOCAL, Holder.BUS)

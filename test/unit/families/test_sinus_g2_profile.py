@@ -19,6 +19,7 @@ from nfo_sinus_driver.catalog import (
     load_family,
 )
 from nfo_sinus_driver.catalog.profile import (
+    FAULT_GONE,
     Acknowledge,
     AcknowledgeThenWrite,
     ControlMethod,
@@ -67,6 +68,15 @@ def control(reference: str = 'fieldbus', *, classic: bool = False) -> ControlMet
 def change(clear: int, add: int = 0, *, retry: bool = False) -> Write:
     """Some bits of the control word, as one transaction: the AND mask is the low word."""
     return Write(MASK, ~clear & 0xFFFF | add << 16, retry=retry)
+
+
+#: Bit 7 rises, and stands until the fault is gone.
+EDGE = (
+    (change(RUN_BITS | 0x80), None),
+    (change(RUN_BITS | 0x80, 0x80), None),
+    (FAULT_GONE, True),
+    (change(RUN_BITS | 0x80), None),
+)
 
 
 # --- MODE and SCMD --------------------------------------------------------------------------------
@@ -200,10 +210,9 @@ def test_a_serial_fault_takes_no_control_from_the_terminals() -> None:
     with pytest.raises(NotPossible, match='press STOP at the drive'):
         play(scmd().acknowledge(SIO_FAIL, 'Freque'), *script, STANDS)
     begins = ((Read(MODE), EXT),)
-    edge = [(change(RUN_BITS | 0x80, add), None) for add in (0, 0x80, 0)]
-    assert play(control().acknowledge(SIO_FAIL, 'Freque'), *begins, *edge, GONE) == ''
+    assert play(control().acknowledge(SIO_FAIL, 'Freque'), *begins, *EDGE, GONE) == ''
     with pytest.raises(NotPossible, match='press STOP at the drive'):
-        play(control().acknowledge(SIO_FAIL, 'Freque'), *begins, *edge, STANDS)
+        play(control().acknowledge(SIO_FAIL, 'Freque'), *begins, *EDGE, STANDS)
 
 
 def test_procedures() -> None:
@@ -231,14 +240,18 @@ def test_the_network_has_control() -> None:
 
 def test_the_control_word_is_taken_and_runs() -> None:
     # from a motor that still stops, too: no state between shows then
-    others = [status(state=state) for state in (State.FAULTED, State.OPERATION_ENABLED)]
-    stopping = status(state=State.STOPPING)
+    others = [
+        status(state=state, word=FROM_NET) for state in (State.FAULTED, State.OPERATION_ENABLED)
+    ]
+    stopping = status(state=State.STOPPING, word=FROM_NET)
+    startable = status(state=State.READY_TO_SWITCH_ON, word=FROM_NET)
+    local = status(state=State.READY_TO_SWITCH_ON, word=0)
     for reference, ready in (('fieldbus', READY | NET_REF), ('terminal', READY)):
         method = control(reference)
         play(method.take_control(), (Read(MODE), STOP), (Write(WORD, ready), None))
         play(
             method.run(),
-            (Wait(status(state=State.READY_TO_SWITCH_ON), stopping, not_by=others), None),
+            (Wait(startable, stopping, not_by=[*others, local]), None),
             (Write(WORD, ready | 1, retry=False), None),
             (Wait(status(state=State.SWITCHED_ON), stopping, not_by=others), None),
             (Write(WORD, ready | 9, retry=False), None),
@@ -299,11 +312,10 @@ def test_what_is_removed_by_the_control_word() -> None:
 
 
 def test_a_fault_is_acknowledged_by_an_edge() -> None:
-    edge = [(change(RUN_BITS | 0x80, add), None) for add in (0, 0x80, 0)]
-    assert play(control().acknowledge(OVERLOAD, 'Freque'), *edge) == ''
+    assert play(control().acknowledge(OVERLOAD, 'Freque'), *EDGE) == ''
     # a serial one by MODE = Stop alone first
     serial = (Read(MODE), BUS), (TO_NOBODY, REFUSED)
-    assert play(control().acknowledge(SIO_FAIL, 'Freque'), *serial, *edge) == ''
+    assert play(control().acknowledge(SIO_FAIL, 'Freque'), *serial, *EDGE) == ''
 
 
 def test_where_no_edge_is_taken_reading_has_to_do() -> None:

@@ -9,7 +9,14 @@ import pytest
 from support.steps import REFUSED, Wait, play, status
 
 from nfo_sinus_driver.catalog import Holder, NotPossible, Refusal, Removal, load_family
-from nfo_sinus_driver.catalog.profile import Acknowledge, AcknowledgeThenWrite, Read, Write
+from nfo_sinus_driver.catalog.profile import (
+    FAULT_GONE,
+    Acknowledge,
+    AcknowledgeThenWrite,
+    Read,
+    Wait as Pause,
+    Write,
+)
 
 OPTIMAL = load_family('sinus_optimal')
 MODE, SMODE, WORD = 'fieldbus.mode', 'fieldbus.smode', 'fieldbus.drive_control'
@@ -17,6 +24,7 @@ STATUS, ACK = 'fieldbus.drive_status', 'fieldbus.inv_st_with_ack'
 MANUAL, AUTO, BUS = 1, 2, 3
 FREQUENCY, SPEED = 'fieldbus.input_freq_setpoint', 'fieldbus.input_speed_setpoint'
 BUS_CONTROL, ENABLE, SWITCH_ON, FROM_BUS = 1 << 14, 1 << 3, 1 << 0, 1 << 9
+ENABLED, STOPPING = 1 << 2, 1 << 15
 OVERLOAD, SIO_FAIL = OPTIMAL.status_code(5), OPTIMAL.status_code(14)
 
 smode = OPTIMAL.profile.methods['mode_scmd']('fieldbus', OPTIMAL.__contains__)
@@ -95,16 +103,30 @@ def test_no_fault_is_acknowledged_by_mode() -> None:
 
 
 def test_lost_control_is_asked_for_anew() -> None:
-    ready = Write(WORD, BUS_CONTROL), None
-    play(control.take_control(), (Read(STATUS), FROM_BUS), ready)
-    play(control.take_control(), (Read(STATUS), 0), (Write(WORD, 0), None), ready)
+    ready, ramps = (Write(WORD, BUS_CONTROL), None), (Write(WORD, BUS_CONTROL | ENABLE), None)
+    shown = status(word=FROM_BUS)
+    others = [status(word=0), status(word=FROM_BUS | ENABLED)]
+    taken = Wait(shown, not_by=others), None
+    # no status shows when the bit is taken, or taken away
+    blind = Pause(0.2), None
+    for word, asked, script in (
+        (FROM_BUS, BUS_CONTROL, (ready, taken)),
+        (0, 0, (ready, taken)),
+        (0, BUS_CONTROL, ((Write(WORD, 0), None), blind, ready, taken)),
+        (FROM_BUS, 0, (ready, blind, taken)),
+        (FROM_BUS | STOPPING, 0x4008, (ramps, (Wait(shown, others[1], not_by=others[:1]), None))),
+        (STOPPING, 0x4008, ((Write(WORD, 0), None), blind, ready, taken)),
+    ):
+        play(control.take_control(), (Read(STATUS), word), (Read(WORD), asked), *script)
 
 
 def test_it_is_enabled_and_then_switched_on() -> None:
     enabled = BUS_CONTROL | ENABLE
-    shown = Wait(status(word=1 << 2), not_by=[status(), status(word=1)])
+    ready = Wait(status(word=1), status(word=ENABLED), not_by=[status(), status(word=FROM_BUS)])
+    shown = Wait(status(word=ENABLED), not_by=[status(), status(word=1)])
     play(
         control.run(),
+        (ready, None),
         (Write(WORD, enabled), None),
         (shown, None),
         (Write(WORD, enabled | SWITCH_ON, retry=False), None),
@@ -131,8 +153,12 @@ def test_what_is_removed() -> None:
 
 
 def test_a_fault_is_acknowledged_by_an_edge() -> None:
-    edge = [(Write(WORD, word), None) for word in (0x4008, 0x4088, 0x4008)]
-    assert play(control.acknowledge(OVERLOAD, 'Freque'), (Read(WORD), 0x4089), *edge) == ''
+    low, high = (Write(WORD, 0x4008), None), (Write(WORD, 0x4088), None)
+    edge = high, (FAULT_GONE, True), low
+    assert play(control.acknowledge(OVERLOAD, 'Freque'), (Read(WORD), 0x4009), low, *edge) == ''
+    # one that an acknowledgement has left has to fall first
+    fallen = low, (Pause(0.2), None)
+    assert play(control.acknowledge(OVERLOAD, 'Freque'), (Read(WORD), 0x4089), *fallen, *edge) == ''
     play(control.zero_setpoint('Freque'))
 
 

@@ -10,6 +10,7 @@ import contextlib
 from typing import ClassVar
 
 from nfo_sinus_driver.catalog.profile import (
+    FAULT_GONE,
     Acknowledge,
     AcknowledgeThenWrite,
     ControlMethod,
@@ -100,7 +101,9 @@ class Ds402(ControlMethod):
         """
         Switch off, so that a run command is an edge later, under control of the bus.
 
-        The module holds the drive in bus mode [M0 §6.4]; one that has left it is put back.
+        The module holds the drive in bus mode [M0 §6.4]; one that has left it is put back. What
+        stands in the control word then counts from that moment on, and what is written before may
+        not count at all: it is switched off by the very next frame, and again.
 
         :raises NotPossible: it is tuning.
         """
@@ -108,6 +111,8 @@ class Ds402(ControlMethod):
             raise NotPossible('the drive lets no one take control now (MODE is Inhibit: tuning?)')
         if not (yield from self.in_control()):
             yield Write(_MODE, Mode.BUS)
+            yield from try_steps(one(Write(CONTROL_WORD, words.SHUTDOWN, head=True)))
+            yield Until(lambda status: bool((status.word or 0) & words.Status.REMOTE))
         yield Write(CONTROL_WORD, words.SHUTDOWN)
 
     def zero_setpoint(self, control_mode: str) -> Steps[None]:
@@ -191,12 +196,11 @@ class Ds402(ControlMethod):
 
     @staticmethod
     def _reset_fault() -> Steps[None]:
-        for word in (
-            words.DISABLE_VOLTAGE,
-            words.DISABLE_VOLTAGE | words.Control.FAULT_RESET,
-            words.DISABLE_VOLTAGE,
-        ):
-            yield Write(CONTROL_WORD, word, retry=False)
+        yield Write(CONTROL_WORD, words.DISABLE_VOLTAGE, retry=False)
+        reset = words.DISABLE_VOLTAGE | words.Control.FAULT_RESET
+        yield Write(CONTROL_WORD, reset, retry=False)
+        yield FAULT_GONE
+        yield Write(CONTROL_WORD, words.DISABLE_VOLTAGE, retry=False)
 
     def _acknowledge_by_reading(self, control_mode: str) -> Steps[None]:
         ours = yield from self.perhaps_in_control()
