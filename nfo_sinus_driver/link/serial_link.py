@@ -35,7 +35,7 @@ from nfo_sinus_driver.link.modbus_pdu import (
     write_of,
 )
 from nfo_sinus_driver.link.port import Port
-from nfo_sinus_driver.link.request_link import WRITE_WAIT, RequestLink
+from nfo_sinus_driver.link.request_link import LONG_PAUSE, WRITE_WAIT, RequestLink
 
 _T = TypeVar('_T')
 
@@ -331,21 +331,25 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         last_chance = first + 2 * length * char_time
         came = 0
         last = longest = 0.0
+        looked = False
         refusals: list[Refused] = []
         while True:
-            data = self._port.read(self._now.until(deadline))
+            look = last + LONG_PAUSE if came and not looked else deadline
+            data = self._port.read(self._now.until(min(look, deadline)))
             now = self._now()
             if not data:
+                looked = now >= look
                 if now < deadline:
                     continue
                 break
             # bytes that come while the request is still being sent are no answer to it
             self._line_end = max(self._line_end, now)
             data = self._echo.strip(data)
-            if came:
-                # less the time of these bytes themselves
+            if came and looked:
+                # less the time of these bytes themselves; without a look that found none, this
+                # thread may not have run
                 longest = max(longest, now - last - len(data) * char_time)
-            last = now
+            last, looked = now, False
             came += len(data)
             answer = _feed(reader, data, None if believe_refusal else refusals)
             if answer is not None:
