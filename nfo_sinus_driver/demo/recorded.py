@@ -10,6 +10,7 @@ import dataclasses
 from dataclasses import dataclass, field
 from datetime import datetime
 import functools
+import math
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,12 @@ class Curve:
         """Append a point."""
         self.times.append(time)
         self.values.append(value)
+
+    def broken_at(self, moments: Iterable[float]) -> Curve:
+        """Return a curve without a line through moments at which nothing is known."""
+        gaps = ((moment, math.nan) for moment in moments)
+        points = sorted((*zip(self.times, self.values, strict=True), *gaps), key=lambda one: one[0])
+        return Curve([time for time, _ in points], [value for _, value in points])
 
 
 @dataclass(frozen=True)
@@ -184,6 +191,10 @@ class _Reader:
         shown = _spans([(time, m.text) for time, m in texts], length)
         # a fault is named a moment before the drive's state is one
         faults = {m.text: m.code for _, m in texts if m.kind == m.FAULT}
+        phases = _spans([(time, _phase(m)) for time, m in self._statuses], length)
+        lost = [span.begin for span in phases if span.what == 'lost']
+        actual = Curve([time for time, _ in statuses], [m.actual for _, m in statuses])
+        current = Curve([time for time, _ in currents], [m.output_current for _, m in currents])
         diagnostics = (m for _, m in self._messages.get('/diagnostics', ()))
         return Recording(
             drive=self._drive,
@@ -193,12 +204,12 @@ class _Reader:
             source=source,
             unit=next((m.unit for _, m in reversed(statuses) if m.unit), 'Hz'),
             identity=identity(diagnostics, self._drive),
-            setpoint=self._received('setpoint'),
-            actual=Curve([time for time, _ in statuses], [m.actual for _, m in statuses]),
-            speed=self._received('actual_speed'),
-            current=Curve([time for time, _ in currents], [m.output_current for _, m in currents]),
+            setpoint=self._setpoint(),
+            actual=actual.broken_at(lost),
+            speed=self._received('actual_speed').broken_at(lost),
+            current=current.broken_at(lost),
             connected=self._while('connected', length),
-            phases=_spans([(time, _phase(m)) for time, m in self._statuses], length),
+            phases=phases,
             texts=shown,
             faults=[
                 dataclasses.replace(span, code=faults[span.what])
@@ -222,6 +233,14 @@ class _Reader:
     def _received(self, topic: str) -> Curve:
         found = self._messages.get(f'{self._drive}/{topic}', ())
         return Curve([self._since(stamp) for stamp, _ in found], [m.data for _, m in found])
+
+    def _setpoint(self) -> Curve:
+        """Return what was given: by other topics than ``~/setpoint`` as the status has it."""
+        given = self._received('setpoint')
+        if given.times:
+            return given
+        enabled = [(time, m) for time, m in self._statuses if m.enabled]
+        return Curve([time for time, _ in enabled], [m.setpoint for _, m in enabled])
 
     def _while(self, flag: str, end: float) -> list[Span]:
         """Return when a field of the status was true."""

@@ -138,15 +138,21 @@ class CommunicationWatchdog:
         return otherwise
 
     async def require_set(self) -> None:
-        """Set it, if that was not done yet; failing to set the default prevents no start."""
+        """
+        Set it, if that was not done yet.
+
+        Failing to set the default prevents no start; the next enable tries again.
+        """
         settings = self._state.settings
         if self._is_settled(settings.own_timeout):
             return
+        done = True
         if settings.drive_timeout == AS_THE_DRIVE_CAN:
-            await self._try_usual(settings.own_timeout)
+            done = await self._try_usual(settings.own_timeout)
         else:
             await self.set_now(settings.own_timeout)
-        self._settled = settings.own_timeout, self._state.timeout.stops_motor
+        if done:
+            self._settled = settings.own_timeout, self._state.timeout.stops_motor
         self._report_timeout()
         self.warn_if_unfit()
 
@@ -198,24 +204,25 @@ class CommunicationWatchdog:
         if not state.timeout.can_be_set and not state.bus.supervised:
             raise DriveError(Cause.OWN_TIMEOUT_IMPOSSIBLE)
 
-    async def _try_usual(self, seconds: float) -> None:
+    async def _try_usual(self, seconds: float) -> bool:
         """
-        Set the default, where the drive is set to stop its motor.
+        Set the default, where the drive is set to stop its motor; return whether nothing failed.
 
         That setting is left as it is, and so is a shorter time-out: others have chosen them.
         """
         timeout = self._state.timeout
         if not seconds or self._state.plc_time:
-            return
+            return True
         try:
             await timeout.read()
-            if not timeout.stops_motor:
-                return
-            await timeout.watch(seconds)
-            if not timeout.watched_by and not self._is_kept(seconds):
-                await self._write_usual(seconds)
+            if timeout.stops_motor:
+                await timeout.watch(seconds)
+                if not timeout.watched_by and not self._is_kept(seconds):
+                    await self._write_usual(seconds)
         except (LinkError, DriveError) as error:
             self._report_not_taken(error)
+            return False
+        return True
 
     def _is_kept(self, seconds: float) -> bool:
         """Return whether others have set one that is no longer than this."""

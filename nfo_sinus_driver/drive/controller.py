@@ -64,6 +64,7 @@ class Controller:
         self._setpoint = setpoint
         #: Called on the bus after a stop was begun, with the reason.
         self._on_stop: Callable[[Report], None] = lambda _: None
+        self._show_stop: Callable[[], None] = lambda: None
         self._control = Control(self._bus.now, self._changed, self._notify_stop)
         #: Since when nothing can start the motor any more, for the driver ends, s.
         self._closed_at = math.inf
@@ -170,9 +171,14 @@ class Controller:
         """Call a function on the bus whenever the motor is stopped, with the reason."""
         self._on_stop = call
 
+    def show_stop_by(self, show: Callable[[], None]) -> None:
+        """Have a stop of the motor shown while it keeps polls from their turns."""
+        self._show_stop = show
+
     def _notify_stop(self, why: Report) -> None:
         # after the stop of this motor is on its way
         self._bus.call(lambda: self._on_stop(why))
+        self._bus.call(self._show_stop)
 
     def stop_because(self, why: Report) -> None:
         """Stop the motor, if this driver may run it, for a reason that its status does not show."""

@@ -77,6 +77,8 @@ _SLOW_TURNS = 15
 #: A motor is at its speed while the controlled quantity changes by no more than this share from
 #: poll to poll; else frequency and speed are both measured each time.
 _STEADY = 0.02
+#: How often what is known is published while a stop keeps polls from their turns, s.
+_SHOW_PERIOD = 0.25
 _MODE_TURNS = 60
 #: How often a read beside the status is tried in one poll: what the driver has to know, and what it
 #: measures, which did not fail just before.
@@ -143,6 +145,7 @@ class Poller:
         self._recognise = recognise
         self._task: Task | None = None
         self._keep_alive_task: Task | None = None
+        self._show_task: Task | None = None
         #: Poll at full rate.
         self.active = False
         #: The newest poll.
@@ -164,6 +167,8 @@ class Poller:
         self._reported_fault = 0
         self._conditions = Conditions(state)
         state.on_missed(self._poll_soon)
+        if controller is not None:
+            controller.show_stop_by(self._show_stop)
 
     @property
     def begun(self) -> bool:
@@ -183,6 +188,7 @@ class Poller:
             self._bus.cancel(task)
         self._bus.cancel(self._keep_alive_task)
         self._keep_alive_task = None
+        self._bus.cancel(self._show_task)
         self._bus.recorder.cycle(self._unit, math.nan)
         self._publish(None)
 
@@ -637,6 +643,20 @@ class Poller:
         except Exception:
             # an error of the listener must not end the polling
             _log.exception('the loss of the drive could not be reported')
+
+    def _show_stop(self) -> None:
+        self._bus.cancel(self._show_task)
+        self._show_task = self._bus.spawn(self._show_while_stopping())
+
+    async def _show_while_stopping(self) -> None:
+        """Publish what is known while the stop of a drive that answers in part delays its polls."""
+        assert self._controller is not None
+        while self._controller.stopping:
+            before = self.snapshot, self._bus.paused
+            await self._bus.sleep(_SHOW_PERIOD)
+            waits = before == (self.snapshot, self._bus.paused) and self._controller.stopping
+            if waits and self._task is not None and self._state.connected:
+                self._publish(self._state.status)
 
     def _publish(self, status: InverterStatus | None) -> None:
         state = self._state

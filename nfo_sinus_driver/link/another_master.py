@@ -267,9 +267,12 @@ class AnotherMaster:
         self._sightings = Sightings(remarks)
         self._response_timeout = response_timeout
         self._messages = messages
+        #: What may become a frame, and what came between the frames of another master.
         self._buffer = b''
+        self._rest = b''
         self._own: deque[bytes] = deque(maxlen=_OWN)
-        self._open_requests: dict[int, _OpenRequest] = {}
+        #: In the order in which they came, which is that of their answers.
+        self._open_requests: dict[int, list[_OpenRequest]] = {}
 
     def sent(self, frame: bytes) -> None:
         """Note a request of ours: it may come back, and is not of another master."""
@@ -281,72 +284,68 @@ class AnotherMaster:
 
     def open_until(self, unit: int) -> float:
         """Return until when an answer of a unit may be to another master; 0: it is not."""
-        request = self._open_requests.get(unit)
-        return 0.0 if request is None else request.until
+        return max((one.until for one in self._open_requests.get(unit, ())), default=0.0)
 
-    def take_late(self, unit: int, now: float) -> bytes:
-        """Return the beginning of the answer to a request that is overdue and may come late."""
-        request = self._open_requests.get(unit)
-        if request is None or now < request.until:
-            return b''
-        del self._open_requests[unit]
-        return request.answer_head
+    def take_late(self, unit: int, now: float) -> list[bytes]:
+        """Return the beginnings of the answers that are overdue and may come late."""
+        requests = self._open_requests.pop(unit, [])
+        self._open_requests[unit] = [one for one in requests if now < one.until]
+        return [one.answer_head for one in requests if now >= one.until]
 
     def hear(self, data: bytes, now: float) -> bool:
         """Take bytes that are no answer to us; those of no frame are kept for a while."""
-        if not data:
-            return False
-        self._buffer = (self._buffer + data)[-_MOST:]
-        while self._find(now):
-            pass
+        buffer = (self._buffer + data)[-_MOST:]
+        behind = 0
+        for start, end, message in self._messages(buffer):
+            # an answer comes behind its request
+            if start >= behind and self._is_foreign(buffer[start:end], message, now):
+                self._rest += buffer[behind:start]
+                behind = end
+        self._buffer = buffer[behind:]
         return False
 
     def was_answered_in(self, data: bytes) -> bool:
         """Return whether another master's request and the answer to it are in some bytes."""
         head = b''
-        for start, end, message in self._messages(data):
+        for _, _, message in self._messages(data):
             if head and _has_head(message, head):
                 return True
-            if not self._is_own(data[start:end], message):
-                head = _answer_head(message) or head
+            head = _answer_head(message) or head
         return False
 
     def take_rest(self, unit: int) -> bytes:
         """Return the bytes of no frame of another master, now that the line is silent."""
-        if unit in self._open_requests:
+        if self._open_requests.get(unit):
             # the beginning of the answer, perhaps
             return b''
-        rest, self._buffer = self._buffer, b''
+        rest, self._rest, self._buffer = self._rest + self._buffer, b'', b''
         return rest
 
     def clear(self) -> None:
         """Forget what came: the port is closed."""
-        self._buffer = b''
+        self._buffer = self._rest = b''
         self._open_requests.clear()
 
-    def _find(self, now: float) -> bool:
-        buffer = self._buffer
-        for start, end, message in self._messages(buffer):
-            if self._is_foreign(buffer[start:end], message, now):
-                self._buffer = buffer[:start] + buffer[end:]
-                return True
-        return False
-
-    def _is_own(self, frame: bytes, message: bytes) -> bool:
+    def _is_own(self, frame: bytes, message: bytes, now: float) -> bool:
         """Return whether a frame may be an echo of ours; a write's answer is the same."""
-        return frame in (self._own if message[1] in _SINGLE else [*self._own][-1:])
+        if message[1] in _SINGLE:
+            return frame in self._own
+        # another master that is there may send the same
+        return frame in [*self._own][-1:] and not self.is_there(now)
 
     def _is_foreign(self, frame: bytes, message: bytes, now: float) -> bool:
         unit, function = message[:2]
-        if self._is_own(frame, message):
+        if self._is_own(frame, message, now):
             return False
-        request = self._open_requests.get(unit)
-        if request is not None and request.is_answered_by(message):
-            del self._open_requests[unit]
-            return True
+        requests = self._open_requests.setdefault(unit, [])
+        for number, request in enumerate(requests, start=1):
+            if request.is_answered_by(message):
+                # those before it were lost
+                del requests[:number]
+                return True
         head = _answer_head(message)
         if not head:
             return False
         self._sightings.add(now, _ANOTHER_MODBUS_MASTER)
-        self._open_requests[unit] = _OpenRequest(unit, function, head, now + self._response_timeout)
+        requests.append(_OpenRequest(unit, function, head, now + self._response_timeout))
         return True

@@ -47,7 +47,7 @@ _IN_PIECES = (
 )
 #: A pause within an answer that is longer than a good adapter makes, s; so many of them are
 #: reported, and their count decays: on a busy machine there is one now and then.
-_LONG_PAUSE = 0.03
+LONG_PAUSE = 0.03
 _MANY_PAUSES = 3
 _KEPT_OF_PAUSES = 0.9
 
@@ -394,7 +394,7 @@ class RequestLink(ABC, Generic[_Request]):
         """Note the longest pause, s, within a whole answer; return whether it is too long."""
         if not self._has_run:
             return False
-        too_long = longest > _LONG_PAUSE
+        too_long = longest > LONG_PAUSE
         self._in_pieces = self._in_pieces + 1 if too_long else _KEPT_OF_PAUSES * self._in_pieces
         if self._in_pieces >= _MANY_PAUSES:
             self.remarks.add(_IN_PIECES)
@@ -557,12 +557,17 @@ class CodecLink(RequestLink[Any]):
         reader = codec.reader()
         came = 0
         last = pause = 0.0
-        while data := self._read_line(deadline):
+        while True:
+            data = self._read_line(min(last + LONG_PAUSE, deadline)) if came else b''
+            looked = not data
+            if not (data := data or self._read_line(deadline)):
+                break
             now = self._now()
             self._another.hear(data, now)
             data = self._echo.strip(data)
-            if came:
-                # less the time of these bytes themselves
+            if came and looked:
+                # less the time of these bytes themselves; without a look that found none, this
+                # thread may not have run
                 pause = max(pause, now - last - len(data) * self._settings.char_time)
             last = now
             came += len(data)

@@ -35,7 +35,7 @@ from nfo_sinus_driver.link.modbus_pdu import (
     write_of,
 )
 from nfo_sinus_driver.link.port import Port
-from nfo_sinus_driver.link.request_link import WRITE_WAIT, RequestLink
+from nfo_sinus_driver.link.request_link import LONG_PAUSE, WRITE_WAIT, RequestLink
 
 _T = TypeVar('_T')
 
@@ -112,10 +112,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         doubted = not quarantined.isdisjoint(answer_kinds(request))
         if doubted or self._another.is_there(self._now()):
             return self.write(unit, address, data)
-        reply = self._believed(request)
-        if self._doubtful:
-            raise DamagedAnswer(f'unit {unit}: {DOUBTFUL}')
-        return Reply(*reply)
+        return Reply(*self._believed(request))
 
     # --- what differs by protocol -----------------------------------------------------------------
 
@@ -140,29 +137,31 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
     def _ask_once(self, request: Request[Any]) -> tuple[Any, float]:
         self._await_gap(request)
         resynced = self._make_certain(request)
-        refusal: Refused | None = None
         try:
-            answer = self._believed(request)
-        except Refused as error:
-            refusal = error
+            return self._believed(request)
         except LinkError as error:
             error.responded = resynced
             raise
-        if self._doubtful:
-            raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
-        if refusal is not None:
-            raise refusal
-        return answer
 
     def _believed(self, request: Request[_T]) -> tuple[_T, float]:
-        """Return the answer to a request, perhaps to another master, but not one sent twice."""
+        """Return the answer to a request: not one sent twice, nor one to another master."""
+        names_it = isinstance(request, Write)
         try:
             answer = self._transact(request)
         except Refused:
+            # it names a function, and nothing else
+            self._require_ours(request)
             self._confirm(request)
             raise
-        self._confirm(request, names_it=isinstance(request, Write))
+        if not names_it:
+            self._require_ours(request)
+        self._confirm(request, names_it=names_it)
         return answer
+
+    def _require_ours(self, request: Request[Any]) -> None:
+        """Make sure that the last answer is to us (DamagedAnswer: perhaps not)."""
+        if self._doubtful:
+            raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
 
     def _read_request(self, unit: int, address: Address) -> Request[Any]:
         return read_of(unit, address)
@@ -241,11 +240,16 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             self._late.note_unrequested(self._now())
             raise
         now = self._now()
-        stray = bool(self._another.take_rest(request.unit)) and (
-            came or self._another.is_there(now)
-        )
+        there = self._another.is_there(now)
+        stray = bool(self._another.take_rest(request.unit)) and (came or there)
         if stray:
             self._late.note_unrequested(now)
+        if stray and there and not is_write:
+            # a request of another master may be in it, and its answer still to come
+            until = now + self._late.longest(request.unit)
+            while data := self._listen(until):
+                self._another.hear(data, self._now())
+            super()._await_gap(request)
         return stray
 
     def _note_unrequested(self, data: bytes, request: Request[Any]) -> None:
@@ -254,7 +258,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
     def _take_late(self, request: Request[Any], now: float) -> None:
         if late := self._another.take_late(request.unit, now):
-            self._late.quarantine(request.unit, (late,), now)
+            self._late.quarantine(request.unit, late, now)
 
     @property
     def _write_wait(self) -> float:
@@ -304,7 +308,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         if not late and self._late.repeated is None:
             # and the request has left, even where the port is faster than its settings say
             self._line_end = arrived
-        if self._has_run:
+        if self._has_run and not self._doubtful:
             self._late.took(request.unit, arrived - self._sent_at - length)
         if came_back and not alone:
             # another master has sent the same request, which is answered, too
@@ -327,21 +331,25 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         last_chance = first + 2 * length * char_time
         came = 0
         last = longest = 0.0
+        looked = False
         refusals: list[Refused] = []
         while True:
-            data = self._port.read(self._now.until(deadline))
+            look = last + LONG_PAUSE if came and not looked else deadline
+            data = self._port.read(self._now.until(min(look, deadline)))
             now = self._now()
             if not data:
+                looked = now >= look
                 if now < deadline:
                     continue
                 break
             # bytes that come while the request is still being sent are no answer to it
             self._line_end = max(self._line_end, now)
             data = self._echo.strip(data)
-            if came:
-                # less the time of these bytes themselves
+            if came and looked:
+                # less the time of these bytes themselves; without a look that found none, this
+                # thread may not have run
                 longest = max(longest, now - last - len(data) * char_time)
-            last = now
+            last, looked = now, False
             came += len(data)
             answer = _feed(reader, data, None if believe_refusal else refusals)
             if answer is not None:

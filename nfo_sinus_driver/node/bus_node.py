@@ -15,6 +15,7 @@ from nfo_sinus_msgs.msg import BusStatistics
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.time import Time
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.bus import Bus
@@ -28,6 +29,7 @@ from nfo_sinus_driver.node.overrides import families_of, require_parameter
 from nfo_sinus_driver.node.qos import RELIABLE
 from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
+from nfo_sinus_driver.node.stamps import Stamps
 from nfo_sinus_driver.setting import Setting
 from nfo_sinus_driver.state_folder import StateFolder
 
@@ -64,6 +66,7 @@ class BusNode(Node):
         self.bus_context.bus.on_mute(
             lambda seconds: publish_queue.put(lambda: self._log_mute(seconds))
         )
+        self._stamps = Stamps(lambda: self.get_clock().now().nanoseconds)
         self._logged_port: str | None = ''
         self._logged_remarks: set[str] = set()
         self._last_diagnosis: tuple[bytes, str] | None = None
@@ -118,7 +121,7 @@ class BusNode(Node):
             return
         statistics = self.bus_context.bus.statistics()
         silent = [drive.name for drive in self.bus_context.drives if drive.is_silent]
-        stamp = self.get_clock().now().to_msg()
+        stamp = Time(nanoseconds=self._stamps.now()).to_msg()
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
         error = self.bus_context.bus.port_error
         none = not any(drive.drive.ever_responded for drive in self.bus_context.drives)

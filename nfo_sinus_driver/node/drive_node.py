@@ -28,7 +28,7 @@ from nfo_sinus_driver.node.factory_settings import with_factory_address
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
 from nfo_sinus_driver.node.messages import Joint
-from nfo_sinus_driver.node.other_lines import OtherLines, is_elsewhere, stop_of
+from nfo_sinus_driver.node.other_lines import OtherLines, drive_of, is_elsewhere, stop_of
 from nfo_sinus_driver.node.overrides import did_you_mean
 from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.reporter import Reporter
@@ -107,7 +107,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._other_lines = OtherLines(
             self,
             queue,
-            lambda: self.managed.settings.stop_with,
+            lambda: [one for one in self.managed.settings.stop_with if not self._beside(one)],
             lambda: self.managed.drive.snapshot.enabled,
         )
         try:
@@ -133,7 +133,16 @@ class DriveNode(LifecycleNodeMixin, Node):
         """Stop the drives that stop with this one; called on the bus."""
         self._other_lines.stop()
         reason = Report(Cause.STOPPED_WITH, drive=self.get_fully_qualified_name(), why=why)
-        self._bus_context.stop_beside(self.managed.settings.stop_with, reason)
+        beside = {self._beside(name) for name in self.managed.settings.stop_with}
+        self._bus_context.stop_beside(beside - {self.get_name()}, reason)
+
+    def _beside(self, name: str) -> str:
+        """Return which drive of this line a name in ``stop_with`` means; ``''``: none."""
+        if not is_elsewhere(name):
+            return name
+        namespace, _, drive = drive_of(stop_of(self, name)).rpartition('/')
+        here = namespace == self.get_namespace().rstrip('/') and drive in self._bus_context.names
+        return drive if here else ''
 
     @property
     def later_parameters(self) -> list[str]:

@@ -106,11 +106,19 @@ class OtherLines:
                 self._complain(service, f'error in the driver: {error!r}')
 
     def _call(self, service: str, client: Client) -> None:
+        for before, (called, _) in tuple(self._calls.items()):
+            if called == service:
+                # it is not answered any more
+                client.remove_pending_request(before)
+                del self._calls[before]
         future = client.call_async(Trigger.Request())
         self._calls[future] = service, time.monotonic() + _LONGEST_ANSWER
         future.add_done_callback(lambda _: self._queue.put(lambda: self._take_answer(future)))
 
     def _take_answer(self, future: Future) -> None:
+        if future not in self._calls:
+            # it was called anew
+            return
         service, _ = self._calls.pop(future)
         try:
             answer = future.result()
@@ -121,7 +129,7 @@ class OtherLines:
             # its client is destroyed, for it is no longer named
             return
         if answer.success:
-            self._log.info(f'{_drive(service)} stops with it: {answer.message}')
+            self._log.info(f'{drive_of(service)} stops with it: {answer.message}')
         else:
             self._complain(service, answer.message)
 
@@ -142,19 +150,20 @@ class OtherLines:
         missing = {one for one, client in self._clients.items() if not client.service_is_ready()}
         for service in sorted(missing - self._missing):
             self._log.warning(
-                f'{_drive(service)} does not stop with it: nothing offers {service}; start its '
+                f'{drive_of(service)} does not stop with it: nothing offers {service}; start its '
                 'driver, or correct stop_with'
             )
         for service in sorted(self._missing - missing):
-            self._log.info(f'{_drive(service)} is there now: it stops with this drive')
+            self._log.info(f'{drive_of(service)} is there now: it stops with this drive')
         self._missing = missing
 
     def _complain(self, service: str, why: str) -> None:
         self._log.error(
-            f'{_drive(service)} does NOT stop with it: {why}; use its enable input or the '
+            f'{drive_of(service)} does NOT stop with it: {why}; use its enable input or the '
             'emergency stop'
         )
 
 
-def _drive(service: str) -> str:
+def drive_of(service: str) -> str:
+    """Return the full name of the drive that has a service."""
     return service.rpartition('/')[0]

@@ -181,7 +181,7 @@ class Reporter:
     def _publish_statistics(self) -> None:
         managed = self._managed()
         silent = [managed.name] if managed.is_silent else []
-        stamp = self._node.get_clock().now().to_msg()
+        stamp = _message(self._stamps.now())
         statistics = managed.drive.statistics
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
 
@@ -193,7 +193,7 @@ class Reporter:
         self._last_diagnosis = diagnosis
         name = self._node.get_fully_qualified_name().lstrip('/')
         status = diagnostics.drive_status(name, managed, snapshot, diagnosis)
-        stamp = self._node.get_clock().now().to_msg()
+        stamp = _message(self._stamps.now())
         self._diagnostics.publish(diagnostics.array(status, stamp))
 
 

@@ -17,6 +17,8 @@ import time
 #: Readings of the steady clock so close before and after one of the node's are good enough, ns.
 _NEAR = 200_000
 _READINGS = 5
+#: The latest stamp that a message can have, in January 2038: its seconds have 31 bits, ns.
+_LATEST = 2**31 * 10**9 - 1
 
 
 class Stamps:
@@ -34,16 +36,16 @@ class Stamps:
         self._steady = steady
 
     def of(self, moment: float) -> int:
-        """Return the node's time of a moment (s), in ns, 0 for NaN."""
+        """Return the node's time of a moment (s), in ns, as far as a message has it; 0 for NaN."""
         if math.isnan(moment):
             return 0
         steady, now = self._together()
         # simulated time begins at zero, and times before it cannot be
-        return max(0, now - (steady - round(moment * 1e9)))
+        return min(max(0, now - (steady - round(moment * 1e9))), _LATEST)
 
     def now(self) -> int:
-        """Return the node's time, in ns."""
-        return self._now()
+        """Return the node's time, in ns, as far as a message has it."""
+        return min(self._now(), _LATEST)
 
     def _together(self) -> tuple[int, int]:
         """Return what both clocks show at once."""

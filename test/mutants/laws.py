@@ -570,6 +570,22 @@ LAWS = (
     ),
     Mutant(
         8,
+        'an exception to another master refuses what we write',
+        'nfo_sinus_driver/link/serial_link.py',
+        '            self._require_ours(request)\n            self._confirm(request)',
+        '            self._confirm(request)',
+        ('test/unit/link/test_another_master_on_a_line.py',),
+    ),
+    Mutant(
+        8,
+        'an answer to the last of several requests of another master answers all of them',
+        'nfo_sinus_driver/link/another_master.py',
+        '                del requests[:number]',
+        '                requests.clear()',
+        ('test/unit/link/test_another_master_on_a_line.py',),
+    ),
+    Mutant(
+        8,
         'a late answer of another MOVITRAC is believed',
         'nfo_sinus_driver/link/late_replies.py',
         '        return any(kind in self._left(other, now) for other in others)',

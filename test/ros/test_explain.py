@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import math
 from pathlib import Path
 import re
 from typing import Any
@@ -13,8 +14,9 @@ from typing import Any
 from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
+from rcl_interfaces.msg import Log
 from rclpy.serialization import serialize_message
-from std_msgs.msg import Header
+from std_msgs.msg import Float32, Header
 from std_srvs.srv import SetBool
 
 from nfo_sinus_driver.demo import bags
@@ -136,6 +138,65 @@ def test_a_better_reason_for_the_same_stop_is_no_other_stop(tmp_path: Path) -> N
     write(tmp_path / 'run', messages)
     [run] = read(tmp_path / 'run', [_DRIVE])
     assert [(stop.time, stop.reason) for stop in run.stops] == [(1.0, 'power cycle')]
+
+
+def lost(at: float) -> DriveStatus:
+    return DriveStatus(
+        header=Header(stamp=stamp(at)), stop_reason=DriveStatus.REASON_DRIVE_LOST,
+        stop_text='lost: no answer',
+    )
+
+
+def runs(at: float, value: float) -> DriveStatus:
+    message = status(at, enabled=True)
+    message.actual = message.setpoint = value
+    return message
+
+
+def test_where_a_drive_is_lost_no_curve_has_a_line_and_set_points_of_any_topic_are_drawn(
+    tmp_path: Path,
+) -> None:
+    messages: list[tuple[str, float, Any]] = [
+        (f'{_DRIVE}/status', 0.0, runs(0.0, 25.0)), (f'{_DRIVE}/status', 1.0, runs(1.0, 25.0)),
+        (f'{_DRIVE}/status', 3.0, lost(3.0)), (f'{_DRIVE}/status', 8.0, status(8.0)),
+        *((f'{_DRIVE}/actual_speed', at, Float32(data=value))
+          for at, value in ((0.5, 740.0), (1.0, 750.0), (8.0, 0.0))),
+    ]
+    write(tmp_path / 'run', messages)
+    [run] = read(tmp_path / 'run', [_DRIVE])
+    for curve in (run.actual, run.speed):
+        assert [time for time, value in zip(curve.times, curve.values, strict=True)
+                if math.isnan(value)] == [3.0]
+        assert curve.times == sorted(curve.times)
+    assert run.setpoint.values == [25.0, 25.0]
+
+
+def test_each_event_is_told_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = [
+        (0.9, 'enable (true) called by /panel', 'enabled'),
+        (3.0, f'{_DRIVE}/stop called by /panel', 'stopped (24 Stop)'),
+    ]
+    name = _DRIVE.strip('/').replace('/', '.')
+    write(tmp_path / 'run', [
+        (f'{_DRIVE}/status', 0.0, status(0.0)),
+        (f'{_DRIVE}/status', 1.0, status(1.0, enabled=True)),
+        (f'{_DRIVE}/status', 3.0, status(3.0, DriveStatus.REASON_STOP, _STOPS['STOP'])),
+        (f'{_DRIVE}/status', 6.0, status(6.0, enabled=True)),
+        (f'{_DRIVE}/status', 9.0, lost(9.0)),
+        (f'{_DRIVE}/status', 10.0, lost(10.0)),
+        *(('/rosout', at, Log(stamp=stamp(at), name=name, msg=f'{called}: {answer}'))
+          for at, called, answer in log),
+    ])
+    assert plot([str(tmp_path / 'run'), '--drive', _DRIVE, '--explain']) == 0
+    _, *lines = filter(None, capsys.readouterr().out.splitlines())
+    assert [line.split(maxsplit=1)[1] for line in lines] == [
+        'connected',
+        'enable (true) called by /panel: enabled',
+        f'STOPPED, stop: {_STOPS["STOP"]}',
+        'enabled',
+        'STOPPED, drive lost: lost: no answer',
+        'the end of the recording',
+    ]
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 import contextlib
 import signal
 import time
+from types import SimpleNamespace
 from typing import NamedTuple
 
 from bench import A_WHILE, Bench, Client, Process, holds_for, wait_until
@@ -18,9 +19,10 @@ import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.node.other_lines import PERIOD
+from nfo_sinus_driver.node.other_lines import PERIOD, OtherLines
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _TWO = """
@@ -59,6 +61,50 @@ def test_a_drive_stops_those_that_it_names_and_says_why(bench: Bench) -> None:
     assert not answer.successful
     assert "no drive 'outfed' on this line: choose of infeed, outfeed" in answer.reason
     assert answer.reason.endswith('did you mean outfeed?')
+
+
+@needs('own')
+def test_full_names_of_its_own_line_are_those_of_the_line_and_its_own_is_none(
+    bench: Bench
+) -> None:
+    bench.simulator('--address', '1', '--address', '2')
+    parameters = bench.folder / 'two.yaml'
+    parameters.write_text(
+        _TWO.replace('stop_with: [outfeed]', 'stop_with: [/line1/infeed, infeed, /line1/outfeed]')
+    )
+    driver = bench.driver('-r', '__ns:=/line1', '--params-file', str(parameters))
+    infeed = bench.client('/line1/infeed').connected()
+    outfeed = bench.client('/line1/outfeed').connected()
+    outfeed.enable()
+    for _ in range(5):
+        infeed.enable()
+        assert infeed.call('stop').success
+    infeed.enable()
+    infeed.wait_for('status', lambda one: one.enabled, 'it is enabled')
+    holds_for(A_WHILE, lambda: infeed.newest('status').enabled, 'its own stop does not stop it')
+    outfeed.wait_for(
+        'status', lambda one: one.stop_reason == DriveStatus.REASON_STOP_WITH, 'the other stops'
+    )
+    assert 'stop called by /line1/infeed' not in driver.text
+
+
+def test_a_call_that_is_never_answered_is_not_kept_for_ever() -> None:
+    forgotten: list[Future] = []
+    client = SimpleNamespace(
+        call_async=lambda request: Future(),
+        service_is_ready=lambda: True,
+        remove_pending_request=forgotten.append,
+    )
+    node = SimpleNamespace(
+        get_logger=lambda: None,
+        resolve_service_name=lambda name: name,
+        create_client=lambda *_, **__: client,
+    )
+    queue = SimpleNamespace(put_first=lambda do: do(), put_every=lambda period, do: None)
+    others = OtherLines(node, queue, lambda: ['/line2/right'], lambda: True)
+    for _ in range(10):
+        others.stop()
+    assert len(others._calls) == 1 and len(forgotten) == 9
 
 
 class Line(NamedTuple):

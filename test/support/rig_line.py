@@ -351,7 +351,14 @@ class Line:
 
     def another_sends(self, frame: bytes, at: float) -> None:
         """Let another master begin to send a frame at a moment; this end hears it, too."""
-        self.later(at, lambda: self.wire.receive(frame, at))
+
+        def arrive() -> None:
+            # an adapter returns what this end sends, and nothing else
+            echo, self.wire._echo = self.wire._echo, False
+            self.wire.receive(frame, at)
+            self.wire._echo = echo
+
+        self.later(at, arrive)
         for number in range(len(frame)):
             end = at + (number + 1) * self.settings.char_time
             self.later(end, lambda byte=frame[number : number + 1]: self.send(byte))

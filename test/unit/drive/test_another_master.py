@@ -16,7 +16,7 @@ from support.rig import Rig
 from nfo_sinus_driver.drive import Cause, Snapshot
 from nfo_sinus_driver.link import classic, modbus_ascii, movitrac, rtu
 from nfo_sinus_driver.link.modbus_link import ReadDevice, ReportSlaveId
-from nfo_sinus_driver.link.modbus_pdu import read_of
+from nfo_sinus_driver.link.modbus_pdu import Read, Write, read_of
 
 SECONDS = 40.0
 
@@ -63,7 +63,7 @@ def require_truth(rig: Rig, connection: str) -> None:
     assert not rig.notes.said(Cause.LOST_IN_USE)
     (remark,) = rig.bus.remarks
     assert 'another' in remark and 'master' in remark and 'disconnect it' in remark
-    assert rig.bus.statistics().foreign_frames > SECONDS / 2
+    assert rig.bus.statistics().foreign_frames > SECONDS / 4
 
 
 @pytest.mark.parametrize('poll_rate', [50.0, 5.0])
@@ -89,6 +89,44 @@ def test_a_master_that_asks_what_the_drive_is_is_another_master(
         encode = rtu.encode if connection == 'rtu' else modbus_ascii.encode
         rig.line.another_asks(encode(request_), 0.5)
         require_truth(rig, connection)
+
+
+@pytest.mark.parametrize(('connection', 'rate'), [('rtu', 15.0), ('ascii', 5.0)])
+def test_no_reading_and_no_refusal_of_another_master_is_taken_for_ours(
+    connection: str, rate: float
+) -> None:
+    nowhere = 0xEEE0
+    encode = rtu.encode if connection == 'rtu' else modbus_ascii.encode
+    random = Random(1)
+    rig = Rig(connection, line={'turnaround': 0.02}, poll_rate=10.0)
+    rig.turn()
+    requests: list[Any] = [
+        read_of(1, rig.drive.params.address('status.dc_link')),
+        Read(1, nowhere, 1), Read(1, nowhere, 2),
+        Write(1, nowhere, b'\0\1'), Write(1, nowhere, b'\0\1\0\2'),
+    ]
+
+    def ask() -> None:
+        rig.line.another_sends(encode(random.choice(requests)), rig.clock.now)
+        rig.line.later(rig.clock.now + random.uniform(0.5, 1.5) / rate, ask)
+
+    rig.notes.snapshots.clear()
+    ask()
+    rig.pass_time(20.0)
+    assert all(-0.3 < shown.frequency < 20.3 for shown in rig.notes.snapshots)
+    assert len(rig.notes.snapshots) > 40
+    assert not rig.notes.said(Cause.LOST_IN_USE)
+    rig.send(None)
+    enabled = 0
+    for _ in range(6):
+        rig.answer(rig.drive.stop())
+        answer = rig.answer(rig.drive.enable())
+        assert 'exception' not in answer
+        enabled += 'enabled' in answer
+    assert enabled >= 3
+    assert not rig.notes.said(Cause.CHANGED_AT_DRIVE)
+    # the laws of the line are not for what another master asks
+    rig.kill()
 
 
 @pytest.mark.parametrize('connection', ['rtu', 'ascii'])

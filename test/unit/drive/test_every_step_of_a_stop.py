@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future
 import contextlib
+import itertools
 from typing import Any
 
 import pytest
@@ -114,3 +115,29 @@ def test_a_refused_stop_of_a_motor_that_stands_is_no_alarm_until_it_turns(connec
         rig.meet = lambda key, data: 'unheard'
         rig.pass_time(3.0)
         assert rig.notes.said(Cause.CANNOT_STOP)
+
+
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_the_status_goes_on_while_one_write_of_a_stop_gets_no_answer(connection: str) -> None:
+    with Rig(connection, poll_rate=10.0) as rig:
+        rig.turn()
+        first: list[str] = []
+        shown: list[tuple[float, bool]] = []
+
+        def meet(key: str, data: bytes | None) -> str | None:
+            if data is not None and not first:
+                first.append(key)
+            return 'drop' if data is not None and key in first else None
+
+        began = rig.clock.now
+        rig.meet = meet
+        rig.notes.on_snapshot = (  # type: ignore[method-assign]
+            lambda snapshot: shown.append((rig.clock.now, snapshot.enabled))
+        )
+        rig.drive.stop()
+        rig.pass_time(3.0)
+        times = [began, *(at for at, _ in shown), rig.clock.now]
+        assert max(after - at for at, after in itertools.pairwise(times)) < 0.8
+        assert not any(enabled for at, enabled in shown if at > began + 0.6)
+        rig.meet = lambda key, data: None
+        rig.pass_time(3.0)

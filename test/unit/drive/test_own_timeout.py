@@ -185,6 +185,23 @@ def test_9_a_default_that_the_drive_does_not_take_keeps_no_motor_from_running(
 
 
 @timed
+@pytest.mark.parametrize('what', ['refused', 'unheard'])
+def test_9_a_default_that_the_drive_did_not_take_is_set_by_the_next_enable(
+    connection: str, what: str
+) -> None:
+    with by_default(connection, 0.0) as rig:
+        rig.connect()
+        key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
+        rig.spoil(what, key, 1000)
+        rig.enable()
+        rig.answer(rig.drive.stop())
+        assert rig.notes.said(Cause.OWN_TIMEOUT_NOT_TAKEN) and own_timeout(rig) == 0.0
+        rig.meet = lambda key, data: None
+        rig.enable()
+        assert own_timeout(rig) == rig.drive.settings.own_timeout
+
+
+@timed
 def test_9_by_default_a_clean_end_leaves_a_slow_motor_to_its_ramp(connection: str) -> None:
     with by_default(
         connection, 0.0, parameters=ramps(CONNECTIONS[connection].model, 0.3, 30.0)

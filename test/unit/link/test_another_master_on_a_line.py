@@ -5,18 +5,31 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import classic_far_end
 import classic_link_bench
-from link_bench import Bench as RtuBench
+from link_bench import UNIT, A, B, Bench as RtuBench, C
 import movitrac_bench
 import movitrac_far_end
 import pytest
+from virtual_wire import AsciiWire, Fate
 
-from nfo_sinus_driver.link import classic, movitrac, rtu
-from nfo_sinus_driver.link.interface import DamagedAnswer
+from nfo_sinus_driver.link import classic, modbus_ascii, movitrac, rtu
+from nfo_sinus_driver.link.interface import Address, DamagedAnswer
 from nfo_sinus_driver.link.modbus_link import ReportSlaveId
+from nfo_sinus_driver.link.modbus_pdu import Read, Write
 
 OTHER_VALUE = bytes.fromhex('000000aa')
+#: A register that the unit does not have.
+NOWHERE = 0xEEE0
+#: A unit takes some time to answer.
+SLOW = Fate(delay=0.3)
+
+
+class AsciiBench(RtuBench):
+    link_class = modbus_ascii.AsciiLink
+    wire_class = AsciiWire
 
 
 def classic_bench(*fates: str) -> classic_link_bench.Bench:
@@ -69,3 +82,95 @@ def test_a_request_that_comes_twice_is_no_answer_to_itself() -> None:
     link = RtuBench().link
     assert not link._another.was_answered_in(frame + frame)
     assert link._another.was_answered_in(frame + answer + rtu.crc(answer))
+
+
+#: What another master sends to the unit that we ask, too.
+FOREIGN = {
+    'reads as many registers': Read(UNIT, 0x3F8, 1),
+    'reads what we read before': Read(UNIT, A.index, 1),
+    'reads what is not there': Read(UNIT, NOWHERE, 1),
+    'writes what is not there': Write(UNIT, NOWHERE, b'\0\1'),
+    'writes several that are not there': Write(UNIT, NOWHERE, b'\0\1\0\2'),
+}
+LINKS = {'rtu': (RtuBench, rtu.encode), 'ascii': (AsciiBench, modbus_ascii.encode)}
+
+
+class SharedLine:
+    """
+    A unit that another master asks, too, which was heard before.
+
+    :ivar number: of our next request at which that sends, ``times`` requests in a row, just
+        ``before`` it or behind it.
+    """
+
+    def __init__(self, protocol: str, foreign: str, *, before: bool, times: int = 1) -> None:
+        bench_class, self._encode = LINKS[protocol]
+        self.bench = bench = bench_class(trusted=True)
+        self.number = -1
+        self._request, self._before, self._times = FOREIGN[foreign], before, times
+        self._ours, self._write = 0, bench.wire.write
+        bench.slave.heal(*[SLOW] * 1000)
+        bench.wire.write = self._send  # type: ignore[method-assign]
+        for _ in range(2):
+            self._another(Read(UNIT, 0x111, 1), bench.wire.now)
+            bench.wire.now += 0.2
+            bench.read(B)
+
+    def _send(self, frame: bytes) -> None:
+        wire = self.bench.wire
+        self.number -= 1
+        now = self.number == 0
+        end = wire.now + len(frame) * wire.settings.char_time
+        if now and self._before:
+            end = self._another(self._request, wire.now)
+        self._write(frame)
+        for _ in range(self._times if now and not self._before else 0):
+            end = self._another(self._request, end)
+
+    def _another(self, request: Any, at: float) -> float:
+        """Let another master send a request from a moment on; return when it has been sent."""
+        bench = self.bench
+        end = bench.wire.arrive(at, self._encode(request))
+        refused = request.register == NOWHERE
+        bench.slave.heal(Fate(delay=0.3, what='refuse' if refused else 'answer'), *[SLOW] * 1000)
+        bench.wire.far_end(rtu.encode(request), end)
+        return end
+
+    def answers_of(self, address: Address) -> list[bytes]:
+        """Return what the unit said to the requests for this address, ours and others."""
+        requests = self.bench.slave.requests
+        asked = [number for number, one in enumerate(requests) if one[2] == address.index]
+        return [self.bench.answer_of(number) for number in asked]
+
+
+@pytest.mark.parametrize('times', [1, 2])
+@pytest.mark.parametrize('before', [True, False], ids=['before', 'behind'])
+@pytest.mark.parametrize('number', range(1, 6))
+@pytest.mark.parametrize('foreign', FOREIGN)
+@pytest.mark.parametrize('protocol', LINKS)
+def test_what_is_read_or_refused_is_the_answer_to_us(
+    protocol: str, foreign: str, number: int, before: bool, times: int
+) -> None:
+    line = SharedLine(protocol, foreign, before=before, times=times)
+    line.number = number
+    for address in (A, B, C, A, B):
+        assert line.bench.read(address).data in line.answers_of(address)
+
+
+@pytest.mark.parametrize('before', [True, False], ids=['before', 'behind'])
+@pytest.mark.parametrize('words', [(5,), (5, 6)])
+@pytest.mark.parametrize('protocol', LINKS)
+def test_the_refusal_of_another_master_s_write_refuses_no_write_of_ours(
+    protocol: str, words: tuple[int, ...], before: bool
+) -> None:
+    foreign = 'writes several that are not there' if words[1:] else 'writes what is not there'
+    line = SharedLine(protocol, foreign, before=before)
+    line.number = 1
+    for _ in range(3):
+        try:
+            line.bench.write(A, *words)
+        except DamagedAnswer as error:
+            assert error.maybe_done
+        else:
+            return
+    raise AssertionError('never certain')

@@ -15,6 +15,7 @@ from classic_link_bench import LONG, MODE, SETTINGS, TIMEOUT, UNIT, A, B, Bench
 from hypothesis import given, strategies as st
 import pytest
 from support.addresses import classic_id, packed
+from virtual_wire import run_late
 
 from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.link.classic import ClassicLink
@@ -266,6 +267,14 @@ def test_an_adapter_that_echoes_no_more() -> None:
     with pytest.raises(DamagedAnswer):
         bench.read(B)
     assert bench.read(A).data == bench.answer_of(len(bench.asked) - 1)
+
+
+def test_a_driver_that_did_not_run_within_answers_blames_no_adapter() -> None:
+    bench = Bench(settings=LineSettings(9600, '7E1', response_timeout=0.2))
+    run_late(bench.wire)
+    for number in range(6):
+        assert bench.read(A).data == bench.answer_of(number)
+    assert not bench.link.remarks.texts
 
 
 def test_answer_whose_pieces_an_adapter_holds_back() -> None:

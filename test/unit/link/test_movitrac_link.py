@@ -11,6 +11,7 @@ from dataclasses import replace
 from movitrac_bench import CHAR, LONG, RESYNC, SETTINGS, TIMEOUT, UNIT, VALUE, A, B, Bench, at
 from movitrac_far_end import Fate
 import pytest
+from virtual_wire import run_late
 
 from nfo_sinus_driver.link import Identification, movitrac, open_link
 from nfo_sinus_driver.link.interface import (
@@ -312,6 +313,14 @@ def test_a_closed_port() -> None:
     with pytest.raises(PortError, match='does not exist'):
         link.open()
     link.close()
+
+
+def test_a_driver_that_did_not_run_within_answers_blames_no_adapter() -> None:
+    bench = Bench()
+    run_late(bench.wire)
+    for number in range(6):
+        assert bench.read(A).data == bench.answer_of(number)
+    assert not bench.link.remarks.texts
 
 
 def test_answer_whose_pieces_an_adapter_holds_back() -> None:

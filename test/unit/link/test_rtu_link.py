@@ -13,7 +13,7 @@ from link_bench import ONE, SETTINGS, TIMEOUT, TWO, UNIT, A, B, Bench, C, D
 import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
-from virtual_wire import Fate
+from virtual_wire import Fate, run_late
 
 from nfo_sinus_driver.link.interface import (
     BAUD_RATES,
@@ -139,6 +139,14 @@ def test_pauses_that_an_adapter_makes_are_learned_and_reported() -> None:
     pieces = 1
     assert bench.read(C).data == packed(1, 4)
     assert bench.wire.now - bench.wire.sent[-1][0] > 0.4
+
+
+def test_a_driver_that_did_not_run_within_answers_blames_no_adapter() -> None:
+    bench = Bench(settings=LineSettings(response_timeout=0.2))
+    run_late(bench.wire)
+    for number in range(6):
+        assert bench.read(A).data == bench.answer_of(number)
+    assert not bench.link.remarks.texts and not bench.link._pause
 
 
 @pytest.mark.parametrize('cut', [1, 3, 6])

@@ -92,3 +92,11 @@ def test_a_clock_that_is_set_back_takes_the_stamps_with_it() -> None:
     clocks.epoch -= 60_000 * _MS
     again = sequence.next(99.6)
     assert abs(again - (first - 59_900 * _MS)) < 0.01 * _MS
+
+
+def test_a_clock_beyond_2038_gives_the_latest_stamp_that_a_message_can_have() -> None:
+    clocks = Clocks(2**31 * 1_000_000_000)
+    clocks.time = 5000 * _MS
+    latest = 2**31 * 1_000_000_000 - 1
+    assert clocks.stamps().of(5.0) == clocks.stamps().now() == latest
+    assert Sequence(clocks.stamps()).next(5.0) == latest
