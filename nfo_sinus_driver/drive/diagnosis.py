@@ -183,7 +183,8 @@ class Conditions:
         by_code = status.means(Meaning.CURRENT_LIMIT)
         limited = by_code or Fact.LIMIT_ACTIVE in status.facts
         if limited and not status.faulted:
-            (limit,) = status.model.codes(Meaning.CURRENT_LIMIT)
+            # by telegram 1 a family has it as a code and as a warning; another has none
+            limit = next(iter(status.model.codes(Meaning.CURRENT_LIMIT)), status.listed)
             yield Severity.WARNING, self._state.report(Cause.CURRENT_LIMITED, limit=limit)
         if status.kind is Kind.ALARM and not by_code:
             if status.listed.remedy:

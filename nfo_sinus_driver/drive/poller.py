@@ -655,7 +655,9 @@ class Poller:
             before = self.snapshot, self._bus.paused
             await self._bus.sleep(_SHOW_PERIOD)
             waits = before == (self.snapshot, self._bus.paused) and self._controller.stopping
-            if waits and self._task is not None and self._state.connected:
+            # one that was lost has shown nothing since that could be shown again
+            known = self._state.connected and self.snapshot.connected
+            if waits and known and self._task is not None:
                 self._publish(self._state.status)
 
     def _publish(self, status: InverterStatus | None) -> None:

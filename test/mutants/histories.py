@@ -380,8 +380,9 @@ HISTORIES = (
         2,
         'a drive is enabled while it is waited for that its motor stands',
         CONTROLLER,
-        '        with self._sequence.external_stop(why):\n            return await self._release(',
-        '        if True:\n            return await self._release(',
+        '        with self._sequence.external_stop(why):\n'
+        '            stop = self._stopped if ended',
+        '        if True:\n            stop = self._stopped if ended',
         NO_STOP_FORGOTTEN,
     ),
     Mutant(

@@ -473,8 +473,8 @@ LAWS = (
         9,
         'the usual time-out of the drive is not set',
         WATCHDOG,
-        '            await self._try_usual(settings.own_timeout)',
-        '            pass',
+        '            done = await self._try_usual(settings.own_timeout)',
+        '            done = True',
         ('test/unit/drive/test_own_timeout.py', '-k', 'was_killed and rtu'),
     ),
     Mutant(
