@@ -477,6 +477,9 @@ class Controller:
         stands = await self._await_standstill(timeout)
         await prepare()
         if not stands:
+            # not every drive shows whether it ramps or runs again, by a command that came late
+            with contextlib.suppress(LinkError):
+                await self.method.stop(self._state.control_mode)
             await self._state.timeout.read()
             if not self._state.timeout.shortest or self.method.control_retained:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)

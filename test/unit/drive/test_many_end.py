@@ -54,6 +54,16 @@ def test_each_is_stopped_before_one_is_released(connection: str) -> None:
             assert not drive.stop_owed and not drive.stop_waits
 
 
+def test_a_motor_that_is_left_to_its_ramp_is_left_without_a_run_command() -> None:
+    # one that a gateway has held until after the confirmed stop looks like a ramp to many drives
+    with Rig(parameters={'control.retard': 500.0}) as rig:
+        rig.turn()
+        rig.result(rig.drive.stop_for_good(_PATIENCE))
+        rig.asked.clear()
+        assert 'left to its ramp' in rig.answer(rig.drive.disconnect(1.0))
+        assert [data for _, key, data in rig.asked if key == _SCMD and data] == [b'\0\0']
+
+
 def test_a_drive_that_is_cut_off_ends_the_wait_for_it() -> None:
     with Rig(drives=2) as rig:
         rig.turn()
