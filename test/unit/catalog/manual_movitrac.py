@@ -21,7 +21,8 @@ from manual_text import Fact, manual
 from nfo_sinus_driver.catalog import Access, load_family
 
 FAMILY = load_family('movitrac31')
-BY_INDEX = {row.at('movitrac').index: row for row in FAMILY.values()}
+#: The row of each index; a digit of it has a row of its own after it.
+BY_INDEX = {row.at('movitrac').index: row for row in reversed(FAMILY.values())}
 #: Several rows of the manual are bits of one index; these have a name of their own [C73].
 SEVERAL = {13: 'Status binary inputs and outputs', 237: 'Option at X20, option at X21'}
 #: What is misprinted, with the reading that is followed [C74].
@@ -108,6 +109,11 @@ def labels_of(line: Line) -> dict[int, str]:
     group = {'60': '600', '61': '611'}.get(line.number[:2])
     if group is not None:
         text = '\n'.join(one.meaning for one in lines() if one.number[:2] == line.number[:2])
+    return labels_in(text)
+
+
+def labels_in(text: str) -> dict[int, str]:
+    """The labels that a text prints."""
     parts = re.split(r'\b(\d+)(?:\.00)? ?= ?', text)
     # the text recognition has taken some capital I for a small l
     return {
@@ -156,6 +162,16 @@ def list_of_movitrac() -> Iterator[Fact]:
             assert spans or row.key.startswith('status.'), row.key
             ends = (spans[0][0], spans[-1][1]) if spans else (None, None)
             yield f'{row.key} range', ends, (row.minimum, row.maximum)
+    for card in (20, 21):
+        row = FAMILY[f'status.option_x{card}']
+        printed = (line.split('\t') for line in manual(4) if f'Option at X{card}: Bit' in line)
+        byte, _, _, labels, *_ = next(cells for cells in printed if cells[0][:4] == 'Byte')
+        yield f'{row.key} labels', labels_in(labels), {
+            code: plain(label) for code, label in row.labels.items()
+        }
+        # byte 0 comes first [C72]
+        three = bytes([0] * int(byte.removeprefix('Byte ')) + [3]).ljust(4, b'\0')
+        yield f'{row.key} byte', 3, row.at('movitrac').number.decode(three)
 
 
 def conversion_list_of_movitrac() -> Iterator[Fact]:

@@ -252,13 +252,14 @@ class Laws(History):
         crossed = self._taken_away == len(self._rig.asked) - 1
         if crossed and key == CONTROL and not stops:
             self.enabled_at = next((one.at for one in self._commands if one.name == 'enable'), None)
-        # a stop goes ahead of everything but what it has to read itself
+        # stops go ahead of everything but what each has to read itself
         due = self._stop_due
+        lead = self.shown.lead * max(1, sum(one.name in STOPS for one in self._commands))
         if stops:
             self._stop_due = None
             self._stop_tried_at, self._tried_in_fault = self.now, bool(self._far.faults)
         before = 0 if due is None else len(self._rig.asked) - 1 - due
-        if before > self.shown.lead:
+        if before > lead:
             raise Broken(f'{before} transactions went ahead of a stop')
 
     # --- what is reported -------------------------------------------------------------------------
