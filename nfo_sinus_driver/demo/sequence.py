@@ -212,5 +212,5 @@ class DemoSequence(Node):
         self._current = message.output_current
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        # a bus reports its port as its hardware
-        self._ports.update(status.hardware_id for status in message.status)
+        pairs = (pair for status in message.status for pair in status.values)
+        self._ports.update(pair.value for pair in pairs if pair.key == 'port')

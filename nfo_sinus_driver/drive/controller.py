@@ -460,9 +460,9 @@ class Controller:
         # may be active that an acknowledgement has not removed yet
         status = self._state.status
         may_run = self.commanded or self.stopping or (status is not None and status.from_bus)
-        # at an end that has stopped it, one more would go ahead of the stops of other drives
-        owed = self.stop_owed or self.stop_overdue
-        ended = self._control.stopped_at >= self._closed_at and not owed
+        # one more would go ahead of the stops of other drives, and fail where the line has broken
+        owed = self.stop_owed or self.stop_overdue or status is None or status.runs_by_bus
+        ended = self._control.stopped_at > -math.inf and not owed
         # no client can enable it until the motor stands still
         with self._sequence.external_stop(why):
             stop = self._stopped if ended else self.stop

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import math
+import re
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -38,7 +39,7 @@ def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str
     if not snapshot.connected:
         if not managed.is_silent:
             # a node that is not configured has nothing to report
-            return DiagnosticStatus.STALE, 'not connected: the node is not configured'
+            return DiagnosticStatus.OK, 'not connected: the node is not configured'
         why = managed.why_silent or 'the log of the node says what to check'
         return DiagnosticStatus.ERROR, f'not connected: {why}'
     level = _LEVELS[snapshot.kind]
@@ -75,8 +76,12 @@ def drive_status(
         'actual': _quantity(snapshot.actual, snapshot.unit),
         **_figures(drive.statistics),
     }
+    if snapshot.kind is Kind.FAULT:
+        # a bridge to a list of faults takes what is there for active
+        values['fault'] = re.sub(r'\W+', '_', snapshot.text).strip('_').upper()
     level, message = verdict
-    return _status(level, f'{name}: drive', message, serial, values)
+    # such a bridge takes what has a slash for the name of a node
+    return _status(level, f'{name}: drive', message, serial.replace('/', '-'), values)
 
 
 def _logged(entry: LogEntry | None) -> str:
@@ -116,7 +121,8 @@ def bus_status(
     else:
         level, message = DiagnosticStatus.OK, 'all drives answer'
     values = {'port': port, **_figures(statistics)}
-    return _status(level, f'{name}: line', message, port, values)
+    # /dev/ttyUSB0 is ttyUSB0
+    return _status(level, f'{name}: line', message, port.rpartition('/')[2], values)
 
 
 def _figures(statistics: Statistics) -> dict[str, str]:

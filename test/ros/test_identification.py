@@ -36,7 +36,8 @@ def _diagnosis(client: Client, name: str = 'nfo_sinus') -> DiagnosticStatus:
     def seen() -> DiagnosticStatus | None:
         for message in reversed(client.messages['diagnostics']):
             for status in message.status:
-                if status.name == f'{name}: drive' and status.level == DiagnosticStatus.OK:
+                ours = status.name == f'{name}: drive' and status.level == DiagnosticStatus.OK
+                if ours and not status.message.startswith('not connected'):
                     return status
         return None
 

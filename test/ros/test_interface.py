@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import itertools
 import math
+import re
 
 from bench import FULL_RATE, PATIENCE, TOPICS, Bench, Client, seconds, wait_until
 from connections import Connection, needs
@@ -146,6 +147,10 @@ def _diagnosis(client: Client, name: str) -> DiagnosticStatus | None:
     return None
 
 
+def _values(status: DiagnosticStatus) -> dict[str, str]:
+    return {pair.key: pair.value for pair in status.values}
+
+
 @needs('direct')
 def test_diagnostics_of_an_address_without_a_drive_are_steady(bench: Bench) -> None:
     bench.simulator('--address', '7')
@@ -187,16 +192,34 @@ def test_diagnostics_name_a_fault_with_its_remedy(bench: Bench) -> None:
         status = _diagnosis(client, 'nfo_sinus: drive')
         return status if status is not None and status.level == level else None
 
-    wait_until(lambda: level(DiagnosticStatus.OK), 'all is well')
+    well = wait_until(lambda: level(DiagnosticStatus.OK), 'all is well')
+    assert 'fault' not in _values(well)
     overvoltage = bench.drives.overvoltage
     drive.inject('fault', overvoltage.code)
     diagnosis = wait_until(lambda: level(DiagnosticStatus.ERROR), 'the fault')
     assert diagnosis.message.startswith(f'{overvoltage.text}: ')
     assert all(part in diagnosis.message for part in overvoltage.explained)
+    assert _values(diagnosis)['fault'] == re.sub(r'\W+', '_', overvoltage.text.upper())
     inv_st = client.wait_for('inv_st', lambda m: m.code == overvoltage.code, 'the fault')
     assert inv_st.kind == InvSt.FAULT
     assert inv_st.requires_ack
     assert inv_st.remedy
+    assert client.call('fault_ack').success
+    over = wait_until(lambda: level(DiagnosticStatus.OK), 'the fault is over')
+    assert 'fault' not in _values(over)
+
+
+def test_diagnostics_of_a_node_that_is_not_configured_are_no_error(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver('-p', 'autostart:=false')
+    client = bench.client()
+    status = wait_until(lambda: _diagnosis(client, 'nfo_sinus: drive'), 'its diagnosis')
+    assert status.level == DiagnosticStatus.OK
+    assert status.message == 'not connected: the node is not configured'
+    line = wait_until(lambda: _diagnosis(client, 'nfo_sinus_bus: line'), 'that of the line')
+    # a path would be taken for the name of a node
+    assert line.hardware_id and '/' not in line.hardware_id
+    assert _values(line)['port'].endswith(line.hardware_id)
 
 
 def test_diagnostics_of_a_run_name_its_fault_and_cry_over_no_stop_that_goes_well(

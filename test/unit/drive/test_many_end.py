@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 from support.rig import Rig
 
+from nfo_sinus_driver.drive import Cause
+
 #: How long each may take, s; all of them take longer on such a line.
 _PATIENCE = 4.0
 _SCMD = 'fieldbus.scmd'
@@ -62,6 +64,20 @@ def test_a_motor_that_is_left_to_its_ramp_is_left_without_a_run_command() -> Non
         rig.asked.clear()
         assert 'left to its ramp' in rig.answer(rig.drive.disconnect(1.0))
         assert [data for _, key, data in rig.asked if key == _SCMD and data] == [b'\0\0']
+
+
+def test_a_line_that_breaks_after_the_confirmed_stop_owes_no_other() -> None:
+    with Rig(parameters={'control.retard': 500.0}) as rig:
+        rig.turn()
+        rig.result(rig.drive.stop())
+        rig.line.state = 'silent'
+        # before the loss is noticed
+        released = rig.drive.disconnect(1.0)
+        assert rig.answer(released) and released.exception() is not None
+        assert not rig.drive.stop_waits and not rig.drive.stop_overdue
+        rig.pass_time(3.0)
+        assert not rig.notes.said(Cause.CANNOT_STOP)
+        rig.line.mend()
 
 
 def test_a_drive_that_is_cut_off_ends_the_wait_for_it() -> None:
