@@ -146,13 +146,14 @@ def test_every_bit_of_the_status_of_an_optimal_is_published(
     connection: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with Rig(connection, poll_rate=50.0).connect() as rig:
+        shown = 0
+        unit = control_unit.OptimalControlUnit
+        monkeypatch.setattr(unit, 'status_word', property(lambda _: shown))
         for bit in range(16):
-            monkeypatch.setattr(
-                control_unit.OptimalControlUnit, 'status_word', property(lambda _, bit=bit: 1 << bit)
-            )
+            shown = 1 << bit
             rig.pass_time(0.2)
             status = rig.drive.snapshot.status
-            assert status.shown_word == 1 << bit
+            assert status.shown_word == shown
             assert status.facts == SAYS.get(bit, Fact(0)), bit
             assert not status.facts & ~status.valid
             assert (status.state is State.SWITCHED_ON) == (bit == 2), bit

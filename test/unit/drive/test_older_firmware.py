@@ -16,6 +16,8 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from support.classic_ends import on_classic
+from support.parameter_ends import ENDS
 from support.rig import Connection, Rig
 from support.said import raises, said
 
@@ -28,6 +30,10 @@ from nfo_sinus_driver.simulator.classic import LineError
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.sinus_g2.servers import ClassicServer as Server
 
+#: What a change of loses the drive.
+LINE = {'serial.address', 'serial.si_baud'}
+#: What is not changed while the motor is enabled, even at set-point 0.
+SCALED = {'motor.f_nom': 60, 'motor.n_nom': 1700}
 STOP, EXT, BUS = 1, 2, 3
 SIO_FAIL, OFF, STANDBY, LIMIT = 14, 24, 37, 27
 TIMEOUT = ('serial.sio_tot', 'serial.auto_stop')
@@ -122,6 +128,43 @@ def test_under_bus_control_settings_are_just_written(rig: Older, turning: bool) 
     assert rig.modes == [BUS]
     assert rig.turns == rig.drive.following == turning
     assert not rig.flags
+
+
+def test_every_setting_that_its_manual_lists_is_written_and_read_back() -> None:
+    # at the other end of its range [M2 table 1]; those of the line have a test of their own
+    with Older(poll_rate=2.0, telemetry_rate=0.0, allow_communication_changes=True) as rig:
+        rig.connect(parameters=True)
+        has = rig.drive.parameters.values
+        ends = {one.name: on_classic(one, '5.0') for one in ENDS if one.name in has}
+        assert ends.keys() == has.keys()
+        for key in [key for key in has if key not in LINE | SCALED.keys()]:
+            low, high = ends[key].low, ends[key].high
+            wanted = low if has[key] == high else high
+            if wanted != has[key]:
+                rig.result(rig.drive.parameters.change({key: wanted}))
+            assert rig.far.peek(key) == wanted == rig.drive.parameters.values[key], key
+        assert not rig.flags and not rig.energised
+
+
+def test_what_scales_a_set_point_is_written_under_bus_control_without_an_enable() -> None:
+    with Older() as rig:
+        rig.connect()
+        rig.enable()
+        rig.result(rig.drive.stop())
+        rig.pass_time(1.0)
+        for key, value in SCALED.items():
+            rig.result(rig.drive.parameters.change({key: value}))
+            assert rig.far.peek(key) == value
+        assert rig.modes == [BUS] and not rig.flags
+
+
+@pytest.mark.xfail(strict=True, reason='the control that is taken for it counts as an enable')
+def test_what_scales_a_set_point_is_written_under_control_that_is_given_back() -> None:
+    with Older() as rig:
+        rig.connect()
+        for key, value in SCALED.items():
+            rig.result(rig.drive.parameters.change({key: value}))
+            assert rig.far.peek(key) == value
 
 
 def test_what_else_has_control_keeps_it(rig: Older) -> None:
@@ -331,7 +374,7 @@ def test_nothing_at_all_is_asked_that_it_does_not_know() -> None:
 
 @pytest.mark.parametrize(
     ('key', 'value', 'then'),
-    [('serial.address', 9, 'the address (9)'), ('serial.si_baud', '4800bps', 'baud_rate (4800')],
+    [('serial.address', 9, 'address (9)'), ('serial.si_baud', '4800bps', 'baud_rate (4800')],
 )
 def test_a_setting_of_its_line_counts_at_once_and_how_to_follow_is_said(
     key: str, value: Any, then: str
