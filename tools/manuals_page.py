@@ -13,7 +13,7 @@ import re
 
 DOCS = Path(__file__).resolve().parents[1] / 'docs'
 TABLE = DOCS / 'manuals.csv'
-COLUMNS = ['manual', 'place', 'what', 'status', 'served_by', 'why']
+COLUMNS = ['manual', 'place', 'what', 'status', 'served_by', 'why', 'shown_by']
 STATUSES = ('served', 'in part', 'not')
 #: Title and page of each manual.
 MANUALS = {
@@ -30,6 +30,7 @@ _INTRODUCTION = """\
 # The manuals
 
 What each manual offers to the owner of a drive, where the driver serves it, or why it does not.
+`docs/manuals.csv` names the test that shows each row.
 
 """
 _HEAD = '| place | what | status | where, or why not |\n|---|---|---|---|\n'
@@ -85,6 +86,11 @@ def _served(row: Row) -> Iterator[str]:
 def served_by(row: Row) -> list[str]:
     """Return each thing by which a row is served: a name that is typed, or a place in the docs."""
     return [one.strip() for one in row['served_by'].split(';') if one.strip()]
+
+
+def shown_by(row: Row) -> list[str]:
+    """Return each test that shows a row: ``unit/link/test_frames.py::test_a_frame``."""
+    return [one.strip() for one in row['shown_by'].split(';') if one.strip()]
 
 
 def _title(file: str, anchor: str) -> str:

@@ -82,6 +82,29 @@ def test_what_a_row_names_is_there() -> None:
     assert {row: names for row, names in found.items() if names} == {}
 
 
+def is_test(name: str) -> bool:
+    """Whether there is a test of this name."""
+    file, _, function = name.partition('::')
+    path = ROOT / 'test' / file
+    return path.is_file() and re.search(rf'^def {re.escape(function)}\(', read(path), re.M) is not None
+
+
+def test_what_is_served_has_a_test_that_shows_it() -> None:
+    # what is done by hand at the drive, a wire or a jumper, is only told
+    told = re.compile(r'drives/\w+\.md#')
+    wrong = [
+        (row['manual'], row['place'], row['what'])
+        for row in ROWS
+        if not all(map(is_test, _TOOL['shown_by'](row)))
+        or (row['status'] == 'not' and row['shown_by'])
+        or (
+            row['status'] != 'not' and not row['shown_by']
+            and not all(map(told.match, _TOOL['served_by'](row)))
+        )
+    ]
+    assert wrong == []
+
+
 def test_a_row_says_what_serves_it_or_why_it_is_not_served() -> None:
     assert [row for row in ROWS if list(row) != _TOOL['COLUMNS'] or None in row.values()] == []
     wrong = [

@@ -12,6 +12,7 @@ from support.rig import Connection, Rig
 from support.said import raises
 
 from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.catalog import Fact, State
 from nfo_sinus_driver.drive import Cause, DriveSettings
 from nfo_sinus_driver.simulator.sinus_optimal import control_unit
 
@@ -120,6 +121,42 @@ def test_each_step_of_the_optimal_is_confirmed_before_the_next(
         assert confirmed == [
             (0x4000, 0), (0x4008, FROM_BUS), (0x4009, FROM_BUS | ENABLED)
         ]
+
+
+#: What each bit of its status says [M1]; 2 is Enabled, 4 and 5 are echoes, 8 is not used.
+SAYS = {
+    0: Fact.READY,
+    1: Fact.SWITCHED_ON | Fact.OPERATION_ENABLED,
+    3: Fact.FAULT,
+    6: Fact.RUN_INPUT_MISSING,
+    7: Fact.ALARM,
+    9: Fact.NETWORK_CONTROL,
+    10: Fact.SETPOINT_REACHED,
+    11: Fact.LIMIT_ACTIVE,
+    # it starts again by itself
+    12: Fact.SLEEPING | Fact.OPERATION_ENABLED,
+    13: Fact.STOP_MODE_BRAKE,
+    14: Fact.REVERSE,
+    15: Fact.STOPPING,
+}
+
+
+@pytest.mark.parametrize('connection', ['optimal', 'telegram1 optimal'])
+def test_every_bit_of_the_status_of_an_optimal_is_published(
+    connection: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Rig(connection, poll_rate=50.0).connect() as rig:
+        shown = 0
+        unit = control_unit.OptimalControlUnit
+        monkeypatch.setattr(unit, 'status_word', property(lambda _: shown))
+        for bit in range(16):
+            shown = 1 << bit
+            rig.pass_time(0.2)
+            status = rig.drive.snapshot.status
+            assert status.shown_word == shown
+            assert status.facts == SAYS.get(bit, Fact(0)), bit
+            assert not status.facts & ~status.valid
+            assert (status.state is State.SWITCHED_ON) == (bit == 2), bit
 
 
 @pytest.mark.parametrize('key', ['stop', 'start', 'ext'])

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 from typing import Any
 
@@ -20,6 +21,7 @@ from nfo_sinus_driver.drive.events import Report
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import PROTOCOLS, NoAnswer
 from nfo_sinus_driver.setting import settings_of
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
 
 OVERLOAD = 5
 MODE, SCMD = 'fieldbus.mode', 'fieldbus.scmd'
@@ -119,6 +121,44 @@ def test_telemetry() -> None:
     with Rig(telemetry_rate=0.0).connect() as rig:
         rig.pass_time(2.0)
         assert rig.notes.telemetry == []
+
+
+#: What a drive measures of its motor, and counts; an Optimal has the last seven.
+MEASURED: dict[Role, Callable[[SimulatedDrive], float]] = {
+    Role.OUTPUT_VOLTAGE: lambda far: far.motor.voltage,
+    Role.DC_LINK_VOLTAGE: lambda far: far.motor.dc_link,
+    Role.ACTUAL_TORQUE: lambda far: 100 * far.motor.torque,
+    Role.MOTOR_TEMPERATURE: lambda far: far.motor.temperature,
+    Role.PT1000_TEMPERATURE: lambda far: 25 + 0.6 * far.motor.temperature,
+    Role.BRAKE_TIME: lambda far: far.counters.brake_time,
+    Role.ACTUAL_FREQUENCY: lambda far: far.motor.frequency,
+    Role.ACTUAL_SPEED: lambda far: far.motor.speed,
+    Role.OUTPUT_CURRENT: lambda far: far.motor.current,
+    Role.OUTPUT_POWER: lambda far: far.motor.power,
+    Role.POWER_FACTOR: lambda far: far.motor.power_factor,
+    Role.OPERATING_TIME: lambda far: far.counters.operating_time,
+    Role.RUNNING_TIME: lambda far: far.counters.running_time,
+}
+
+
+@pytest.mark.parametrize(
+    ('connection', 'measures'), [('classic v5.0', [*MEASURED]), ('optimal', [*MEASURED][6:])]
+)
+def test_telemetry_is_what_the_drive_measures_and_nothing_else(
+    connection: str, measures: list[Role]
+) -> None:
+    with Rig(connection, poll_rate=5.0).turn() as rig:
+        # beyond 16 bits, in each unit
+        rig.far.counters.operating_time = 7000.0
+        rig.far.counters.running_time = 6700.0
+        rig.far.counters.brake_time = 70_000.0
+        rig.far.motor.temperature = 40.0
+        # one of those that change slowly with each message
+        rig.pass_time(12.0)
+        values = rig.notes.telemetry[-1].values
+        assert {role for role, value in values.items() if not math.isnan(value)} == {*measures}
+        for role in measures:
+            assert values[role] == pytest.approx(MEASURED[role](rig.far), rel=0.02, abs=0.02), role
 
 
 def test_telemetry_of_older_firmware() -> None:

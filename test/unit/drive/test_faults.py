@@ -10,12 +10,12 @@ import itertools
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.catalog import Family, Kind, Meaning, load_family
+from nfo_sinus_driver.catalog import Fact, Family, Kind, Meaning, load_family
 from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import TRIES
 
-OVERLOAD, OVERHEATED, SIO_FAIL = 5, 3, 14
+OVERLOAD, OVERHEATED, DC_LOW, SIO_FAIL = 5, 3, 7, 14
 MODE, WORD, MASK = (f'fieldbus.{key}' for key in ('mode', 'drive_control', 'drv_ctrl_write_mask'))
 CONNECTIONS = ('rtu', 'rtu, control word', 'optimal', 'optimal, control word')
 every_connection = pytest.mark.parametrize('connection', CONNECTIONS)
@@ -92,6 +92,20 @@ def test_every_alarm_of_the_optimal_is_shown_and_reported_and_stops_nothing(
             assert rig.drive.following
             rig.far.faults.acknowledge()
             rig.wait_until(lambda: rig.notes.snapshot.kind is Kind.STATUS, 5.0)
+
+
+@pytest.mark.parametrize('connection', ['optimal', 'optimal, control word'])
+def test_an_alarm_of_the_optimal_is_acknowledged_like_a_fault(connection: str) -> None:
+    with Rig(connection) as rig:
+        rig.connect()
+        rig.far.trip(DC_LOW)
+        rig.wait_until(lambda: rig.notes.snapshot.kind is Kind.ALARM, 5.0)
+        assert Fact.ALARM in rig.notes.snapshot.status.facts
+        rig.acknowledged = connection == 'optimal'
+        assert rig.answer(rig.drive.acknowledge()) == f'acknowledged {DC_LOW} DC Low'
+        assert rig.far.control_unit.ack_reads == rig.acknowledged
+        assert rig.far.faults.codes == []
+        rig.wait_until(lambda: rig.notes.snapshot.kind is Kind.STATUS, 5.0)
 
 
 @every_connection

@@ -17,7 +17,8 @@ from nfo_sinus_driver.drive import Cause, DriveSettings
 #: Where the drive shows the set-point that it was given [M0 table 4, M1].
 OWN_SETPOINT = {
     'rtu': 'status.frq_set', 'classic': 'status.frq_set', 'canopen': 'status.frq_set',
-    'rtu, control word': 'status.frq_set', 'optimal': 'fieldbus.input_freq_setpoint',
+    'classic v5.0': 'status.frq_set', 'rtu, control word': 'status.frq_set',
+    'optimal': 'fieldbus.input_freq_setpoint',
 }  # fmt: skip
 
 
@@ -97,6 +98,8 @@ def test_a_monitored_optimal_reports_the_setpoint_that_it_follows(
         rig.far.control_unit.press('ext')
         rig.pass_time(1.5)
         assert rig.notes.snapshots[-1].setpoint == pytest.approx(setpoint)
+        followed = rig.drive.model.profile.setpoints[mode].followed
+        assert rig.notes.telemetry[-1].measured[followed] == pytest.approx(setpoint)
 
 
 def test_what_is_only_read_is_kept_up_beside_the_settings() -> None:

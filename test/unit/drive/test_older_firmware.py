@@ -16,17 +16,24 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from support.classic_ends import on_classic
+from support.parameter_ends import ENDS
 from support.rig import Connection, Rig
 from support.said import raises, said
 
 from nfo_sinus_driver.catalog import Fact, Kind, Role
 from nfo_sinus_driver.drive import Cause, DriveError, Severity
+from nfo_sinus_driver.drive.broadcast import broadcast_stop
 from nfo_sinus_driver.drive.tuning import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.classic import LineError
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.sinus_g2.servers import ClassicServer as Server
 
+#: What a change of loses the drive.
+LINE = {'serial.address', 'serial.si_baud'}
+#: What is not changed while the motor is enabled, even at set-point 0.
+SCALED = {'motor.f_nom': 60, 'motor.n_nom': 1700}
 STOP, EXT, BUS = 1, 2, 3
 SIO_FAIL, OFF, STANDBY, LIMIT = 14, 24, 37, 27
 TIMEOUT = ('serial.sio_tot', 'serial.auto_stop')
@@ -121,6 +128,43 @@ def test_under_bus_control_settings_are_just_written(rig: Older, turning: bool) 
     assert rig.modes == [BUS]
     assert rig.turns == rig.drive.following == turning
     assert not rig.flags
+
+
+def test_every_setting_that_its_manual_lists_is_written_and_read_back() -> None:
+    # at the other end of its range [M2 table 1]; those of the line have a test of their own
+    with Older(poll_rate=2.0, telemetry_rate=0.0, allow_communication_changes=True) as rig:
+        rig.connect(parameters=True)
+        has = rig.drive.parameters.values
+        ends = {one.name: on_classic(one, '5.0') for one in ENDS if one.name in has}
+        assert ends.keys() == has.keys()
+        for key in [key for key in has if key not in LINE | SCALED.keys()]:
+            low, high = ends[key].low, ends[key].high
+            wanted = low if has[key] == high else high
+            if wanted != has[key]:
+                rig.result(rig.drive.parameters.change({key: wanted}))
+            assert rig.far.peek(key) == wanted == rig.drive.parameters.values[key], key
+        assert not rig.flags and not rig.energised
+
+
+def test_what_scales_a_set_point_is_written_under_bus_control_without_an_enable() -> None:
+    with Older() as rig:
+        rig.connect()
+        rig.enable()
+        rig.result(rig.drive.stop())
+        rig.pass_time(1.0)
+        for key, value in SCALED.items():
+            rig.result(rig.drive.parameters.change({key: value}))
+            assert rig.far.peek(key) == value
+        assert rig.modes == [BUS] and not rig.flags
+
+
+@pytest.mark.xfail(reason='the control that is taken for it counts as an enable')
+def test_what_scales_a_set_point_is_written_under_control_that_is_given_back() -> None:
+    with Older() as rig:
+        rig.connect()
+        for key, value in SCALED.items():
+            rig.result(rig.drive.parameters.change({key: value}))
+            assert rig.far.peek(key) == value
 
 
 def test_what_else_has_control_keeps_it(rig: Older) -> None:
@@ -323,6 +367,53 @@ def test_nothing_at_all_is_asked_that_it_does_not_know() -> None:
         rig.result(drive.disconnect(5.0))
         unasked = LineError.UNKNOWN | LineError.PREFIX | LineError.UNREADABLE | LineError.UNWRITABLE
         assert not rig.flags & unasked
+
+
+# --- its line and its faults ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('key', 'value', 'then'),
+    [('serial.address', 9, 'address (9)'), ('serial.si_baud', '4800bps', 'baud_rate (4800')],
+)
+def test_a_setting_of_its_line_counts_at_once_and_how_to_follow_is_said(
+    key: str, value: Any, then: str
+) -> None:
+    with Older(allow_communication_changes=True) as rig:
+        rig.connect(parameters=True)
+        # its codes are others than those of newer firmware [C5]
+        assert 'serial.si_prot' not in rig.drive.parameters.values
+        answer = rig.answer(rig.drive.parameters.change({key: value}))
+        assert rig.far.peek(key) == value
+        assert f'start this driver with the {then}' in answer
+        assert not rig.energised
+
+
+def test_a_broadcast_of_mode_stop_ends_the_serial_faults_of_all() -> None:
+    # the one message that a drive with such a fault obeys [M2 §7]
+    with Rig('classic v5.0', drives=2).turn() as rig:
+        for far in rig.fars.values():
+            far.control_unit.serial_error(LineError.TIMEOUT)
+        rig.pass_time(1.0)
+        assert [far.faults.codes for far in rig.fars.values()] == 2 * [[SIO_FAIL]]
+        rig.result(rig.bus.run(broadcast_stop(rig.bus, rig.drives.values())))
+        rig.pass_time(1.0)
+        for number, far in rig.fars.items():
+            assert (far.faults.codes, far.faults.sio_err, far.control_unit.mode) == ([], 0, STOP)
+            assert rig.drives[number].snapshot.kind is Kind.STATUS
+            assert not far.motor.driven
+
+
+def test_its_status_is_shown_by_the_texts_of_its_firmware(monkeypatch: pytest.MonkeyPatch) -> None:
+    # 37 to 40 are those of the serial line here, 41 to 44 of a fieldbus [M2 table 3]
+    with Rig('classic v5.0', control_method='monitor').connect() as rig:
+        for code, text in (
+            (37, 'Sio Stby'), (38, 'Sio Run'), (39, 'Sio Acc'), (40, 'Sio Ret'),
+            (41, 'Bus Stby'), (42, 'Bus Run'), (43, 'Bus Acc'), (44, 'Bus Ret'),
+        ):  # fmt: skip
+            show(rig, monkeypatch, code)
+            rig.pass_time(0.3)
+            assert (rig.drive.snapshot.status.code, rig.drive.snapshot.text) == (code, text)
 
 
 # --- without a status word ------------------------------------------------------------------------

@@ -95,6 +95,29 @@ def test_unit_sign_and_reached(connection: str, mode: str) -> None:
             assert not snapshot.setpoint_clamped
 
 
+@pytest.mark.parametrize('mode', MODES)
+def test_older_firmware_has_one_set_point_whose_unit_and_steps_are_those_of_its_mode(
+    mode: str,
+) -> None:
+    # E001E [M2 table 2]
+    with enabled('classic v5.0', mode) as rig:
+        for value in (MODES[mode].value, -MODES[mode].value):
+            rig.send(value)
+            rig.pass_time(4.0)
+            assert rig.written('fieldbus.setpoint')[-1] == MODES[mode].steps * value
+            assert in_drive(rig, mode) == rig.drive.snapshot.setpoint == value
+            turns = rig.far.motor.torque if mode == 'Torque' else rig.far.motor.frequency
+            assert turns * value > 0
+            # of PI-Reg it is RegAct, of a process that has no sign here
+            actual = abs(value) if mode == 'PI-Reg' else value
+            snapshot = rig.drive.snapshot
+            assert snapshot.actual == pytest.approx(actual, rel=0.07, abs=1.0)
+            assert (snapshot.control_mode, snapshot.unit) == (mode, MODES[mode].unit)
+        key = 'status.reg_act'
+        if mode == 'PI-Reg':
+            assert rig.notes.telemetry[-1].measured[key] == pytest.approx(actual, rel=0.07)
+
+
 def test_a_set_point_is_rounded_to_a_step_of_the_drive() -> None:
     for mode, value, raw in (('Freque', 12.34, 123), ('Speed', -600.4, -600)):
         with enabled('rtu', mode) as rig:

@@ -44,15 +44,14 @@ RUNS = {
 }
 OPTIMAL_RUNS = {'fieldbus': RUNS['fieldbus'], 'terminal': RUNS['terminal']}
 TUNES = {0x201, 0x301, 0x401, 0x501}
-both_models = pytest.mark.parametrize('connection', ['rtu', 'optimal'])
 
 
-@both_models
+@pytest.mark.parametrize('connection', ['rtu', 'classic v5.0', 'optimal'])
 def test_run_commands(connection: str) -> None:
     wrong = {}
-    for reference, (code, frequency) in (RUNS if connection == 'rtu' else OPTIMAL_RUNS).items():
+    for reference, (code, frequency) in (OPTIMAL_RUNS if connection == 'optimal' else RUNS).items():
         with Rig(connection, reference=reference, poll_rate=5.0, telemetry_rate=0.0) as rig:
-            command = SCMD if connection == 'rtu' else 'fieldbus.smode'
+            command = 'fieldbus.smode' if connection == 'optimal' else SCMD
             rig.connect()
             rig.far.memory.put(rig.far.control_unit.setpoint_key, 333)
             rig.enable()

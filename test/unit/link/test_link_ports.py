@@ -133,6 +133,32 @@ def test_every_format_is_tolerated_by_a_pseudo_terminal(pty: Pty, char_format: s
         port.close()
 
 
+@pytest.mark.parametrize(
+    ('char_format', 'expected'),
+    [
+        ('7E1', termios.CS7 | termios.PARENB),
+        ('7N2', termios.CS7 | termios.CSTOPB),
+        ('8E1', termios.CS8 | termios.PARENB),
+        ('8O1', termios.CS8 | termios.PARENB | termios.PARODD),
+        ('8N1', termios.CS8),
+        ('8N2', termios.CS8 | termios.CSTOPB),
+    ],
+)
+def test_every_format_is_set(
+    pty: Pty, monkeypatch: pytest.MonkeyPatch, char_format: str, expected: int
+) -> None:
+    # a pseudo-terminal keeps none of it
+    wanted: list[int] = []
+    monkeypatch.setattr(
+        serial_port.termios, 'tcsetattr', lambda fd, when, modes: wanted.append(modes[2])
+    )
+    port = SerialPort(pty.path, LineSettings(char_format=char_format))
+    port.open()
+    port.close()
+    format_bits = termios.CSIZE | termios.PARENB | termios.PARODD | termios.CSTOPB
+    assert [cflag & format_bits for cflag in wanted] == [expected]
+
+
 @pytest.mark.parametrize('baud', BAUD_RATES)
 def test_every_baud_rate_is_set(pty: Pty, baud: int) -> None:
     port = SerialPort(pty.path, LineSettings(baud_rate=baud, char_format='8N1'))
