@@ -990,12 +990,4 @@ LAWS = (
         'elif False:',
         (MOTOR_FOLLOWS,),
     ),
-    Mutant(
-        2,
-        'each set-point anew is taken for another master',
-        FOLLOWING,
-        '_REACTION = 1.0',
-        '_REACTION = 0.0',
-        (MOTOR_FOLLOWS,),
-    ),
 )
