@@ -14,15 +14,9 @@ PYTEST = -m pytest -p xdist -p timeout -p hypothesispytest --dist worksteal
 WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PATH \
 	-u PYTHONPATH -u ROS_DISTRO -u ROS_VERSION
 
-# What stands on pymodbus: the simulator's own Modbus, and the frames of the driver that are compared.
-USES_PYMODBUS = $(addprefix test/unit/simulator/test_, \
-	modbus.py lines.py foreign_masters.py plc.py) \
-	$(addprefix test/unit/link/test_, \
-	rtu_codec.py ascii_codec.py tcp_codec.py identify_codec.py serial_interop.py)
-
 .DEFAULT_GOAL := help
 .PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench docs parameters
-.PHONY: all bench-gate build clean coverage
+.PHONY: all bench-gate build clean coverage golden
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -42,9 +36,9 @@ test: setup ## lint, types, unit, ros, until the first one fails
 		$(MAKE) --no-print-directory $$stage || exit; \
 	done
 
-all: ## all that says whether it is right: test, docs, mutants, campaign (hours)
+all: ## all that says whether it is right: all of test, docs, mutants, campaign (hours)
 	@for stage in test docs mutants campaign; do \
-		$(MAKE) --no-print-directory $$stage || exit; \
+		$(MAKE) --no-print-directory $$stage FULL=1 || exit; \
 	done
 
 lint: setup ## ruff, and who may import whom
@@ -57,20 +51,20 @@ types: setup ## mypy, on all that is not ROS
 	@.venv/bin/mypy
 
 # More workers than processors: these tests wait more than they work.
-unit: setup ## tests without ROS, with the oldest and the newest libraries (FULL=1: all there is)
+unit: setup ## tests without ROS; of products a share (FULL=1: all, and with every library)
 	@echo '== unit: without rclpy, with the oldest pymodbus'
 	@# by one process, so that the workers have it compiled already; what is wrong they say again
 	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) --collect-only -qq test/unit \
 		>/dev/null 2>&1 || true
 	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 9 test/unit
+ifdef FULL
 	@echo '== unit again, what uses pymodbus: the current one'
-	@FULL=$(FULL) $(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 9 $(if $(FULL), \
-		test/unit/link test/unit/simulator, $(USES_PYMODBUS))
+	@FULL=1 $(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 9 test/unit/link test/unit/simulator
 	@if [ -d .venv/noble ]; then \
-		echo '== unit again, what uses libraries: those of Ubuntu 24.04, Python 3.12'; \
-		FULL=$(FULL) $(WITHOUT_ROS) .venv/noble/bin/python $(PYTEST) -n 9 $(if $(FULL), \
-			test/unit, $(USES_PYMODBUS) test/unit/cli test/unit/node); \
+		echo '== unit again: the libraries of Ubuntu 24.04, Python 3.12'; \
+		FULL=1 $(WITHOUT_ROS) .venv/noble/bin/python $(PYTEST) -n 9 test/unit; \
 	fi
+endif
 
 ros: setup ## end-to-end tests with rclpy (CONNECTION=classic_v2: over another one; CONNECTION=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
@@ -92,6 +86,9 @@ campaign: setup ## many histories of commands, faults and line losses in any ord
 		-n auto --dist worksteal test/unit/drive/test_any_order.py -k campaign
 	@ACKNOWLEDGEMENTS=$(or $(ACKNOWLEDGEMENTS),1000) tools/run python $(PYTEST) -n auto \
 		test/unit/drive/test_no_turn_at_acknowledge.py -k no_turn
+
+golden: setup ## name the tests whose frames are others than with the driver of COMMIT (HEAD)
+	@$(WITHOUT_ROS) .venv/without-ros/bin/python tools/golden.py $(COMMIT)
 
 fuzz: setup ## spoiled frames through every decoder (FRAMES=1000000 SEED=1 ONLY=frame)
 	@$(WITHOUT_ROS) PYTHONPATH=.:test .venv/without-ros/bin/python -m fuzz \

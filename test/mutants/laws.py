@@ -42,6 +42,10 @@ SILENCES = 'nfo_sinus_driver/bus/scheduler.py'
 MUTE_PORT = 'test/unit/drive/test_mute_port.py'
 GATE = 'nfo_sinus_driver/drive/recognition.py'
 RECOGNISING = 'nfo_sinus_driver/drive/recognising.py'
+#: Whether a motor follows its set-points, and why it stopped.
+FOLLOWING = 'nfo_sinus_driver/drive/following.py'
+MOTOR_FOLLOWS = 'test/unit/drive/test_motor_follows.py'
+WHY_STOPPED = 'test/unit/drive/test_why_stopped.py'
 #: What is tested of a driver that stood still, and of a drive whose status cannot be read.
 STANDS_STILL = 'test/unit/drive/test_driver_stands_still.py'
 UNREADABLE = 'test/unit/drive/test_status_unreadable.py'
@@ -933,7 +937,7 @@ LAWS = (
     Mutant(
         2,
         'a motor that stands against its set-points goes on where only its turning shows a run',
-        'nfo_sinus_driver/drive/following.py',
+        FOLLOWING,
         'elif self._stands(frequency, measured.at):',
         'elif False:',
         ('test/unit/drive/test_runs_by_frequency.py', '-k', 'stands_against or never_turns'),
@@ -945,5 +949,45 @@ LAWS = (
         'return size * self._way if self.known and size else size',
         'return size',
         ('test/unit/drive/test_described_direction.py', '-k', 'starts_anew'),
+    ),
+    Mutant(
+        3,
+        'a drive goes on although the one that it stops with has stopped',
+        CONTROLLER,
+        '        self._bus.call(lambda: self._on_stop(why))',
+        '        pass',
+        ('test/unit/drive/test_stop_with.py',),
+    ),
+    Mutant(
+        7,
+        'why a motor stopped is not kept',
+        TABLE,
+        '            self.stopped_for = why\n            self._on_stop(why)',
+        '            self._on_stop(why)',
+        (WHY_STOPPED,),
+    ),
+    Mutant(
+        7,
+        'a drive that was away and is not in control any more has stopped for no known reason',
+        'nfo_sinus_driver/drive/stop_reason.py',
+        '        Cause.CONTROL_LOST_WHILE_AWAY,\n',
+        '',
+        (WHY_STOPPED,),
+    ),
+    Mutant(
+        2,
+        'a motor that does not slow down without set-points goes on',
+        FOLLOWING,
+        'return self._after_expiry.take(abs(frequency), at)',
+        'return False',
+        (MOTOR_FOLLOWS,),
+    ),
+    Mutant(
+        2,
+        'a motor that another master reverses goes on',
+        FOLLOWING,
+        'elif role is not None and self._turns_back(frequency, measured.at, least, most):',
+        'elif False:',
+        (MOTOR_FOLLOWS,),
     ),
 )

@@ -35,7 +35,7 @@ from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.memory import Memory, ProcessMemory
 from nfo_sinus_driver.link import Address, LinkError, Refused, Reply
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from support import telegram_laws, trace_laws
+from support import golden, telegram_laws, trace_laws
 from support.recognition_law import RecognitionLaw
 from support.rig_line import Clock, Line
 from support.said import Said, said, says
@@ -239,6 +239,7 @@ class Rig:
             options={**hardest(connection.model), **connection.options, **(options or {})},
             **line,
         )
+        golden.keep(self.line.frames)
         self.line.passed = self._passed
         self.fars = self.line.drives
         for far in self.fars.values():

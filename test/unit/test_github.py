@@ -32,7 +32,13 @@ def test_it_runs_for_every_change() -> None:
     when = WORKFLOW[True]
     assert {'push', 'pull_request'} <= when.keys()
     assert WORKFLOW['permissions'] == {'contents': 'read'}
-    assert all(job['timeout-minutes'] <= 180 for job in JOBS.values())
+    assert all(job['timeout-minutes'] <= 180 for name, job in JOBS.items() if name != 'all')
+
+
+def test_all_is_run_each_night_and_for_no_change() -> None:
+    assert WORKFLOW[True]['schedule']
+    assert JOBS['all']['if'] == "github.event_name == 'schedule'"
+    assert JOBS['all']['steps'][-1]['run'] == 'make all'
 
 
 def test_ros_from_apt_is_tried_on_both_machines_and_kilted_may_fail() -> None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 import itertools
 from pathlib import Path
 import re
@@ -346,11 +346,16 @@ def missing(sentences: Iterable[Sentence], page: str) -> list[str]:
 # --- the tests ------------------------------------------------------------------------------------
 
 
-CODE = Code({
-    path.relative_to(PACKAGE).as_posix(): path.read_text(encoding='utf-8')
-    for path in sorted(PACKAGE.rglob('*.py'))
-    if path.relative_to(PACKAGE).parts[0] not in OTHER_PROGRAMS
-})
+@cache
+def code() -> Code:
+    """Return all that an operator may read of; not when each worker collects the tests."""
+    return Code({
+        path.relative_to(PACKAGE).as_posix(): path.read_text(encoding='utf-8')
+        for path in sorted(PACKAGE.rglob('*.py'))
+        if path.relative_to(PACKAGE).parts[0] not in OTHER_PROGRAMS
+    })
+
+
 PAGE_TEXT = PAGE.read_text(encoding='utf-8')
 
 
@@ -360,7 +365,7 @@ REFUSED = Sentence('99', ('the drive refused (exception ', ')'))
 
 def templates() -> Iterator[Sentence]:
     """Yield the sentence of each cause by which something is wrong."""
-    silent = SUCCESSES | only_informing(CODE)
+    silent = SUCCESSES | only_informing(code())
     for cause, template in SENTENCES.items():
         if cause not in silent:
             yield of_template(cause.name, template)
@@ -377,7 +382,7 @@ def templates() -> Iterator[Sentence]:
             ),
         ),
         (
-            CODE.logged,
+            lambda: code().logged(),
             (
                 *('cannot start: …', 'error in a service of …', '…; retrying'),
                 'set-point … ignored: it is not a finite number',  # given by a caller
@@ -386,7 +391,7 @@ def templates() -> Iterator[Sentence]:
             ),
         ),
         (
-            CODE.raised,
+            lambda: code().raised(),
             (
                 '… does not exist: … Ports found: …',
                 'port is empty: name a device, such as /dev/ttyUSB0',
@@ -394,7 +399,7 @@ def templates() -> Iterator[Sentence]:
                 'the drive lets no one take control now (MODE is Inhibit: tuning?)',
             ),
         ),
-        (CODE.answered, ('the bus did not get to it',)),
+        (lambda: code().answered(), ('the bus did not get to it',)),
     ],
     ids=['causes', 'logged', 'exceptions', 'answers'],
 )
@@ -415,7 +420,7 @@ def test_every_refusal_of_a_drive_has_an_entry() -> None:
 
 
 def test_every_entry_is_still_said_and_stands_once() -> None:
-    said = [*CODE.texts(), *REFUSALS, REFUSED]
+    said = [*code().texts(), *REFUSALS, REFUSED]
     said += [of_template(cause.name, text) for cause, text in SENTENCES.items()]
     # a few words with values around them would stand for anything
     telling = [one for one in said if one.has_words and len(''.join(one.parts)) > 4]
@@ -426,16 +431,16 @@ def test_every_entry_is_still_said_and_stands_once() -> None:
 
 def test_exceptions_are_needed_and_right() -> None:
     graver = {
-        mention.attr for _, node in CODE.nodes() if refuses(node) for mention in causes_in(node)
+        mention.attr for _, node in code().nodes() if refuses(node) for mention in causes_in(node)
     }
     assert {'CANNOT_STOP', 'NOT_CONNECTED'} <= graver
     assert not {cause.name for cause in SUCCESSES} & graver
-    assert not SUCCESSES & only_informing(CODE), 'these are left out anyway'
+    assert not SUCCESSES & only_informing(code()), 'these are left out anyway'
     with_values = {
         name
-        for path, node in CODE.nodes()
+        for path, node in code().nodes()
         if isinstance(node, ast.Call) and name_of(node.func) == 'ValueError'
-        for name in (path, f'{path}:{getattr(CODE.function_around(node), "name", "")}')
+        for name in (path, f'{path}:{getattr(code().function_around(node), "name", "")}')
     }
     assert not NEVER_SHOWN.keys() - with_values
 
