@@ -11,6 +11,8 @@ import pytest
 from support.movitrac_ends import COUNTS, ENDS, Ends
 from support.rig import Rig
 
+from nfo_sinus_driver.catalog import Role, load_family
+
 #: What has to be on for a setting to be switched on [M4 §2.1.2].
 NEEDED = {f'control.hoist_{number}': f'special.four_quadrant_{number}' for number in (1, 2)}
 #: P802: On only by the keypad.
@@ -55,7 +57,8 @@ SIZES = {'ipos.lag_distance'}
 #: And those that have a text for each code: the code, and what it means.
 TEXTS = {
     '': """
-        271 status.inverter_type 3100 MOVITRAC 31.., 306 status.output_stage 33 31C011-503-4-00
+        271 status.inverter_type 3100 MOVITRAC 31.., 306 status.output_stage 33 31C011-503-4-00,
+        157 terminal.output_61 33 Brake released
     """,
     'ffi': """
         600 status.process_data_configuration 4 3PD+parameter,
@@ -153,7 +156,6 @@ def test_everything_that_is_only_read_is_shown_as_the_manual_codes_it(card: str)
     wrong: list[object] = []
     with fitted(card) as rig:
         rig.turn(30.0)
-        rig.drive.deactivate()
         for index, key in rows(BCD, card):
             value, data = shown(rig, key, int(index), 1200 + 50 * int(index))
             # eight decimal digits, two of them decimals [M4 §3.1]
@@ -174,4 +176,127 @@ def test_everything_that_is_only_read_is_shown_as_the_manual_codes_it(card: str)
             value, data = shown(rig, key, int(index), 100 * int(code))
             if (value, int(data)) != (text.strip(), 100 * int(code)):
                 wrong.append((key, value, data))
+    assert wrong == []
+
+
+def test_what_is_measured_is_that_of_the_motor() -> None:
+    with Rig('movitrac') as rig:
+        rig.turn()
+        motor = rig.far.motor
+        for hertz in (20.0, -35.0):
+            rig.send(hertz)
+            rig.pass_time(4.0)
+            # P000 and P004 have no sign
+            assert rig.drive.snapshot.frequency == pytest.approx(hertz, abs=0.05)
+            assert rig.drive.snapshot.speed == pytest.approx(motor.speed, abs=1.0)
+            measured = rig.notes.telemetry[-1]
+            # P010, P011, P020
+            assert measured.values[Role.DC_LINK_VOLTAGE] == pytest.approx(motor.dc_link, abs=1.0)
+            assert measured.values[Role.OUTPUT_VOLTAGE] == pytest.approx(motor.voltage, abs=1.0)
+            current = 100 * motor.current / motor.plate.current
+            assert measured.measured['status.apparent_current'] == pytest.approx(current, abs=2.0)
+            # P003
+            assert measured.measured['status.external_current_limit'] == 100.0
+
+
+def test_each_terminal_has_its_bit() -> None:
+    # 41 to 43 and 47 to 51, then 61 to 64 and 69 to 72, then 52 to 54 [M4 §4 P030 to P043]
+    inputs = dict(enumerate((41, 42, 43, 47, 48, 49, 50, 51))) | {16: 52, 17: 53, 18: 54}
+    outputs = {f'terminal.output_{number}': 'No function' for number in (63, 64, 69, 70, 71)}
+    outputs |= {f'terminal.output_{number}': 'Brake applied' for number in (62, 72)}
+    with fitted('fio', parameters={**outputs, 'terminal.input_42': 'No function'}) as rig:
+        rig.connect()
+
+        def shown() -> int:
+            return int(rig.result(rig.drive.measure('status.terminals')))
+
+        for bit, number in inputs.items():
+            found = []
+            for closed in (False, True):
+                rig.far.control_unit.switch(number, closed)
+                found.append(shown() >> bit & 1)
+            rig.far.control_unit.switch(number, False)
+            assert found == [0, 1], number
+        # the brake holds the motor
+        assert shown() & 0xFF00 == 1 << 9 | 1 << 15
+
+
+# --- inverter status ------------------------------------------------------------------------------
+
+
+def test_byte_2_and_3_of_the_inverter_status_are_the_status_word() -> None:
+    # option cards FEN at X21 and none at X20; clockwise, set 2, voltage signal [M4 §4 index 284]
+    settings = {'motor.enable_set_selection': True, 'terminal.input_42': 'Parameter set select.'}
+    with fitted('fen', parameters=settings) as rig:
+        for hertz, closed, word in (
+            (20.0, False, 0x1914), (20.0, True, 0x191C), (-20.0, True, 0x190C)
+        ):
+            rig.far.control_unit.switch(42, closed)
+            rig.turn(abs(hertz))
+            rig.send(hertz)
+            rig.pass_time(2.0)
+            status = rig.drive.snapshot.status
+            assert status is not None and f'{status.shown_word:04X}' == f'{word:04X}'
+            # the number, and no fault, above
+            whole = rig.result(rig.drive.measure('fieldbus.inverter_status'))
+            assert int(whole) == 0x100000 | word
+            rig.result(rig.drive.stop())
+            rig.pass_time(1.0)
+
+
+def test_every_fault_of_the_list_is_named_with_its_remedy_and_logged() -> None:
+    faults = [code for code in load_family('movitrac31').status_codes.values() if code.code >= 100]
+    assert len(faults) > 40
+    wrong = {}
+    with Rig('movitrac', options={'status_numbers': 'binary'}) as rig:
+        rig.connect()
+        for fault in faults:
+            rig.far.trip(fault.code)
+            rig.wait_until(lambda fault=fault: rig.drive.snapshot.text == fault.text, 3.0)
+            shown = rig.drive.snapshot
+            entry = rig.result(rig.drive.error_log(1))[0]
+            found = shown.status.code, shown.remedy, entry.code, entry.text
+            if not fault.remedy or found != (fault.code, fault.remedy, fault.code, fault.text):
+                wrong[fault.code] = found
+            rig.far.control_unit.reset()
+            rig.pass_time(0.3)
+    assert wrong == {}
+
+
+# --- fault memory ---------------------------------------------------------------------------------
+
+#: What is kept of each fault, by how far its index is from the first of them.
+KEPT = {
+    0: 'dc_link_voltage', 2: 'heat_sink_temperature', 3: 'frequency', 4: 'apparent_current',
+    6: 'utilization', 7: 'inverter_status', 8: 'terminal_status',
+}
+
+
+def test_all_that_is_kept_of_each_of_five_faults_is_read() -> None:
+    wrong: list[object] = []
+    with Rig('movitrac') as rig:
+        rig.turn(20.0)
+        for warmer, fault in enumerate((101, 107, 106, 103, 102)):
+            rig.far.control_unit.ambient = 20.0 + warmer
+            rig.far.trip(fault)
+            rig.far.control_unit.reset()
+        kept = rig.far.control_unit._fault_memory.raw
+        for number, first in enumerate((400, 409, 418, 427, 436)):
+            for offset, name in KEPT.items():
+                key = f'status.fault_t{number}_{name}'
+                value = rig.result(rig.drive.measure(key))
+                data = last(rig, f'c8{first + offset:04x}')[6:]
+                number_of = int(data, 16) if offset > 6 else int(data) / 100
+                ours = kept(key) if offset > 6 else kept(key) / 100
+                if not value == number_of == ours:
+                    wrong.append((key, value, data, ours))
+        # the newest first
+        warm = [
+            rig.result(rig.drive.measure(f'status.fault_t{number}_heat_sink_temperature'))
+            for number in range(5)
+        ]
+        assert warm == sorted(warm, reverse=True) and len({*warm}) == 5
+        (newest, *_) = rig.result(rig.drive.error_log())
+        for part in ('DC link ', 'heat sink ', 'frequency ', 'apparent current ', 'utilization '):
+            assert any(one.startswith(part) for one in newest.readings), part
     assert wrong == []
