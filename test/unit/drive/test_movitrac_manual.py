@@ -25,7 +25,7 @@ BCD = {
         5 status.apparent_current, 6 status.inverter_utilization, 308 status.motor_utilization_1,
         309 status.motor_utilization_2,
         8 status.fault_t0, 9 status.fault_t1, 10 status.fault_t2, 11 status.fault_t3,
-        12 status.fault_t4,
+        12 status.fault_t4, 98 setpoint.n2_offset,
         298 status.stop_setpoint_1_n2, 299 status.start_hysteresis_1_n2,
         300 status.stop_setpoint_2_n2, 301 status.start_hysteresis_2_n2
     """,
@@ -300,3 +300,17 @@ def test_all_that_is_kept_of_each_of_five_faults_is_read() -> None:
         for part in ('DC link ', 'heat sink ', 'frequency ', 'apparent current ', 'utilization '):
             assert any(one.startswith(part) for one in newest.readings), part
     assert wrong == []
+
+
+def test_no_row_of_the_list_is_left_out() -> None:
+    read = [row[1] for table in (BCD, WORDS, LONG, TEXTS) for card in table
+            for row in rows(table, card)]
+    read += [f'status.fault_t{number}_{name}' for number in range(5) for name in KEPT.values()]
+    # P050 and P051 are parts of index 237: test_movitrac_identity.py; set-point and function bits
+    # are commands; P830 is never written
+    aside = {
+        'status.option_x20', 'status.option_x21', 'fieldbus.remote_setpoint',
+        'fieldbus.function_bits', 'fieldbus.factory_setting',
+    }
+    every = [*read, *(ends.name for ends in ENDS), *aside]
+    assert sorted(every) == sorted(load_family('movitrac31'))

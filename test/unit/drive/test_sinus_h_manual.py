@@ -173,4 +173,7 @@ def test_each_of_the_35_trips_is_named_with_its_remedy_and_logged() -> None:
                 wrong[code] = shown.remedy, entry
             assert f'acknowledged {code} {text}' in rig.answer(rig.drive.acknowledge())
             rig.pass_time(0.5)
+        # of the eight situations of PNU 947 the present one is empty
+        log = [entry.code for entry in rig.result(rig.drive.error_log())]
+        assert log == list(TRIPS)[:-8:-1]
     assert wrong == {}
