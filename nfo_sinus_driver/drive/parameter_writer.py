@@ -169,7 +169,7 @@ class ParameterWriter:
         """Refuse what a start or a set-point depends on while enabled, even at set-point 0."""
         model = self._state.model
         depends = key in model.profile.start_settings or key in model.scaling
-        if depends and self._procedures.commanded:
+        if depends and self._procedures.enabled:
             raise not_changed(key, Report(Cause.NOT_WHILE_ENABLED))
 
     def describe(self, entry: Written) -> Change:

@@ -11,6 +11,7 @@ import contextlib
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family, Holder, Procedure, Reset, Role
 from nfo_sinus_driver.drive import drive_state
+from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
@@ -51,9 +52,10 @@ class Procedures:
         return self._controller
 
     @property
-    def commanded(self) -> bool:
-        """The motor is enabled, or about to be."""
-        return self._controller is not None and self._controller.commanded
+    def enabled(self) -> bool:
+        """The motor is enabled, or about to be; not by the control that a write has taken."""
+        states = ControlState.ENABLING, ControlState.ENABLED
+        return self._controller is not None and self._controller.state in states
 
     def require(self, procedure: Procedure | Reset) -> None:
         """Make sure that a procedure may begin."""

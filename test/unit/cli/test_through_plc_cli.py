@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 from cli_bench import Bench, Done, MakeBench
 import pytest
@@ -24,7 +26,7 @@ OVER_MODBUS = {
 }
 
 
-def behind_plc(make_bench: MakeBench, plc: PlcSetting, **options: str) -> Bench:
+def behind_plc(make_bench: MakeBench, plc: PlcSetting, **options: Any) -> Bench:
     bench = make_bench(protocol='telegram1', plc=plc, **options)
     options = [one.replace('telegram1', 'modbus_tcp') for one in bench.options]
     bench.options = (*options, '--control-method', 'telegram1')
@@ -81,6 +83,27 @@ def test_trips_of_a_sinus_h_are_shown_by_name(
     done = nfo(*other.options, 'get', 'profidrive.telegram', 'profidrive.manufacturer')
     assert 'Standard telegram' in done.out and '849' in done.out
     assert 'no settings are known' in nfo(*other.options, 'list').err
+
+
+def test_all_that_a_sinus_h_tells_is_shown_by_name(
+    make_bench: MakeBench, nfo: Nfo, bench: Bench
+) -> None:
+    # the vendor's telegram [M3 §7.2], and every parameter of the module that is read [M3 §8]
+    longer = dataclasses.replace(QUICK, longer_telegram=True)
+    vendor = {'com.opt_para_13': 'Vendor Specific Telegram'}
+    other = behind_plc(make_bench, longer, model='sinus_h', settings=vendor)
+    with other.simulator.lock:
+        other.drive().trip(11)
+    numbers = (922, 944, 947, 953, 964, 965, 967, 968)
+    model = load_family('sinus_h', 'telegram1')
+    names = [key for key, row in model.items() if row.at('telegram1').index in numbers]
+    assert len(names) == 12
+    done = nfo(*other.options, 'get', '--json', 'telegram.alarm_info', 'telegram.torque', *names)
+    assert done.status == 0, done.err
+    shown = {name: one['value'] for name, one in json.loads(done.out).items()}
+    assert shown.keys() == {'telegram.alarm_info', 'telegram.torque', *names}
+    assert shown['telegram.alarm_info'] == 1
+    assert (shown['profidrive.fault_number'], shown['profidrive.profile']) == (11, 0x0328)
 
 
 def test_layout_1_says_what_it_lacks(make_bench: MakeBench, nfo: Nfo, bench: Bench) -> None:

@@ -470,3 +470,27 @@ def test_diff_of_drive_and_file(nfo: Nfo, bench: Bench, some: Path) -> None:
 def test_diff_that_fails_is_trouble(nfo: Nfo, tmp_path: Path) -> None:
     assert nfo('diff', tmp_path / 'none.yaml').status == 2
     assert nfo('diff', '--against', 9, '--response-timeout', 0.2, '--retries', 0).status == 2
+
+
+# --- another family -------------------------------------------------------------------------------
+
+
+def test_settings_of_a_movitrac_go_to_a_file_and_back(
+    make_bench: Callable[..., Bench], tmp_path: Path
+) -> None:
+    # what the maker's own program for a PC is for [M4 §2.2.1]
+    bench = make_bench(model='movitrac31', protocol='movitrac', serial_numbers=[])
+    wanted = {'ramp.t11_up': 3.7, 'motor.pwm_frequency_1': '8 kHz', 'control.dc_braking_1': True}
+    done = bench.run('set', *(f'{key}={value}' for key, value in wanted.items()))
+    assert done.status == 0, done.err
+    assert has(bench, wanted)
+    path = tmp_path / 'all.yaml'
+    assert bench.run('dump', path).status == 0
+    others = {'ramp.t11_up': 9.0, 'motor.pwm_frequency_1': '4 kHz', 'control.dc_braking_1': False}
+    for key, value in others.items():
+        bench.set(key, value)
+    done = bench.run('diff', path)
+    assert done.status == 1 and all(key in done.out for key in wanted)
+    done = bench.run('load', path)
+    assert done.status == 0, done.err
+    assert has(bench, wanted)

@@ -484,3 +484,24 @@ def test_part_numbers_of_a_movitrac_are_those_of_its_display(
         '554841105 (821 123 4.11)', '554842641 (821 123 X.11)'
     ]
     assert '554841105 (821 123 4.11)' in bench.run('list', '--group', 'special').out
+
+
+def test_a_movitrac_says_who_it_is_what_it_shows_and_what_its_faults_were(
+    make_bench: Callable[..., Bench],
+) -> None:
+    # index 271 and 306; P050, P071, index 284 and 298; P060 and index 400 on [M4 §4]
+    bench = make_bench(
+        model='movitrac31', protocol='movitrac', serial_numbers=[], option_card='ffi'
+    )
+    with bench.simulator.lock:
+        bench.drive().memory.put('status.fieldbus_type', 200)
+        bench.drive().trip(101)
+        word = bench.drive().peek('fieldbus.inverter_status')
+    shown = bench.run('info').out
+    assert 'MOVITRAC 31C015-503-4-00' in shown and '821 123 4.11' in shown
+    names = 'option_x20', 'fieldbus_type', 'stop_setpoint_1_n2', 'output_stage'
+    done = bench.run('get', *(f'status.{name}' for name in names), 'fieldbus.inverter_status')
+    shown = [line.split(None, 1)[1] for line in done.out.splitlines()]
+    assert shown == ['FF. (Fieldbus)', 'INTERBUS-S', '0', '31C015-503-4-00', str(word)]
+    done = bench.run('errors')
+    assert done.status == 0 and 'Overcurrent (DC link ' in done.out

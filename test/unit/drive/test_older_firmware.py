@@ -158,7 +158,6 @@ def test_what_scales_a_set_point_is_written_under_bus_control_without_an_enable(
         assert rig.modes == [BUS] and not rig.flags
 
 
-@pytest.mark.xfail(reason='the control that is taken for it counts as an enable')
 def test_what_scales_a_set_point_is_written_under_control_that_is_given_back() -> None:
     with Older() as rig:
         rig.connect()
