@@ -32,6 +32,7 @@ def test_info(nfo: Nfo, bench: Bench) -> None:
     done = nfo('info')
     assert done.status == 0 and done.err == ''
     words = dict(line.split(maxsplit=1) for line in done.out.splitlines())
+    assert words['vendor'] == 'NFO Drives AB'
     assert words['product'] == 'NFO Sinus 1.50/400'
     assert words['firmware'] == '4.38 / 4018'
     assert words['motor'] == '1.5 kW, 400 V, 50 Hz, 1440 rpm, 3.4 A'

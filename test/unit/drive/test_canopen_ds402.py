@@ -5,6 +5,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
 import pytest
 from support.rig import Rig
 
@@ -175,6 +178,69 @@ def test_what_makes_a_set_point_mean_something_else_is_refused(
         begun = len(rig.line.frames)
         assert why in rig.answer(rig.drive.enable())
         assert written(rig, begun) == [] and not rig.drive.following
+
+
+#: What the driver only reads, by the name that it has here: index and sub-index [M0 table 11], how
+#: many bytes that has by CiA 402, and what 1 is there. Each is given another number.
+READ_ONLY = {
+    'error_code': (0x603F, 0, 2, 1),
+    'vl_velocity_demand': (0x6043, 0, 2, 1),
+    'vl_velocity_actual_value': (0x6044, 0, 2, 1),
+    'vl_velocity_min_amount': (0x6046, 1, 4, 1),
+    'vl_velocity_max_amount': (0x6046, 2, 4, 1),
+    'vl_velocity_acceleration_delta_speed': (0x6048, 1, 4, 1),
+    'vl_velocity_acceleration_delta_time': (0x6048, 2, 2, 1),
+    'vl_velocity_deceleration_delta_speed': (0x6049, 1, 4, 1),
+    'vl_velocity_deceleration_delta_time': (0x6049, 2, 2, 1),
+    'vl_dimension_factor_numerator': (0x604C, 1, 4, 1),
+    'vl_dimension_factor_denominator': (0x604C, 2, 4, 1),
+    'motor_rated_current': (0x6075, 0, 4, 0.001),
+    'torque_actual_value': (0x6077, 0, 2, 0.1),
+    'motor_type': (0x6402, 0, 2, 1),
+    'supported_drive_modes': (0x6502, 0, 4, 1),
+}
+
+
+def test_objects_of_the_profile_are_read_by_their_numbers() -> None:
+    with Rig('canopen, ds402') as rig:
+        rig.connect()
+        entries = rig.far.servers['canopen']._entries
+
+        def give(place: tuple[int, int], number: int, size: int) -> None:
+            data = number.to_bytes(size, 'little')
+            entries[place] = dataclasses.replace(entries[place], read=lambda: data)
+
+        wanted: dict[str, Any] = {}
+        for number, (name, (index, sub, size, one)) in enumerate(READ_ONLY.items(), 101):
+            give((index, sub), number, size)
+            wanted[name] = pytest.approx(number * one)
+        for place in ((0x605B, 0), (0x605C, 0)):
+            give(place, 0, 2)
+        wanted |= dict.fromkeys(('shutdown_option_code', 'disable_operation_code'), 'Release')
+        found = {name: rig.result(rig.drive.measure(f'fieldbus.{name}')) for name in wanted}
+        assert found == wanted
+        # and none is a setting
+        for name in wanted:
+            change = rig.drive.parameters.change({f'fieldbus.{name}': 1})
+            assert 'is no parameter that can be changed here' in rig.answer(change), name
+
+
+@every_shape
+@pytest.mark.parametrize('coasts', [False, True])
+def test_shutdown_ramps_or_coasts_as_st_mode_says(connection: str, coasts: bool) -> None:
+    # 605Bh and 2021h, which is StMode, are one parameter
+    ways = {False: 'Brake', True: 'Release'}
+    with Rig(connection, parameters={'control.retard': 8.0}) as rig:
+        rig.connect(parameters=True)
+        for way in (ways[not coasts], ways[coasts]):
+            rig.result(rig.drive.parameters.change({'control.st_mode': way}))
+            shown = rig.result(rig.drive.measure('fieldbus.shutdown_option_code'))
+            assert shown == way
+        rig.turn(25.0)
+        assert rig.answer(rig.drive.stop()).startswith('stop')
+        assert rig.far.motor.driven is not coasts
+        rig.pass_time(9.0)
+        assert not rig.far.motor.driven
 
 
 def test_a_module_without_mode_is_commanded_all_the_same() -> None:

@@ -10,7 +10,7 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.catalog import Fact, Kind
 from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 from nfo_sinus_driver.simulator.classic import LineError
 from nfo_sinus_driver.simulator.memory import Reason, Refused
@@ -128,6 +128,36 @@ def test_an_open_run_input_is_reported_although_the_drive_could_be_braking() -> 
     brakes = {'control.dc_brk': 6}
     with Rig(options={'run_input': False}, parameters=brakes).connect() as rig:
         assert 'its RUN input (DIN1) is not active' in rig.answer(rig.drive.enable(), 10.0)
+
+
+@pytest.mark.parametrize(
+    'connection', ['rtu', 'rtu, control word', 'classic', 'classic, control word']
+)
+def test_stop_at_the_keypad_ends_bus_control_and_enable_regains_it(connection: str) -> None:
+    # [M0 §5.2]
+    with Rig(connection).turn() as rig:
+        assert Fact.NETWORK_CONTROL in rig.drive.snapshot.status.facts
+        rig.far.control_unit.press('stop')
+        rig.pass_time(1.0)
+        shown = rig.drive.snapshot
+        assert not rig.far.motor.driven and not shown.enabled
+        assert shown.text == 'Stop' and Fact.NETWORK_CONTROL not in shown.status.facts
+        assert rig.far.control_unit.mode == Mode.STOP
+        rig.assert_only_enable_helps()
+        assert rig.far.control_unit.on_bus
+        assert Fact.NETWORK_CONTROL in rig.drive.snapshot.status.facts
+
+
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'canopen', 'rtu, control word'])
+def test_a_run_input_that_is_opened_stops_the_motor_and_says_so(connection: str) -> None:
+    # [M0 §5.2]
+    with Rig(connection).turn() as rig:
+        rig.far.set_run_input(False)
+        rig.pass_time(1.0)
+        assert not rig.far.motor.driven and not rig.drive.following
+        assert rig.notes.said('RUN input (DIN1)')
+        rig.far.set_run_input(True)
+        rig.assert_only_enable_helps()
 
 
 def test_run_input_is_missing() -> None:

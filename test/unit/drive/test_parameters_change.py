@@ -221,6 +221,25 @@ def test_settings_of_the_line_are_changed_last_and_followed() -> None:
         assert rig.notes.said(hint, Severity.WARNING)
 
 
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'canopen'])
+def test_the_protocol_of_the_drive_is_changed_with_permission_alone(connection: str) -> None:
+    # the codes of [M0 tables 2, 4]: of the line that it has it hears until the next power-on
+    codes = {'None': 0, 'NFO': 1, 'MbusAsc': 2, 'MbusRtu': 3, 'ABCC': 4}
+    for allowed in (False, True):
+        with Rig(connection, allow_communication_changes=allowed) as rig:
+            rig.connect(parameters=True)
+            parameters = rig.drive.parameters
+            before = rig.far.peek('serial.bus_type')
+            for name, code in codes.items():
+                if not allowed and name != before:
+                    answer = rig.answer(parameters.change({'serial.bus_type': name}))
+                    assert 'communication settings are not changed unless allow_' in answer
+                    assert rig.far.peek('serial.bus_type') == before
+                elif allowed:
+                    rig.result(parameters.change({'serial.bus_type': name}))
+                    assert rig.far.memory.raw('serial.bus_type') == code
+
+
 def test_a_new_address_that_counts_at_once() -> None:
     with Rig(parameters={'serial.auto_reset': True}, allow_communication_changes=True) as rig:
         rig.connect(parameters=True)

@@ -118,6 +118,23 @@ def test_older_firmware_has_one_set_point_whose_unit_and_steps_are_those_of_its_
             assert rig.notes.telemetry[-1].measured[key] == pytest.approx(actual, rel=0.07)
 
 
+@pytest.mark.parametrize('mode', MODES)
+def test_over_classic_one_parameter_takes_the_set_point_of_every_mode(mode: str) -> None:
+    # E001E, which the drive redirects by its Mode [M0 table 3]
+    with enabled('classic', mode) as rig:
+        rig.send(MODES[mode].value)
+        rig.pass_time(2.0)
+        raw = MODES[mode].value * MODES[mode].steps
+        assert rig.written('fieldbus.setpoint')[-1] == raw
+        assert b'\x04!\x02E001E=%04X\x03' % raw in {
+            bytes.fromhex(one['hex'])[:-1] for one in rig.line.frames
+        }
+        assert rig.far.memory.raw(rig.far.control_unit.setpoint_key) == raw
+        snapshot = rig.drive.snapshot
+        assert (snapshot.control_mode, snapshot.unit) == (mode, MODES[mode].unit)
+        assert snapshot.actual == pytest.approx(MODES[mode].value, rel=0.07, abs=1.0)
+
+
 def test_a_set_point_is_rounded_to_a_step_of_the_drive() -> None:
     for mode, value, raw in (('Freque', 12.34, 123), ('Speed', -600.4, -600)):
         with enabled('rtu', mode) as rig:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from support.rig import CONNECTIONS, Rig
 
@@ -84,3 +86,38 @@ def test_scales_that_cannot_be_read_are_chosen(connection: str) -> None:
         assert codec.decode(registers.encode(key, 20.0)) == 2000
         assert registers.value(key, registers.encode(key, 20.0)) == 20.0
         assert registers.limits(key)[2] == 0.01
+
+
+#: Setting and its value, control mode, set-point, and its counts; a fixed value of 100 counts. That
+#: the simulated drive has the factory's scale does not matter: both ways are counts.
+CHOSEN = {
+    'frequency_scale': (0.2, 'Freque', 20.0, 100, 'freque.f_fix1', 20.0),
+    'torque_scale': (0.5, 'Torque', 20.0, 40, 'torque.t_fix1', 50.0),
+    # the settings of the regulator have tenths, as printed [M0 table 4]
+    'process_scale': (0.2, 'PI-Reg', 40.0, 200, 'pi_reg.r_fix1', 10.0),
+}
+
+
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'canopen'])
+@pytest.mark.parametrize('scale', CHOSEN)
+def test_a_scale_that_is_chosen_counts_for_set_points_measured_values_and_settings(
+    connection: str, scale: str
+) -> None:
+    one, mode, setpoint, counts, key, value = CHOSEN[scale]
+    settings: dict[str, Any] = {scale: one}
+    parameters = {'control.mode': mode, 'control.accel': 0.2}
+    with Rig(connection, parameters=parameters, **settings) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        rig.keep(lambda: rig.drive.set_setpoint(setpoint))
+        rig.pass_time(2.0)
+        assert rig.far.memory.raw(rig.far.control_unit.setpoint_key) == counts
+        assert rig.drive.snapshot.setpoint == setpoint
+        assert rig.drive.snapshot.actual == pytest.approx(setpoint, abs=3 * one, rel=0.07)
+        rig.answer(rig.drive.stop())
+        rig.result(rig.drive.parameters.change({key: value}))
+        assert rig.far.memory.raw(key) == 100
+        assert rig.result(rig.drive.measure(key)) == value
+        # these are in Hz whatever the scale is [M0 §8.3.1]
+        assert rig.result(rig.drive.measure('motor.f_nom')) == 50
+        assert rig.result(rig.drive.measure('output.f_max')) == rig.far.peek('output.f_max')

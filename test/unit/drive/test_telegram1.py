@@ -86,6 +86,22 @@ def test_status_and_direction_are_those_of_the_motor(connection: str) -> None:
         assert lacks in rig.answer(rig.drive.error_log())
 
 
+def test_pulses_enabled_is_shown_in_the_status_word_of_a_g2_and_is_no_stop() -> None:
+    # P924: bit 15 of ZSW1 [M0 table 8]; of DriveStatus it would say that the drive stops
+    with Rig(G2) as rig:
+        rig.connect()
+        rig.enable()
+        rig.send(20.0)
+        rig.pass_time(1.5)
+        status = rig.drive.snapshot.status
+        assert status is not None and status.shown_word & 0x8000
+        assert status.state is State.OPERATION_ENABLED and Fact.STOPPING not in status.facts
+        rig.answer(rig.drive.stop())
+        rig.pass_time(1.0)
+        status = rig.drive.snapshot.status
+        assert status is not None and not status.shown_word & 0x8000
+
+
 #: 750 rpm in the block: by 8192 for 1500 on an Optimal [M1]; counts of SpdSet [M0 §6.3 table 9].
 BLOCK_AT_750 = {'telegram1 optimal, speed': 4096, 'telegram1 g2, speed': 750}
 

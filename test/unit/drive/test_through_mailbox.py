@@ -244,6 +244,82 @@ def test_torque_by_the_mailbox_is_in_no_poll() -> None:
         assert rig.drive.state.control_mode == 'Torque'
 
 
+#: What the parameters of PROFIdrive are called here, by PNU and sub-index [M0 table 8].
+PROFIDRIVE = {
+    'profidrive.node_address': (918, 0),
+    'profidrive.telegram': (922, 0),
+    'profidrive.operating_mode': (930, 0),
+    'profidrive.fault_counter': (944, 0),
+    'profidrive.fault_number': (947, 0),
+    'profidrive.warning_word': (953, 0),
+    'profidrive.warning_word_2': (954, 0),
+    'profidrive.manufacturer': (964, 0),
+    'profidrive.unit_type': (964, 1),
+    'profidrive.version': (964, 2),
+    'profidrive.firmware_year': (964, 3),
+    'profidrive.firmware_day': (964, 4),
+    'profidrive.profile': (965, 0),
+    'profidrive.control_word': (967, 0),
+    'profidrive.status_word': (968, 0),
+}
+
+
+def test_parameters_of_profidrive_are_read_by_their_numbers() -> None:
+    with Rig(G2) as rig:
+        rig.connect()
+        channel = rig.line.plc.channels[1].server.parameters
+        for place in PROFIDRIVE.values():
+            # each has another number: none is taken for another
+            number = place[0] + 1000 * place[1]
+            channel.entries[place] = ParameterEntry(lambda number=number: number)
+        # a torque control mode, as the manual codes it
+        channel.entries[930, 0] = ParameterEntry(lambda: 0x8000)
+        found = {key: rig.result(rig.drive.measure(key)) for key in PROFIDRIVE}
+        wanted: dict[str, Any] = {
+            key: number + 1000 * sub for key, (number, sub) in PROFIDRIVE.items()
+        }
+        wanted |= {'profidrive.operating_mode': 'Torque control'}
+        # xxyy, in decimal
+        wanted |= {'profidrive.version': 29.64}
+        assert found == wanted
+
+
+#: Of what is measured slowly, where it stands [M0 table 9], and how much of it is 1 there.
+SLOW = {
+    Role.MOTOR_TEMPERATURE: (1132, 0.1, 2),
+    Role.PT1000_TEMPERATURE: (1131, 0.1, 2),
+    Role.OPERATING_TIME: (1039, 0.1, 4),
+    Role.RUNNING_TIME: (1040, 0.1, 4),
+    Role.BRAKE_TIME: (1133, 1.0, 4),
+    Role.ENERGY: (1233, 0.001, 4),
+    Role.TOTAL_ENERGY: (1234, 1.0, 4),
+}
+
+
+def test_temperatures_times_energy_and_versions_of_a_g2_come_by_the_mailbox_too() -> None:
+    named = ['status.spd_act', 'status.reg_act', 'fieldbus.sw_ver', 'fieldbus.nfo_ver']
+    named += ['fieldbus.spd_scl_numerator', 'fieldbus.spd_scl_denominator']
+    with Rig(G2, measured=named) as rig:
+        channel = rig.line.plc.channels[1].server.parameters
+        for pnu, _, size in SLOW.values():
+            number = 3 * pnu
+            channel.entries[pnu, 0] = ParameterEntry(
+                lambda number=number: number, size=size, signed=True
+            )
+        for pnu, number in ((1022, -345), (1130, 234)):
+            channel.entries[pnu, 0] = ParameterEntry(lambda number=number: number, signed=True)
+        for sub, number in enumerate((3, 20)):
+            channel.entries[1023, sub] = ParameterEntry(lambda number=number: number, size=4)
+        rig.connect()
+        rig.wait_until(lambda: rig.notes.telemetry)
+        shown = rig.notes.telemetry[0]
+        wanted = {role: pytest.approx(3 * pnu * one) for role, (pnu, one, _) in SLOW.items()}
+        assert {role: shown.values[role] for role in SLOW} == wanted
+        assert [*shown.measured.values()] == pytest.approx(
+            [-345, 23.4, 4.38, 4018, 3, 20]
+        )
+
+
 # --- parameters by a user's own addresses ---------------------------------------------------------
 
 

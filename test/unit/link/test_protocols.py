@@ -106,6 +106,14 @@ def test_baud_rates(protocol: str, baud_rate: int) -> None:
             open_link(protocol, '/dev/x', line)
 
 
+@pytest.mark.parametrize('protocol', ['classic', 'modbus_rtu', 'modbus_ascii'])
+@pytest.mark.parametrize('baud_rate', [1200, 2400, 4800, 9600, 19200, 38400, 57600])
+def test_a_serial_line_has_the_rates_that_the_manual_prints(protocol: str, baud_rate: int) -> None:
+    # [M0 §6.1.2, §6.2.2]
+    link = BusSettings('/dev/x', protocol, baud_rate=baud_rate).open()
+    assert link.protocol.name == protocol
+
+
 @pytest.mark.parametrize('port', ['/dev/ttyACM0', 'can0', 'socket://adapter:4001'])
 def test_canopen_has_the_bit_rates_of_its_adapters(port: str) -> None:
     for bit_rate in (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 1_000_000):
