@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import pytest
@@ -54,6 +55,29 @@ def test_speeds_are_in_rpm_whatever_the_scale(connection: str, scale: tuple[int,
         rig.far.memory.put('speed.c_fix1', 1500)
         read = rig.result(rig.drive.measure('speed.c_fix1'))
         assert read == (1500 * scale[0] / scale[1] if used else 1500)
+
+
+@pytest.mark.parametrize('mode', ['Speed', 'Freque'])
+@pytest.mark.parametrize('words', ['telegram1 g2, speed', 'telegram1 g2, drivecontrol'])
+def test_behind_a_plc_a_scale_of_speeds_keeps_a_motor_from_running_by_speeds(
+    words: str, mode: str
+) -> None:
+    speed = mode == 'Speed'
+    driver = {'expected_control_mode': mode, **({'nominal_speed': 1500.0} if speed else {})}
+    connection = dataclasses.replace(
+        CONNECTIONS[words], plc={'layout': 2},
+        driver={**CONNECTIONS[words].driver, **driver}, parameters={'control.mode': mode},
+    )
+    with Rig(connection, parameters={'fieldbus.spd_scl_numerator': 2}) as rig:
+        rig.connect()
+        answer = rig.answer(rig.drive.enable())
+        assert ('SpdScl is 2/1' in answer) == speed
+        assert rig.drive.following != speed
+        # it keeps no fault from being acknowledged
+        rig.far.trip(rig.a_fault)
+        rig.pass_time(0.5)
+        rig.acknowledged += 1
+        assert 'acknowledged' in rig.answer(rig.drive.acknowledge())
 
 
 def test_a_scale_that_was_changed_since_connect_counts_from_the_next_enable_on() -> None:
