@@ -16,7 +16,7 @@ WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PAT
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench docs parameters
-.PHONY: all bench-gate build clean coverage golden
+.PHONY: all bench-gate build clean coverage exhaustive golden
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -86,6 +86,10 @@ campaign: setup ## many histories of commands, faults and line losses in any ord
 		-n auto --dist worksteal test/unit/drive/test_any_order.py -k campaign
 	@ACKNOWLEDGEMENTS=$(or $(ACKNOWLEDGEMENTS),1000) tools/run python $(PYTEST) -n auto \
 		test/unit/drive/test_no_turn_at_acknowledge.py -k no_turn
+
+exhaustive: setup ## each thing that can go wrong at each request of a run (PART=1/8 PAIRS=1)
+	@$(WITHOUT_ROS) .venv/without-ros/bin/python test/exhaustive/run.py $(if $(PART),--part $(PART)) \
+		$(if $(PAIRS),--pairs) $(if $(MACHINE),--machine $(MACHINE))
 
 golden: setup ## name the tests whose frames are others than with the driver of COMMIT (HEAD)
 	@$(WITHOUT_ROS) .venv/without-ros/bin/python tools/golden.py $(COMMIT)
