@@ -16,7 +16,7 @@ WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PAT
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench docs parameters
-.PHONY: all bench-gate build clean coverage exhaustive golden
+.PHONY: all bench-gate build clean coverage exhaustive golden laws
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -93,6 +93,9 @@ exhaustive: setup ## each thing that can go wrong at each request of a run (PART
 
 golden: setup ## name the tests whose frames are others than with the driver of COMMIT (HEAD)
 	@$(WITHOUT_ROS) .venv/without-ros/bin/python tools/golden.py $(COMMIT)
+
+laws: setup ## for each law of docs/architecture.md the tests that hold it, and its mutants
+	@$(WITHOUT_ROS) .venv/without-ros/bin/python tools/list_laws.py
 
 fuzz: setup ## spoiled frames through every decoder (FRAMES=1000000 SEED=1 ONLY=frame)
 	@$(WITHOUT_ROS) PYTHONPATH=.:test .venv/without-ros/bin/python -m fuzz \
