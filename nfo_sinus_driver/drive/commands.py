@@ -307,8 +307,11 @@ class Commands:
         return await carry_out(steps, self._params, Priority.STOP, onward=True)
 
     async def release(self) -> None:
-        """Release control."""
-        await carry_out(self._method.release(), self._params, Priority.SERVICE)
+        """Release control; again from the beginning where a step that is sent once is lost."""
+        try:
+            await carry_out(self._method.release(), self._params, Priority.SERVICE)
+        except (NoAnswer, DamagedAnswer):
+            await carry_out(self._method.release(), self._params, Priority.SERVICE)
 
     async def remove(self, control_mode: str) -> Removal:
         """

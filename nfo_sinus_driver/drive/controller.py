@@ -516,7 +516,7 @@ class Controller:
                         min(until - self._bus.now(), self._sequence.shown_for),
                     )
                 status = self._state.status or status
-            if not (status.keeps_running or await self._sequence.unrest(status)):
+            if not (status.keeps_running or await self._sequence.unrest(status, retry=True)):
                 return True
             await self.stop(patience=max(until - self._bus.now(), _LEAST_PATIENCE))
 

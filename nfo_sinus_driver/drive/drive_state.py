@@ -306,18 +306,19 @@ class DriveState:
         return self._note_status(measured)
 
     async def measured_with(
-        self, status: InverterStatus, before: InverterStatus | None
+        self, status: InverterStatus, before: InverterStatus | None, *, retry: bool
     ) -> InverterStatus:
         """
         Return a status with the frequency, measured now unless it has come with it.
 
         :param before: the last one that was measured; what it fell from is in it.
+        :param retry: repeat a request when there is no response.
         :raises LinkError: the drive does not answer.
         """
         has = self.nameplate.has(self.model.key(self.turning.role))
         if not has or not math.isnan(status.frequency):
             return status
-        return await self._measured_with(status, before, Priority.LOOK, retry=False)
+        return await self._measured_with(status, before, Priority.LOOK, retry=retry)
 
     async def _measured_with(
         self,

@@ -443,18 +443,21 @@ class StopSequence:
             return self._state.report(Cause.DRIVE_SAYS)
         return None if status.local else await self.unrest(status)
 
-    async def unrest(self, status: InverterStatus) -> Report | None:
+    async def unrest(self, status: InverterStatus, *, retry: bool = False) -> Report | None:
         """
         Return what shows that a motor without a run may turn, or may be turned; ``None``: nothing.
 
         :param status: of a drive that stops, or stands.
+        :param retry: repeat a request without a response; a stop is written again before.
         """
         if status.runs_by_bus and await self._has_run_command(status):
             return self._state.report(Cause.RUN_COMMAND_STANDS)
         if status.driven:
             # it is on its way
             return None
-        self._measured = status = await self._state.measured_with(status, self._measured)
+        self._measured = status = await self._state.measured_with(
+            status, self._measured, retry=retry
+        )
         if not self.coasts or status.falls_since(self._begun_at):
             return None
         turning = self._state.turning

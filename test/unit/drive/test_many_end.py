@@ -88,3 +88,26 @@ def test_a_drive_that_is_cut_off_ends_the_wait_for_it() -> None:
         begun = rig.clock.monotonic()
         assert 'NOT confirmed' in rig.answer(stop)
         assert rig.clock.monotonic() - begun < _PATIENCE + 1.0
+
+
+# ``make exhaustive`` has them all
+@pytest.mark.parametrize('connection', ['optimal, control word', 'movitrac, by terminals'])
+def test_one_lost_answer_fails_no_release(connection: str) -> None:
+    asked = lost_at = 0
+    # at each request of it in turn
+    while lost_at <= asked:
+        with Rig(connection, line={'response_timeout': 0.1}) as rig:
+            rig.turn()
+            rig.result(rig.drive.quick_stop())
+            rig.pass_time(1.5)
+            begun = len(rig.asked)
+
+            def meet(*_: object, rig: Rig = rig, at: int = begun + lost_at) -> str | None:
+                return 'drop' if len(rig.asked) == at + 1 else None
+
+            rig.meet = meet
+            released = rig.drive.disconnect(2.0)
+            rig.answer(released)
+            assert released.exception() is None, (lost_at, rig.asked[begun:])
+            asked = len(rig.asked) - begun
+            lost_at += 1
