@@ -19,6 +19,8 @@ import sys
 import tempfile
 
 _ROOT = Path(__file__).resolve().parents[1]
+#: Where the tests are that have a virtual rig.
+_TESTS = ('test/unit/drive', 'test/unit/families')
 #: What a test had on its lines: how many frames, and their hash.
 Traces = Mapping[str, tuple[str, str]]
 
@@ -27,7 +29,6 @@ def main() -> int:
     """Compare; return 1 where something differs."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('commit', nargs='?', default='HEAD', help='default: HEAD')
-    parser.add_argument('--tests', nargs='+', default=['test/unit/drive', 'test/unit/families'])
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix='nfo_sinus_golden_') as folder:
         other = Path(folder) / 'other'
@@ -35,10 +36,10 @@ def main() -> int:
         try:
             for name in ('test', 'pyproject.toml'):
                 _replace(other / name, _ROOT / name)
-            before = _traces(other, Path(folder) / 'before', options.tests)
+            before = _traces(other, Path(folder) / 'before')
         finally:
             _git('worktree', 'remove', '--force', str(other))
-        now = _traces(_ROOT, Path(folder) / 'now', options.tests)
+        now = _traces(_ROOT, Path(folder) / 'now')
     changed = _changed(before, now)
     for line in changed:
         print(line)
@@ -56,14 +57,14 @@ def _changed(before: Traces, now: Traces) -> list[str]:
     return found
 
 
-def _traces(tree: Path, file: Path, tests: list[str]) -> Traces:
+def _traces(tree: Path, file: Path) -> Traces:
     """Run the tests of a tree, and return what they had on their lines; some may fail."""
     file.touch()
     subprocess.run(
         (
             *(sys.executable, '-m', 'pytest', '-q', '-p', 'xdist', '-p', 'timeout'),
             *('-p', 'hypothesispytest', '-p', 'support.golden', '-p', 'no:cacheprovider'),
-            *('-n', 'auto', '--dist', 'worksteal', *tests),
+            *('-n', 'auto', '--dist', 'worksteal', *_TESTS),
         ),
         cwd=tree,
         # the driver of the tree, not the one that is installed
