@@ -460,9 +460,15 @@ class Controller:
         # may be active that an acknowledgement has not removed yet
         status = self._state.status
         may_run = self.commanded or self.stopping or (status is not None and status.from_bus)
-        # one more would go ahead of the stops of other drives, and fail where the line has broken
-        owed = self.stop_owed or self.stop_overdue or status is None or status.runs_by_bus
-        ended = self._control.stopped_at > -math.inf and not owed
+        # at an end that has stopped it, one more would go ahead of the stops of other drives
+        owed = self.stop_owed or self.stop_overdue
+        ended = self._control.stopped_at >= self._closed_at and not owed
+        if ended:
+            # the last poll shows nothing of what has come since
+            status = await self._state.read_status(Priority.SERVICE)
+            ended = status.from_bus and not (
+                status.runs_by_bus or status.tuning or status.faulted
+            )
         # no client can enable it until the motor stands still
         with self._sequence.external_stop(why):
             stop = self._stopped if ended else self.stop
@@ -478,8 +484,7 @@ class Controller:
         await prepare()
         if not stands:
             # not every drive shows whether it ramps or runs again, by a command that came late
-            with contextlib.suppress(LinkError):
-                await self.method.stop(self._state.control_mode)
+            await self.stop(patience=_LEAST_PATIENCE)
             await self._state.timeout.read()
             if not self._state.timeout.shortest or self.method.control_retained:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)

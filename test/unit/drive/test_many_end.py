@@ -5,13 +5,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
 #: How long each may take, s; all of them take longer on such a line.
 _PATIENCE = 4.0
@@ -66,20 +67,6 @@ def test_a_motor_that_is_left_to_its_ramp_is_left_without_a_run_command() -> Non
         assert [data for _, key, data in rig.asked if key == _SCMD and data] == [b'\0\0']
 
 
-def test_a_line_that_breaks_after_the_confirmed_stop_owes_no_other() -> None:
-    with Rig(parameters={'control.retard': 500.0}) as rig:
-        rig.turn()
-        rig.result(rig.drive.stop())
-        rig.line.state = 'silent'
-        # before the loss is noticed
-        released = rig.drive.disconnect(1.0)
-        assert rig.answer(released) and released.exception() is not None
-        assert not rig.drive.stop_waits and not rig.drive.stop_overdue
-        rig.pass_time(3.0)
-        assert not rig.notes.said(Cause.CANNOT_STOP)
-        rig.line.mend()
-
-
 def test_a_drive_that_is_cut_off_ends_the_wait_for_it() -> None:
     with Rig(drives=2) as rig:
         rig.turn()
@@ -111,3 +98,36 @@ def test_one_lost_answer_fails_no_release(connection: str) -> None:
             assert released.exception() is None, (lost_at, rig.asked[begun:])
             asked = len(rig.asked) - begun
             lost_at += 1
+
+
+def _take_over(rig: Rig) -> None:
+    rig.far.control_unit.press('ext')
+
+
+def _tune(rig: Rig) -> None:
+    rig.far.write_raw(_SCMD, int(Scmd.FULL_TUNING))
+
+
+def _trip(rig: Rig) -> None:
+    # with a run command that a gateway has held until after the stop
+    rig.far.write_raw(_SCMD, int(Scmd.FIX_1_F))
+    rig.far.trip(rig.a_fault)
+
+
+@pytest.mark.parametrize('happen', [_take_over, _tune, _trip])
+def test_what_has_come_since_the_last_poll_of_an_end_is_stopped(
+    happen: Callable[[Rig], None]
+) -> None:
+    with Rig() as rig:
+        rig.turn()
+        rig.send(None)
+        rig.result(rig.drive.stop_for_good(_PATIENCE))
+        polled = len(rig.notes.snapshots)
+        rig.wait_until(lambda: len(rig.notes.snapshots) > polled)
+        happen(rig)
+        rig.asked.clear()
+        rig.answer(rig.drive.disconnect(1.0))
+        rig.pass_time(2.0)
+        stops = [key for _, key, data in rig.asked if key == _SCMD and data == b'\0\0']
+        assert stops and rig.far.control_unit.tuning is None
+        rig.notes.events.clear()
