@@ -345,6 +345,8 @@ class ControlMethod(abc.ABC):
     :cvar older: firmware of the family's :class:`OlderDialect` has it, too.
     :cvar unused_scales: parameters that multiply its set-points where they are not all the same;
         a start requires that they are.
+    :cvar unfollowed_scale: numerator and denominator of what multiplies its set-points in Speed
+        mode and is not followed; a start requires that it is 1.
     :cvar needs: parameters without which a drive cannot be commanded by it.
     :cvar procedures: what begins each procedure that it has.
     :cvar holders: who has control, where this method sees that otherwise than its :class:`Profile`.
@@ -364,6 +366,7 @@ class ControlMethod(abc.ABC):
     reads_run_command: ClassVar[bool] = False
     older: ClassVar[bool] = True
     unused_scales: ClassVar[Sequence[str]] = ()
+    unfollowed_scale: ClassVar[Sequence[str]] = ()
     needs: ClassVar[Sequence[str]] = ()
     procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {}
     control_retained: ClassVar[str] = ''

@@ -92,7 +92,23 @@ class StartSequence:
         scales = state.nameplate.scales
         if key := scales.impossible:
             raise DriveError(Cause.SCALE_IMPOSSIBLE, key=key, value=scales.found[key])
+        if control_mode == 'Speed':
+            await self._require_no_scale()
         return control_mode, await read_limits(state, control_mode)
+
+    async def _require_no_scale(self) -> None:
+        """Ensure that nothing multiplies speeds that is not followed, where it can be read."""
+        params = self._state.params
+        keys = self._state.settings.method_class.unfollowed_scale
+        if not keys or not all(map(params.reaches, keys)):
+            return
+        above, below = [await params.read_number(key, Priority.SERVICE) for key in keys]
+        # one that is impossible is none [C114]
+        if above != below and min(above, below) > 0:
+            value = f'{above:g}/{below:g}'
+            raise DriveError(
+                Cause.SCALE_NOT_FOLLOWED, above=keys[0], below=keys[1], value=value
+            )
 
     async def start(self, control_mode: str, prepare: Prepare) -> None:
         """

@@ -125,13 +125,10 @@ class Telegram1(ControlMethod):
 
     def require_startable(self) -> Steps[None]:
         """
-        Ensure that the PLC lets us command the drive.
+        See to it that the PLC lets us command the drive.
 
         :raises NotPossible: it does not.
         """
-        yield from self._require_released()
-
-    def _require_released(self) -> Steps[None]:
         if not int((yield Read(STATUS))) & RELEASED:
             raise NotPossible(
                 'the PLC has not released the drive to ROS (bit 1 of register +3 of its block is '
@@ -181,7 +178,7 @@ class Telegram1(ControlMethod):
 
         :raises NotPossible: the PLC does not let us command the drive.
         """
-        yield from self._require_released()
+        yield from self.require_startable()
         yield begin(self.ready)
         yield Hold(lambda status: True, _TAKEN_IN)
         yield begin(self.ready | FAULT_ACK)

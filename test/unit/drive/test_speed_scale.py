@@ -71,7 +71,7 @@ def test_behind_a_plc_a_scale_of_speeds_keeps_a_motor_from_running_by_speeds(
     with Rig(connection, parameters={'fieldbus.spd_scl_numerator': 2}) as rig:
         rig.connect()
         answer = rig.answer(rig.drive.enable())
-        assert ('SpdScl is 2/1' in answer) == speed
+        assert ('fieldbus.spd_scl_denominator are 2/1' in answer) == speed
         assert rig.drive.following != speed
         # it keeps no fault from being acknowledged
         rig.far.trip(rig.a_fault)

@@ -14,55 +14,20 @@ from dataclasses import replace
 from fractions import Fraction
 
 from nfo_sinus_driver.catalog.directed import with_direction
-from nfo_sinus_driver.catalog.profile import (
-    NotPossible,
-    Profile,
-    Read,
-    Refusal,
-    SetpointTarget,
-    Steps,
-    Until,
-)
+from nfo_sinus_driver.catalog.profile import Profile, SetpointTarget, Steps, Until
 from nfo_sinus_driver.catalog.speed_mode import SpeedMode
 from nfo_sinus_driver.catalog.status import Fact, Role, State
 from nfo_sinus_driver.families._telegram1 import method, profidrive
 from nfo_sinus_driver.families._telegram1.method import Telegram1, Words
 from nfo_sinus_driver.families.sinus_g2 import words as drivecontrol
 
+#: SpdScl, which multiplies speeds that come over the bus [M0 §8.3.2]; a mailbox is too slow to
+#: follow it.
+_SPEED_SCALE = ('fieldbus.spd_scl_numerator', 'fieldbus.spd_scl_denominator')
 _STARTABLE = (State.READY_TO_SWITCH_ON, State.STOPPING)
 
 
-#: What multiplies speeds that come over the bus; read where the PLC has a mailbox.
-_SPEED_SCALE = ('fieldbus.spd_scl_numerator', 'fieldbus.spd_scl_denominator')
-
-
-class _ByPlc(Telegram1):
-    """What both ways to command a G2 behind a PLC have in common."""
-
-    unused_scales = _SPEED_SCALE
-
-    def require_startable(self) -> Steps[None]:
-        """
-        Ensure that the PLC lets us command the drive, and that a set-point in rpm means rpm.
-
-        :raises NotPossible: it does not, or the drive multiplies speeds by SpdScl [M0 §8.3.2].
-        """
-        yield from super().require_startable()
-        try:
-            above = int((yield Read(_SPEED_SCALE[0])))
-            below = int((yield Read(_SPEED_SCALE[1])))
-            # one that is impossible is none [C114]
-            if above == below or min(above, below) <= 0 or (yield Read('control.mode')) != 'Speed':
-                return
-        except Refusal:
-            return
-        raise NotPossible(
-            f'SpdScl is {above}/{below}, and behind a PLC the driver does not take that into '
-            'account: set it to 1/1, or control.mode to Freque'
-        )
-
-
-class G2Telegram1(_ByPlc):
+class G2Telegram1(Telegram1):
     """
     Control by STW1 of PROFIdrive: switched on, then enabled; the sign of the set-point reverses.
 
@@ -70,6 +35,7 @@ class G2Telegram1(_ByPlc):
     """
 
     coasts = True
+    unfollowed_scale = _SPEED_SCALE
     ready = int(profidrive.OFF)
     runs = int(profidrive.Control.ON)
     # bit 9 of ZSW1 asks for control, and does not say that the bus has it
@@ -112,10 +78,11 @@ _READY = (
 _ON = int(_READY | drivecontrol.Control.SWITCH_ON)
 
 
-class G2DriveControl(_ByPlc):
+class G2DriveControl(Telegram1):
     """Control by DriveControl: switched on, then enabled [C54]."""
 
     coasts = True
+    unfollowed_scale = _SPEED_SCALE
     ready = int(_READY)
     runs = int(
         drivecontrol.Control.SWITCH_ON
