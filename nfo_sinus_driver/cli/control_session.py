@@ -205,9 +205,8 @@ class ControlSession(Listener):
         def may_turn() -> bool:
             snapshot = self.drive.snapshot
             if snapshot.at < begun:
-                # no poll yet; if none comes, the drive is lost soon
-                longest = self.drive.settings.lost_after + _LONGEST_POLL
-                return snapshot.connected and time.monotonic() < begun + longest
+                # no poll yet; if none comes, there is nothing to wait for
+                return time.monotonic() < begun + _LONGEST_POLL
             return snapshot.status is not None and snapshot.status.driven
 
         self._wait_while(may_turn, patience)

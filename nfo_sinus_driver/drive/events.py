@@ -229,7 +229,7 @@ class Cause(enum.Enum):
     )
     SCALE_NOT_FOLLOWED = (
         '{above} and {below} are {value}, and behind a PLC the driver does not take into account '
-        'that speeds are multiplied by it: set both to 1, or control.mode to Freque'
+        'that speeds are multiplied by it: set both to 1, or {key} to Freque'
     )
     SCALE_CHANGED = (
         'what set-points or measured values are multiplied by was changed at the drive ({change}): '

@@ -105,9 +105,12 @@ class StartSequence:
         above, below = [await params.read_number(key, Priority.SERVICE) for key in keys]
         # one that is impossible is none [C114]
         if above != below and min(above, below) > 0:
-            value = f'{above:g}/{below:g}'
             raise DriveError(
-                Cause.SCALE_NOT_FOLLOWED, above=keys[0], below=keys[1], value=value
+                Cause.SCALE_NOT_FOLLOWED,
+                above=keys[0],
+                below=keys[1],
+                value=f'{above:g}/{below:g}',
+                key=self._state.model.key(Role.CONTROL_MODE),
             )
 
     async def start(self, control_mode: str, prepare: Prepare) -> None:

@@ -268,7 +268,7 @@ LAWS = (
         3,
         'an exit does not look for a run command at standstill',
         CONTROLLER,
-        'if not (status.keeps_running or await self._sequence.unrest(status)):',
+        'if not (status.keeps_running or await self._sequence.unrest(status, retry=True)):',
         'if True:',
         (STOPPED_IS_TRUE, '-k', 'measured_speed_stays and rtu or exit_is_a_success'),
     ),

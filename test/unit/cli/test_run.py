@@ -21,6 +21,7 @@ from typing import Any
 from cli_bench import COMMAND, PATIENCE, QUICK, ROOT, Bench, Done, MakeBench, wait_until
 import pytest
 
+from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.state_folder import StateFolder
 
 Nfo = Callable[..., Done]
@@ -455,12 +456,12 @@ def test_a_second_ctrl_c_says_that_the_motor_may_run(bench: Bench) -> None:
 
 
 def test_a_drive_that_is_not_released_after_its_stop_is_no_failure(make_bench: MakeBench) -> None:
-    bench = make_bench(settings={'control.accel': 0.2, 'control.retard': 500})
+    bench = make_bench(settings={'control.accel': 0.2, 'control.retard': 2})
     with bench.running() as process:
         process.send_signal(signal.SIGINT)
         assert process.stderr is not None
         read_until(process.stderr, 'ramps down')
-        bench.simulator.inject('line-dead', 600)
+        bench.refuse('fieldbus.mode', Reason.STATE)
         err = process.stderr.read()
         assert process.wait(PATIENCE) == 0, err
     assert 'control was not released: ' in err and 'WITHOUT a confirmed stop' not in err
