@@ -917,6 +917,7 @@ LAWS = (
         '                reply = transfer.without_old(reply)',
         '                pass',
         (STANDS_STILL, '-k', 'nothing_old and rtu'),
+        also=((WATCH, 'if self._bus.paused == paused:', 'if True:'),),
     ),
     Mutant(
         3,

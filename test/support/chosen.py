@@ -22,11 +22,14 @@ KINDS = (
     'rtu', 'tcp', 'classic', 'canopen', 'canopen, ds402', 'movitrac', 'telegram1 g2', 'described',
 )
 _ONE_IN = 4
-_WHY_STOPPED = 'test/unit/drive/test_why_stopped.py'
+_DRIVE = 'test/unit/drive'
 #: The cells that no other replaces, with the mutant that lives without them.
 NEEDED = {
-    f'{_WHY_STOPPED}::test_after_each_stop_it_is_known_why[rtu-power cycle]':
+    f'{_DRIVE}/test_why_stopped.py::test_after_each_stop_it_is_known_why[rtu-power cycle]':
         'a drive that was away and is not in control any more has stopped for no known reason',
+    f'{_DRIVE}/test_stopped_is_true.py::test_no_stop_is_a_success_while_the_measured_speed_stays'
+    '[rtu-exit]':
+        'an exit does not look for a run command at standstill',
 }
 
 #: A test: its name with that of its cell, and where it stands on each axis of the product.

@@ -37,6 +37,7 @@ def test_a_drive_that_is_left_alone_while_it_runs_is_stopped() -> None:
 def test_a_drive_that_is_being_left_is_not_enabled() -> None:
     with Rig(parameters={'control.retard': 8.0}) as rig:
         rig.turn(40.0)
+        rig.asked.clear()
         leaving = rig.drive.disconnect(1.0)
         rig.pass_time(0.3)
         assert not leaving.done()
@@ -48,6 +49,8 @@ def test_a_drive_that_is_being_left_is_not_enabled() -> None:
         assert 'left to its ramp' in rig.answer(leaving)
         rig.pass_time(10.0)
         assert not rig.drive.following and not rig.far.motor.driven
+        # not only because the last stop of the release has ended it
+        assert not any(rig.written('fieldbus.scmd'))
 
 
 def test_an_attempt_that_fails_at_once_confirms_nothing() -> None:
