@@ -57,6 +57,10 @@ def test_each_event_ends_a_run(machine: type[AnyOrder]) -> None:
             if not state.rig.far.control_unit.run_input:
                 state.run_input_on(wait=1.0)
             state.put_right()
+        # a refused enable leaves nothing by which the motor starts later
+        state.enable_without_run_input(wait=1.0)
+        state.run_input_on(wait=2.5)
+        state.put_right()
         for give in ('', 'stop', 'deactivate'):
             state.lose_line('silent', give, 9.0, wait=2.5)
         state.put_right()
