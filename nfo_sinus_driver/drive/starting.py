@@ -53,9 +53,10 @@ class _StepTime:
         return self._is_late(status)
 
     def _is_late(self, status: InverterStatus) -> bool:
-        # in standby after the start delay it has forgotten the start, and must not wait for
-        # another one
-        forgotten = self._delay is not None and status.standby and not self._braking
+        # in standby after the start delay, or without control, it has forgotten the start, and must
+        # not wait for another one
+        in_standby = status.standby and not self._braking
+        forgotten = self._delay is not None and (in_standby or not status.from_bus)
         return forgotten or self._state.bus.now() > self._deadline + self.added
 
 

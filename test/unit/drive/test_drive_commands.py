@@ -104,6 +104,22 @@ def test_two_at_a_time_cannot_enable_and_a_start_delay_of_the_drive_is_waited_fo
         assert rig.far.motor.driven
 
 
+@pytest.mark.parametrize(
+    'connection', ['rtu', 'rtu, control word', 'classic v5.0', 'optimal', 'optimal, control word']
+)
+def test_a_power_cycle_in_a_start_delay_ends_the_enable(connection: str) -> None:
+    # how long that delay is, an Optimal does not report
+    with Rig(connection, parameters={'control.run_dly': 2}).connect() as rig:
+        enabling = rig.drive.enable()
+        rig.pass_time(1.0)
+        rig.far.power_cycle(0.05)
+        rig.answer(enabling, 8.0)
+        assert enabling.exception() is not None
+        rig.pass_time(3.0)
+        assert not rig.turns
+        rig.enable()
+
+
 @pytest.mark.parametrize('connection', ['rtu', 'classic v5.0', 'rtu, control word', 'canopen'])
 @pytest.mark.parametrize('delay', [0, 3])
 def test_dc_braking_before_a_start_is_waited_for(connection: str, delay: int) -> None:
