@@ -51,7 +51,7 @@ def _of_one(law: str, cells: list[Test]) -> set[str]:
     wanted = [cell for cell in cells if str(cell[1].get('connection')) not in left_out]
     found: set[str] = set()
     met: set[tuple[str, str]] = set()
-    # nor does it follow from the order of rows which goes with which
+    # in an order of its own for each law, so that other values go together there
     for name, params in sorted(wanted or cells, key=lambda cell: crc32(cell[0].encode())):
         values = {(key, repr(value)) for key, value in params.items()}
         if not values or not values <= met:

@@ -90,8 +90,8 @@ def is_test(name: str) -> bool:
 
 
 def test_what_is_served_has_a_test_that_shows_it() -> None:
-    # what is done by hand at the drive, a wire or a jumper, is only told
-    told = re.compile(r'drives/\w+\.md#')
+    # what is done by hand at the drive, a wire or a jumper, is only documented
+    documented = re.compile(r'drives/\w+\.md#')
     wrong = [
         (row['manual'], row['place'], row['what'])
         for row in ROWS
@@ -99,7 +99,7 @@ def test_what_is_served_has_a_test_that_shows_it() -> None:
         or (row['status'] == 'not' and row['shown_by'])
         or (
             row['status'] != 'not' and not row['shown_by']
-            and not all(map(told.match, _TOOL['served_by'](row)))
+            and not all(map(documented.match, _TOOL['served_by'](row)))
         )
     ]
     assert wrong == []

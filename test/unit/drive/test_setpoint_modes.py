@@ -71,6 +71,18 @@ def facts(rig: Rig) -> Fact:
     return Fact(0) if status is None else status.facts
 
 
+def assert_turns(rig: Rig, mode: str, value: float) -> float:
+    """The motor turns at a set-point, and what is published has its unit; return what it shows."""
+    turns = rig.far.motor.torque if mode == 'Torque' else rig.far.motor.frequency
+    assert turns * value > 0
+    # of PI-Reg it is RegAct; the simulated process has no sign
+    actual = abs(value) if mode == 'PI-Reg' else value
+    snapshot = rig.drive.snapshot
+    assert snapshot.actual == pytest.approx(actual, rel=0.07, abs=1.0)
+    assert (snapshot.control_mode, snapshot.unit) == (mode, MODES[mode].unit)
+    return actual
+
+
 @every_mode
 def test_unit_sign_and_reached(connection: str, mode: str) -> None:
     with enabled(connection, mode) as rig:
@@ -85,14 +97,8 @@ def test_unit_sign_and_reached(connection: str, mode: str) -> None:
             rig.far.memory.set('control.accel', 0.2)
             rig.pass_time(2.0)
             assert Fact.SETPOINT_REACHED in facts(rig)
-            turns = rig.far.motor.torque if mode == 'Torque' else rig.far.motor.frequency
-            assert turns * value > 0
-            # the actual value has the unit of the set-point; the simulated process has no sign
-            actual = abs(value) if mode == 'PI-Reg' else value
-            snapshot = rig.drive.snapshot
-            assert snapshot.actual == pytest.approx(actual, rel=0.07, abs=1.0)
-            assert (snapshot.control_mode, snapshot.unit) == (mode, MODES[mode].unit)
-            assert not snapshot.setpoint_clamped
+            assert_turns(rig, mode, value)
+            assert not rig.drive.snapshot.setpoint_clamped
 
 
 @pytest.mark.parametrize('mode', MODES)
@@ -106,13 +112,7 @@ def test_older_firmware_has_one_set_point_whose_unit_and_steps_are_those_of_its_
             rig.pass_time(4.0)
             assert rig.written('fieldbus.setpoint')[-1] == MODES[mode].steps * value
             assert in_drive(rig, mode) == rig.drive.snapshot.setpoint == value
-            turns = rig.far.motor.torque if mode == 'Torque' else rig.far.motor.frequency
-            assert turns * value > 0
-            # of PI-Reg it is RegAct, of a process that has no sign here
-            actual = abs(value) if mode == 'PI-Reg' else value
-            snapshot = rig.drive.snapshot
-            assert snapshot.actual == pytest.approx(actual, rel=0.07, abs=1.0)
-            assert (snapshot.control_mode, snapshot.unit) == (mode, MODES[mode].unit)
+            actual = assert_turns(rig, mode, value)
         key = 'status.reg_act'
         if mode == 'PI-Reg':
             assert rig.notes.telemetry[-1].measured[key] == pytest.approx(actual, rel=0.07)

@@ -1,0 +1,28 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""``make exhaustive`` finds what is wrong with a driver, and each of its cases can be run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import runpy
+
+import pytest
+
+from nfo_sinus_driver.drive.stopping import StopSequence
+
+TOOL = runpy.run_path(str(Path(__file__).resolve().parents[2] / 'exhaustive' / 'run.py'))
+
+
+def test_what_can_go_wrong_can_happen_to_each_machine() -> None:
+    known = {*TOOL['FAULTS'], *TOOL['REFUSALS']}
+    for machine in TOOL['MACHINES']:
+        assert [name for name in TOOL['faults_of'](machine)
+                if name not in known and not callable(getattr(machine, name, None))] == []
+
+
+def test_a_driver_that_does_not_stop_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert TOOL['try_case']('G2ModeScmd', ((300, 'answer lost'),)) == ''
+    monkeypatch.setattr(StopSequence, 'start', lambda *_: None)
+    assert TOOL['try_case']('G2ModeScmd', ()) != ''
