@@ -7,7 +7,10 @@
 A campaign finds by luck what is found here by counting. The run is the same each time: connect,
 enable, forward, reverse, set-points that cease, stop, a fault and its acknowledgement, quick stop,
 release, the end of the driver; the laws of ``test_any_order`` judge it, by all that is on the line
-and in the drive. With ``--pairs`` a second thing goes wrong later in it.
+and in the drive. With ``--pairs`` a second thing goes wrong, between an enable and a stop.
+
+What comes before the first thing that goes wrong is the same for all cases: the run goes through
+it once, and forks at each request for each thing.
 """
 
 from __future__ import annotations
@@ -15,11 +18,12 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
-import functools
+import gc
 import os
 from pathlib import Path
+import signal
 import sys
+import tempfile
 from typing import Any
 
 _TEST = Path(__file__).resolve().parents[1]
@@ -34,6 +38,10 @@ Case = tuple[tuple[int, str], ...]
 _CONNECTS = ('forward', 'forward again', 'fault', 'last run')
 #: Of the requests of a step that are the same, as in polls, so many are spoiled.
 _OF_EQUAL = 2
+#: The steps of a pair: from an enable to a confirmed stop.
+_OF_PAIRS = ('forward', 'reverse', 'no set-points', 'stop')
+#: No run takes longer, s.
+_PATIENCE = 300
 
 
 def _of_line(state: AnyOrder, attribute: str, number: int) -> None:
@@ -89,14 +97,14 @@ class Run:
     """
     One run with what goes wrong in it.
 
-    :ivar asked: each request, as the step of the run, the parameter, and whether it is written.
+    :param wrong: called with each request, as the step of the run, the parameter, and whether it is
+        written; returns what goes wrong with it, ``''`` if nothing.
     """
 
-    def __init__(self, machine: type[AnyOrder], case: Case) -> None:
+    def __init__(self, machine: type[AnyOrder], wrong: Callable[[str, str, bool], str]) -> None:
         self._state: Any = type(machine.__name__, (_Instant, machine), {})()
-        self._due = dict(case)
+        self._wrong = wrong
         self._step = ''
-        self.asked: list[tuple[str, str, bool]] = []
 
     def run(self) -> None:
         """Go through it (AssertionError: a law is broken)."""
@@ -133,16 +141,15 @@ class Run:
     def _meet(
         self, meet: Callable[[str, bytes | None], str | None], key: str, data: bytes | None
     ) -> str | None:
-        wrong = self._due.get(len(self.asked))
         status = self._state.rig.far.memory.model.key_of_status
         # one setting or measured value is read in the background like another
         matters = key == status or key.startswith('fieldbus.') or data is not None
-        self.asked.append((self._step, key if matters else 'a value', data is not None))
+        wrong = self._wrong(self._step, key if matters else 'a value', data is not None)
         usual = meet(key, data)
         if self._state.rig.line.state in ('noise', 'late'):
             # for one answer
             self._state.rig.line.mend()
-        if wrong is None:
+        if not wrong:
             return usual
         if wrong in REFUSALS:
             self._state.laws.disturbed()
@@ -159,77 +166,133 @@ class Run:
         return usual
 
 
-def try_case(name: str, case: Case) -> str:
-    """Return what was wrong with a run, ``''`` if nothing."""
+def complaint_of(run: Run) -> str:
+    """Return what is wrong with a run, ``''`` if nothing."""
     try:
-        Run(_machine(name), case).run()
+        run.run()
     except Exception as error:
         # a mistake in the driver or in a law must not end the others
         return f'{type(error).__name__}: {error}'.splitlines()[0]
     return ''
 
 
-def moments_of(name: str) -> list[int]:
-    """Return the requests of a run that differ: of equal ones in a step the first few."""
-    whole = Run(_machine(name), ())
-    whole.run()
-    met = Counter[tuple[str, str, bool]]()
-    moments = []
-    for at, request in enumerate(whole.asked):
-        met[request] += 1
-        if met[request] <= _OF_EQUAL:
-            moments.append(at)
-    return moments
+class Given:
+    """One case."""
+
+    def __init__(self, case: Case) -> None:
+        self._due, self._asked = dict(case), -1
+
+    def __call__(self, step: str, key: str, writes: bool) -> str:
+        self._asked += 1
+        return self._due.get(self._asked, '')
 
 
-def _machine(name: str) -> type[AnyOrder]:
-    return next(machine for machine in MACHINES if machine.__name__ == name)
+class Tree:
+    """
+    All cases of one kind of drive: each forks where its first thing goes wrong.
 
+    :param depth: how many things go wrong.
+    :param part: which of how many parts is tried, by the first thing.
+    :param jobs: how many processes at a time.
+    :param done: a file to which each process adds a byte.
+    """
 
-def cases_of(name: str, pairs: bool) -> Iterator[Case]:
-    """Yield all cases of one kind of drive, in order."""
-    moments, faults = moments_of(name), tuple(faults_of(_machine(name)))
-    for number, at in enumerate(moments):
-        for fault in faults:
-            if not pairs:
-                yield ((at, fault),)
-            for then in moments[number + 1:] if pairs else ():
-                yield from (((at, fault), (then, second)) for second in faults)
+    def __init__(
+        self, machine: type[AnyOrder], depth: int, part: tuple[int, int], jobs: int, done: int
+    ) -> None:
+        self._machine, self._depth, self._jobs, self._done = machine, depth, jobs, done
+        self._part, self._pairs = part, depth > 1
+        self._faults = tuple(faults_of(machine))
+        self._asked, self._number = -1, 0
+        self._met = Counter[tuple[str, str, bool]]()
+        self._case: Case = ()
+        self._running: dict[int, Case] = {}
+
+    def run(self) -> None:
+        """Try all."""
+        gc.freeze()
+        complaint = complaint_of(Run(self._machine, self))
+        while self._running:
+            self._wait()
+        self._report(self._case, complaint)
+        if self._case:
+            os._exit(0)
+
+    def __call__(self, step: str, key: str, writes: bool) -> str:
+        self._asked += 1
+        self._met[step, key, writes] += 1
+        differs = self._met[step, key, writes] <= _OF_EQUAL
+        if self._depth and differs and (not self._pairs or step in _OF_PAIRS):
+            for fault in self._faults:
+                if self._goes_wrong(fault):
+                    return fault
+        return ''
+
+    def _goes_wrong(self, fault: str) -> bool:
+        """Return whether it does in this process, which is the one to go through that case."""
+        self._number += 1
+        part, parts = self._part
+        if not self._case and self._number % parts != part % parts:
+            return False
+        while len(self._running) >= self._jobs:
+            self._wait()
+        case = (*self._case, (self._asked, fault))
+        process = os.fork()
+        if process:
+            self._running[process] = case
+            return False
+        self._case, self._depth, self._jobs = case, self._depth - 1, 1
+        self._running.clear()
+        if not self._depth:
+            signal.alarm(_PATIENCE)
+        return True
+
+    def _wait(self) -> None:
+        process, status = os.wait()
+        case = self._running.pop(process)
+        if status:
+            self._report(case, f'no end after {_PATIENCE} s, or killed: status {status}')
+
+    def _report(self, case: Case, complaint: str) -> None:
+        os.write(self._done, b'x' if complaint else b'.')
+        if complaint:
+            again = ' '.join(f"--case '{at}:{fault}'" for at, fault in case)
+            line = f'--machine {self._machine.__name__} {again}\n    {complaint}\n'
+            os.write(sys.stdout.fileno(), line.encode())
 
 
 def main() -> int:
     """Try all cases of this part; return 1 where one breaks a law."""
     parser = argparse.ArgumentParser(description=__doc__)
-    names = [machine.__name__ for machine in MACHINES]
-    parser.add_argument('--machine', action='append', choices=names, help='default: all')
+    machines = {machine.__name__: machine for machine in MACHINES}
+    parser.add_argument('--machine', action='append', choices=machines, help='default: all')
     parser.add_argument('--part', default='1/1', metavar='I/N', help='every Nth case only')
     parser.add_argument('--pairs', action='store_true', help='two things go wrong')
     parser.add_argument('--case', action='append', metavar='AT:FAULT', help='this one alone')
     parser.add_argument('--jobs', type=int, default=os.cpu_count(), metavar='N')
     options = parser.parse_args()
     failures = 0
-    for name in options.machine or names:
-        failures += _try_all(name, options)
+    for name in options.machine or machines:
+        if options.case:
+            split = (one.partition(':') for one in options.case)
+            case = tuple((int(at), fault) for at, _, fault in split)
+            complaint = complaint_of(Run(machines[name], Given(case)))
+            print(f'{name}: {complaint or "nothing is wrong"}')
+            failures += bool(complaint)
+        else:
+            failures += _try_all(machines[name], options)
     return 1 if failures else 0
 
 
-def _try_all(name: str, options: argparse.Namespace) -> int:
-    if options.case:
-        split = (one.partition(':') for one in options.case)
-        cases = [tuple((int(at), fault) for at, _, fault in split)]
-    else:
-        part, parts = map(int, options.part.split('/'))
-        cases = [case for at, case in enumerate(cases_of(name, options.pairs))
-                 if at % parts == part % parts]
-    failures = 0
-    with ProcessPoolExecutor(options.jobs) as executor:
-        tried = executor.map(functools.partial(try_case, name), cases, chunksize=8)
-        for case, complaint in zip(cases, tried, strict=True):
-            if complaint:
-                failures += 1
-                again = ' '.join(f"--case '{at}:{fault}'" for at, fault in case)
-                print(f'--machine {name} {again}\n    {complaint}', flush=True)
-    print(f'{name}: {len(cases)} cases, {failures} break a law', flush=True)
+def _try_all(machine: type[AnyOrder], options: argparse.Namespace) -> int:
+    part, _, parts = options.part.partition('/')
+    with tempfile.TemporaryFile() as done:
+        depth = 2 if options.pairs else 1
+        Tree(machine, depth, (int(part), int(parts)), options.jobs, done.fileno()).run()
+        done.seek(0)
+        ends = done.read()
+    failures = ends.count(b'x')
+    print(f'{machine.__name__}: {len(ends)} cases, {failures} break a law', flush=True)
     return failures
 
 

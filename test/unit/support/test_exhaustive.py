@@ -22,7 +22,12 @@ def test_what_can_go_wrong_can_happen_to_each_machine() -> None:
                 if name not in known and not callable(getattr(machine, name, None))] == []
 
 
+def _complaint(*case: tuple[int, str]) -> str:
+    run = TOOL['Run'](TOOL['MACHINES'][0], TOOL['Given'](case))
+    return TOOL['complaint_of'](run)
+
+
 def test_a_driver_that_does_not_stop_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert TOOL['try_case']('G2ModeScmd', ((300, 'answer lost'),)) == ''
+    assert _complaint((300, 'answer lost')) == ''
     monkeypatch.setattr(StopSequence, 'start', lambda *_: None)
-    assert TOOL['try_case']('G2ModeScmd', ()) != ''
+    assert _complaint() != ''
