@@ -27,10 +27,11 @@ import tempfile
 from typing import Any
 
 _TEST = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(_TEST.parent), str(_TEST), str(_TEST / 'unit' / 'drive')]
+sys.path[:0] = [str(_TEST.parent), str(_TEST), str(_TEST / 'unit' / 'drive'),
+                str(_TEST / 'exhaustive')]
 
 from any_order_machine import AnyOrder  # noqa: E402, the tests are no package
-from any_order_machines import MACHINES  # noqa: E402
+from machines import EVERY_MACHINE  # noqa: E402
 
 #: At which request what goes wrong; the first is 0.
 Case = tuple[tuple[int, str], ...]
@@ -141,9 +142,9 @@ class Run:
     def _meet(
         self, meet: Callable[[str, bytes | None], str | None], key: str, data: bytes | None
     ) -> str | None:
-        status = self._state.rig.far.memory.model.key_of_status
+        status = self._state.rig.drive.params.model.key_of_status
         # one setting or measured value is read in the background like another
-        matters = key == status or key.startswith('fieldbus.') or data is not None
+        matters = key == status or key.startswith(('fieldbus.', 'telegram.')) or data is not None
         wrong = self._wrong(self._step, key if matters else 'a value', data is not None)
         usual = meet(key, data)
         if self._state.rig.line.state in ('noise', 'late'):
@@ -151,6 +152,7 @@ class Run:
             self._state.rig.line.mend()
         if not wrong:
             return usual
+        self._state.laws.spoiled()
         if wrong in REFUSALS:
             self._state.laws.disturbed()
             return wrong
@@ -264,7 +266,7 @@ class Tree:
 def main() -> int:
     """Try all cases of this part; return 1 where one breaks a law."""
     parser = argparse.ArgumentParser(description=__doc__)
-    machines = {machine.__name__: machine for machine in MACHINES}
+    machines = {machine.__name__: machine for machine in EVERY_MACHINE}
     parser.add_argument('--machine', action='append', choices=machines, help='default: all')
     parser.add_argument('--part', default='1/1', metavar='I/N', help='every Nth case only')
     parser.add_argument('--pairs', action='store_true', help='two things go wrong')

@@ -17,11 +17,15 @@ from itertools import groupby
 import struct
 from typing import Any
 
+#: For how long the PLC takes a word for valid whose life counter stands still, s [C108].
+_PLC_TIME = 1.0
+
 
 @dataclasses.dataclass(frozen=True)
 class Exchange:
-    """What was written in one transaction, and what had been read before it: ZSW1, flags."""
+    """What was written in one transaction, when, and what had been read before: ZSW1, flags."""
 
+    at: float
     stw1: int
     setpoint: int
     life: int
@@ -53,8 +57,9 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
                 16: 13 if words == (start + 8, 3) else 0,
             }.get(function, 0)
             assert at or function in (3, 43, 17), f'function {function} at a block'
-            written = Exchange(*struct.unpack_from('>3H', data, at), zsw1, flags) if at else None
             reads = function in (3, 23) and words in ((start, 5), (start, 8))
+            command = struct.unpack_from('>3H', data, at) if at else ()
+            written = Exchange(frame['first'], *command, zsw1, flags) if at else None
             asked = {number: (reads, written)}
         elif number in asked:
             reads, written = asked.pop(number)
@@ -141,7 +146,9 @@ class Judge(abc.ABC):
             return
         if before is not None and now.life == before.life:
             yield f'{shown}: the life counter stood still'
-        stood = before.stw1 if before is not None else 0
+        # the PLC removes the word of a driver that it does not hear
+        heard = before is not None and now.at - before.at < _PLC_TIME
+        stood = before.stw1 if before is not None and heard else 0
         if now.stw1 & ~self.known:
             yield f'{shown}: bits that are not known'
         if now.setpoint and not now.stw1 & self.run:

@@ -177,6 +177,16 @@ class History:
         """Take note that another master did something to the drive."""
         self.disturbed_at = self.now
 
+    def spoiled(self) -> None:
+        """Take note that the request that is on its way may have to be sent again, and waits."""
+        if self._whole_since is not None:
+            self._whole_since = self.now
+        for command in self._commands:
+            command.undisturbed = False
+        self._no_run_from = max(
+            self._no_run_from, self.now + 2 * self.times.response_timeout + self.times.carried_out
+        )
+
     def started_by_another(self) -> None:
         """Take note that another master has given a run command over the bus."""
         self.disturbed_at = self.now

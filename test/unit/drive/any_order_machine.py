@@ -66,7 +66,7 @@ class AnyOrder(RuleBasedStateMachine):
     ) -> None:
         """Begin with a drive in which something stands, and with these settings of the driver."""
         self.rig = Rig(
-            Connection(self.protocol, self.model, self.method, self.reference, driver=self.driver),
+            self.connection,
             parameters=parameters,
             options=options,
             line=self.line,
@@ -81,6 +81,13 @@ class AnyOrder(RuleBasedStateMachine):
         self.laws = Laws(self.rig)
         self.connect()
         self.activate()
+
+    @property
+    def connection(self) -> Connection:
+        """That to its drive."""
+        return Connection(
+            self.protocol, self.model, self.method, self.reference, driver=self.driver
+        )
 
     def begin_for_each_event(self) -> None:
         """Begin in the way that shows most of what ends a run; each family its own."""

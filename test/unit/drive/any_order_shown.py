@@ -24,6 +24,7 @@ from nfo_sinus_driver.simulator.movitrac31.commands import (
 )
 from nfo_sinus_driver.simulator.movitrac31.parameters import Bit, Mode, Number
 from nfo_sinus_driver.simulator.sinus.control_unit import Source
+from nfo_sinus_driver.simulator.telegram1 import Stw1
 
 #: What commands a drive of NFO [M0 §7], [M1]; of the mask and its word, the latter comes last.
 MODE, CONTROL, MASK = 'fieldbus.mode', 'fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'
@@ -420,15 +421,104 @@ class ShownMovitrac(Shown):
         )
 
 
+#: Behind a PLC an answer is two of its cycles and two telegrams later.
+_PLC = Times(noticed=0.7, noticed_idle=1.4, carried_out=0.2, found=7.0)
+
+
+class BehindPlc(Shown):
+    """What of a drive a telegram shows; for a class that knows the drive."""
+
+    times = _PLC
+    lead = 2
+    refuses_stop = True
+
+    def facts(self) -> dict[str, Any]:
+        """Return what a telegram tells: no codes, and of some drives no direction."""
+        return {'fault': bool(self._far.faults), 'by bus': None, 'running': None}
+
+    def reads_status(self, request: Request) -> bool:
+        return request == ('telegram.status', None)
+
+    def wrong(self, key: str, number: int) -> Complaints:
+        if not key.startswith('telegram.'):
+            yield f'{key} was written'
+
+    def stops(self, key: str, number: int) -> bool:
+        return key in ('telegram.begin', 'telegram.clear')
+
+
+class ShownG2BehindPlc(BehindPlc, ShownG2):
+    """A G2 with the option card of PROFINET."""
+
+
+class ShownOptimalBehindPlc(BehindPlc, ShownOptimal):
+    """An Optimal with the option card of PROFINET."""
+
+
+class ShownH(BehindPlc):
+    """A Sinus H."""
+
+    @property
+    def by_bus(self) -> bool:
+        return bool(self._unit.word & Stw1.CONTROL_BY_PLC)
+
+    @property
+    def running(self) -> bool:
+        return self.standing and self._far.motor.driven and not self._far.faults
+
+    @property
+    def standing(self) -> bool:
+        return bool(self._unit._commanded)
+
+
+class ShownDescribed(Shown):
+    """What a drive shows that a file describes."""
+
+    lead = 3
+    refuses_stop = True
+
+    @property
+    def by_bus(self) -> bool:
+        return bool(self._unit.obeys)
+
+    @property
+    def running(self) -> bool:
+        return self.standing and self._far.motor.driven and not self._far.faults
+
+    @property
+    def standing(self) -> bool:
+        return self.by_bus and bool(self._unit._run)
+
+    def facts(self) -> dict[str, Any]:
+        return {'fault': bool(self._far.faults), 'by bus': None, 'running': None}
+
+    def reads_status(self, request: Request) -> bool:
+        return request == (self._far.memory.model.key_of_status, None)
+
+    def wrong(self, key: str, number: int) -> Complaints:
+        yield from ()
+
+    def stops(self, key: str, number: int) -> bool:
+        return key != self._unit._drive.setpoint.key or not number
+
+
 _FAMILIES: Mapping[str, type[Shown]] = {
     'sinus_g2': ShownG2,
     'sinus_optimal': ShownOptimal,
     'movitrac31': ShownMovitrac,
 }
+_BEHIND_PLC: Mapping[str, type[Shown]] = {
+    'sinus_g2': ShownG2BehindPlc,
+    'sinus_optimal': ShownOptimalBehindPlc,
+    'sinus_h': ShownH,
+}
 
 
 def shown_by(rig: Rig) -> Shown:
     """Return what the drive of a rig shows."""
-    if rig.drive.settings.method == 'ds402':
+    model, method = rig.drive.settings.model, rig.drive.settings.method
+    if method == 'ds402':
         return ShownDs402(rig)
-    return _FAMILIES[rig.drive.settings.model](rig)
+    if method == 'custom':
+        return ShownDescribed(rig)
+    return (_BEHIND_PLC if method == 'telegram1' else _FAMILIES)[model](rig)

@@ -17,13 +17,13 @@ TOOL = runpy.run_path(str(Path(__file__).resolve().parents[2] / 'exhaustive' / '
 
 def test_what_can_go_wrong_can_happen_to_each_machine() -> None:
     known = {*TOOL['FAULTS'], *TOOL['REFUSALS']}
-    for machine in TOOL['MACHINES']:
+    for machine in TOOL['EVERY_MACHINE']:
         assert [name for name in TOOL['faults_of'](machine)
                 if name not in known and not callable(getattr(machine, name, None))] == []
 
 
 def _complaint(*case: tuple[int, str]) -> str:
-    run = TOOL['Run'](TOOL['MACHINES'][0], TOOL['Given'](case))
+    run = TOOL['Run'](TOOL['EVERY_MACHINE'][0], TOOL['Given'](case))
     return TOOL['complaint_of'](run)
 
 
