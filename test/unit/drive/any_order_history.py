@@ -179,13 +179,12 @@ class History:
 
     def spoiled(self) -> None:
         """Take note that the request that is on its way may have to be sent again, and waits."""
+        again = self.now + 2 * self.times.response_timeout
+        self._no_run_from = max(self._no_run_from, again + self.times.carried_out)
         if self._whole_since is not None:
-            self._whole_since = self.now
+            self._whole_since = again
         for command in self._commands:
             command.undisturbed = False
-        self._no_run_from = max(
-            self._no_run_from, self.now + 2 * self.times.response_timeout + self.times.carried_out
-        )
 
     def started_by_another(self) -> None:
         """Take note that another master has given a run command over the bus."""

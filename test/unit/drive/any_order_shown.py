@@ -450,6 +450,11 @@ class BehindPlc(Shown):
 class ShownG2BehindPlc(BehindPlc, ShownG2):
     """A G2 with the option card of PROFINET."""
 
+    @property
+    def standing(self) -> bool:
+        # only a new edge of bit 0 leads out of that state
+        return super().standing and self._unit.state != 'SWITCH_ON_DISABLED'
+
 
 class ShownOptimalBehindPlc(BehindPlc, ShownOptimal):
     """An Optimal with the option card of PROFINET."""
