@@ -101,6 +101,8 @@ class SinusH(_BehindPlc):
     name = 'telegram1 sinus_h'
     # no manual tells whether its terminal counts beside the bus
     enders = ('first_fault', 'plc_restarts', 'plc_misses_the_drive')
+    # the stop that follows is another word, and for a start the judge of words would not have it
+    not_refused = ('telegram.clear',)
 
 
 class _Described(_Plain):

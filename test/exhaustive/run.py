@@ -150,7 +150,7 @@ class Run:
         if self._state.rig.line.state in ('noise', 'late'):
             # for one answer
             self._state.rig.line.mend()
-        if not wrong:
+        if not wrong or (wrong in REFUSALS and key in getattr(self._state, 'not_refused', ())):
             return usual
         self._state.laws.spoiled()
         if wrong in REFUSALS:

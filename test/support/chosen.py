@@ -6,7 +6,8 @@ Which tests of a product run before every commit; ``FULL=1`` runs all of them.
 
 A product of a law, connections and events finds two kinds of fault: the law is broken, which any
 connection shows, and a connection is special, which any law of its kind shows. So each value of
-each parameter has a test, but not each with each; and each law has a connection of each kind. What
+each parameter has a test, but not each with each; the laws of ``test_laws.py`` have a connection of
+each kind, and those of other files have every second kind in turn. What
 breaks one cell alone is for ``make all``. The mutants say whether that is enough: ``make mutants``
 tries them with what runs here, and a cell that one needs is named in ``NEEDED``.
 """
@@ -17,12 +18,16 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from zlib import crc32
 
-#: A connection of each kind; of the others a law has one in so many.
+#: A connection of each kind.
 KINDS = (
     'rtu', 'tcp', 'classic', 'canopen', 'canopen, ds402', 'movitrac', 'telegram1 g2', 'described',
 )
-_ONE_IN = 4
+#: Of the others a law has one in so many.
+_ONE_IN = 6
 _DRIVE = 'test/unit/drive'
+#: Its laws have all of them, those of other files one in so many.
+_EACH_KIND = f'{_DRIVE}/test_laws.py'
+_ONE_KIND_IN = 2
 #: The cells that no other replaces, with the mutant that lives without them.
 NEEDED = {
     f'{_DRIVE}/test_why_stopped.py::test_after_each_stop_it_is_known_why[rtu-power cycle]':
@@ -45,9 +50,14 @@ def chosen(tests: Iterable[Test]) -> set[str]:
 
 
 def _of_one(law: str, cells: list[Test]) -> set[str]:
-    others = sorted({str(params.get('connection')) for _, params in cells} - set(KINDS))
+    connections = {str(params.get('connection')) for _, params in cells}
     # which of them differs from law to law
-    left_out = set(others) - set(others[crc32(law.encode()) % _ONE_IN::_ONE_IN])
+    turn = crc32(law.encode())
+    kinds = [kind for kind in KINDS if kind in connections]
+    if not law.startswith(_EACH_KIND):
+        kinds = kinds[turn % _ONE_KIND_IN::_ONE_KIND_IN]
+    others = sorted(connections - set(KINDS))[turn % _ONE_IN::_ONE_IN]
+    left_out = connections - {*kinds, *others}
     wanted = [cell for cell in cells if str(cell[1].get('connection')) not in left_out]
     found: set[str] = set()
     met: set[tuple[str, str]] = set()

@@ -17,7 +17,7 @@ from any_order_machines import MACHINES, G2DriveControl, G2ModeScmd, OptimalMode
 from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis.stateful import run_state_machine_as_test
 import pytest
-from support.examples import examples
+from support.examples import FULL
 
 #: How many histories a campaign has in all, 0: a normal run; and where they come from.
 HISTORIES = int(os.environ.get('HISTORIES', '0'))
@@ -26,7 +26,7 @@ SEED = int(os.environ.get('SEED', '0'))
 _SHARE = 100
 #: Always the same histories, so that what passes once passes on every machine.
 NORMAL = settings(
-    max_examples=examples(40),
+    max_examples=40 if FULL else 8,
     stateful_step_count=30,
     derandomize=True,
     deadline=None,
