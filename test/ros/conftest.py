@@ -12,6 +12,8 @@ from pathlib import Path
 from bench import Bench
 from connections import CONNECTIONS, DEFAULT, EACH_KIND, USUAL, Connection, reason_to_skip
 import pytest
+from support.chosen import axes_of, chosen
+from support.examples import FULL
 
 from nfo_sinus_driver.demo.bench import own_domain
 
@@ -23,6 +25,8 @@ os.environ['FASTDDS_BUILTIN_TRANSPORTS'] = 'UDPv4'
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
 
+#: Of its connections a test has one in so many, unless all were asked for (FULL=1).
+_ONE_CONNECTION_IN = 3
 #: What ``--connection`` takes for all of them.
 _ALL = 'all'
 
@@ -78,8 +82,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             shared.setdefault(item.nodeid.split('[')[0], []).append(item)
     if config.getoption('--connection', DEFAULT) == _ALL:
         return
-    left_out = [item for tests in shared.values() for item in _left_out(tests)]
-    config.hook.pytest_deselected(items=left_out)
+    left_out = {item for tests in shared.values() for item in _left_out(tests)}
+    if not (FULL or any('[' in argument for argument in config.args)):
+        rest = ((item.nodeid, axes_of(item)) for item in items if item not in left_out)
+        names = chosen(rest, one_in=_ONE_CONNECTION_IN)
+        left_out |= {item for item in items if item.nodeid not in names}
+    config.hook.pytest_deselected(items=list(left_out))
     items[:] = [item for item in items if item not in left_out]
 
 

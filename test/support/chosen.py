@@ -18,11 +18,13 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from zlib import crc32
 
+import pytest
+
 #: A connection of each kind.
 KINDS = (
     'rtu', 'tcp', 'classic', 'canopen', 'canopen, ds402', 'movitrac', 'telegram1 g2', 'described',
 )
-#: Of the others a law has one in so many.
+#: Of the others a law has one in so many, if nothing else is said.
 _ONE_IN = 6
 _DRIVE = 'test/unit/drive'
 #: Its laws have all of them, those of other files one in so many.
@@ -41,22 +43,34 @@ NEEDED = {
 Test = tuple[str, Mapping[str, object]]
 
 
-def chosen(tests: Iterable[Test]) -> set[str]:
-    """Return the names of those that run."""
+def chosen(tests: Iterable[Test], one_in: int = _ONE_IN) -> set[str]:
+    """Return the names of those that run; of what is no kind each law has one in so many."""
     products: dict[str, list[Test]] = defaultdict(list)
     for name, params in tests:
         products[name.partition('[')[0]].append((name, params))
-    return {name for law, cells in products.items() for name in _of_one(law, cells)}
+    return {name for law, cells in products.items() for name in _of_one(law, cells, one_in)}
 
 
-def _of_one(law: str, cells: list[Test]) -> set[str]:
+def axes_of(item: pytest.Item) -> dict[str, object]:
+    """Return where a test stands on each axis of its product: rows written by hand are one axis."""
+    params = dict(item.callspec.params) if isinstance(item, pytest.Function) and hasattr(
+        item, 'callspec') else {}
+    axes: dict[str, object] = {}
+    for mark in item.iter_markers('parametrize'):
+        names = mark.args[0] if isinstance(mark.args[0], str) else ','.join(mark.args[0])
+        if 'connection' not in names.split(','):
+            axes[names] = [params.pop(name.strip(), None) for name in names.split(',')]
+    return axes | params
+
+
+def _of_one(law: str, cells: list[Test], one_in: int) -> set[str]:
     connections = {str(params.get('connection')) for _, params in cells}
     # which of them differs from law to law
     turn = crc32(law.encode())
     kinds = [kind for kind in KINDS if kind in connections]
     if not law.startswith(_EACH_KIND):
         kinds = kinds[turn % _ONE_KIND_IN::_ONE_KIND_IN]
-    others = sorted(connections - set(KINDS))[turn % _ONE_IN::_ONE_IN]
+    others = sorted(connections - set(KINDS))[turn % one_in::one_in]
     left_out = connections - {*kinds, *others}
     wanted = [cell for cell in cells if str(cell[1].get('connection')) not in left_out]
     found: set[str] = set()
