@@ -213,7 +213,7 @@ class SimulatedDrive:
 
     def peek(self, key: str) -> Value:
         """Return a parameter in engineering units, without side effects."""
-        return Memory.show(self.memory.model[key], self._peek(key))
+        return self.memory.shown(key, self._peek(key))
 
     # ---- inside ----
 

@@ -76,6 +76,8 @@ class Memory:
         for key, value in settings.items():
             self.set(key, value)
         self.given = frozenset(settings)
+        #: Of each parameter that was shown the raw number, and what it is in engineering units.
+        self._shown: dict[str, tuple[int, Value]] = {}
 
     def raw(self, key: str) -> int:
         """Return the raw number of a parameter."""
@@ -91,8 +93,7 @@ class Memory:
 
     def get(self, key: str) -> Value:
         """Return a parameter in engineering units."""
-        parameter = self.model[key]
-        return self.show(parameter, self._raw[key])
+        return self.shown(key, self._raw[key])
 
     @property
     def version(self) -> Fraction | None:
@@ -111,11 +112,16 @@ class Memory:
             raise ValueError(f'{self.model.name} has no parameter {key!r}')
         self._raw[key] = _raw_of(self.model[key], value)
 
-    @staticmethod
-    def show(parameter: Parameter, raw: int) -> Value:
-        """Turn a raw number of this memory into engineering units."""
-        protocol = home(parameter)
-        return parameter.decode(parameter.at(protocol).number.encode(raw), protocol)
+    def shown(self, key: str, raw: int) -> Value:
+        """Turn a raw number of a parameter into engineering units."""
+        # whoever watches a drive asks for all of them again and again, and few change
+        last = self._shown.get(key)
+        if last is None or last[0] != raw:
+            parameter = self.model[key]
+            protocol = home(parameter)
+            data = parameter.at(protocol).number.encode(raw)
+            last = self._shown[key] = raw, parameter.decode(data, protocol)
+        return last[1]
 
     @staticmethod
     def check(parameter: Parameter, raw: int) -> None:
