@@ -50,13 +50,14 @@ types: setup ## mypy, on all that is not ROS
 	@echo '== types: mypy --strict'
 	@.venv/bin/mypy
 
-# More workers than processors: these tests wait more than they work.
+# Those that compute have a worker for each processor; beside them those that wait have more, and
+# are heard when they have ended. Each group collects its own tests alone.
+COMPUTING = test/unit/drive test/unit/link test/unit/bus test/unit/catalog test/unit/families
 unit: setup ## tests without ROS; of products a share (FULL=1: all, and with every library)
 	@echo '== unit: without rclpy, with the oldest pymodbus'
-	@# by one process, so that the workers have it compiled already; what is wrong they say again
-	@$(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) --collect-only -qq test/unit \
-		>/dev/null 2>&1 || true
-	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 9 test/unit
+	@# so that the workers have it compiled already
+	@.venv/without-ros/bin/python -m compileall -q nfo_sinus_driver test
+	@$(MAKE) --no-print-directory -j2 computing waiting
 ifdef FULL
 	@echo '== unit again, what uses pymodbus: the current one'
 	@FULL=1 $(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 9 test/unit/link test/unit/simulator
@@ -65,6 +66,15 @@ ifdef FULL
 		FULL=1 $(WITHOUT_ROS) .venv/noble/bin/python $(PYTEST) -n 9 test/unit; \
 	fi
 endif
+
+.PHONY: computing waiting
+computing:
+	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n auto $(COMPUTING)
+
+waiting:
+	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 6 \
+		$(addprefix --ignore=,$(COMPUTING)) test/unit > .venv/log/waiting 2>&1; \
+	status=$$?; cat .venv/log/waiting; exit $$status
 
 ros: setup ## end-to-end tests with rclpy (CONNECTION=classic_v2: over another one; CONNECTION=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
