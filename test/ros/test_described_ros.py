@@ -12,7 +12,7 @@ import signal
 import subprocess
 import termios
 
-from bench import Bench, holds_for
+from bench import PATIENCE, Bench, holds_for
 from connections import needs
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
@@ -74,7 +74,7 @@ def test_a_run(bench: Bench, file: Path, family: str) -> None:
     with client.run_at(10.0):
         driver.signal(signal.SIGKILL)
         # its own time-out stops it
-        drive.wait_for(lambda state: not state['driven'], 20.0)
+        drive.wait_for(lambda state: not state['driven'], PATIENCE)
     assert 'Traceback' not in bench.log
 
 

@@ -75,11 +75,10 @@ def test_refresh_answers_what_has_changed(bench: Bench) -> None:
         lambda: values(client, 'freque.f_fix7', 'control.auto_start')
         == {'freque.f_fix7': 44.5, 'control.auto_start': True},
         'both show',
-        timeout=1.0,
     )
     drive.inject('factory-reset')
     assert client.call('refresh_parameters').success
-    wait_until(lambda: client.parameter('freque.f_fix7') == 50.0, 'the factory value', timeout=1.0)
+    wait_until(lambda: client.parameter('freque.f_fix7') == 50.0, 'the factory value')
     assert wire.writes() == []
 
 
@@ -104,7 +103,7 @@ def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
     memory.put('freque.op_mode', 193)
     assert client.call('refresh_parameters').success
     wanted = {'freque.f_fix2': most, 'control.run_dly': raw, 'freque.op_mode': '193'}
-    wait_until(lambda: values(client, *wanted) == wanted, 'the new ones show', timeout=2.0)
+    wait_until(lambda: values(client, *wanted) == wanted, 'the new ones show')
     span = client.descriptor('freque.f_fix2').floating_point_range[0]
     assert (span.from_value, span.to_value) == (0.0, most), 'the range takes it in'
     assert wire.writes() == []
@@ -118,7 +117,7 @@ def test_what_no_manual_allows_is_shown_as_it_is(bench: Bench) -> None:
     assert set_one(client, 'freque.op_mode', 'Fix-1 F').successful
     memory.put('freque.f_fix2', 100)
     assert client.call('refresh_parameters').success
-    wait_until(lambda: client.parameter('freque.f_fix2') == 10.0, 'in range', timeout=2.0)
+    wait_until(lambda: client.parameter('freque.f_fix2') == 10.0, 'in range')
     span = client.descriptor('freque.f_fix2').floating_point_range[0]
     assert (span.from_value, span.to_value) == (0.0, 150.0), 'the range is that of the manual'
     says_once(driver, f'changed at the drive: freque.f_fix2: 15 -> {most} Hz')

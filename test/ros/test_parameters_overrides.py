@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bench import A_WHILE, Bench, Client, Process, holds_for, wait_until
+from bench import A_WHILE, PATIENCE, Bench, Client, Process, holds_for, wait_until
 from connections import needs
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
@@ -132,7 +132,7 @@ def test_apply_parameters_false_only_reports(bench: Bench) -> None:
 def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
     # it runs by its terminals from power-up on
     drive = bench.simulator('--set', 'control.auto_start=ON', paced=False)
-    drive.wait_for(lambda state: state['turning'], 20.0)
+    drive.wait_for(lambda state: state['turning'], PATIENCE)
     wire = Wire(bench)
     driver = bench.driver(*COUNTED, *_given(bench, 'control.accel: 6', 'motor.u_nom: 230'))
     client = bench.client().connected()

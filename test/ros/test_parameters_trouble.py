@@ -33,7 +33,7 @@ pytestmark = needs('parameters')
 #: SCMD = Stop [M0 table 5, table 18].
 _STOP = Write(1, 0x0298, (0,))
 #: How soon one says that a drive does not answer, s: not a time-out for each of a hundred settings.
-_SOON = 30.0
+_SOON = PATIENCE
 
 
 def _agree(client: Client, drive: Stubborn) -> None:

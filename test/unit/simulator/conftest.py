@@ -18,6 +18,11 @@ from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.modbus import server
 
+#: How long an answer of known length is waited for on the slowest machine, one of any length, s.
+PATIENCE, SOON = 60.0, 2.0
+#: Longer than any answer.
+MOST = 256
+
 
 class Bench:
     """A drive on the bench: commands by name, and time that passes by command."""
@@ -82,8 +87,10 @@ class Master:
     def send(self, data):
         os.write(self.fd, data)
 
-    def receive(self, count=256, timeout=2.0):
-        """Return ``count`` bytes, or what came within the time."""
+    def receive(self, count=None, timeout=None):
+        """Return ``count`` bytes, or what came within the time; of an unknown number soon."""
+        timeout = timeout or (PATIENCE if count else SOON)
+        count = count or MOST
         data = b''
         end = time.monotonic() + timeout
         while len(data) < count:
@@ -93,7 +100,7 @@ class Master:
             data += os.read(self.fd, 4096)
         return data
 
-    def ask(self, address, pdu, count=256, timeout=2.0):
+    def ask(self, address, pdu, count=None, timeout=None):
         self.send(frame(address, pdu))
         return self.receive(count, timeout)
 

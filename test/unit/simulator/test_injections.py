@@ -80,7 +80,7 @@ def test_what_happens_to_a_drive_happens_to_no_other(served):
     assert client.state(1)['parameters']['control.accel'] == accel
     client.inject('power-cycle', address=1)
     assert client.state(1)['silent']
-    client.wait_for(lambda state: not state['silent'], address=1)
+    client.wait_for(lambda state: not state['silent'], 60.0, address=1)
 
 
 def test_a_standing_cause_goes_and_a_load_comes_on_request(served):
@@ -93,7 +93,7 @@ def test_a_standing_cause_goes_and_a_load_comes_on_request(served):
         client.inject('ack-cause-gone', address=1)
     client.inject('keypad', 'start', address=1)
     client.inject('load', 0.9, address=1)
-    client.wait_for(lambda state: state['turning'], address=1)
+    client.wait_for(lambda state: state['turning'], 60.0, address=1)
     assert simulator.drives[1].motor.load == 0.9
 
 

@@ -30,7 +30,7 @@ READ_INV_ST = bytes.fromhex('0302A50001')
 MODE_BUS = bytes.fromhex('0602940003')
 
 
-def until(condition, timeout=10.0):
+def until(condition, timeout=60.0):
     """Wait for a condition; fail when it does not come true in time."""
     end = time.monotonic() + timeout
     while not condition():
@@ -101,7 +101,7 @@ def test_tcp_serves_one_master_after_another_and_may_hang_up(make_frame):
         with pytest.raises(PortError, match='choose another'):
             Simulator(tcp=address[1])
         for hangs_up in (False, True):
-            with socket.create_connection(address, timeout=10) as master:
+            with socket.create_connection(address, timeout=60) as master:
                 master.sendall(make_frame(1, READ_MODE))
                 assert master.recv(100) == make_frame(1, bytes.fromhex('03020001'))
                 if hangs_up:
@@ -186,7 +186,7 @@ def test_the_motor_lives_in_real_time(link):
                 server(drive).write(register, [word])
         begin = time.monotonic()
         with Client.at_link(link) as client:
-            state = client.wait_for(lambda state: state['frequency'] == 20, timeout=10)
+            state = client.wait_for(lambda state: state['frequency'] == 20, timeout=60)
         assert time.monotonic() - begin > 0.15
         assert state['turning'] and state['driven']
 
