@@ -22,12 +22,15 @@ def test_what_can_go_wrong_can_happen_to_each_machine() -> None:
                 if name not in known and not callable(getattr(machine, name, None))] == []
 
 
-def _complaint(*case: tuple[int, str]) -> str:
-    run = TOOL['Run'](TOOL['EVERY_MACHINE'][0], TOOL['Given'](case))
-    return TOOL['complaint_of'](run)
+def _complaint(machine: str, *case: tuple[int, str]) -> str:
+    kinds = {one.__name__: one for one in TOOL['EVERY_MACHINE']}
+    return TOOL['complaint_of'](TOOL['Run'](kinds[machine], TOOL['Given'](case)))
 
 
-def test_a_driver_that_does_not_stop_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert _complaint((300, 'answer lost')) == ''
+@pytest.mark.parametrize('machine', ['G2ModeScmd', 'Movitrac', 'SinusH', 'Described'])
+def test_a_driver_that_does_not_stop_is_found(
+    machine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert _complaint(machine, (100, 'answer lost')) == ''
     monkeypatch.setattr(StopSequence, 'start', lambda *_: None)
-    assert _complaint() != ''
+    assert _complaint(machine) != ''
