@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 import gc
 import os
 from pathlib import Path
@@ -67,8 +67,8 @@ FAULTS: Mapping[str, Callable[[AnyOrder], object]] = {
     'power cycle': lambda state: state.power_cycle(state.boot_times[0], wait=0.0),
     'long power cycle': lambda state: state.power_cycle(state.boot_times[-1], wait=0.0),
 }
-#: What the drive answers instead.
-REFUSALS = ('refused', 'busy')
+#: What the drive answers instead; the last one to what is written.
+REFUSALS = ('refused', 'busy', 'carried out, refused')
 
 
 def faults_of(machine: type[AnyOrder]) -> Iterator[str]:
@@ -193,6 +193,7 @@ class Tree:
     """
     All cases of one kind of drive: each forks where its first thing goes wrong.
 
+    :param faults: what may go wrong, as :func:`faults_of` has it.
     :param depth: how many things go wrong.
     :param part: which of how many parts is tried, by the first thing.
     :param jobs: how many processes at a time.
@@ -200,11 +201,18 @@ class Tree:
     """
 
     def __init__(
-        self, machine: type[AnyOrder], depth: int, part: tuple[int, int], jobs: int, done: int
+        self,
+        machine: type[AnyOrder],
+        faults: Iterable[str],
+        depth: int,
+        part: tuple[int, int],
+        jobs: int,
+        done: int,
     ) -> None:
         self._machine, self._depth, self._jobs, self._done = machine, depth, jobs, done
         self._part, self._pairs = part, depth > 1
-        self._faults = tuple(faults_of(machine))
+        self._faults = tuple(faults)
+        self._faults_of_reads = tuple(one for one in self._faults if one != REFUSALS[-1])
         self._asked, self._number = -1, 0
         self._met = Counter[tuple[str, str, bool]]()
         self._case: Case = ()
@@ -225,7 +233,7 @@ class Tree:
         self._met[step, key, writes] += 1
         differs = self._met[step, key, writes] <= _OF_EQUAL
         if self._depth and differs and (not self._pairs or step in _OF_PAIRS):
-            for fault in self._faults:
+            for fault in self._faults if writes else self._faults_of_reads:
                 if self._goes_wrong(fault):
                     return fault
         return ''
@@ -269,6 +277,7 @@ def main() -> int:
     machines = {machine.__name__: machine for machine in EVERY_MACHINE}
     parser.add_argument('--machine', action='append', choices=machines, help='default: all')
     parser.add_argument('--part', default='1/1', metavar='I/N', help='every Nth case only')
+    parser.add_argument('--fault', action='append', metavar='FAULT', help='this one alone')
     parser.add_argument('--pairs', action='store_true', help='two things go wrong')
     parser.add_argument('--case', action='append', metavar='AT:FAULT', help='this one alone')
     parser.add_argument('--jobs', type=int, default=os.cpu_count(), metavar='N')
@@ -289,8 +298,9 @@ def main() -> int:
 def _try_all(machine: type[AnyOrder], options: argparse.Namespace) -> int:
     part, _, parts = options.part.partition('/')
     with tempfile.TemporaryFile() as done:
+        faults = [one for one in faults_of(machine) if one in (options.fault or [one])]
         depth = 2 if options.pairs else 1
-        Tree(machine, depth, (int(part), int(parts)), options.jobs, done.fileno()).run()
+        Tree(machine, faults, depth, (int(part), int(parts)), options.jobs, done.fileno()).run()
         done.seek(0)
         ends = done.read()
     failures = ends.count(b'x')

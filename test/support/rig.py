@@ -201,7 +201,7 @@ class Rig:
         test, at the next :meth:`pass_time`, for a driver survives everything.
     :ivar meet: called with each request before it is sent, the parameter and what is written to it
         (``None``: it is read); what it returns goes wrong: ``refused``, ``busy``, ``none such``,
-        ``unheard``,
+        ``unheard``, ``carried out, refused``,
         ``drop`` (carried out, not answered), ``damage``, ``double``, ``delay``, or ``ignored``.
     :ivar asked: every request, as ``meet`` has it, and its drive; what is read before a write in
         one piece stands as two.
@@ -538,6 +538,9 @@ class Rig:
             if wrong in _REFUSALS:
                 self.line.go_to(self.clock.now + _TURN)
                 raise Refused(_REFUSALS[wrong])
+            if wrong == 'carried out, refused':
+                call(unit, address, *data)
+                raise Refused(Refused.DEVICE_FAILURE)
             if wrong == 'ignored':
                 self.line.go_to(self.clock.now + _TURN)
                 return Reply(b'', self.clock.now)

@@ -26,7 +26,7 @@ SEED = int(os.environ.get('SEED', '0'))
 _SHARE = 100
 #: Always the same histories, so that what passes once passes on every machine.
 NORMAL = settings(
-    max_examples=40 if FULL else 8,
+    max_examples=40 if FULL else 4,
     stateful_step_count=30,
     derandomize=True,
     deadline=None,
