@@ -36,8 +36,8 @@ test: setup ## lint, types, unit, ros, until the first one fails
 		$(MAKE) --no-print-directory $$stage || exit; \
 	done
 
-all: ## all that says whether it is right: all of test, docs, mutants, campaign (hours)
-	@for stage in test docs mutants campaign; do \
+all: ## all that says whether it is right: test, docs, mutants, campaign, exhaustive (hours)
+	@for stage in test docs mutants campaign exhaustive; do \
 		$(MAKE) --no-print-directory $$stage FULL=1 || exit; \
 	done
 
