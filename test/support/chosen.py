@@ -37,6 +37,9 @@ NEEDED = {
     f'{_DRIVE}/test_stopped_is_true.py::test_no_stop_is_a_success_while_the_measured_speed_stays'
     '[rtu-exit]':
         'an exit does not look for a run command at standstill',
+    f'{_DRIVE}/test_driver_stands_still.py::'
+    'test_a_stop_is_on_the_wire_at_once_while_a_drive_is_known_as_slow[rtu]':
+        'a stop waits for a link that only listens',
 }
 
 #: A test: its name with that of its cell, and where it stands on each axis of the product.
