@@ -41,11 +41,15 @@ class BusContext:
     memory: Memory
     publish_queue: PublishQueue = field(default_factory=PublishQueue)
     setpoint_subscriber: SetpointSubscriber = field(default_factory=SetpointSubscriber)
+    graph_watch: GraphWatch = field(default_factory=GraphWatch)
     #: The names of all drives of the line, those to come too.
     names: list[str] = field(default_factory=list)
     drives: list[ManagedDrive] = field(default_factory=list)
     #: The functions that take a set-point for all drives of the line, one for each drive.
     on_setpoint_all: list[Callable[[Float32], None]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.publish_queue.put_every(PERIOD, self.graph_watch.look)
 
     def expect(self, names: Sequence[str]) -> None:
         """Note the names of the drives that will be added."""
@@ -63,8 +67,7 @@ class BusContext:
         """Subscribe to topics, each of a type and for a function; warn of other types."""
         for topic, (type_, callback) in topics.items():
             self.setpoint_subscriber.subscribe(node, type_, topic, callback)
-        types = {topic: type_ for topic, (type_, _) in topics.items()}
-        self.publish_queue.put_every(PERIOD, GraphWatch(node, types).look)
+        self.graph_watch.add(node, {topic: type_ for topic, (type_, _) in topics.items()})
 
     def add(self, drive: ManagedDrive) -> None:
         """Add a drive."""

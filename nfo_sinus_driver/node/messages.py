@@ -206,6 +206,7 @@ class Joint:
         self._name = name
         self._ratio = ratio
         self._position = 0.0
+        self._velocity = math.nan
         self._at = -math.inf
 
     @property
@@ -213,18 +214,21 @@ class Joint:
         """Its name in messages."""
         return self._name()
 
-    def state(self, snapshot: Snapshot, stamp: Time, frame_id: str) -> JointState:
-        """Return its state of a poll; the position is the integral of the speed since the start."""
-        velocity = snapshot.speed * _RPM / self._ratio()
+    def move(self, snapshot: Snapshot) -> None:
+        """Take the speed of a poll; the position is its integral since the start."""
+        self._velocity = snapshot.speed * _RPM / self._ratio()
         step = snapshot.at - self._at
-        if 0 < step < _LONGEST_STEP and not math.isnan(velocity):
-            self._position += velocity * step
+        if 0 < step < _LONGEST_STEP and not math.isnan(self._velocity):
+            self._position += self._velocity * step
         self._at = snapshot.at
+
+    def state(self, stamp: Time, frame_id: str) -> JointState:
+        """Return where it is and how fast it turns."""
         return JointState(
             header=Header(stamp=stamp, frame_id=frame_id),
             name=[self.name],
             position=[self._position],
-            velocity=[velocity],
+            velocity=[self._velocity],
         )
 
     def setpoint(self, velocity: float, drive: Drive) -> float:

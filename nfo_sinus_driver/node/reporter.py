@@ -19,6 +19,7 @@ from nfo_sinus_msgs.msg import (
     Telemetry as TelemetryMessage,
 )
 from rclpy.lifecycle import LifecycleNodeMixin
+from rclpy.publisher import Publisher
 from rclpy.time import Time as NodeTime
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
@@ -134,25 +135,30 @@ class Reporter:
 
     def _publish_snapshot(self, snapshot: Snapshot) -> None:
         stamp = _message(self._status_stamps.next(snapshot.at))
-        frame_id = self._frame_id()
-        self._publish_status(snapshot, stamp, frame_id)
+        # a message costs as much as a transaction, heard or not; why it stopped goes out always
+        if snapshot.stop is not self._stop or _is_heard(self._status):
+            self._publish_status(snapshot, stamp)
         self._diagnose(snapshot, on_change=True)
         if snapshot.status is None:
             return
-        self._frequency.publish(Float32(data=snapshot.frequency))
-        self._speed.publish(Float32(data=snapshot.speed))
-        self._joint_states.publish(self._joint.state(snapshot, stamp, frame_id))
+        if _is_heard(self._frequency):
+            self._frequency.publish(Float32(data=snapshot.frequency))
+        if _is_heard(self._speed):
+            self._speed.publish(Float32(data=snapshot.speed))
+        self._joint.move(snapshot)
+        if _is_heard(self._joint_states):
+            self._joint_states.publish(self._joint.state(stamp, self._frame_id()))
         inv_st = (snapshot.status.code, snapshot.kind)
         if inv_st != self._last_inv_st:
             self._last_inv_st = inv_st
-            self._inv_st.publish(messages.inv_st(snapshot, stamp, frame_id))
+            self._inv_st.publish(messages.inv_st(snapshot, stamp, self._frame_id()))
 
-    def _publish_status(self, snapshot: Snapshot, stamp: Time, frame_id: str) -> None:
+    def _publish_status(self, snapshot: Snapshot, stamp: Time) -> None:
         if snapshot.stop is not self._stop:
             self._say_stop(snapshot)
         scale = self._managed().scale
         self._status.publish(
-            messages.drive_status(snapshot, stamp, frame_id, scale, self._stop_text)
+            messages.drive_status(snapshot, stamp, self._frame_id(), scale, self._stop_text)
         )
 
     def _say_stop(self, snapshot: Snapshot) -> None:
@@ -162,9 +168,11 @@ class Reporter:
     def _publish_telemetry(self, telemetry: Telemetry) -> None:
         stamp = _message(self._telemetry_stamps.next(telemetry.at))
         frame_id = self._frame_id()
-        self._telemetry.publish(messages.telemetry(telemetry, stamp, frame_id))
-        model = self._managed().drive.model
-        self._measured.publish(messages.measured(telemetry, model, stamp, frame_id))
+        if _is_heard(self._telemetry):
+            self._telemetry.publish(messages.telemetry(telemetry, stamp, frame_id))
+        if _is_heard(self._measured):
+            model = self._managed().drive.model
+            self._measured.publish(messages.measured(telemetry, model, stamp, frame_id))
 
     def _publish_log_entry(self, entry: LogEntry) -> None:
         self._log_entries.publish(messages.error_log_entry(entry, self.stamp(entry.at)))
@@ -174,11 +182,13 @@ class Reporter:
         self._say_stop(snapshot)
         if not snapshot.connected:
             stamp = _message(self._status_stamps.next(time.monotonic()))
-            self._publish_status(snapshot, stamp, self._frame_id())
+            self._publish_status(snapshot, stamp)
         self._diagnose(snapshot, on_change=False)
         self._publish_statistics()
 
     def _publish_statistics(self) -> None:
+        if not _is_heard(self._statistics):
+            return
         managed = self._managed()
         silent = [managed.name] if managed.is_silent else []
         stamp = _message(self._stamps.now())
@@ -195,6 +205,10 @@ class Reporter:
         status = diagnostics.drive_status(name, managed, snapshot, diagnosis)
         stamp = _message(self._stamps.now())
         self._diagnostics.publish(diagnostics.array(status, stamp))
+
+
+def _is_heard(publisher: Publisher) -> bool:
+    return publisher.get_subscription_count() > 0
 
 
 def _message(nanoseconds: int) -> Time:
