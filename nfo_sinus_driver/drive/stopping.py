@@ -108,8 +108,9 @@ class StopSequence:
         self.shown_for = _SHOWN_FOR
         #: The last status with a speed since the stop.
         self._measured: InverterStatus | None = None
-        #: How many attempts in a row the drive has refused, and how many got no answer.
-        self._refusals = self._unanswered = 0
+        #: How many attempts in a row the drive has refused, how many got no answer, and to how many
+        #: of the latter it answered another request.
+        self._refusals = self._unanswered = self._ignored = 0
         #: The last stop that was confirmed was one by force.
         self.forced = False
         #: Why it is not clear whether the last one stops the motor; ``None``: it does.
@@ -160,7 +161,7 @@ class StopSequence:
             self._unconfirmed = _NO_ANSWER_YET
             self._sent_at = self._force_at = self._forced_at = self._stood_at = math.inf
             self._measured = self.unclear = None
-            self._refusals = self._unanswered = 0
+            self._refusals = self._unanswered = self._ignored = 0
             self.forced = False
             self._due = self._bus.now() + drive_state.TIMEOUT
             task = self._bus.spawn(self._keep_trying())
@@ -320,7 +321,7 @@ class StopSequence:
         try:
             await self._method.stop(control_mode)
             self._sent_at = min(self._sent_at, self._bus.now())
-            self._refusals = self._unanswered = 0
+            self._refusals = self._unanswered = self._ignored = 0
         except Refused as error:
             if error.code == Refused.BUSY and self._bus.now() < self._due:
                 self._unconfirmed = report_of(error)
@@ -336,7 +337,10 @@ class StopSequence:
                 raise
             failure = error
         # a drive that does not respond at all ends it here
+        ignored, self._ignored = self._ignored, 0
         status = await self._state.read_status(Priority.LOOK, retry=False)
+        if isinstance(failure, NoAnswer | DamagedAnswer):
+            self._ignored = ignored + 1
         if failure is None:
             status = await self._newer(status, reasons, self._sent_at)
         if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
@@ -386,7 +390,8 @@ class StopSequence:
             # the first refusal may have been one of the moment
             return self._refusals > 1 and (status.from_bus or status.driven)
         if failure is not None:
-            return True
+            # the line may have come back only after the first one
+            return self._ignored > 1
         shows_at = min(self._sent_at + _RAMP_SHOWS_BY, self._force_at)
         if status.stands_running:
             # it may be braked first, or magnetised for a while

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 import contextlib
 import itertools
@@ -141,3 +141,28 @@ def test_the_status_goes_on_while_one_write_of_a_stop_gets_no_answer(connection:
         assert not any(enabled for at, enabled in shown if at > began + 0.6)
         rig.meet = lambda key, data: None
         rig.pass_time(3.0)
+
+
+@pytest.mark.parametrize('connection', CONNECTIONS)
+def test_a_line_that_comes_back_at_any_request_of_a_stop_forces_nothing(connection: str) -> None:
+    forced = []
+    for number in range(2, 9):
+        with Rig(connection, line=QUICK) as rig:
+            rig.turn()
+            asked = itertools.count(1)
+
+            def meet(
+                key: str, data: bytes | None, rig: Rig = rig, asked: Iterator[int] = asked,
+                number: int = number,
+            ) -> None:
+                if next(asked) == number:
+                    rig.line.mend()
+
+            rig.line.state = 'silent'
+            rig.meet = meet
+            rig.drive.stop()
+            rig.pass_time(6.0)
+            if rig.notes.said(Cause.STOP_FORCED):
+                forced.append(number)
+            assert not rig.turns
+    assert not forced
