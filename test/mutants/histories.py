@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from mutant import (
-    ADVICE,
     ANY_ORDER,
     COMMANDS,
     CONTROL_TAKEN,
@@ -73,14 +72,6 @@ HISTORIES = (
         G2_CONTROL,
         # a poll would find it, too
         ((CONTROLLER, '            return Report(Cause.RUNS_UNASKED)\n', '            pass\n'),),
-    ),
-    Mutant(
-        2,
-        'in any order: another control mode does not end the enable',
-        ADVICE,
-        '    if state.control_mode != control_mode:',
-        '    if False:',
-        G2_SCMD,
     ),
     Mutant(
         2,
