@@ -880,6 +880,14 @@ LAWS = (
     ),
     Mutant(
         3,
+        'a motor coasts where the line comes back during a stop',
+        SEQUENCE,
+        'return self._ignored > 1',
+        'return True',
+        ('test/unit/drive/test_every_step_of_a_stop.py', '-k', 'comes_back'),
+    ),
+    Mutant(
+        3,
         'a drive whose answers alone are lost is not stopped',
         SEQUENCE,
         '            if not self._state.params.recognition.holds:\n                raise',
