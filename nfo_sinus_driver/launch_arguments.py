@@ -113,7 +113,7 @@ def fail_with_driver(event: Any, context: Any) -> None:
 
 def require_packages(needed: Mapping[str, str], find: Callable[[str], object]) -> None:
     """
-    See to it that all packages are installed before any of them is started.
+    Ensure that all packages are installed before any of them is started.
 
     :param needed: what each is for, by its name.
     :param find: raises a LookupError where there is no package of a name.

@@ -115,7 +115,7 @@ def listed(head: str, lines: Iterable[str]) -> str:
 
 
 def require_yes(options: argparse.Namespace, question: str) -> None:
-    """See to it that the operator wants it, by asking or by ``--yes``; else an error."""
+    """Ensure that the operator wants it, by asking or by ``--yes``; else an error."""
     if options.yes:
         return
     if not (sys.stdin.isatty() and sys.stderr.isatty()):

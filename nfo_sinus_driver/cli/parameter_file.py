@@ -257,7 +257,7 @@ def readable(model: Family) -> Mapping[str, Parameter]:
 
 
 def require_names(names: Iterable[str], known: Iterable[str], whose: str, end: str = '') -> None:
-    """See to it that all names are known; those that are not are listed."""
+    """Ensure that all names are known; those that are not are listed."""
     known = list(known)
     strange = [name for name in dict.fromkeys(names) if name not in known]
     if strange:

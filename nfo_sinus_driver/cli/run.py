@@ -130,7 +130,7 @@ class _Run:
         return status if confirmed else _FAILED
 
     def _require_ready(self) -> None:
-        """See to it that the motor stands, without a fault; nothing is written."""
+        """Ensure that the motor stands, without a fault; nothing is written."""
         offline = self._control.offline
         offline.identify(thoroughly=False)
         status = offline.read_status()
@@ -161,7 +161,7 @@ class _Run:
         return mode
 
     def _require_setpoint(self, mode: str) -> None:
-        """See to it that the set-point is one for this mode and this motor."""
+        """Ensure that the set-point is one for this mode and this motor."""
         offline, options = self._control.offline, self._options
         if options.setpoint is None:
             return

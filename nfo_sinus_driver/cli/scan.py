@@ -260,7 +260,7 @@ _IF_OTHER = ('response_timeout', 'retries')
 
 
 def _require_new(name: str, *, force: bool) -> None:
-    """See to it that no file is replaced that may have been edited since."""
+    """Ensure that no file is replaced that may have been edited since."""
     if name != STANDARD and not force and Path(name).exists():
         raise CliError(f'{name} exists already: choose another name, or say --force to replace it')
 

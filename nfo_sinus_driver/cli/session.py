@@ -170,7 +170,7 @@ class Session:
         self._bus.on_mute(call)
 
     def polled(self, address: int) -> None:
-        """Take note that one round of reading a drive is over."""
+        """Record that one round of reading a drive is over."""
         now = time.monotonic()
         before = self._polled_at.get(address, math.nan)
         self._polled_at[address] = now

@@ -195,7 +195,7 @@ def _left_as_it_is(file: ParameterFile, drive: OfflineDrive, keys: list[str]) ->
 
 
 def _require_standstill(drive: OfflineDrive, data: Mapping[str, bytes]) -> None:
-    """See to it that what only a standing motor allows is not tried while it runs."""
+    """Ensure that what only a standing motor allows is not tried while it runs."""
     keys = [key for key in data if drive.model[key].stopped]
     if keys and drive.read_status().driven:
         head = f'the motor runs ({drive.state.describe()}), and these need it stopped{_NOTHING}:'

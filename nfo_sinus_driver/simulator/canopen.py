@@ -187,11 +187,11 @@ class Server(abc.ABC):
 
     @abc.abstractmethod
     def established(self) -> None:
-        """Take note that a client talks to it."""
+        """Record that a client talks to it."""
 
     @abc.abstractmethod
     def lost(self) -> None:
-        """Take note that whoever it watched over is silent, or that it left the bus by itself."""
+        """Record that whoever it watched over is silent, or that it left the bus by itself."""
 
     # ---- the bus ----
 

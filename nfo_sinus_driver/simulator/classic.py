@@ -126,7 +126,7 @@ class Server(abc.ABC):
 
     @abc.abstractmethod
     def refused(self, flag: LineError) -> bool:
-        """Take note of a message that is not carried out; return whether it is answered by NAK."""
+        """Record a message that is not carried out; return whether it is answered by NAK."""
 
 
 class Classic(Protocol):

@@ -43,7 +43,7 @@ def control_path(link: str | None = None, tcp: int | None = None) -> str:
 
 
 def require_free(path: str) -> None:
-    """See to it that no live simulator has its control channel at ``path`` (ControlError)."""
+    """Ensure that no live simulator has its control channel at ``path`` (ControlError)."""
     with socket.socket(socket.AF_UNIX) as probe:
         probe.settimeout(1.0)
         try:

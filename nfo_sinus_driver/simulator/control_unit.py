@@ -122,10 +122,10 @@ class ControlUnit(abc.ABC):
         """Look whether a parameter may be written now (Refused: STATE)."""
 
     def stored(self, key: str) -> None:
-        """Take note that a parameter has a new value in the memory."""
+        """Record that a parameter has a new value in the memory."""
 
     def written(self, key: str, protocol: str) -> None:
-        """Take note by which protocol, as the tables call it, a parameter was just written."""
+        """Record by which protocol, as the tables call it, a parameter was just written."""
 
     # ---- what it does ----
 
@@ -184,7 +184,7 @@ class ControlUnit(abc.ABC):
         return 0.0
 
     def heard(self) -> None:
-        """Take note that a valid frame for this drive arrived."""
+        """Record that a valid frame for this drive arrived."""
 
     # ---- for tests and people ----
 

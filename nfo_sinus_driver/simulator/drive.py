@@ -114,7 +114,7 @@ class SimulatedDrive:
         return self.control_unit.hears(protocol, timing)
 
     def heard(self) -> None:
-        """Take note that a valid frame addressed to this drive arrived."""
+        """Record that a valid frame addressed to this drive arrived."""
         self.control_unit.heard()
 
     def read_raw(self, key: str) -> int:

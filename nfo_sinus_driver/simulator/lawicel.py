@@ -74,7 +74,7 @@ class Adapter:
             yield self._carry_out(line)
 
     def tried(self, frame: Frame, *, sent: bool) -> bytes:
-        """Take note that a frame could be sent, or could not; return what it answers."""
+        """Record that a frame could be sent, or could not; return what it answers."""
         if sent:
             self._unsent = 0
             return (b'Z' if frame.extended else b'z') + _CR

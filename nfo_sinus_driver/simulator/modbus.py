@@ -66,7 +66,7 @@ class Requests(abc.ABC):
         """Write words from a register on (Refused: as the reason says)."""
 
     def require(self, register: int, count: int) -> None:
-        """See to it that words can be read, or :class:`Refused`: for function 23, if it has it."""
+        """Ensure that words can be read, or :class:`Refused`: for function 23, if it has it."""
         raise Refused(Reason.FUNCTION, 'there is no function 23')
 
     def write_and_read(
@@ -203,7 +203,7 @@ class Server(Requests):
         self.drive.write_over('modbus', parameter, raw)
 
     def require(self, register: int, count: int) -> None:
-        """See to it that a parameter stands at a register, and has so many."""
+        """Ensure that a parameter stands at a register, and has so many."""
         self._find(register, count)
 
     def _log_entry(self, register: int, count: int) -> tuple[int, ...] | None:

@@ -315,7 +315,7 @@ class Unit:
 
     @staticmethod
     def heard() -> None:
-        """Take note of a frame; it means nothing to a PLC, its program watches the life counter."""
+        """Record a frame; it means nothing to a PLC, its program watches the life counter."""
 
     def advance_to(self, now: float) -> None:
         """Catch up with the caller's clock (s)."""
@@ -346,7 +346,7 @@ class Registers(modbus.Requests):
         channel.put(offset, tuple(words))
 
     def require(self, register: int, count: int) -> None:
-        """See to it that a block has registers (Refused: ADDRESS)."""
+        """Ensure that a block has registers (Refused: ADDRESS)."""
         self._find(register, count)
 
     def _find(self, register: int, count: int) -> tuple[Channel, int]:

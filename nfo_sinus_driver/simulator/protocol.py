@@ -54,7 +54,7 @@ class Station(Interface):
         """Whether it is set to this protocol, speed and format."""
 
     def heard(self) -> None:
-        """Take note that a valid frame addressed to it arrived."""
+        """Record that a valid frame addressed to it arrived."""
 
     def advance_to(self, now: float) -> None:
         """Catch up with the caller's clock (s); the first call only sets the clock."""

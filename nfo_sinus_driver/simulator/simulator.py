@@ -277,7 +277,7 @@ class Simulator:
 
 
 def _require_possible(addresses: Sequence[int], endpoints: Sequence[Endpoint]) -> None:
-    """See to it that addresses are there, are different, and can be on all these lines."""
+    """Ensure that addresses are there, are different, and can be on all these lines."""
     for address in addresses:
         if addresses.count(address) > 1:
             raise ValueError(f'address {address} is given twice')

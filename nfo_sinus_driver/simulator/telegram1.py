@@ -89,7 +89,7 @@ class FieldbusWatch:
         self._unheard: float | None = None
 
     def heard(self) -> None:
-        """Take note of a telegram."""
+        """Record a telegram."""
         self._unheard = 0.0
 
     def forget(self) -> None:

@@ -84,4 +84,4 @@ class Wire(abc.ABC):
 
     @abc.abstractmethod
     def _unplugged(self) -> None:
-        """Take note that the port has disappeared."""
+        """Record that the port has disappeared."""

@@ -42,7 +42,7 @@ class RecognitionLaw:
         self._silent_since: dict[int, float] = {}
 
     def port_lost(self) -> None:
-        """Take note that the port is lost: whatever comes next may be another drive."""
+        """Record that the port is lost: whatever comes next may be another drive."""
         self._answers.clear()
         self._silent_since.clear()
 
@@ -59,7 +59,7 @@ class RecognitionLaw:
             )
 
     def ended(self, unit: int, error: LinkError | None, *, reads: bool, now: float) -> None:
-        """Take note of how a request ended."""
+        """Record how a request ended."""
         if isinstance(error, (NotReady, NotSent, PortError)):
             return
         if error is not None and not (error.responded or isinstance(error, Refused)):

@@ -423,7 +423,7 @@ class Rig:
         self.judge(self.looked)
 
     def _require_consistent(self) -> None:
-        """See to it that the state of control says what there is of a stop, and who is followed."""
+        """Ensure that the state of control says what there is of a stop, and who is followed."""
         for drive in self.drives.values():
             controller = drive._controller
             if controller is None:

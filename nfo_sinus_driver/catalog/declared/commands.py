@@ -220,7 +220,7 @@ class Commands:
         return {**self._lists, 'prepare_stops': stops}
 
     def require_no_run(self, name: str, steps: Steps, line: int) -> None:
-        """See to it that no step of what is no run command gives one, not for a moment."""
+        """Ensure that no step of what is no run command gives one, not for a moment."""
         for place, word, known in self._states(steps):
             for run in self._run_words(place):
                 by_bits = run.bits and word & known & run.bits == run.bits
@@ -291,7 +291,7 @@ class Commands:
             yield _RunWord(word, 0 if numbers else word & ~stop[0] & sure)
 
     def _check_settings(self) -> None:
-        """See to it that no setting is the run command."""
+        """Ensure that no setting is the run command."""
         run, stop = (
             {step.key for step in self._lists[name] if isinstance(step, Assign)}
             for name in ('run', 'stop')
@@ -313,7 +313,7 @@ class Commands:
             self._problems.add(line, f'{name} begins with a pause: a stop is never delayed')
 
     def _check_direction(self) -> None:
-        """See to it that run leaves the direction that it is said to: forward."""
+        """Ensure that run leaves the direction that it is said to: forward."""
         if self._direction is None or self._direction_place is None:
             return
         value, _ = self._run.get(self._direction_place, (None, 0))
@@ -325,7 +325,7 @@ class Commands:
             )
 
     def _check_stop(self, name: str) -> None:
-        """See to it that a stop takes back what run has left."""
+        """Ensure that a stop takes back what run has left."""
         line = self._control[name].line
         run, stop, place = dict(self._run), self._left_by(name), self._direction_place
         if self._direction is not None and place is not None:

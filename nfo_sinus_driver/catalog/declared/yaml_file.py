@@ -55,7 +55,7 @@ class Problems:
     found: dict[str, None] = field(default_factory=dict)
 
     def add(self, line: int, text: str) -> None:
-        """Take note of a sentence about a line."""
+        """Record a sentence about a line."""
         self.found[f'{self.path}, line {line}: {text}'] = None
 
     @contextlib.contextmanager

@@ -79,7 +79,7 @@ class Declared(ControlMethod):
 
     def require_startable(self) -> Steps[None]:
         """
-        See to it that the drive obeys the line, and does nothing yet; it only reads.
+        Ensure that the drive obeys the line, and does nothing yet; it only reads.
 
         :raises NotPossible: keypad or terminals run the motor; or a parameter is not as it has to
             be, and the file does not have it written.

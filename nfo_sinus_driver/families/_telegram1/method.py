@@ -125,7 +125,7 @@ class Telegram1(ControlMethod):
 
     def require_startable(self) -> Steps[None]:
         """
-        See to it that the PLC lets us command the drive.
+        Ensure that the PLC lets us command the drive.
 
         :raises NotPossible: it does not.
         """

@@ -110,7 +110,7 @@ class ByLine(ControlMethod):
 
     def require_startable(self) -> Steps[None]:
         """
-        See to it that the motor does what the line says, and nothing before; it only reads.
+        Ensure that the motor does what the line says, and nothing before; it only reads.
 
         :raises NotPossible: something else drives it, or would, or it would turn at set-point 0.
         """
@@ -127,7 +127,7 @@ class ByLine(ControlMethod):
 
     @abc.abstractmethod
     def _require_terminals(self, assigned: Assigned, closed: int) -> None:
-        """See to it that the terminals allow a start (NotPossible: they do not)."""
+        """Ensure that the terminals allow a start (NotPossible: they do not)."""
 
     @staticmethod
     def _elsewhere() -> NotPossible:
@@ -189,7 +189,7 @@ def assignments() -> Steps[Assigned]:
 
 
 def require_no_direction(assigned: Assigned, closed: int) -> None:
-    """See to it that no terminal gives a direction (NotPossible: one does)."""
+    """Ensure that no terminal gives a direction (NotPossible: one does)."""
     for terminal, function in assigned.items():
         if function in _DIRECTIONS and closed & words.TERMINALS[terminal]:
             raise NotPossible(
@@ -198,7 +198,7 @@ def require_no_direction(assigned: Assigned, closed: int) -> None:
 
 
 def require_direction(assigned: Assigned, closed: int) -> None:
-    """See to it that a terminal gives a direction (NotPossible: none does)."""
+    """Ensure that a terminal gives a direction (NotPossible: none does)."""
     having = [terminal for terminal, function in assigned.items() if function in _DIRECTIONS]
     if not any(closed & words.TERMINALS[terminal] for terminal in having):
         names = ' or '.join(map(str, having))
@@ -209,7 +209,7 @@ def require_direction(assigned: Assigned, closed: int) -> None:
 
 
 def require_enable(assigned: Assigned, closed: int) -> None:
-    """See to it that no terminal keeps the motor from running (NotPossible: one does)."""
+    """Ensure that no terminal keeps the motor from running (NotPossible: one does)."""
     for terminal, function in assigned.items():
         if function in (_ENABLE, _INHIBIT) and not closed & words.TERMINALS[terminal]:
             raise NotPossible(
@@ -219,7 +219,7 @@ def require_enable(assigned: Assigned, closed: int) -> None:
 
 def _require_still_at_zero() -> Steps[None]:
     """
-    See to it that the motor stands at set-point 0.
+    Ensure that the motor stands at set-point 0.
 
     :raises NotPossible: the parameter set in use has a least frequency.
     """

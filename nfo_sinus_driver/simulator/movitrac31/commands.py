@@ -73,7 +73,7 @@ class Commands:
         self._command: Command | None = None
 
     def changed(self, key: str) -> None:
-        """Take note that a setting has a new value; the keypad begins with no direction."""
+        """Record that a setting has a new value; the keypad begins with no direction."""
         self._command = None
         if key == MANUAL:
             self.key = 0

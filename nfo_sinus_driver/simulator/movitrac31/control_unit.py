@@ -130,7 +130,7 @@ class MovitracControlUnit(ControlUnit):
         return self.variant.interface == 'rs232' or not self.memory.raw(_MASTER_SLAVE)
 
     def heard(self) -> None:
-        """Take note of a valid frame: the cause of a PC time-out is gone."""
+        """Record a valid frame: the cause of a PC time-out is gone."""
         self._silence = 0.0
         self.faults.end_cause(PC_TIMEOUT)
 
@@ -163,7 +163,7 @@ class MovitracControlUnit(ControlUnit):
         self.eeprom.before(key)
 
     def stored(self, key: str) -> None:
-        """Take note of a setting that has a new value."""
+        """Record a setting that has a new value."""
         self.eeprom.after(key)
         self._commands.changed(key)
 

@@ -262,12 +262,12 @@ class Eeprom:
         return key in self._saved
 
     def before(self, key: str) -> None:
-        """Take note that a parameter will be written."""
+        """Record that a parameter will be written."""
         if not self._saves:
             self._saved.setdefault(key, self._memory.raw(key))
 
     def after(self, key: str) -> None:
-        """Take note that it has been."""
+        """Record that it has been."""
         if self._saves:
             self._saved.pop(key, None)
 

@@ -284,7 +284,7 @@ class SinusControlUnit(ControlUnit):
             raise Refused(Reason.STATE, f'fault {self.faults.shown} is active')
 
     def stored(self, key: str) -> None:
-        """Take note of the motor's data and of the settings of the line."""
+        """Record the motor's data and of the settings of the line."""
         if key.startswith('motor.'):
             self.motor.plate = self.nameplate()
         if key.startswith('serial.'):
@@ -321,7 +321,7 @@ class SinusControlUnit(ControlUnit):
         self.settle()
 
     def acknowledged(self) -> None:
-        """Take note that an acknowledgement ended the last fault."""
+        """Record that an acknowledgement ended the last fault."""
         if self.variant.run_command_in_fault == 'drops':
             self._drop_run_command()
 
@@ -384,7 +384,7 @@ class SinusControlUnit(ControlUnit):
         return self.serial.hears(protocol, timing)
 
     def heard(self) -> None:
-        """Take note of a valid frame: the bus is alive."""
+        """Record a valid frame: the bus is alive."""
         self.serial.heard()
 
     def serial_error(self, what: LineError) -> None:

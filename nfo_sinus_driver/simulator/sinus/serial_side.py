@@ -102,7 +102,7 @@ class SerialSide:
         self.initialise()
 
     def changed(self) -> None:
-        """Take note that one of the settings was written."""
+        """Record that one of the settings was written."""
         spoken = next((name for name, code in BUS_TYPES.items() if code == self.bus_type), '')
         if self._rules(spoken).at_once or self._memory.raw('serial.auto_reset'):
             self.initialise()
@@ -118,7 +118,7 @@ class SerialSide:
         )
 
     def heard(self) -> None:
-        """Take note of a valid frame: the bus is alive."""
+        """Record a valid frame: the bus is alive."""
         self._unheard = 0.0
 
     def advance(self, dt: float) -> None:

@@ -217,7 +217,7 @@ class G2ControlUnit(SinusControlUnit):
             self._by_profile = True
 
     def written(self, key: str, protocol: str) -> None:
-        """Take note of a fieldbus: to the older firmware all but Classic is one [C3]."""
+        """Record a fieldbus: to the older firmware all but Classic is one [C3]."""
         if key in _COMMANDS:
             self.by_fieldbus = protocol != 'classic' and self.firmware.own_bus_codes
 

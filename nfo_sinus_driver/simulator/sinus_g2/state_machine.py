@@ -343,7 +343,7 @@ class SelfRestart:
         self._ran = 0.0
 
     def tripped(self, code: int) -> None:
-        """Take note of a fault."""
+        """Record a fault."""
         self._tries[code] += 1
         self._waited = self._ran = 0.0
 

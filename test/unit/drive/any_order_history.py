@@ -108,7 +108,7 @@ class History:
         return self._rig.clock.now
 
     def command(self, name: str, future: Future[Any]) -> None:
-        """Take note of a command that was given."""
+        """Record a command that was given."""
         undisturbed = self._steady
         waiting = [one for one in self._commands if not one.future.done()]
         stops = [one for one in waiting if one.name in STOPS and not one.idle]
@@ -148,25 +148,25 @@ class History:
         return self._tried_in_fault and self.now - self._stop_tried_at < REFUSED
 
     def connected(self) -> None:
-        """Take note that the driver looks after the drive from now on, or tries to."""
+        """Record that the driver looks after the drive from now on, or tries to."""
         if not self.watched:
             self.watched = True
             self._watched_at = self.now
             self._no_run_from = max(self._no_run_from, self.now + self.times.carried_out)
 
     def activated(self) -> None:
-        """Take note that it polls at full rate from now on."""
+        """Record that it polls at full rate from now on."""
         self.active = True
         self._active_at = self.now
 
     def gave(self, value: float) -> None:
-        """Take note of a set-point that was given."""
+        """Record a set-point that was given."""
         if value != self._setpoint[1]:
             self.setpoint_since = self.now, value
         self._setpoint = self.now, value
 
     def lose(self, within: float) -> None:
-        """Take note of something after which the motor may not turn, but for a moment yet."""
+        """Record something after which the motor may not turn, but for a moment yet."""
         self.enabled_at = None
         self._ended_by_fault = None
         self.lost_at = self.now
@@ -174,11 +174,11 @@ class History:
         self._no_run_from = max(self._no_run_from, self.now + within + later)
 
     def disturbed(self) -> None:
-        """Take note that another master did something to the drive."""
+        """Record that another master did something to the drive."""
         self.disturbed_at = self.now
 
     def spoiled(self) -> None:
-        """Take note that the request that is on its way may have to be sent again, and waits."""
+        """Record that the request that is on its way may have to be sent again, and waits."""
         again = self.now + 2 * self.times.response_timeout
         self._no_run_from = max(self._no_run_from, again + self.times.carried_out)
         if self._whole_since is not None:
@@ -187,23 +187,23 @@ class History:
             command.undisturbed = False
 
     def started_by_another(self) -> None:
-        """Take note that another master has given a run command over the bus."""
+        """Record that another master has given a run command over the bus."""
         self.disturbed_at = self.now
         self._foreign = True
 
     def forgotten(self) -> None:
-        """Take note that the drive may have been made to forget its run command."""
+        """Record that the drive may have been made to forget its run command."""
         if not self.standing and not self.pending('enable'):
             self.lose(self.noticed)
 
     def control_mode_changed(self) -> None:
-        """Take note that the drive controls another quantity now."""
+        """Record that the drive controls another quantity now."""
         self.disturbed_at = self.now
         if not self.pending('enable'):
             self.lose(self.noticed + self.shown.patience('control mode'))
 
     def killed(self) -> None:
-        """Take note that the driver is no more."""
+        """Record that the driver is no more."""
         self._commands.clear()
         self.lose(0.0)
         self.active = self.watched = self._ours = False

@@ -48,7 +48,7 @@ def another_master(rig: Rig, connection: str, unit: int, *keys: str) -> None:
 
 
 def require_truth(rig: Rig, connection: str) -> None:
-    """See to it that nothing is published but a motor that runs at 20 Hz, without a long break."""
+    """Ensure that nothing is published but a motor that runs at 20 Hz, without a long break."""
     published: list[tuple[float, Snapshot]] = []
     rig.notes.on_snapshot = (  # type: ignore[method-assign]
         lambda snapshot: published.append((rig.clock.now, snapshot))

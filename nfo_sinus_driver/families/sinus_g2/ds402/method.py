@@ -78,7 +78,7 @@ class Ds402(ControlMethod):
 
     def require_startable(self) -> Steps[None]:
         """
-        See to it that a set-point means rpm, and that set-point 0 does not turn the motor.
+        Ensure that a set-point means rpm, and that set-point 0 does not turn the motor.
 
         :raises NotPossible: the drive multiplies set-points, or has a least speed (CiA 402).
         """

@@ -84,7 +84,7 @@ class FunctionBits(ControlMethod):
         return _HOLDERS[(yield Read(_SOURCE))]
 
     def require_startable(self) -> Steps[None]:
-        """See to it that no terminal would start the motor."""
+        """Ensure that no terminal would start the motor."""
         if (yield Read(_INPUTS)):
             raise NotPossible('terminal X1 is closed: open it')
 
