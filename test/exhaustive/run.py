@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import gc
+import math
 import os
 from pathlib import Path
 import signal
@@ -194,8 +195,8 @@ class Tree:
     All cases of one kind of drive: each forks where its first thing goes wrong.
 
     :param faults: what may go wrong, as :func:`faults_of` has it.
-    :param depth: how many things go wrong.
-    :param part: which of how many parts is tried, by the first thing.
+    :param parts: for the first thing, and for the second if there is one: (n, k) tries each nth of
+        what may go wrong, from the kth on.
     :param jobs: how many processes at a time.
     :param done: a file to which each process adds a byte.
     """
@@ -204,13 +205,12 @@ class Tree:
         self,
         machine: type[AnyOrder],
         faults: Iterable[str],
-        depth: int,
-        part: tuple[int, int],
+        parts: Sequence[tuple[int, int]],
         jobs: int,
         done: int,
     ) -> None:
-        self._machine, self._depth, self._jobs, self._done = machine, depth, jobs, done
-        self._part, self._pairs = part, depth > 1
+        self._machine, self._jobs, self._done = machine, jobs, done
+        self._parts, self._pairs = parts, len(parts) > 1
         self._faults = tuple(faults)
         self._faults_of_reads = tuple(one for one in self._faults if one != REFUSALS[-1])
         self._asked, self._number = -1, 0
@@ -231,8 +231,9 @@ class Tree:
     def __call__(self, step: str, key: str, writes: bool) -> str:
         self._asked += 1
         self._met[step, key, writes] += 1
-        differs = self._met[step, key, writes] <= _OF_EQUAL
-        if self._depth and differs and (not self._pairs or step in _OF_PAIRS):
+        if self._met[step, key, writes] > _OF_EQUAL or (self._pairs and step not in _OF_PAIRS):
+            return ''
+        if len(self._case) < len(self._parts):
             for fault in self._faults if writes else self._faults_of_reads:
                 if self._goes_wrong(fault):
                     return fault
@@ -241,8 +242,8 @@ class Tree:
     def _goes_wrong(self, fault: str) -> bool:
         """Return whether it does in this process, which is the one to go through that case."""
         self._number += 1
-        part, parts = self._part
-        if not self._case and self._number % parts != part % parts:
+        every, first = self._parts[len(self._case)]
+        if self._number % every != first:
             return False
         while len(self._running) >= self._jobs:
             self._wait()
@@ -251,9 +252,9 @@ class Tree:
         if process:
             self._running[process] = case
             return False
-        self._case, self._depth, self._jobs = case, self._depth - 1, 1
+        self._case, self._jobs, self._number = case, 1, 0
         self._running.clear()
-        if not self._depth:
+        if len(case) == len(self._parts):
             signal.alarm(_PATIENCE)
         return True
 
@@ -295,12 +296,21 @@ def main() -> int:
     return 1 if failures else 0
 
 
+def _parts_of(options: argparse.Namespace) -> list[tuple[int, int]]:
+    part, parts = map(int, options.part.split('/'))
+    if not options.pairs:
+        return [(parts, part % parts)]
+    # an even choice of both things, and all parts together are all pairs
+    side = math.isqrt(parts)
+    if side * side != parts:
+        raise SystemExit(f'pairs are tried in 1, 4, 9, 100, 400 parts and so on, not in {parts}')
+    return [(side, part // side % side), (side, part % side)]
+
+
 def _try_all(machine: type[AnyOrder], options: argparse.Namespace) -> int:
-    part, _, parts = options.part.partition('/')
     with tempfile.TemporaryFile() as done:
         faults = [one for one in faults_of(machine) if one in (options.fault or [one])]
-        depth = 2 if options.pairs else 1
-        Tree(machine, faults, depth, (int(part), int(parts)), options.jobs, done.fileno()).run()
+        Tree(machine, faults, _parts_of(options), options.jobs, done.fileno()).run()
         done.seek(0)
         ends = done.read()
     failures = ends.count(b'x')
