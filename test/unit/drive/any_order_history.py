@@ -179,6 +179,7 @@ class History:
 
     def spoiled(self) -> None:
         """Record that the request that is on its way may have to be sent again, and waits."""
+        self._stop_due = None
         again = self.now + 2 * self.times.response_timeout
         self._no_run_from = max(self._no_run_from, again + self.times.carried_out)
         if self._whole_since is not None:
