@@ -29,7 +29,7 @@ _COMPLAINT_PERIOD = 5.0
 #: The interval grows each time, up to this, s.
 _LONGEST_COMPLAINT_PERIOD = 60.0
 #: After how many stops in a row without an answer the drive is tried with other requests.
-_UNANSWERED_BEFORE_FORCE = 4
+_UNANSWERED_BEFORE_FORCE = 3
 #: The slowest ramp, of 2000 s, shows in the frequency by then, s, however coarse that is.
 _RAMP_SHOWS_BY = 7.0
 #: How long a motor that was released may show its speed without a fall, s, until it is reported
@@ -108,8 +108,8 @@ class StopSequence:
         self.shown_for = _SHOWN_FOR
         #: The last status with a speed since the stop.
         self._measured: InverterStatus | None = None
-        #: How many attempts in a row the drive has refused, how many got no answer, and to how many
-        #: of the latter it answered another request.
+        #: How many attempts in a row the drive has refused, how many got no answer, and after how
+        #: many of the latter it answered another request.
         self._refusals = self._unanswered = self._ignored = 0
         #: The last stop that was confirmed was one by force.
         self.forced = False
@@ -317,12 +317,14 @@ class StopSequence:
         faulted = self._state.status is not None and self._state.status.faulted
         failure: LinkError | None = None
         if not self._state.connected:
+            self._ignored = 0
             await self._find()
         try:
             await self._method.stop(control_mode)
             self._sent_at = min(self._sent_at, self._bus.now())
             self._refusals = self._unanswered = self._ignored = 0
         except Refused as error:
+            self._unanswered = self._ignored = 0
             if error.code == Refused.BUSY and self._bus.now() < self._due:
                 self._unconfirmed = report_of(error)
                 return _Outcome.BUSY
@@ -337,10 +339,9 @@ class StopSequence:
                 raise
             failure = error
         # a drive that does not respond at all ends it here
-        ignored, self._ignored = self._ignored, 0
         status = await self._state.read_status(Priority.LOOK, retry=False)
-        if isinstance(failure, NoAnswer | DamagedAnswer):
-            self._ignored = ignored + 1
+        ignored = isinstance(failure, NoAnswer | DamagedAnswer)
+        self._ignored += ignored
         if failure is None:
             status = await self._newer(status, reasons, self._sent_at)
         if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
@@ -364,7 +365,8 @@ class StopSequence:
         if unconfirmed.cause is Cause.STILL_TURNS and self._bus.now() > self._forced_at + _CLEAR_BY:
             return _Outcome.UNCLEAR
         over = isinstance(failure, Refused) and faulted and not status.faulted
-        return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED
+        at_once = over or (ignored and self._ignored == 1)
+        return _Outcome.UNANSWERED if at_once else _Outcome.UNCONFIRMED
 
     async def _find(self) -> None:
         """

@@ -166,3 +166,27 @@ def test_a_line_that_comes_back_at_any_request_of_a_stop_forces_nothing(connecti
                 forced.append(number)
             assert not rig.turns
     assert not forced
+
+
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'canopen'])
+@pytest.mark.parametrize('loses', [False, True])
+def test_a_drive_that_ignores_its_stop_is_stopped_by_force_also_on_a_bad_line(
+    connection: str, loses: bool
+) -> None:
+    with Rig(connection) as rig:
+        rig.turn()
+        written: list[str] = []
+
+        def meet(key: str, data: bytes | None) -> str | None:
+            if data is not None:
+                written.append(key)
+                return 'unheard' if key == written[0] else None
+            # the status after each second stop is lost
+            lost = written and written[-1] == written[0] and written.count(written[0]) % 2
+            return 'unheard' if loses and lost else None
+
+        stop = rig.drive.stop()
+        rig.meet = meet
+        rig.pass_time(12.0 if loses else 2.0)
+        assert stop.done() and (loses or not stop.exception())
+        assert rig.notes.said(Cause.STOP_FORCED) and not rig.turns
