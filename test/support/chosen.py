@@ -27,8 +27,10 @@ KINDS = (
 #: Of the others a law has one in so many, if nothing else is said.
 _ONE_IN = 6
 _DRIVE = 'test/unit/drive'
-#: Its laws have all of them, those of other files one in so many.
+#: Its laws have all of them, and one in so many of the others; those of other files have one kind
+#: in so many.
 _EACH_KIND = f'{_DRIVE}/test_laws.py'
+_ONE_IN_OF_LAWS = 4
 _ONE_KIND_IN = 2
 #: The cells that no other replaces, with the mutant that lives without them.
 NEEDED = {
@@ -71,7 +73,9 @@ def _of_one(law: str, cells: list[Test], one_in: int) -> set[str]:
     # which of them differs from law to law
     turn = crc32(law.encode())
     kinds = [kind for kind in KINDS if kind in connections]
-    if not law.startswith(_EACH_KIND):
+    if law.startswith(_EACH_KIND):
+        one_in = _ONE_IN_OF_LAWS
+    else:
         kinds = kinds[turn % _ONE_KIND_IN::_ONE_KIND_IN]
     others = sorted(connections - set(KINDS))[turn % one_in::one_in]
     left_out = connections - {*kinds, *others}
