@@ -9,6 +9,7 @@ import os
 import tempfile
 
 from hypothesis import HealthCheck, settings
+import pytest
 from support.examples import FULL
 
 # The machine may be slow, and that is no failure. Always the same examples, whatever the machine
@@ -35,6 +36,15 @@ if not FULL:
         from hypothesis.internal.conjecture import providers
 
         providers._get_local_constants = lambda: providers._local_constants
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave the slowest to ``FULL=1``, but for those that are named."""
+    if FULL or any('::' in argument for argument in config.args):
+        return
+    slow = [item for item in items if item.get_closest_marker('slow')]
+    config.hook.pytest_deselected(items=slow)
+    items[:] = [item for item in items if item not in slow]
 
 
 def pytest_collection() -> None:

@@ -141,6 +141,7 @@ class Conveyor:
         return {at for at in NAMES if self.simulator.state(at)['turning']}
 
 
+@pytest.mark.slow
 @needs('rtu')
 @pytest.mark.timeout(2 * _START)
 def test_a_conveyor_from_its_start_to_its_end(bench: Bench) -> None:

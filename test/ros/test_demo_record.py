@@ -104,6 +104,7 @@ def test_the_demo_fails_if_it_cannot_record() -> None:
     assert 'FAILED: no bag can be written to /proc/demo/ride' in done.stderr
 
 
+@pytest.mark.slow
 @needs('own')
 @pytest.mark.parametrize('always', [False, True])
 def test_the_demo_leaves_the_drive_of_another_driver_alone(

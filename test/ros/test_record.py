@@ -16,6 +16,7 @@ from types import SimpleNamespace
 
 from bench import Bench, Process, wait_until
 from connections import needs
+import pytest
 
 from nfo_sinus_driver.demo.recorded import drives_in, identity, read
 from nfo_sinus_driver.demo.recording import topics_of
@@ -53,6 +54,7 @@ def _is_png(path: Path) -> bool:
     return path.read_bytes().startswith(b'\x89PNG')
 
 
+@pytest.mark.slow
 @needs('own')
 def test_the_run_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     bench.simulator()
@@ -113,6 +115,7 @@ def test_the_run_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     assert again.returncode == 2 and 'is there already' in again.stderr
 
 
+@pytest.mark.slow
 @needs('own')
 def test_all_drives_are_recorded_and_it_is_explained_why_they_stopped(bench: Bench) -> None:
     simulator = bench.simulator('--address', '1', '--address', '2')

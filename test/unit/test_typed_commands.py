@@ -17,12 +17,11 @@ import subprocess
 import sys
 
 import pytest
-from support.examples import FULL
 from support.typed import Typed, typed
 
 from nfo_sinus_driver.cli.main import main, parse
 
-pytestmark = pytest.mark.skipif(not FULL, reason='each page is typed by make all')
+pytestmark = pytest.mark.slow
 
 _CLI = 'import sys; from nfo_sinus_driver.cli.main import main; sys.exit(main())'
 _SIMULATOR = 'nfo_sinus_driver.simulator'
