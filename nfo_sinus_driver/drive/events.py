@@ -52,13 +52,15 @@ class Cause(enum.Enum):
     LOST = 'lost: {why}; retrying'
     LOST_IN_USE = f'lost: {{why}}; retrying; it is stopped as soon as it answers; {_GO_ON}'
     OLD_DATA = (
-        'the data from the drive stand still in the PLC for {seconds:g} s or more (its life '
-        'counter does not change): check the fieldbus between them and that the program of the '
+        "the drive's data in the PLC have not changed for {seconds:g} s or more (its life "
+        'counter stands still): check the fieldbus between them and that the program of the '
         'PLC runs'
     )
     RESTARTED = 'the drive has started anew, as its boot-up message says: check its mains'
     TAKES_CONTROL = '{why}: a motor that the terminals run stops now'
-    HELD_BY_LINE = 'only watched, and yet {why}: a motor that the terminals ran has stopped'
+    HELD_BY_LINE = (
+        'control_method is monitor, but {why}: a motor that the terminals ran has stopped'
+    )
     NOT_RECOGNISED = (
         'it is not known what is at address {address} ({why}): nothing is written there, no stop '
         'either, which could start another drive. Use its {enable_input} if its motor turns; check '
@@ -127,7 +129,7 @@ class Cause(enum.Enum):
     START_FAULTED = 'the drive did not start: {status}'
     NOT_STARTED = 'the drive does not start: {status}'
     STOPPED_WHILE_ENABLING = 'it was stopped while it was being enabled'
-    NOT_CONFIRMED = 'the drive does not do it; it says {status}'
+    NOT_CONFIRMED = 'the drive did not carry out the command; its status is {status}'
     # --- enable, stop, acknowledge, release
     ENABLED = 'enabled; it follows set-points that arrive from now on'
     ENABLED_BY_OWN_REFERENCE = 'enabled; it follows its own reference ({reference})'
@@ -166,7 +168,7 @@ class Cause(enum.Enum):
         'its speed. Use the {enable_input} or the emergency stop if it is driven'
     )
     STOP_FORCED = (
-        'an ordinary stop did not do ({why}): control was taken from the drive, or its motor was '
+        'a normal stop had no effect ({why}): control was taken from the drive, or its motor was '
         'released ({status}). Find out why it did not stop, and whether another master commands '
         'it'
     )
@@ -281,7 +283,9 @@ class Cause(enum.Enum):
         'the bus has lost control meanwhile ({status}). The drive was '
         f'switched off and on, or its keypad was used: check its mains; {_GO_ON}'
     )
-    CONTROL_WITHHELD = 'the PLC has taken the release to ROS back ({status}): give it in the PLC'
+    CONTROL_WITHHELD = (
+        'the PLC has withdrawn its release to ROS ({status}): set it again in the PLC'
+    )
     RUNS_UNASKED = (
         'it runs under bus control although it was not enabled: find out whether another master '
         'commands it'
@@ -326,8 +330,8 @@ class Cause(enum.Enum):
         'one wakes it'
     )
     IMPOSSIBLE_VALUE = (
-        'it says that {key} is {value}, which cannot be: that is not published; check motor and '
-        'scaling in the drive, and that no other master is on the line'
+        'implausible {key} = {value}: not published; check motor and scaling in the drive, and '
+        'that no other master is on the line'
     )
     # --- the time-out of the drive itself
     NO_OWN_TIMEOUT = _NO_TIMEOUT.format(
@@ -434,7 +438,7 @@ class Cause(enum.Enum):
         '{enable_input} lost, or STOP pressed?'
     )
     TUNING_DOES_NOT_BEGIN = '{what} does not begin ({status}): is its {enable_input} active?'
-    TUNING_ENDLESS = '{what} has no end ({status}): stopping it'
+    TUNING_ENDLESS = '{what} has not finished in time ({status}): stopping it'
     TUNING_CHANGED = '{how}; changed: {changes}'
     LOG_ERASED = 'the error log is erased'
     LOG_NOT_ERASED = 'the drive took the command, but its error log is not empty'
@@ -443,7 +447,7 @@ class Cause(enum.Enum):
     ENERGY_RESET_UNKNOWN = '{what} came with firmware {since:.2f}; this drive has {firmware}'
     # --- the error log
     LOG_ENTRY = 'error log: {entry}'
-    LOG_ENTRY_UNSEEN = 'error log: {entry}; no poll saw it'
+    LOG_ENTRY_UNSEEN = 'error log: {entry} (missed by polling)'
     LOG_UNDOCUMENTED = 'the error log of this model ({model}) is not documented'
     LOG_NOT_WATCHED = 'its error log is not watched: {error}'
     LOG_CHANGES = 'the drive writes into its error log all the time: try again'
@@ -463,7 +467,7 @@ class Cause(enum.Enum):
     )
     CHANGED_AS_WANTED = '{change}, as the parameter file says'
     CHANGED_AT_DRIVE = 'changed at the drive: {change}'
-    NOT_AS_WANTED = '{key} is {has} in the drive, but {wanted} was given: it is left so'
+    NOT_AS_WANTED = '{key} is {has} in the drive, but {wanted} was given: not changed'
     WANTED_BUT_MISSING = 'this drive has no {keys}: not applied'
     WANTED_BUT_REFUSED = 'not applied from the parameter file: {why}'
     NO_SETTING = '{key} is no parameter that can be changed here'

@@ -180,7 +180,7 @@ def test_only_watched_and_yet_in_bus_mode() -> None:
         rig.connect()
         rig.pass_time(0.5)
         assert rig.notes.said(
-            'only watched, and yet the CANopen module holds the drive in bus mode'
+            'control_method is monitor, but the CANopen module holds the drive in bus mode'
         )
 
 

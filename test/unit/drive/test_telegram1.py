@@ -265,7 +265,7 @@ def test_a_sinus_h_that_ignores_its_stops_is_released() -> None:
         rig.wait_until(lambda: not rig.far.motor.driven, 15.0)
         assert 0x0474 in words(rig.line.frames)
         rig.pass_time(1.0)
-        assert not rig.drive.stop_unconfirmed and rig.notes.said('an ordinary stop did not do')
+        assert not rig.drive.stop_unconfirmed and rig.notes.said('a normal stop had no effect')
 
 
 @every_family
@@ -313,7 +313,7 @@ def test_without_the_release_of_the_plc_nothing_turns() -> None:
         rig.turn()
         channel.released = False
         rig.pass_time(1.0)
-        assert rig.notes.said('the PLC has taken the release to ROS back')
+        assert rig.notes.said('the PLC has withdrawn its release to ROS')
         assert not rig.turns
         channel.released = True
         rig.pass_time(1.0)

@@ -116,7 +116,7 @@ LOSSES: dict[str, Callable[[Rig], None]] = {
 #: What is said of some of them.
 NAMED = {
     'fieldbus for 3 s': 'the PLC has no valid data from the drive',
-    'program of the PLC': 'the data from the drive stand still in the PLC',
+    'program of the PLC': "the drive's data in the PLC have not changed",
     'line for 5 s': 'was not reached for',
 }
 
