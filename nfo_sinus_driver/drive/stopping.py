@@ -47,6 +47,9 @@ class _Outcome(enum.Enum):
     #: It is unknown whether the drive has received it, or it was refused in a fault that is over:
     #: it is repeated at once, for a while.
     UNANSWERED = enum.auto()
+    #: It got no answer, and another request did, for the first time: it is repeated at once, for
+    #: the line may have come back only between the two.
+    IGNORED = enum.auto()
     #: The drive was too busy for it, and may take it the next moment.
     BUSY = enum.auto()
     #: It was answered, or it is known that it was not sent.
@@ -273,6 +276,8 @@ class StopSequence:
 
     async def _rest(self, outcome: _Outcome) -> None:
         """Let some time pass before the next attempt, but none after one without an answer."""
+        if outcome is _Outcome.IGNORED:
+            return
         if not self._state.connected:
             await self._bus.sleep(_LOST_RETRY_PERIOD)
         elif self._is_lost or self._bus.now() >= self._due:
@@ -317,7 +322,6 @@ class StopSequence:
         faulted = self._state.status is not None and self._state.status.faulted
         failure: LinkError | None = None
         if not self._state.connected:
-            self._ignored = 0
             await self._find()
         try:
             await self._method.stop(control_mode)
@@ -365,8 +369,9 @@ class StopSequence:
         if unconfirmed.cause is Cause.STILL_TURNS and self._bus.now() > self._forced_at + _CLEAR_BY:
             return _Outcome.UNCLEAR
         over = isinstance(failure, Refused) and faulted and not status.faulted
-        at_once = over or (ignored and self._ignored == 1)
-        return _Outcome.UNANSWERED if at_once else _Outcome.UNCONFIRMED
+        if ignored and self._ignored == 1:
+            return _Outcome.IGNORED
+        return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED
 
     async def _find(self) -> None:
         """
@@ -381,6 +386,7 @@ class StopSequence:
         try:
             await self._look()
         except (NoAnswer, DamagedAnswer):
+            self._ignored = 0
             if not self._state.params.recognition.holds:
                 raise
 

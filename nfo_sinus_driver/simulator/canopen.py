@@ -191,7 +191,7 @@ class Server(abc.ABC):
 
     @abc.abstractmethod
     def lost(self) -> None:
-        """Record that whoever it watched over is silent, or that it left the bus by itself."""
+        """Record that the client it watched over is silent, or that it left the bus by itself."""
 
     # ---- the bus ----
 

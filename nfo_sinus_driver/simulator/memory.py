@@ -114,7 +114,7 @@ class Memory:
 
     def shown(self, key: str, raw: int) -> Value:
         """Turn a raw number of a parameter into engineering units."""
-        # whoever watches a drive asks for all of them again and again, and few change
+        # a client that watches a drive asks for all of them again and again, and few change
         last = self._shown.get(key)
         if last is None or last[0] != raw:
             parameter = self.model[key]

@@ -137,8 +137,8 @@ HISTORIES = (
         3,
         'in any order: a stop waits although the fault that refused it is over',
         SEQUENCE,
-        'at_once = over or (',
-        'at_once = False or (',
+        'return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED',
+        'return _Outcome.UNCONFIRMED',
         ('test/unit/drive/test_any_order_found.py',),
     ),
     Mutant(

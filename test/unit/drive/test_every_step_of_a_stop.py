@@ -190,3 +190,27 @@ def test_a_drive_that_ignores_its_stop_is_stopped_by_force_also_on_a_bad_line(
         rig.pass_time(12.0 if loses else 2.0)
         assert stop.done() and (loses or not stop.exception())
         assert rig.notes.said(Cause.STOP_FORCED) and not rig.turns
+
+
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'canopen'])
+@pytest.mark.parametrize('away', [4.0, 8.0])
+def test_a_drive_that_is_found_again_and_ignores_its_stop_is_soon_stopped_by_force(
+    connection: str, away: float
+) -> None:
+    with Rig(connection, poll_rate=10.0) as rig:
+        rig.turn()
+        written: list[str] = []
+
+        def meet(key: str, data: bytes | None) -> str | None:
+            if data is None:
+                return None
+            written.append(key)
+            return 'unheard' if key == written[0] else None
+
+        rig.line.state = 'silent'
+        rig.drive.stop()
+        rig.meet = meet
+        rig.pass_time(away)
+        rig.line.mend()
+        rig.pass_time(3.0)
+        assert rig.notes.said(Cause.STOP_FORCED) and not rig.turns
