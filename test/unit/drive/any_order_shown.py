@@ -189,8 +189,8 @@ class ShownSinus(Shown):
         refused = (
             self._unit.variant.refuses_in_fault if rig.connection.protocol != 'classic' else 'all'
         )
-        # and what a command reads there comes word by word
-        self.polls_wait = rig.connection.protocol == 'classic'
+        # what a command reads by Classic comes word by word, and a gateway takes twice as long
+        self.polls_wait = rig.connection.protocol in ('classic', 'modbus_tcp')
         self.powered_by_acknowledgement = refused == 'all'
         self.refuses_stop = refused != 'nothing' and self._method == 'mode_scmd'
 
