@@ -104,7 +104,10 @@ class InverterStatus:
         if self.word is not None:
             valid = self.model.profile.status_word.valid
             return valid | Fact.REVERSE if self._has_sign else valid
-        return Fact.OPERATION_ENABLED | Fact.NETWORK_CONTROL | Fact.FAULT | Fact.ALARM
+        # the code of a fault, or of a tuning, stands in for the one that shows who has control
+        hidden = self.kind is Kind.FAULT or self.means(Meaning.TUNING, Meaning.TUNED)
+        control = Fact(0) if hidden else Fact.NETWORK_CONTROL
+        return control | Fact.OPERATION_ENABLED | Fact.FAULT | Fact.ALARM
 
     @property
     def _has_sign(self) -> bool:

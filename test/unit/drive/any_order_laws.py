@@ -18,6 +18,7 @@ from any_order_history import SETPOINT_TIMEOUT, STOPS, Command, History
 from any_order_shown import CONTROL
 from support.rig import Rig
 
+from nfo_sinus_driver.catalog import Fact, InverterStatus
 from nfo_sinus_driver.drive import Cause, DriveError, Severity, Snapshot
 
 #: Within this it is said that a motor cannot be stopped, s.
@@ -273,7 +274,8 @@ class Laws(History):
         return {
             'code': seen.code,
             'fault': snapshot.kind.value == 'fault',
-            'by bus': seen.from_bus,
+            # a code alone may hide it
+            'by bus': seen.from_bus if _tells_control(seen) else None,
             'running': seen.runs and seen.from_bus,
             'limit': _has(seen, 'LIMIT_ACTIVE'),
             'run input missing': _has(seen, 'RUN_INPUT_MISSING'),
@@ -341,6 +343,10 @@ class Laws(History):
             raise Broken('it is reported as not connected, and it is there')
 
 
+def _tells_control(seen: InverterStatus) -> bool:
+    return seen.word is not None or Fact.NETWORK_CONTROL in seen.valid
+
+
 def _has(seen: Any, name: str) -> bool:
     """Return whether a status has a fact."""
     return bool(seen.facts & type(seen.facts)[name])
@@ -348,7 +354,7 @@ def _has(seen: Any, name: str) -> bool:
 
 def _agree(reported: Any, value: Any) -> bool:
     """Return whether what is shown is true; of what is not known, ``None``, all is."""
-    if value is None:
+    if value is None or reported is None:
         return True
     if isinstance(value, float):
         return bool(abs(reported - value) < 0.3)

@@ -191,6 +191,9 @@ class ShownSinus(Shown):
         )
         # what a command reads by Classic comes word by word, and a gateway takes twice as long
         self.polls_wait = rig.connection.protocol in ('classic', 'modbus_tcp')
+        if rig.connection.options.get('dialect') == '5.0':
+            # with its status MODE is read, one more transaction each time
+            self.times = Times(carried_out=0.12)
         self.powered_by_acknowledgement = refused == 'all'
         self.refuses_stop = refused != 'nothing' and self._method == 'mode_scmd'
 

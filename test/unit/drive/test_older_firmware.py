@@ -35,7 +35,7 @@ LINE = {'serial.address', 'serial.si_baud'}
 #: What is not changed while the motor is enabled, even at set-point 0.
 SCALED = {'motor.f_nom': 60, 'motor.n_nom': 1700}
 STOP, EXT, BUS = 1, 2, 3
-SIO_FAIL, OFF, STANDBY, LIMIT = 14, 24, 37, 27
+SIO_FAIL, OFF, STANDBY, LIMIT, TUNING = 14, 24, 37, 27, 28
 TIMEOUT = ('serial.sio_tot', 'serial.auto_stop')
 
 
@@ -505,6 +505,23 @@ def test_a_stop_is_not_confirmed_by_a_current_limit(monkeypatch: pytest.MonkeyPa
         monkeypatch.undo()
         rig.pass_time(3.0)
         assert not rig.drive.stop_unconfirmed and not rig.far.motor.driven
+
+
+@pytest.mark.parametrize('what', ['fault', 'tuning'])
+def test_a_code_that_hides_who_has_control_reports_nothing_of_it(
+    monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    with Rig('classic v5.0').turn() as rig:
+        assert Fact.NETWORK_CONTROL in rig.drive.snapshot.status.valid
+        if what == 'fault':
+            rig.far.trip(rig.a_fault)
+        else:
+            show(rig, monkeypatch, TUNING)
+        rig.pass_time(1.0)
+        status = rig.drive.snapshot.status
+        assert status.code in (rig.a_fault, TUNING)
+        assert Fact.NETWORK_CONTROL not in status.valid
+        assert Fact.OPERATION_ENABLED | Fact.FAULT in status.valid
 
 
 @pytest.mark.parametrize('press', ['start', 'ext'])
