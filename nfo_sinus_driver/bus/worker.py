@@ -401,7 +401,8 @@ class Bus:
 
         :returns: when there is more to do, s on the steady clock, unless a request comes before.
         """
-        self._awake.clear()
+        if self._awake.is_set():
+            self._awake.clear()
         self._note_pause()
         self._take_in()
         self._ring_timers()
@@ -471,7 +472,8 @@ class Bus:
         self._advance(task, None, None)
 
     def _rest(self, until: float) -> None:
-        if not self._inbox and not self._stopping:
+        # no lock is touched between two transactions of a full line
+        if until > -math.inf and not self._inbox and not self._stopping:
             self._awake.wait(None if until == math.inf else max(0.0, until - self.now()))
 
     def _advance(self, task: Task, value: Reply | None, error: BaseException | None) -> None:

@@ -21,6 +21,8 @@ _log = logging.getLogger(__name__)
 _MOST_WAITING = 1000
 #: The same for the values of one stream; its topic keeps no more.
 _MOST_OF_A_STREAM = 10
+#: How long what may wait does so at most, s: to wake the thread costs more than what it then does.
+_LONGEST_WAIT = 0.1
 
 _T = TypeVar('_T')
 
@@ -55,12 +57,16 @@ class PublishQueue:
         self._waiting.append(function)
         self._something.set()
 
-    def stream(self, publish: Callable[[_T], None]) -> Callable[[_T], None]:
+    def stream(
+        self, publish: Callable[[_T], None], is_urgent: Callable[[_T], bool] = lambda value: True
+    ) -> Callable[[_T], None]:
         """
         Return what has values published soon, from any thread, in the order in which they come.
 
         Where they come faster than they are published the oldest are dropped: what is published
         then is less, but never old.
+
+        :param is_urgent: returns whether a value is published at once; else it may wait for 0.1 s.
         """
         waiting: deque[_T] = deque(maxlen=_MOST_OF_A_STREAM)
         queued = False
@@ -70,7 +76,9 @@ class PublishQueue:
             waiting.append(value)
             if not queued:
                 queued = True
-                self.put(publish_waiting)
+                self._waiting.append(publish_waiting)
+            if is_urgent(value) or len(waiting) == _MOST_OF_A_STREAM:
+                self._something.set()
 
         def publish_waiting() -> None:
             nonlocal queued
@@ -120,10 +128,9 @@ class PublishQueue:
             # one message that cannot be sent must not silence the others
             _log.exception('a message could not be published')
 
-    def _time_to_spare(self) -> float | None:
-        """Return for how long nothing is due by the clock, s; ``None``: until a change."""
-        moment = self._schedule.next_moment
-        return None if moment == math.inf else max(0.0, moment - time.monotonic())
+    def _time_to_spare(self) -> float:
+        """Return for how long nothing is due by the clock, nor may wait any longer, s."""
+        return min(max(0.0, self._schedule.next_moment - time.monotonic()), _LONGEST_WAIT)
 
 
 #: The golden ratio: starts that are this part of a period apart never crowd.

@@ -86,7 +86,10 @@ class Reporter:
         self._joint_states = create(JointState, '~/joint_states', RELIABLE)
         self._telemetry = create(TelemetryMessage, '~/telemetry', RELIABLE)
         self._measured = create(Measured, '~/measured', RELIABLE)
-        self._snapshots = queue.stream(self._publish_snapshot)
+        #: There were subscribers to what each poll gives, when the last one was published.
+        self._heard = False
+        self._newest: object = None
+        self._snapshots = queue.stream(self._publish_snapshot, self._is_urgent)
         queue.put_every(_PERIOD, self._report_regularly)
 
     # --- called by the bus --------------------------------------------------------------------
@@ -110,6 +113,14 @@ class Reporter:
     def on_event(self, event: Event) -> None:
         """Log a line."""
         self._queue.put(lambda: self._log_event(event))
+
+    def _is_urgent(self, snapshot: Snapshot) -> bool:
+        """Return whether a poll is awaited, or shows other things than the one before."""
+        before = self._newest
+        self._newest = shown = (
+            snapshot.connected, snapshot.enabled, snapshot.text, snapshot.kind, snapshot.stop
+        )
+        return self._heard or shown != before
 
     # --- on any thread ------------------------------------------------------------------------
 
@@ -135,6 +146,8 @@ class Reporter:
 
     def _publish_snapshot(self, snapshot: Snapshot) -> None:
         stamp = _message(self._status_stamps.next(snapshot.at))
+        of_each_poll = (self._status, self._frequency, self._speed, self._joint_states)
+        self._heard = any(map(_is_heard, of_each_poll))
         # a message costs as much as a transaction, heard or not; why it stopped goes out always
         if snapshot.stop is not self._stop or _is_heard(self._status):
             self._publish_status(snapshot, stamp)

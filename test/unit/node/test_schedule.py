@@ -157,6 +157,35 @@ def test_a_stream_that_comes_faster_than_it_is_published_is_published_from_its_n
     assert done == [*range(500 - 10, 500), -1]
 
 
+def test_what_may_wait_does_so_for_a_moment_only_and_in_its_order(queue: PublishQueue) -> None:
+    done: list[int] = []
+    published = threading.Semaphore(0)
+
+    def publish(number: int) -> None:
+        done.append(number)
+        published.release()
+
+    stream = queue.stream(publish, lambda number: number == 2)
+    stream(0)
+    # nothing else wakes the thread
+    assert published.acquire(timeout=PATIENCE)
+    for number in (1, 2):
+        stream(number)
+    for _ in range(2):
+        assert published.acquire(timeout=PATIENCE)
+    assert done == [0, 1, 2]
+
+
+def test_a_stream_that_may_wait_loses_nothing_for_it(queue: PublishQueue) -> None:
+    done: list[int] = []
+    stream = queue.stream(done.append, lambda number: False)
+    for number in range(30):
+        stream(number)
+        time.sleep(0.005)
+    queue.close(PATIENCE)
+    assert done == [*range(30)]
+
+
 def test_a_stream_that_never_ends_keeps_nothing_else_waiting(queue: PublishQueue) -> None:
     put, due = threading.Event(), threading.Semaphore(0)
     ended = False
