@@ -8,9 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass, field
+import logging
 import threading
+import time
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from std_msgs.msg import Float32
 
@@ -22,6 +25,8 @@ from nfo_sinus_driver.node.graph_watch import PERIOD, GraphWatch
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
+
+_log = logging.getLogger(__name__)
 
 #: How long the bus waits for commands that are to begin at once, s; no drive times out by then.
 _LONGEST_GATHERING = 0.1
@@ -47,6 +52,8 @@ class BusContext:
     drives: list[ManagedDrive] = field(default_factory=list)
     #: The functions that take a set-point for all drives of the line, one for each drive.
     on_setpoint_all: list[Callable[[Float32], None]] = field(default_factory=list)
+    #: The functions that return the diagnosis of each drive, called by the publish queue.
+    diagnose: list[Callable[[], DiagnosticStatus]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.publish_queue.put_every(PERIOD, self.graph_watch.look)
@@ -72,6 +79,17 @@ class BusContext:
     def add(self, drive: ManagedDrive) -> None:
         """Add a drive."""
         self.drives.append(drive)
+
+    def diagnoses(self) -> Iterator[DiagnosticStatus]:
+        """Yield the diagnosis of every drive."""
+        for diagnose in self.diagnose:
+            try:
+                yield diagnose()
+            except Exception:
+                # one that cannot be told must not silence the others
+                _log.exception('a drive could not be diagnosed')
+            # the bus may want to go on
+            time.sleep(0)
 
     def log(self, log: Callable[[str], object], text: str) -> None:
         """Log a line from the publishing thread, for the bus must not wait for a log."""

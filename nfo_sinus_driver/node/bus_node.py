@@ -69,7 +69,8 @@ class BusNode(Node):
         self._stamps = Stamps(lambda: self.get_clock().now().nanoseconds)
         self._logged_port: str | None = ''
         self._logged_remarks: set[str] = set()
-        self._last_diagnosis: tuple[bytes, str] | None = None
+        self._diagnosis = diagnostics.Diagnosis()
+        self._whole_name = self.get_fully_qualified_name().lstrip('/')
         self._statistics = self.create_publisher(BusStatistics, '~/statistics', RELIABLE)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
         self.bus_context.publish_queue.put_every(_PERIOD, self._report)
@@ -126,7 +127,8 @@ class BusNode(Node):
         error = self.bus_context.bus.port_error
         none = not any(drive.drive.ever_responded for drive in self.bus_context.drives)
         status = diagnostics.bus_status(
-            self.get_fully_qualified_name().lstrip('/'),
+            self._diagnosis,
+            self._whole_name,
             self._port,
             statistics,
             error,
@@ -134,7 +136,8 @@ class BusNode(Node):
             self._check if none else '',
             self.bus_context.bus.remarks,
         )
-        self._diagnostics.publish(diagnostics.array(status, stamp))
+        every = self.bus_context.diagnoses()
+        self._diagnostics.publish(diagnostics.array(stamp, status, *every))
         self._log_port(None if error is None else str(error))
         for remark in self.bus_context.bus.remarks:
             if remark not in self._logged_remarks:

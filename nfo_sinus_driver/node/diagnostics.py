@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import math
 import re
 
@@ -26,9 +26,30 @@ _LEVELS = {
 }
 
 
-def array(status: DiagnosticStatus, stamp: Time) -> DiagnosticArray:
-    """Wrap one status for ``/diagnostics``."""
-    return DiagnosticArray(header=Header(stamp=stamp), status=[status])
+class Diagnosis:
+    """The message of one diagnosis, kept: what has not changed is not built again."""
+
+    def __init__(self) -> None:
+        self._status = DiagnosticStatus()
+
+    def of(
+        self, level: bytes, name: str, message: str, hardware_id: str, values: Mapping[str, str]
+    ) -> DiagnosticStatus:
+        """Return the message; it is good until the next call."""
+        status = self._status
+        status.level, status.name, status.message = level, name, message
+        status.hardware_id = hardware_id
+        if [one.key for one in status.values] != [*values]:
+            status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+        for kept, value in zip(status.values, values.values(), strict=True):
+            if kept.value != value:
+                kept.value = value
+        return status
+
+
+def array(stamp: Time, *statuses: DiagnosticStatus) -> DiagnosticArray:
+    """Wrap diagnoses for ``/diagnostics``."""
+    return DiagnosticArray(header=Header(stamp=stamp), status=statuses)
 
 
 def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str]:
@@ -52,7 +73,11 @@ def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str
 
 
 def drive_status(
-    name: str, managed: ManagedDrive, snapshot: Snapshot, verdict: tuple[bytes, str]
+    kept: Diagnosis,
+    name: str,
+    managed: ManagedDrive,
+    snapshot: Snapshot,
+    verdict: tuple[bytes, str],
 ) -> DiagnosticStatus:
     """Return the diagnosis of one drive (verdict: from :func:`drive_verdict`)."""
     drive = managed.drive
@@ -81,7 +106,7 @@ def drive_status(
         values['fault'] = re.sub(r'\W+', '_', snapshot.text).strip('_').upper()
     level, message = verdict
     # such a bridge takes what has a slash for the name of a node
-    return _status(level, f'{name}: drive', message, serial.replace('/', '-'), values)
+    return kept.of(level, f'{name}: drive', message, serial.replace('/', '-'), values)
 
 
 def _logged(entry: LogEntry | None) -> str:
@@ -96,6 +121,7 @@ def _quantity(value: float, unit: str) -> str:
 
 
 def bus_status(
+    kept: Diagnosis,
     name: str,
     port: str,
     statistics: Statistics,
@@ -122,7 +148,7 @@ def bus_status(
         level, message = DiagnosticStatus.OK, 'all drives answer'
     values = {'port': port, **_figures(statistics)}
     # /dev/ttyUSB0 is ttyUSB0
-    return _status(level, f'{name}: line', message, port.rpartition('/')[2], values)
+    return kept.of(level, f'{name}: line', message, port.rpartition('/')[2], values)
 
 
 def _figures(statistics: Statistics) -> dict[str, str]:
@@ -145,15 +171,3 @@ def _figures(statistics: Statistics) -> dict[str, str]:
 
 def _milliseconds(seconds: float) -> str:
     return '' if math.isnan(seconds) else f'{1000 * seconds:.1f} ms'
-
-
-def _status(
-    level: bytes, name: str, message: str, hardware_id: str, values: dict[str, str]
-) -> DiagnosticStatus:
-    return DiagnosticStatus(
-        level=level,
-        name=name,
-        message=message,
-        hardware_id=hardware_id,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )

@@ -121,6 +121,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         ErrorLogServices(self, self.managed, commands, reporter.stamp)
         TuningServices(self, self.managed, reporter.stamp)
         context.add(self.managed)
+        context.diagnose.append(reporter.diagnosis)
 
     def stop_for_good(self, patience: float, why: str) -> Future[Report | None]:
         """Stop the motor within ``patience`` s; no client can start it again."""

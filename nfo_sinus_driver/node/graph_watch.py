@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 #: How often the graph should be checked, s.
-PERIOD = 2.0
+PERIOD = 5.0
 #: How a message of each type is written; the value is harmless.
 _WRITTEN = {
     Float32: '{data: 0.0}',

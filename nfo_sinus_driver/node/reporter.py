@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection
 import time
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nfo_sinus_msgs.msg import (
     BusStatistics,
     DriveStatus,
@@ -34,7 +34,7 @@ from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE
 from nfo_sinus_driver.node.stamps import Sequence, Stamps
 from nfo_sinus_driver.node.wording import Wording
 
-#: How often diagnostics go out and, while the drive is not connected, the status, s.
+#: How often the statistics go out and, while the drive is not connected, the status, s.
 _PERIOD = 1.0
 
 
@@ -73,7 +73,9 @@ class Reporter:
         self._stop: Report | None = None
         self._stop_text = ''
         self._last_inv_st: tuple[int, Kind] | None = None
-        self._last_diagnosis: tuple[bytes, str] | None = None
+        self._verdict: tuple[bytes, str] | None = None
+        self._diagnosis = diagnostics.Diagnosis()
+        self._whole_name = node.get_fully_qualified_name().lstrip('/')
         create = node.create_lifecycle_publisher
         # these are published from the start, in any lifecycle state
         self._status = node.create_publisher(DriveStatus, '~/status', RELIABLE)
@@ -151,7 +153,7 @@ class Reporter:
         # a message costs as much as a transaction, heard or not; why it stopped goes out always
         if snapshot.stop is not self._stop or _is_heard(self._status):
             self._publish_status(snapshot, stamp)
-        self._diagnose(snapshot, on_change=True)
+        self._diagnose(snapshot)
         if snapshot.status is None:
             return
         if _is_heard(self._frequency):
@@ -196,7 +198,6 @@ class Reporter:
         if not snapshot.connected:
             stamp = _message(self._status_stamps.next(time.monotonic()))
             self._publish_status(snapshot, stamp)
-        self._diagnose(snapshot, on_change=False)
         self._publish_statistics()
 
     def _publish_statistics(self) -> None:
@@ -208,16 +209,22 @@ class Reporter:
         statistics = managed.drive.statistics
         self._statistics.publish(messages.bus_statistics(statistics, silent, stamp))
 
-    def _diagnose(self, snapshot: Snapshot, *, on_change: bool) -> None:
+    def _diagnose(self, snapshot: Snapshot) -> None:
+        """Publish the diagnosis of the drive if it has changed."""
+        if diagnostics.drive_verdict(self._managed(), snapshot) != self._verdict:
+            stamp = _message(self._stamps.now())
+            self._diagnostics.publish(diagnostics.array(stamp, self._diagnosis_of(snapshot)))
+
+    def diagnosis(self) -> DiagnosticStatus:
+        """Return the present diagnosis of the drive, good until the next call."""
+        return self._diagnosis_of(self._managed().drive.snapshot)
+
+    def _diagnosis_of(self, snapshot: Snapshot) -> DiagnosticStatus:
         managed = self._managed()
-        diagnosis = diagnostics.drive_verdict(managed, snapshot)
-        if on_change and diagnosis == self._last_diagnosis:
-            return
-        self._last_diagnosis = diagnosis
-        name = self._node.get_fully_qualified_name().lstrip('/')
-        status = diagnostics.drive_status(name, managed, snapshot, diagnosis)
-        stamp = _message(self._stamps.now())
-        self._diagnostics.publish(diagnostics.array(status, stamp))
+        self._verdict = diagnostics.drive_verdict(managed, snapshot)
+        return diagnostics.drive_status(
+            self._diagnosis, self._whole_name, managed, snapshot, self._verdict
+        )
 
 
 def _is_heard(publisher: Publisher) -> bool:

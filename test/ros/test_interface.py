@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import functools
 import itertools
 import math
 import re
@@ -256,7 +257,8 @@ def test_quality_of_service(idle: Bench) -> None:
     client = idle.client().connected()
     node = client.node
     for topic in TOPICS:
-        (info,) = node.get_publishers_info_by_topic(f'/nfo_sinus/{topic}')
+        publishers = functools.partial(node.get_publishers_info_by_topic, f'/nfo_sinus/{topic}')
+        (info,) = wait_until(publishers, f'the publisher of {topic}')
         assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE, topic
         latched = info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
         assert latched == (topic == 'inv_st'), topic
