@@ -140,6 +140,8 @@ class Scheduler:
 
     def _release_found(self) -> None:
         """Requeue what waits for a unit that answers again: it may be a stop."""
+        if not self._queues[_MISSING]:
+            return
         found = [one for one in self._queues[_MISSING] if self._rank(one) != _MISSING]
         for entry in found:
             del self._queues[_MISSING][entry]
@@ -149,7 +151,9 @@ class Scheduler:
         """Return what goes next of one rank; what is for a unit that is missing by now waits."""
         queue = self._queues[rank]
         while True:
-            entry = next((one for one in queue if not self._is_unanswered(one)), None)
+            entry = next(iter(queue), None)
+            if self._unanswered is not None:
+                entry = next((one for one in queue if not self._is_unanswered(one)), None)
             if entry is None or rank == _MISSING or self._rank(entry) != _MISSING:
                 return entry
             del queue[entry]

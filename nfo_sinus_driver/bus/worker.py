@@ -600,6 +600,8 @@ class Bus:
         now, lost = self.now(), not self._port.is_open
         if not lost:
             # ahead of the request that shows whether it helps
+            if not self.silences.mute_for(now):
+                return
             if not self.silences.is_mute(now, max(self._lost_after.values(), default=math.inf)):
                 return
             if self.silences.heard:

@@ -284,11 +284,14 @@ class AnotherMaster:
 
     def open_until(self, unit: int) -> float:
         """Return until when an answer of a unit may be to another master; 0: it is not."""
-        return max((one.until for one in self._open_requests.get(unit, ())), default=0.0)
+        requests = self._open_requests.get(unit)
+        return max(one.until for one in requests) if requests else 0.0
 
     def take_late(self, unit: int, now: float) -> list[bytes]:
         """Return the beginnings of the answers that are overdue and may come late."""
-        requests = self._open_requests.pop(unit, [])
+        requests = self._open_requests.get(unit)
+        if not requests:
+            return []
         self._open_requests[unit] = [one for one in requests if now < one.until]
         return [one.answer_head for one in requests if now >= one.until]
 

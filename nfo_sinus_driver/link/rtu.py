@@ -73,7 +73,8 @@ class RtuReader(AnswerReader[_T]):
 
     def _messages(self) -> Iterator[tuple[int, int, bytes]]:
         buffer = self._buffer
-        for start in range(len(buffer)):
+        # nothing shorter is a frame
+        for start in range(len(buffer) - modbus_pdu.REFUSAL_LENGTH - CRC_LENGTH + 1):
             if buffer.startswith(self._head, start):
                 length = self._request.measure(buffer[start:])
             elif buffer.startswith(self._refusal_head, start):

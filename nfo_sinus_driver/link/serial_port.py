@@ -94,9 +94,8 @@ class SerialPort:
     def read(self, until: float) -> bytes:
         """Return what has come, or nothing; wait for the first byte until a moment."""
         fd = self._descriptor()
-        wait = max(0.0, until - time.monotonic())
         try:
-            if not select.select((fd,), (), (), wait)[0]:
+            if not select.select((fd,), (), (), max(0.0, until - time.monotonic()))[0]:
                 return b''
             data = os.read(fd, _READ_SIZE)
         except BlockingIOError:

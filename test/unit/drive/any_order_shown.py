@@ -189,8 +189,10 @@ class ShownSinus(Shown):
         refused = (
             self._unit.variant.refuses_in_fault if rig.connection.protocol != 'classic' else 'all'
         )
-        # what a command reads by Classic comes word by word, and a gateway takes twice as long
-        self.polls_wait = rig.connection.protocol in ('classic', 'modbus_tcp')
+        # what a command reads by Classic comes word by word; a gateway takes twice as long, and so
+        # do the characters of ASCII
+        slow = ('classic', 'modbus_ascii', 'modbus_tcp')
+        self.polls_wait = rig.connection.protocol in slow
         if rig.connection.options.get('dialect') == '5.0':
             # with its status MODE is read, one more transaction each time
             self.times = Times(carried_out=0.12)
