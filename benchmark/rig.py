@@ -95,9 +95,9 @@ class Listener(Node):
     the master what any subscriber costs, and the benchmark next to nothing.
     """
 
-    def __init__(self, names: Sequence[str], context: Context) -> None:
-        super().__init__('bench_listener', context=context)
-        self.audience = Node('bench_audience', context=context)
+    def __init__(self, master: str, names: Sequence[str], context: Context) -> None:
+        super().__init__(f'bench_listener_{master}', context=context)
+        self.audience = Node(f'bench_audience_{master}', context=context)
         #: Of which drives something was measured.
         self.active: set[str] = set()
         for name in names:
@@ -106,6 +106,12 @@ class Listener(Node):
             self.create_subscription(
                 Float32, f'/{name}/actual_frequency', lambda _, name=name: self.active.add(name), 10
             )
+
+    def leave(self) -> None:
+        """Subscribe to nothing any more."""
+        for node in (self, self.audience):
+            for subscription in list(node.subscriptions):
+                node.destroy_subscription(subscription)
 
     def call(self, kind: type, service: str, **fields: object) -> Any:
         """Call a service once; return its response."""
@@ -135,7 +141,7 @@ class Rig(contextlib.ExitStack):
         super().__init__()
         self.line = Line(baud_rate, protocol)
         #: Unlike any other drive's name: what is said to these must never reach a motor.
-        self.names = [f'simulated_for_bench_{number}' for number in range(1, drives + 1)]
+        self.names = [f'simulated_for_bench_{master}_{n}' for n in range(1, drives + 1)]
         folder = Path(self.enter_context(tempfile.TemporaryDirectory(prefix='nfo_sinus_bench_')))
         self.port = str(folder / 'line')
         self._trace = folder / 'trace'
@@ -143,7 +149,7 @@ class Rig(contextlib.ExitStack):
         with contextlib.ExitStack() as failing:
             failing.push(self)
             self._start_line(baud_rate)
-            self.listener = self._start_listener()
+            self.listener = self._start_listener(master)
             if master == PEER:
                 self.master = self.script('peer.py', self.port, str(baud_rate), *self.names)
             else:
@@ -181,11 +187,11 @@ class Rig(contextlib.ExitStack):
         words = (word for name, value in parameters.items() for word in ('-p', f'{name}:={value}'))
         return self._start(_executable('driver'), '--ros-args', *words)
 
-    def _start_listener(self) -> Listener:
+    def _start_listener(self, master: str) -> Listener:
         context = Context()
         rclpy.init(context=context)
         self.callback(context.try_shutdown)
-        listener = Listener(self.names, context)
+        listener = Listener(master, self.names, context)
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(listener)
         thread = threading.Thread(target=executor.spin, daemon=True)
@@ -212,6 +218,11 @@ class Rig(contextlib.ExitStack):
             )
         self.callback(end, process)
         return process
+
+    def lose_audience(self) -> None:
+        """Go on without a subscriber, until nothing is special about that any more."""
+        self.listener.leave()
+        time.sleep(_SETTLE)
 
     def enable_all(self) -> None:
         """Let every drive run and follow set-points."""

@@ -193,8 +193,8 @@ class ShownSinus(Shown):
         # do the characters of ASCII
         slow = ('classic', 'modbus_ascii', 'modbus_tcp')
         self.polls_wait = rig.connection.protocol in slow
-        if rig.connection.options.get('dialect') == '5.0':
-            # with its status MODE is read, one more transaction each time
+        if rig.connection.options.get('dialect') == '5.0' or rig.connection.protocol == 'modbus_ascii':
+            # MODE is read with its status; a frame has twice the characters
             self.times = Times(carried_out=0.12)
         self.powered_by_acknowledgement = refused == 'all'
         self.refuses_stop = refused != 'nothing' and self._method == 'mode_scmd'
