@@ -147,23 +147,29 @@ class Reporter:
         return frame_id
 
     def _publish_snapshot(self, snapshot: Snapshot) -> None:
-        stamp = _message(self._status_stamps.next(snapshot.at))
+        status = snapshot.status
         of_each_poll = (self._status, self._frequency, self._speed, self._joint_states)
-        self._heard = any(map(_is_heard, of_each_poll))
-        # a message costs as much as a transaction, heard or not; why it stopped goes out always
-        if snapshot.stop is not self._stop or _is_heard(self._status):
-            self._publish_status(snapshot, stamp)
+        heard = {publisher for publisher in of_each_poll if _is_heard(publisher)}
+        self._heard = bool(heard)
         self._diagnose(snapshot)
-        if snapshot.status is None:
+        if status is not None:
+            self._joint.move(snapshot)
+        inv_st = self._last_inv_st if status is None else (status.code, snapshot.kind)
+        # a message costs as much as a transaction, heard or not; why it stopped goes out always
+        stop_is_new = snapshot.stop is not self._stop
+        if not (heard or stop_is_new or inv_st != self._last_inv_st):
             return
-        if _is_heard(self._frequency):
+        stamp = _message(self._status_stamps.next(snapshot.at))
+        if self._status in heard or stop_is_new:
+            self._publish_status(snapshot, stamp)
+        if status is None:
+            return
+        if self._frequency in heard:
             self._frequency.publish(Float32(data=snapshot.frequency))
-        if _is_heard(self._speed):
+        if self._speed in heard:
             self._speed.publish(Float32(data=snapshot.speed))
-        self._joint.move(snapshot)
-        if _is_heard(self._joint_states):
+        if self._joint_states in heard:
             self._joint_states.publish(self._joint.state(stamp, self._frame_id()))
-        inv_st = (snapshot.status.code, snapshot.kind)
         if inv_st != self._last_inv_st:
             self._last_inv_st = inv_st
             self._inv_st.publish(messages.inv_st(snapshot, stamp, self._frame_id()))

@@ -189,11 +189,12 @@ class ShownSinus(Shown):
         refused = (
             self._unit.variant.refuses_in_fault if rig.connection.protocol != 'classic' else 'all'
         )
+        protocol = rig.connection.protocol
         # what a command reads by Classic comes word by word; a gateway takes twice as long, and so
         # do the characters of ASCII
         slow = ('classic', 'modbus_ascii', 'modbus_tcp')
-        self.polls_wait = rig.connection.protocol in slow
-        if rig.connection.options.get('dialect') == '5.0' or rig.connection.protocol == 'modbus_ascii':
+        self.polls_wait = protocol in slow
+        if protocol == 'modbus_ascii' or rig.connection.options.get('dialect') == '5.0':
             # MODE is read with its status; a frame has twice the characters
             self.times = Times(carried_out=0.12)
         self.powered_by_acknowledgement = refused == 'all'
