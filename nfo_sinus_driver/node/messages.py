@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 import math
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.msg import (
@@ -67,25 +68,22 @@ _TELEMETRY = {
 }
 
 
-def drive_status(
-    snapshot: Snapshot, stamp: Time, frame_id: str, scale: Scale, stop_text: str
-) -> DriveStatus:
-    """Return the DriveStatus of a poll, in the unit of a scale, with why it stopped last."""
-    return DriveStatus(
-        header=Header(stamp=stamp, frame_id=frame_id),
-        connected=snapshot.connected,
-        enabled=snapshot.enabled,
-        control_method=_METHODS.get(snapshot.control_method, DriveStatus.CUSTOM),
-        control_mode=_CONTROL_MODES.get(snapshot.control_mode, DriveStatus.UNKNOWN),
-        unit=scale.unit(snapshot.unit),
-        setpoint=scale.shown(snapshot.setpoint),
-        setpoint_age=snapshot.setpoint_age,
-        setpoint_clamped=snapshot.setpoint_clamped,
-        actual=scale.shown(snapshot.actual),
-        stop_reason=snapshot.stop_reason,
-        stop_text=stop_text,
+def drive_status(snapshot: Snapshot, scale: Scale, stop_text: str) -> Mapping[str, Any]:
+    """Return the fields of DriveStatus, in the unit of a scale, with why it stopped last."""
+    return {
+        'connected': snapshot.connected,
+        'enabled': snapshot.enabled,
+        'control_method': _METHODS.get(snapshot.control_method, DriveStatus.CUSTOM),
+        'control_mode': _CONTROL_MODES.get(snapshot.control_mode, DriveStatus.UNKNOWN),
+        'unit': scale.unit(snapshot.unit),
+        'setpoint': scale.shown(snapshot.setpoint),
+        'setpoint_age': snapshot.setpoint_age,
+        'setpoint_clamped': snapshot.setpoint_clamped,
+        'actual': scale.shown(snapshot.actual),
+        'stop_reason': snapshot.stop_reason,
+        'stop_text': stop_text,
         **_status_fields(snapshot.status),
-    )
+    }
 
 
 def _status_fields(status: InverterStatus | None) -> Mapping[str, int | bool]:

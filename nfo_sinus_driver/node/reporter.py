@@ -31,6 +31,7 @@ from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.publish_queue import PublishQueue
 from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE
+from nfo_sinus_driver.node.serialized import Stamped, float32
 from nfo_sinus_driver.node.stamps import Sequence, Stamps
 from nfo_sinus_driver.node.wording import Wording
 
@@ -76,6 +77,7 @@ class Reporter:
         self._verdict: tuple[bytes, str] | None = None
         self._diagnosis = diagnostics.Diagnosis()
         self._whole_name = node.get_fully_qualified_name().lstrip('/')
+        self._pack_status = Stamped(DriveStatus).pack
         create = node.create_lifecycle_publisher
         # these are published from the start, in any lifecycle state
         self._status = node.create_publisher(DriveStatus, '~/status', RELIABLE)
@@ -165,9 +167,9 @@ class Reporter:
         if status is None:
             return
         if self._frequency in heard:
-            self._frequency.publish(Float32(data=snapshot.frequency))
+            self._frequency.publish(float32(snapshot.frequency))
         if self._speed in heard:
-            self._speed.publish(Float32(data=snapshot.speed))
+            self._speed.publish(float32(snapshot.speed))
         if self._joint_states in heard:
             self._joint_states.publish(self._joint.state(stamp, self._frame_id()))
         if inv_st != self._last_inv_st:
@@ -178,9 +180,8 @@ class Reporter:
         if snapshot.stop is not self._stop:
             self._say_stop(snapshot)
         scale = self._managed().scale
-        self._status.publish(
-            messages.drive_status(snapshot, stamp, self._frame_id(), scale, self._stop_text)
-        )
+        fields = messages.drive_status(snapshot, scale, self._stop_text)
+        self._status.publish(self._pack_status(stamp, self._frame_id(), fields))
 
     def _say_stop(self, snapshot: Snapshot) -> None:
         self._stop = snapshot.stop

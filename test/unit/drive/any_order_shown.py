@@ -196,7 +196,7 @@ class ShownSinus(Shown):
         self.polls_wait = protocol in slow
         if protocol == 'modbus_ascii' or rig.connection.options.get('dialect') == '5.0':
             # MODE is read with its status; a frame has twice the characters
-            self.times = Times(carried_out=0.12)
+            self.times = Times().slowed(0.02)
         self.powered_by_acknowledgement = refused == 'all'
         self.refuses_stop = refused != 'nothing' and self._method == 'mode_scmd'
 
