@@ -36,6 +36,9 @@ class PublishQueue:
 
     def __init__(self) -> None:
         self._waiting: deque[Callable[[], None]] = deque(maxlen=_MOST_WAITING)
+        #: What publishes the values of each stream that has some; it has every second turn.
+        self._streams: deque[Callable[[], None]] = deque()
+        self._stream_went = False
         #: These are never dropped, and go first.
         self._urgent: deque[Callable[[], None]] = deque()
         self._schedule = Schedule()
@@ -76,7 +79,7 @@ class PublishQueue:
             waiting.append(value)
             if not queued:
                 queued = True
-                self._waiting.append(publish_waiting)
+                self._streams.append(publish_waiting)
             if is_urgent(value) or len(waiting) == _MOST_OF_A_STREAM:
                 self._something.set()
 
@@ -119,7 +122,10 @@ class PublishQueue:
             return self._urgent.popleft()
         # what is due by the clock is little, and must not wait for the end of what is too much
         due = self._schedule.take_due(time.monotonic())
-        return self._waiting.popleft() if due is None and self._waiting else due
+        if due is not None or not (self._waiting or self._streams):
+            return due
+        self._stream_went = bool(self._streams) and not (self._stream_went and self._waiting)
+        return (self._streams if self._stream_went else self._waiting).popleft()
 
     def _run(self, function: Callable[[], None]) -> None:
         try:

@@ -157,6 +157,19 @@ def test_a_stream_that_comes_faster_than_it_is_published_is_published_from_its_n
     assert done == [*range(500 - 10, 500), -1]
 
 
+def test_a_flood_of_others_silences_no_stream() -> None:
+    done: list[int] = []
+    queue = PublishQueue()
+    stream = queue.stream(done.append)
+    stream(0)
+    for _ in range(2000):
+        queue.put(lambda: None)
+    queue.start()
+    stream(1)
+    queue.close(PATIENCE)
+    assert done == [0, 1]
+
+
 def test_what_may_wait_does_so_for_a_moment_only_and_in_its_order(queue: PublishQueue) -> None:
     done: list[int] = []
     published = threading.Semaphore(0)
