@@ -15,7 +15,7 @@ WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PAT
 	-u PYTHONPATH -u ROS_DISTRO -u ROS_VERSION
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench docs parameters
+.PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench docs pages
 .PHONY: all bench-gate build clean coverage exhaustive golden laws
 
 help: ## list the targets
@@ -135,11 +135,8 @@ docs: .venv/docs/installed ## the documentation as a site, in site/; every link 
 	@.venv/docs/bin/sphinx-build -q -W -E --keep-going -b html -c docs . site
 	@echo 'site/index.html'
 
-parameters: setup ## write the tables of parameters in docs/ from those of the drives and nodes
-	@PYTHONPATH=. .venv/bin/python tools/parameters_page.py > docs/parameters.md.new
-	@mv docs/parameters.md.new docs/parameters.md
-	@PYTHONPATH=. .venv/bin/python tools/settings_page.py
-	@PYTHONPATH=. .venv/bin/python tools/manuals_page.py
+pages: setup ## write what is made in docs/: parameters, settings, manuals
+	@PYTHONPATH=. .venv/bin/python tools/pages.py
 
 build: ## build both packages again
 	@rm -rf build install

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""docs/manuals.md: what each manual offers and what serves it; ``make parameters``."""
+"""docs/manuals.md: what each manual offers and what serves it; ``make pages``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MANUALS = {
 }
 
 _INTRODUCTION = """\
-<!-- Made from docs/manuals.csv by `make parameters`: change that. -->
+<!-- Made from docs/manuals.csv by `make pages`: change that. -->
 
 # The manuals
 
@@ -101,7 +101,3 @@ def _title(file: str, anchor: str) -> str:
 
 def _anchor(title: str) -> str:
     return re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-')
-
-
-if __name__ == '__main__':
-    (DOCS / 'manuals.md').write_text(page(), encoding='utf-8')

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""docs/parameters.md: all parameters for people, made from the tables; ``make parameters``."""
+"""docs/parameters.md: all parameters for people, made from the tables; ``make pages``."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ACCESS = {
 _MOST_LABELS = 7
 
 _INTRODUCTION = """\
-<!-- Made from the tables in nfo_sinus_driver/families by `make parameters`: change those. -->
+<!-- Made from the tables in nfo_sinus_driver/families by `make pages`: change those. -->
 
 # Parameters
 
@@ -258,7 +258,3 @@ _OTHER_COLUMNS: tuple[_Column, ...] = (
     ('Option', lambda row: row.option),
     ('Type', _types),
 )
-
-
-if __name__ == '__main__':
-    print(page(), end='')

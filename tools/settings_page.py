@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The tables of settings in docs/interface.md, made from the settings; ``make parameters``."""
+"""The tables of settings in docs/interface.md, made from the settings; ``make pages``."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ _CODE = re.compile(
 )
 
 
-def page(text: str) -> str:
+def page() -> str:
     """Return the page with its tables of settings made anew."""
+    text = PAGE.read_text(encoding='utf-8')
     for title, settings in ('meaning |', BUS_SETTINGS), ('meaning | change |', DRIVE_SETTINGS):
         begin = f'| parameter | default | range | {title}\n'
         before, found, after = text.partition(begin)
@@ -57,7 +58,3 @@ def _range(one: Setting) -> str:
 
 def _code(text: str) -> str:
     return _CODE.sub(r'`\1`', text)
-
-
-if __name__ == '__main__':
-    PAGE.write_text(page(PAGE.read_text(encoding='utf-8')), encoding='utf-8')

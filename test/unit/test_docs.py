@@ -210,8 +210,13 @@ def test_what_is_public_is_documented() -> None:
     page = read(INTERFACE)
     # a name of older versions
     assert names - documented(page) == {'~/disable_all'}
-    made = runpy.run_path(str(ROOT / 'tools' / 'settings_page.py'))['page'](page)
-    assert page == made, 'make parameters'
+
+
+def test_what_is_made_of_the_pages_is_current(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / 'tools')
+    pages = runpy.run_path(str(ROOT / 'tools' / 'pages.py'))['pages']()
+    assert len(pages) >= 3
+    assert [path.name for path, text in pages.items() if read(path) != text] == [], 'make pages'
 
 
 @pytest.mark.parametrize('path', LAUNCH_FILES, ids=lambda path: path.name)

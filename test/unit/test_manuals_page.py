@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""docs/manuals.csv: what serves a row of a manual is there, and the page is current."""
+"""docs/manuals.csv: what serves a row of a manual is there."""
 
 from __future__ import annotations
 
@@ -124,8 +124,7 @@ def test_what_is_not_served_has_one_of_ten_reasons() -> None:
     assert len(reasons) <= 10, sorted(reasons)
 
 
-def test_the_page_is_current_and_every_manual_has_rows_and_a_page_of_its_drive() -> None:
-    assert read(DOCS / 'manuals.md') == _TOOL['page'](), 'make parameters'
+def test_every_manual_has_rows_and_a_page_of_its_drive() -> None:
     assert {row['manual'] for row in ROWS} == _TOOL['MANUALS'].keys() == FAMILIES.keys()
     for _, drive in _TOOL['MANUALS'].values():
         text = read(DOCS / 'drives' / f'{drive}.md')
