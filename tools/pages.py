@@ -10,6 +10,7 @@ from pathlib import Path
 import manuals_page
 import parameters_page
 import settings_page
+import troubleshooting_page
 
 DOCS = Path(__file__).resolve().parents[1] / 'docs'
 
@@ -20,6 +21,7 @@ def pages() -> dict[Path, str]:
         DOCS / 'interface.md': settings_page.page(),
         DOCS / 'manuals.md': manuals_page.page(),
         DOCS / 'parameters.md': parameters_page.page(),
+        DOCS / 'troubleshooting.md': troubleshooting_page.page(),
     }
 
 

@@ -5,10 +5,13 @@
 
 from __future__ import annotations
 
-from rclpy.node import Node
+from typing import TYPE_CHECKING
 
 from nfo_sinus_driver.drive import DriveError, Report
 from nfo_sinus_driver.drive.events import Calls, sentence
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
 
 
 class NodeError(Exception):

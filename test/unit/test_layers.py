@@ -101,9 +101,7 @@ def family_names() -> re.Pattern[str]:
 
 def named(tree: ast.Module) -> set[str]:
     """The families and parameters that a module names, but for what it says in docstrings."""
-    bodies = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    first = [node.body[0] for node in ast.walk(tree) if isinstance(node, bodies) and node.body]
-    docstrings = {id(one.value) for one in first if isinstance(one, ast.Expr)}
+    docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
     texts = [
         node.value
         for node in ast.walk(tree)
