@@ -30,7 +30,6 @@ from nfo_sinus_driver.cli.run import Run
 from nfo_sinus_driver.cli.scan import Scan
 from nfo_sinus_driver.cli.stop import Ack, Stop
 from nfo_sinus_driver.cli.transfer import Diff, Dump, Load
-from nfo_sinus_driver.cli.tune import Tune
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.version import VERSION
@@ -70,7 +69,7 @@ VERBS: dict[str, Verb] = {
     type(verb).__name__.lower(): verb
     for verb in (
         Scan(), Info(), List(), Get(), Set(), Dump(), Load(), Diff(), Errors(), Monitor(),
-        Family(), Completion(), Ack(), Run(), Stop(), Tune(),
+        Family(), Completion(), Ack(), Run(), Stop(),
     )
 }
 

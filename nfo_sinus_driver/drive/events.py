@@ -633,8 +633,6 @@ class Cause(enum.Enum):
     """It lasted 15 minutes. Check motor and wiring"""
     TUNING_CHANGED = '{how}; changed: {changes}'
     """Also after a failure. Compare the values with the motor plate"""
-    INTERRUPTED = '{signal}: not begun'
-    """`nfo-sinus tune` ended before it began"""
     LOG_ENTRY_UNSEEN = 'error log: {entry} (missed by polling)'
     """It came and went between two polls. Look up the fault; a higher `poll_rate` catches more"""
     LOG_UNDOCUMENTED = 'the error log of this model ({model}) is not documented'

@@ -71,7 +71,7 @@ def simulated(arguments: list[str]) -> Iterator[subprocess.Popen[str]]:
 
 def test_there_are_such_commands() -> None:
     verbs = {parse(shlex.split(one.text)[1:]).verb for one in commands('nfo-sinus')}
-    assert {'scan', 'info', 'set', 'dump', 'load', 'run', 'monitor', 'tune'} <= verbs
+    assert {'scan', 'info', 'set', 'dump', 'load', 'run', 'monitor', 'ack'} <= verbs
     assert len(commands('simulator')) > 5
 
 

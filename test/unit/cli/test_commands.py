@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""``stop``, ``ack``, ``tune`` and ``errors --erase``, judged by the simulated drive itself."""
+"""``stop``, ``ack`` and ``errors --erase``, judged by the simulated drive itself."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ CONNECTIONS: dict[str, dict[str, Any]] = {
     'classic': {'protocol': 'classic'},
     'optimal': OPTIMAL,
 }
-#: Those of a drive that tunes and has an error log.
+#: Those of a drive that has an error log.
 CONNECTIONS_OF_THE_G2 = {
     name: options for name, options in CONNECTIONS.items() if name != 'optimal'
 }
@@ -256,118 +256,19 @@ def test_ack_of_nothing(bench: Bench, nfo: Nfo) -> None:
     assert bench.state()['driven'] and bench.writes() == []
 
 
-# --- tune -----------------------------------------------------------------------------------------
-
-TUNINGS = {
-    'full': '45 TuningOK',
-    'basic': '45 TuningOK',
-    'rs': '46 RsMeasOK',
-    'calculate': '47 ParClcOK',
-}
-
-
-@pytest.mark.parametrize('procedure', TUNINGS)
-def test_tune(bench: Bench, procedure: str) -> None:
-    before = {key: bench.value(key) for key in bench.drive().settings}
-    done = bench.run('tune', procedure, '--yes')
-    assert done.status == 0, done.err
-    assert TUNINGS[procedure] in done.err.splitlines()[-1]
-    # the calculation is over before one has looked
-    assert '28 Tuning' in done.err or procedure == 'calculate'
-    after = {key: bench.value(key) for key in before}
-    changed = {key for key in before if before[key] != after[key]}
-    assert {line.split(':')[0] for line in done.out.splitlines()} == changed
-    assert all(' -> ' in line for line in done.out.splitlines())
-    assert bench.state()['source'] == 'stop'
-
-
-@pytest.mark.parametrize('connection', CONNECTIONS_OF_THE_G2)
-def test_tune_over_every_connection(make_bench: MakeBench, connection: str) -> None:
-    bench = make_bench(**CONNECTIONS[connection])
-    done = bench.run('tune', 'rs', '--yes', '--json')
-    assert done.status == 0, done.err
-    facts = json.loads(done.out)
-    assert facts['success'] is True and facts['seconds'] > 0
-    (changed,) = facts['changed']
-    assert changed['name'] == 'motor.r_stat' and changed['new'] == bench.value('motor.r_stat')
-
-
-def test_tune_that_fails(bench: Bench) -> None:
-    bench.simulator.inject('tuning-fails', 17, address=1)
-    done = bench.run('tune', 'basic', '--yes')
-    assert done.status == 1
-    assert done.err.count('17 TunFailM:') == 1
-    assert 'type nfo-sinus ack first' in done.err and '~/' not in done.err
-    assert bench.run('ack').status == 0
-
-
-def test_tune_without_its_run_input(make_bench: MakeBench) -> None:
-    bench = make_bench(run_input=False)
-    done = bench.run('tune', 'rs', '--yes', '--json')
-    assert done.status == 1
-    facts = json.loads(done.out)
-    assert facts['success'] is False and 'RUN input' in facts['message']
-    assert facts['changed'] == []
-
-
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_cancels_a_tuning(bench: Bench, number: signal.Signals) -> None:
-    before = {key: bench.value(key) for key in bench.drive().settings}
-    with bench.begun('tune', 'full', '--yes') as process:
-        wait_until(lambda: bench.state()['inv_st'] == 28)
-        process.send_signal(number)
-        out, err = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 130, err
-    name = 'Ctrl-C' if number is signal.SIGINT else number.name
-    assert f'{name}: stopping it' in err
-    assert 'full tuning was stopped before it was finished' in err
-    assert 'no parameter has changed' not in out
-    state = bench.state()
-    assert state['inv_st'] != 28 and state['source'] == 'stop'
-    assert {key: bench.value(key) for key in before} == before
-
-
-@pytest.mark.parametrize(('answer', 'tunes'), [('y\n', True), ('n\n', False), ('\n', False)])
-def test_tune_asks_on_a_terminal(bench: Bench, answer: str, tunes: bool) -> None:
-    before = bench.value('motor.r_stat')
-    done = bench.on_terminal('tune', 'rs', ask='[y/N] ', answer=answer)
-    assert 'the motor is energised and may turn' in done.out
-    assert done.status == (0 if tunes else 1)
-    assert (bench.value('motor.r_stat') != before) is tunes
-    if tunes:
-        # which status is seen on the way is luck on a slow machine
-        assert 'stator resistance measurement  ' in done.err
-    else:
-        assert 'nothing was done' in done.out and bench.writes() == []
-
-
-def test_tune_does_not_begin_unasked(bench: Bench) -> None:
-    done = bench.run('tune', 'rs', text='y\n')
-    assert done.status == 2
-    assert 'There is no terminal to answer: say so with --yes' in done.err
-    assert bench.writes() == []
-
-
-def test_tune_of_an_optimal(make_bench: MakeBench) -> None:
-    done = make_bench(**OPTIMAL).run('tune', 'full', '--yes')
-    assert done.status == 1
-    assert 'not known of this model (sinus_optimal)' in done.err and 'keypad' in done.err
+# --- errors --erase -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize('by', ['bus', 'keypad'])
-@pytest.mark.parametrize('verb', [('tune', 'rs'), ('errors', '--erase')])
-def test_a_motor_that_runs_is_left_alone(bench: Bench, nfo: Nfo, by: str, verb: Any) -> None:
+def test_a_motor_that_runs_keeps_its_error_log(bench: Bench, nfo: Nfo, by: str) -> None:
     if by == 'bus':
         bench.run_by_bus()
     else:
         bench.simulator.inject('keypad', 'start', address=1)
-    done = nfo(*verb, '--yes')
+    done = nfo('errors', '--erase', '--yes')
     assert done.status == 1
     assert 'the motor runs' in done.err and 'stop it first' in done.err
     assert bench.state()['driven'] and bench.writes() == []
-
-
-# --- errors --erase -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize('connection', CONNECTIONS_OF_THE_G2)

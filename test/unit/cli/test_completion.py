@@ -34,8 +34,7 @@ def test_a_shell_completes_verbs_options_and_values(tmp_path: Path) -> None:
     assert completed('', tmp_path) >= {*VERBS}
     assert completed('--', tmp_path) >= {'--port', '--version'}
     assert completed('mo', tmp_path) == {'monitor'}
-    assert completed('--address 2 tu', tmp_path) == {'tune'}
-    assert completed('tune ', tmp_path) >= {'full', 'rs'}
+    assert completed('--address 2 sto', tmp_path) == {'stop'}
     assert completed('run --set', tmp_path) == {'--setpoint-max'}
     assert completed('run --control-mode S', tmp_path) == {'Speed'}
     assert completed('--protocol cl', tmp_path) == {'classic'}

@@ -30,7 +30,6 @@ VERBS = (
     ('monitor', '--count', 1, '--addresses', '1,2'),
     ('ack',),
     ('run', 10, '--for', 1),
-    ('tune', 'rs'),
 )
 _QUESTION = 'a motor that the terminals run stops. Go on?'
 

@@ -610,7 +610,7 @@ def test_no_drive_answers(nfo: Nfo) -> None:
 
 def test_a_busy_port_names_its_holder(nfo: Nfo, bench: Bench) -> None:
     with bench.running() as process:
-        for arguments in (['run', 10], ['stop'], ['ack'], ['tune', 'rs', '--yes']):
+        for arguments in (['run', 10], ['stop'], ['ack']):
             done = nfo(*arguments)
             assert done.status == 1 and f'(pid {process.pid})' in done.err
         assert bench.state()['driven']

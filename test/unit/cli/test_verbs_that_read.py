@@ -56,7 +56,7 @@ def test_list_shows_every_setting(nfo: Nfo, bench: Bench) -> None:
 
 @pytest.mark.parametrize('encoding', ['latin-1', 'ascii'])
 @pytest.mark.parametrize(
-    'arguments', ['info', 'list', 'list --json', 'get motor.r_stat', 'dump -', 'errors', 'tune -h']
+    'arguments', ['info', 'list', 'list --json', 'get motor.r_stat', 'dump -', 'errors', 'run -h']
 )
 def test_what_a_locale_cannot_write_ends_no_verb(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, arguments: str, encoding: str
