@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from pathlib import Path
+import re
 from xml.etree import ElementTree
 
 #: What schema 0.2.0 lets an element of a profile say, and what its children are.
@@ -29,16 +30,26 @@ def full_name(name: str, namespace: str, node: str) -> str:
 
 
 def allowed(path: Path) -> Policy:
-    """Return what each enclave is allowed."""
+    """Return what each enclave is allowed; what the schema forbids is an AssertionError."""
     policy: Policy = {}
-    for enclave in ElementTree.parse(path).getroot().iter('enclave'):
+    builder = ElementTree.TreeBuilder(insert_comments=True)
+    root = ElementTree.parse(path, ElementTree.XMLParser(target=builder)).getroot()
+    assert (root.tag, root.attrib) == ('policy', {'version': '0.2.0'})
+    for enclave in root[0]:
+        assert enclave.tag == 'enclave', 'sros2 takes a comment for an enclave without a name'
         rules = policy[enclave.attrib['path']] = defaultdict(set)
         for profile in enclave.iter('profile'):
             for rule in profile:
+                if rule.tag is ElementTree.Comment:
+                    continue
+                child, qualifiers = RULES[str(rule.tag)]
+                names = [str(one.text) for one in rule if one.tag == child]
+                assert len(set(names)) == len(rule) and set(rule.attrib) <= qualifiers, rule.attrib
+                assert all(re.fullmatch(r'~?(/\w+)+', name) for name in names), names
                 for qualifier, what in rule.attrib.items():
                     assert what == 'ALLOW', f'{rule.tag} {qualifier}: {what}'
                     rules[qualifier] |= {
-                        full_name(str(one.text), profile.attrib['ns'], profile.attrib['node'])
-                        for one in rule
+                        full_name(name, profile.attrib['ns'], profile.attrib['node'])
+                        for name in names
                     }
     return policy
