@@ -31,11 +31,7 @@ MESSAGES = {
     '~/statistics': 'BusStatistics', '~/measured': 'Measured',
 }
 SETTINGS = {**BUS_SETTINGS, **DRIVE_SETTINGS}
-OFFERED = {
-    name
-    for path in (ROOT / 'nfo_sinus_driver' / 'node').glob('*.py')
-    for name in topics_and_services(read(path))
-}
+OFFERED = topics_and_services()
 
 
 def is_there(name: str, family: Family) -> bool:
