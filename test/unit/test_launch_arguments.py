@@ -5,10 +5,8 @@
 
 from __future__ import annotations
 
-import asyncio
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 import yaml
@@ -72,36 +70,20 @@ def test_a_parameter_file_is_found_by_path_or_is_one_of_the_package(
 
 
 def test_packages_are_looked_up_before_anything_starts() -> None:
-    def find(name: str) -> str:
-        if name == 'there':
-            return '/opt/there'
-        raise LookupError(name)
-
-    require_packages({'there': 'what is there'}, find)
+    found = {'there': '/opt/there'}
+    require_packages({'there': 'what is there'}, found.__getitem__)
     needed = {'there': 'what is there', 'controller_manager': 'ros2_control', 'robot_x': 'frames'}
-    with pytest.raises(ValueError, match='packages are missing') as missing:
-        require_packages(needed, find)
-    assert str(missing.value) == (
-        'packages are missing: controller_manager (ros2_control), robot_x (frames); '
-        'sudo apt install ros-jazzy-controller-manager ros-jazzy-robot-x'
-    )
+    with pytest.raises(ValueError, match='packages are missing: controller_manager') as no:
+        require_packages(needed, found.__getitem__)
+    assert str(no.value).endswith('install ros-jazzy-controller-manager ros-jazzy-robot-x')
 
 
-@pytest.mark.parametrize(('status', 'fails'), [(0, False), (1, True), (2, True), (-9, True)])
-def test_launch_fails_where_the_driver_has(status: int, fails: bool) -> None:
+def test_launch_fails_where_the_driver_has() -> None:
     # launch ends with 1 where its handler was called; test/ros/test_launch_files.py does it
-    handled: list[str] = []
-
-    def handler(_: object, context: dict[str, Any]) -> None:
-        handled.append(context['message'])
-
-    loop = asyncio.new_event_loop()
-    try:
-        loop.set_exception_handler(handler)
-        event = SimpleNamespace(returncode=status)
-        fail_with_driver(event, SimpleNamespace(asyncio_loop=loop))
-    finally:
-        loop.close()
-    assert [f'status {status}, so launch will end with 1' in text for text in handled] == (
-        [True] * fails
-    )
+    handled: list[dict[str, str]] = []
+    context = SimpleNamespace(asyncio_loop=SimpleNamespace(call_exception_handler=handled.append))
+    for status in (0, 2, -9):
+        fail_with_driver(SimpleNamespace(returncode=status), context)
+    assert [one['message'].split(',')[0] for one in handled] == [
+        'the driver has ended with status 2', 'the driver has ended with status -9'
+    ]
