@@ -117,7 +117,7 @@ bench: setup ## measure speed, stops and noise, and a peer (two hours; BENCH=--q
 		--disable-pip-version-check --requirement=benchmark/requirements.txt
 	@tools/run python benchmark/run.py $(BENCH)
 
-bench-gate: setup ## fail where the driver is slower than its last release (ten minutes)
+bench-gate: setup ## fail where the driver is slower than its last release (15 minutes)
 	@env -u PYTHONPATH .venv/bin/python -m pip install --quiet --no-input --no-cache-dir \
 		--disable-pip-version-check --requirement=benchmark/requirements.txt
 	@tools/run python benchmark/gate.py $(GATE)
