@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 import contextlib
-import dataclasses
 from dataclasses import dataclass
 import functools
 import itertools
@@ -19,8 +18,8 @@ from bench import Bench, Client, Process, wait_until
 from connections import UNFRAMED, Connection
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
-from support.classic_ends import OTHER_ON_CLASSIC, on_classic
-from support.parameter_ends import ENDS, Ends
+from setting_names import SETTINGS
+from support.ends import Ends, of_g2
 from support.variants import hardest
 from support.wire import understand
 
@@ -46,8 +45,21 @@ _WRITE_AND_READ = 23
 _COMMANDS = {'E0029': 0x0294, 'E00AD': 0x0298, 'E001E': 0x03FC}
 #: MODE = Bus and Stop, SCMD = Stop, set-point 0: nothing turns by them.
 _HARMLESS = frozenset(((0x0294, (3,)), (0x0294, (1,)), (0x0298, (0,)), (0x03FC, (0,))))
-_ENDS = {ends.name: ends for ends in ENDS}
-_BY_ID = {ends.classic[0]: ends for ends in ENDS}
+#: Register and Classic id of the settings that tests write [M0 table 2, 4]. Of what has none the
+#: id stands for the register.
+_PLACES = {
+    'motor.p_nom': (0x0220, 'E0008'), 'motor.u_nom': (0x0224, 'E0009'),
+    'control.accel': (0x027E, 'E001D'), 'control.retard': (0x0282, 'E001C'),
+    'control.auto_start': (0x02C8, 'E0033'), 'control.st_mode': (0x0290, 'E0032'),
+    ANY_BUS: (-0x38, 'E0038'), 'freque.op_mode': (0x02E4, 'E0031'),
+    'freque.f_fix1': (0x02E8, 'E0041'), 'pi_reg.setmin': (0x0380, 'E004B'),
+    'pi_reg.reg_amp': (0x0398, 'E0052'), 'serial.address': (0x03D0, 'E00A9'),
+    'serial.si_baud': (0x03D4, 'E00A8'), 'serial.si_prot': (0x03D8, 'E00AA'),
+    'serial.sio_tot': (0x03DC, 'E00AB'), 'serial.auto_stop': (0x03E4, 'E00D8'),
+}
+_BY_ID = {id_: name for name, (_, id_) in _PLACES.items()}
+#: Those whose steps are others on Classic.
+_OTHER_STEPS = {'motor.p_nom', 'control.accel', 'control.retard'}
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +151,9 @@ def _classic(data: bytes) -> Write | None:
     unit, name, word = select[1][0] - 0x20, select[2].decode(), int(select[3], 16)
     if name in _COMMANDS:
         return Write(unit, _COMMANDS[name], (word,))
-    return written(_BY_ID[name].name, (word,), unit, classic=True) if name in _BY_ID else None
+    if name in _BY_ID:
+        return written(_BY_ID[name], (word,), unit, classic=True)
+    return Write(unit, -int(name[1:], 16), (word,))
 
 
 def _movitrac(data: bytes) -> Write | None:
@@ -166,35 +180,30 @@ _WRITTEN: Mapping[str, Callable[[bytes], Write | None]] = {
 
 
 @functools.cache
-def settings(connection: Connection) -> dict[str, Ends]:
-    """Return every setting that a connection reaches, by its ROS parameter, with its ends there."""
+def settings(connection: Connection) -> tuple[str, ...]:
+    """Return the ROS parameter of every setting that a connection reaches."""
     if 'parameters' not in connection.features:
-        return {}
-    found = {
-        name: on_classic(ends, connection.dialect) if connection.protocol == 'classic' else ends
-        for name, ends in _ENDS.items()
-        if name not in connection.beyond
-    }
-    if connection.protocol == 'canopen':
-        # a greater one could not be asked again [C10]
-        address = found['serial.address']
-        found['serial.address'] = dataclasses.replace(
-            address, high=127, high_words=(127,), above=128
-        )
-    return found
+        return ()
+    names = (line.split(',')[2] for line in SETTINGS.splitlines() if line)
+    return tuple(name for name in names if name not in connection.beyond)
+
+
+def ends_of(connection: Connection) -> dict[str, Ends]:
+    """Return the same with their ends there; the test is skipped where there is no manual."""
+    printed = of_g2(connection.protocol, connection.dialect)
+    return {name: printed[name] for name in settings(connection)}
 
 
 def register(name: str) -> int:
-    """Return the register of a setting; of the one that has none the number that none has."""
-    found = _ENDS[name].register
-    return -1 if found is None else found
+    """Return the register of a setting."""
+    return _PLACES[name][0]
 
 
 def written(
     name: str, words: tuple[int, ...], unit: int = 1, *, classic: bool = False
 ) -> Write:
     """Return the request that writes words to a setting; those of Modbus, or of Classic."""
-    return Write(unit, register(name), words, classic and name in OTHER_ON_CLASSIC)
+    return Write(unit, register(name), words, classic and name in _OTHER_STEPS)
 
 
 def set_each(client: Client, *settings: tuple[str, Value | None]) -> list[Any]:
@@ -248,7 +257,7 @@ class Stubborn(contextlib.ExitStack):
     def __init__(self, bench: Bench) -> None:
         super().__init__()
         #: What can be set over the connection of the bench.
-        self.names = tuple(settings(bench.connection))
+        self.names = settings(bench.connection)
         self.simulator = Simulator(
             **bench.line, trace=str(bench.trace), **hardest(bench.connection.model)
         )

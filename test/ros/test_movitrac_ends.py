@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import json
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -16,18 +17,18 @@ from connections import CONNECTIONS
 from parameter_bench import COUNTED, refused, set_one, values
 import pytest
 from rcl_interfaces.srv import DescribeParameters
-from support.movitrac_ends import ENDS, Value
+from support.ends import Ends, Value, of_movitrac
 
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.demo.bench import own_domain
 
 #: What has to be so for a setting to be switched on [M4 §2.1.2].
-#: One of each kind; test/unit/catalog/test_movitrac_ends.py has both ends and every label of all.
+#: One of each kind; test/unit/drive/test_movitrac_manual.py has both ends of all.
 _ONE_OF_EACH = (
     'ramp.t11_up', 'frequency.f_base_1', 'motor.pwm_frequency_1', 'special.four_quadrant_1',
     'serial.inverter_address',
 )
 _AT_KEYPAD = 'special.user_menu'
-_ENDS = {ends.name: ends for ends in ENDS}
 
 
 class Rig:
@@ -69,9 +70,9 @@ class Rig:
         assert self.drive.state()['parameters'][name] == value
 
 
-def select(index: int, raw: str) -> str:
+def select(ends: Ends, value: Value) -> str:
     """Return a SELECT frame to address 1 [M4 §2.1.1], as it stands in a trace."""
-    data = bytes.fromhex(f'a901{index:04x}{raw}')
+    data = bytes.fromhex(f'a901{ends.places[0]:04x}{ends.data(value)}')
     return (data + bytes((sum(data) % 256,))).hex()
 
 
@@ -83,7 +84,8 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
 
 
 def test_every_setting_that_needs_no_card_is_shown_with_its_number(rig: Rig) -> None:
-    bare = [ends for ends in ENDS if not ends.card]
+    family = load_family('movitrac31')
+    bare = [ends for ends in of_movitrac().values() if not family[ends.name].option]
     assert len(bare) == 149
     # the node's own have no group
     names = {name for name in rig.client.parameter_names() if '.' in name}
@@ -96,24 +98,21 @@ def test_every_setting_that_needs_no_card_is_shown_with_its_number(rig: Rig) -> 
         (ends.name, shown[ends.name], descriptor.description)
         for ends, descriptor in zip(bare, described.descriptors, strict=True)
         if type(shown[ends.name]) is not type(ends.low)
-        or f'{ends.number}, index' * bool(ends.number) not in descriptor.description
-        or f'ndex {ends.index}: ' not in descriptor.description
+        or not re.search(rf': (P\d+.*, i|I)ndex {ends.places[0]}: ', descriptor.description)
     ]
     assert wrong == []
 
 
 def test_both_ends_arrive_and_nothing_beyond_them(rig: Rig) -> None:
-    for ends in (_ENDS[name] for name in _ONE_OF_EACH):
+    for ends in (of_movitrac()[name] for name in _ONE_OF_EACH):
         factory = present = values(rig.client, ends.name)[ends.name]
-        for value in (ends.below, ends.above, ends.between):
-            if value is not None:
-                refused(set_one(rig.client, ends.name, value), ends.name)
+        for value in ends.beyond:
+            refused(set_one(rig.client, ends.name, value), ends.name)
         assert rig.writes() == [], ends.name
         # the low end twice, for one of both may be the factory's
-        low, high = (ends.low, ends.low_raw), (ends.high, ends.high_raw)
-        for value, raw in (low, high, low, *ends.codes):
+        for value in (ends.low, ends.high, ends.low, *ends.counts):
             rig.set(ends.name, value)
-            expected = [] if value == present else [select(ends.index, raw)]
+            expected = [] if value == present else [select(ends, value)]
             assert rig.writes() == expected, (ends.name, value)
             rig.has(ends.name, value)
             present = value
@@ -122,13 +121,13 @@ def test_both_ends_arrive_and_nothing_beyond_them(rig: Rig) -> None:
 
 
 def test_the_user_menu_is_switched_off_and_no_more_on(rig: Rig) -> None:
-    ends = _ENDS[_AT_KEYPAD]
+    ends = of_movitrac()[_AT_KEYPAD]
     assert values(rig.client, ends.name)[ends.name] == ends.low
     try:
         rig.set(ends.name, ends.high)
-        assert rig.writes() == [select(ends.index, ends.high_raw)]
+        assert rig.writes() == [select(ends, ends.high)]
         refused(set_one(rig.client, ends.name, ends.low), ends.name, 'use the keypad', '19')
-        assert rig.writes() == [select(ends.index, ends.low_raw)]
+        assert rig.writes() == [select(ends, ends.low)]
         rig.has(ends.name, ends.high)
     finally:
         rig.drive.inject('set', ends.name, ends.low)

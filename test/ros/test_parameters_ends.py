@@ -14,9 +14,9 @@ from parameter_bench import (
     COUNTED,
     Value,
     Wire,
+    ends_of,
     refused,
     set_one,
-    settings,
     values,
     written,
 )
@@ -26,8 +26,8 @@ from nfo_sinus_driver.demo.bench import own_domain
 
 pytestmark = needs('parameters')
 
-#: One of each kind; test/unit/catalog/test_ends.py and test/unit/drive/test_ends_on_classic.py have
-#: both ends and every label of all, test_parameters_listed.py what is shown of all.
+#: One of each kind; test/unit/drive/test_ends_on_classic.py has both ends of all,
+#: test_parameters_listed.py what is shown of all.
 _ONE_OF_EACH = (
     'freque.f_fix1', 'control.accel', 'control.st_mode', 'serial.si_prot', 'serial.address',
     ANY_BUS,
@@ -64,23 +64,20 @@ def rig(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> Ite
 
 def test_both_ends_and_labels_arrive_and_nothing_beyond_them(rig: Rig) -> None:
     classic = rig.connection.protocol == 'classic'
-    there = settings(rig.connection)
+    there = ends_of(rig.connection)
     # on older firmware these count at once, and the line is gone [C7]
     guarded = () if 'later' in rig.connection.features else ('serial.address',)
     for ends in (there[name] for name in _ONE_OF_EACH if name in there and name not in guarded):
         name = ends.name
         factory = present = values(rig.client, name)[name]
-        for value in (ends.below, ends.above, ends.between):
-            if value is not None:
-                refused(set_one(rig.client, name, value), name)
+        for value in ends.beyond:
+            refused(set_one(rig.client, name, value), name)
         assert rig.wire.writes() == [], name
         # the low end twice, for one of both may be the factory's
-        low, high = (ends.low, ends.low_words), (ends.high, ends.high_words)
-        codes = ((label, (code,)) for label, code in ends.codes)
-        for value, words in (low, high, low, *codes):
+        for value in (ends.low, ends.high, ends.low, *ends.counts):
             result = set_one(rig.client, name, value)
             assert result.successful, result.reason
-            request = written(name, words, classic=classic)
+            request = written(name, ends.words(value), classic=classic)
             assert rig.wire.writes() == ([] if value == present else [request]), (name, value)
             rig.has(name, value)
             present = value

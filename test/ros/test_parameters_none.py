@@ -8,11 +8,16 @@ from __future__ import annotations
 from bench import Bench, wait_until
 from connections import needs
 from parameter_bench import QUIET, Wire, refused, set_each, set_one, values
-from support.parameter_ends import ENDS
+from setting_names import SETTINGS
 
 pytestmark = needs('bare')
 
-_NAMES = {ends.name for ends in ENDS}
+#: A value of the type of each setting of a G2.
+_VALUES = {'bool': True, 'integer': 1, 'double': 1.0, 'string': 'Brake'}
+_SETTINGS = {
+    name: _VALUES[type_]
+    for _, _, name, type_ in (line.split(',') for line in SETTINGS.splitlines() if line)
+}
 
 
 def test_a_dump_has_the_nodes_own_parameters_and_loads_again(bench: Bench) -> None:
@@ -23,7 +28,7 @@ def test_a_dump_has_the_nodes_own_parameters_and_loads_again(bench: Bench) -> No
     wire.writes()
     # that one is rclpy's own, and no node at all takes it back
     names = client.parameter_names() - {'start_type_description_service'}
-    assert not names & _NAMES
+    assert not names & _SETTINGS.keys()
     assert client.set_parameters(poll_rate=20.0, setpoint_max=30.0).successful
     dump = values(client, *sorted(names))
     assert dump['setpoint_max'] == 30.0
@@ -40,8 +45,8 @@ def test_settings_are_refused_one_by_one_and_with_others(bench: Bench) -> None:
     client = bench.client().connected()
     wire = Wire(bench)
     wire.writes()
-    for ends in ENDS:
-        refused(set_one(client, ends.name, ends.low), ends.name)
+    for name, value in _SETTINGS.items():
+        refused(set_one(client, name, value), name)
     refused(client.set_parameters(**{'poll_rate': 20.0, 'control.accel': 6.0}), 'control.accel')
     refused(client.set_parameters(poll_rate=20.0, drive_timeout=2.0), 'drive_timeout')
     assert client.parameter('poll_rate') == 10.0

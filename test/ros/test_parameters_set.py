@@ -38,7 +38,7 @@ class Rig:
     """One drive and its driver for all tests here."""
 
     def __init__(self, bench: Bench) -> None:
-        self.names = tuple(settings(bench.connection))
+        self.names = settings(bench.connection)
         self.drive = bench.simulator(paced=False)
         self.driver = bench.driver(*COUNTED)
         self.client: Client = bench.client().connected()

@@ -7,11 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from manual_g2 import codes_of_g2, old_manual_of_g2, tables_of_g2
-from manual_movitrac import conversion_list_of_movitrac, faults_of_movitrac, list_of_movitrac
-from manual_optimal import bits_of_optimal, codes_of_optimal, registers_of_optimal
-from manual_text import Fact
 import pytest
+from support.manual_g2 import codes_of_g2, old_manual_of_g2, tables_of_g2
+from support.manual_movitrac import (
+    conversion_list_of_movitrac,
+    faults_of_movitrac,
+    list_of_movitrac,
+)
+from support.manual_optimal import bits_of_optimal, codes_of_optimal, registers_of_optimal
+from support.manual_text import Fact
 
 READERS = (
     *(tables_of_g2, old_manual_of_g2, codes_of_g2),

@@ -5,13 +5,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, cast
 
 import pytest
 from support.addresses import packed
-from support.classic_ends import on_classic
-from support.parameter_ends import ENDS, Ends
+from support.ends import Ends, of_g2
 from support.rig import Rig
 
 from nfo_sinus_driver.catalog import Role, Value
@@ -26,11 +24,10 @@ _LAST = ('motor.i_magn',)
 def stands(rig: Rig, ends: Ends) -> bytes | None:
     """What stands at the place that the manual prints; ``None``: there it prints no number."""
     if rig.connection.protocol == 'modbus_rtu':
-        assert ends.register is not None
-        return packed(*server(rig.far).read(ends.register, ends.words))
+        return packed(*server(rig.far).read(ends.places[0], len(ends.places)))
     if rig.connection.protocol == 'classic':
         classic = cast(ClassicServer, rig.far.servers['classic'])
-        return packed(*(classic.enquiry(int(one[1:], 16)) for one in ends.classic))
+        return packed(*map(classic.enquiry, ends.places))
     return None
 
 
@@ -41,26 +38,19 @@ def test_every_setting_is_written_to_where_the_manual_has_it_and_read_from_there
     with Rig(connection, allow_communication_changes=True, poll_rate=1.0) as rig:
         rig.connect(parameters=True)
         parameters = rig.drive.parameters
-        rows = [ends for ends in ENDS if ends.name in parameters.values]
+        rows = of_g2(rig.connection.protocol)
         assert len(rows) == (120 if connection == 'classic' else 119)
+        assert rows.keys() == parameters.values.keys()
         wrong: list[tuple[str, Value]] = []
-        for ends in sorted(rows, key=lambda ends: ends.name in _LAST):
-            ends = on_classic(ends, '2.03') if connection == 'classic' else ends
-            if (connection, ends.name) == ('canopen', 'serial.address'):
-                ends = replace(ends, high=127, high_words=(127,))
+        for ends in sorted(rows.values(), key=lambda ends: ends.name in _LAST):
             before = parameters.values[ends.name]
-            values: dict[Value, tuple[int, ...]] = {
-                ends.low: ends.low_words, ends.high: ends.high_words
-            }
             # and back, so that address and rate stay those of the line
-            wanted, words = next(
-                (one for one in values.items() if one[0] != before), (before, ends.low_words)
-            )
+            wanted = ends.high if ends.low == before else ends.low
             changes = rig.result(parameters.change({ends.name: wanted}))
             there = stands(rig, ends)
             done = (
                 len(changes) == (wanted != before)
-                and there in (packed(*words), None)
+                and there in (packed(*ends.words(wanted)), None)
                 and rig.far.peek(ends.name) == wanted == parameters.values[ends.name]
                 and rig.result(rig.drive.measure(ends.name)) == wanted
             )

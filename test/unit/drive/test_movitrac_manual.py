@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from support.movitrac_ends import COUNTS, ENDS, Ends
+from support.ends import Ends, of_movitrac
 from support.rig import Rig
 
 from nfo_sinus_driver.catalog import Role, load_family
@@ -17,6 +17,8 @@ from nfo_sinus_driver.catalog import Role, load_family
 NEEDED = {f'control.hoist_{number}': f'special.four_quadrant_{number}' for number in (1, 2)}
 #: P802: On only by the keypad.
 ONE_WAY = 'special.user_menu'
+#: How many settings there are with a card, and without one.
+COUNTS = {'': 149, 'frs': 14, 'fio': 16, 'fea': 14, 'fen': 8, 'fpi': 28, 'ffi': 9}
 #: Indices that are only read, as the manual has them, and the option card that they need.
 BCD = {
     '': """
@@ -88,21 +90,20 @@ def last(rig: Rig, start: str) -> str:
 def not_set(rig: Rig, ends: Ends) -> list[object]:
     """Set both ends of a setting and put back what was there; return what was not as it must be."""
     wrong: list[object] = []
-    parameters, long = rig.drive.parameters, len(ends.low_raw) > 8
+    parameters, (index,) = rig.drive.parameters, ends.places
+    select, sent_back = ('ad', 'ac') if ends.long else ('a9', 'c8')
     before = parameters.values[ends.name]
-    two = [(ends.low, ends.low_raw), (ends.high, ends.high_raw)]
-    if ends.name == ONE_WAY:
-        two = two[1:]
+    two = [ends.high] if ends.name == ONE_WAY else [ends.low, ends.high]
     # what is there already is not written
-    for value, raw in sorted(two, key=lambda one: one[0] == before):
+    for value in sorted(two, key=lambda one: one == before):
         if value == parameters.values[ends.name]:
             continue
         rig.result(parameters.change({ends.name: value}))
-        sent = last(rig, 'ad' if long else 'a9')
-        if sent != f'{"ad" if long else "a9"}01{ends.index:04x}{raw.lower()}':
+        sent = last(rig, select)
+        if sent != f'{select}01{index:04x}{ends.data(value)}':
             wrong.append((value, sent))
-        shown = last(rig, f'{"ac" if long else "c8"}{ends.index:04x}')
-        if not shown.endswith(raw.lower()):
+        shown = last(rig, f'{sent_back}{index:04x}')
+        if not shown.endswith(ends.data(value)):
             wrong.append((value, shown))
         if not rig.far.peek(ends.name) == parameters.values[ends.name] == value:
             wrong.append((value, rig.far.peek(ends.name), parameters.values[ends.name]))
@@ -111,22 +112,29 @@ def not_set(rig: Rig, ends: Ends) -> list[object]:
     return wrong
 
 
+def needs(name: str, card: str) -> bool:
+    """Whether a setting is there with this card, and ``''``: without any."""
+    cards = load_family('movitrac31')[name].option.lower()
+    return card in cards.split(' or ') if card else not cards
+
+
 @pytest.mark.parametrize('card', COUNTS)
 def test_both_ends_of_every_setting_are_written_and_read_as_the_manual_has_them(card: str) -> None:
     with fitted(card, allow_communication_changes=True) as rig:
         rig.connect(parameters=True)
         change = rig.drive.parameters.change
-        wrong, done = {}, 0
-        for ends in (one for one in ENDS if one.card == card):
+        wrong = {}
+        for ends in of_movitrac().values():
+            if not needs(ends.name, card):
+                continue
             needed = NEEDED.get(ends.name)
             if needed:
                 rig.result(change({needed: True}))
             wrong[ends.name] = not_set(rig, ends)
             if needed:
                 rig.result(change({needed: False}))
-            done += 1
         assert {name: found for name, found in wrong.items() if found} == {}
-        assert done == COUNTS[card]
+        assert len(wrong) == COUNTS[card]
         # an owner may set P841 as the driver itself never does
         assert all('another P841' in one for one in rig.violations())
         rig.line.frames.clear()
@@ -312,5 +320,5 @@ def test_no_row_of_the_list_is_left_out() -> None:
         'status.option_x20', 'status.option_x21', 'fieldbus.remote_setpoint',
         'fieldbus.function_bits', 'fieldbus.factory_setting',
     }
-    every = [*read, *(ends.name for ends in ENDS), *aside]
+    every = [*read, *of_movitrac(), *aside]
     assert sorted(every) == sorted(load_family('movitrac31'))

@@ -6,16 +6,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import functools
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import pytest
 
-MANUALS = Path(__file__).resolve().parents[4] / 'shared' / 'manuals'
+MANUALS = Path(__file__).resolve().parents[3] / 'shared' / 'manuals'
 #: Where it stands, what is printed there, as the catalog would have it, and what that has.
 Fact: TypeAlias = tuple[str, Any, Any]
 
 
+@functools.cache
 def manual(number: int) -> list[str]:
     """The lines of the manual M0 to M4; the test is skipped where it is not there."""
     found = sorted(MANUALS.glob(f'{number:03d}_*.txt'))

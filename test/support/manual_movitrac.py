@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 import functools
 import re
-
-from manual_text import Fact, manual
+from string import ascii_lowercase
 
 from nfo_sinus_driver.catalog import Access, load_family
+from support.manual_text import Fact, manual
 
 FAMILY = load_family('movitrac31')
 #: The row of each index; a digit of it has a row of its own after it.
@@ -33,6 +33,12 @@ NAMES = {
     618: 'PI3 Actual value (hex)',
 }
 REFERENCES = {'286': '329'}
+#: How a number stands in four or eight bytes, and what one count is [M4 §3].
+FORMATS = {
+    '4-byte BCD': ('32', Fraction(1, 100)),
+    '4-byte binary': ('32_be', Fraction(1)),
+    '8-byte': ('32_hb', Fraction(1)),
+}
 #: Of these the unit belongs to the labels, or is uncertain [C78].
 NO_UNIT = {272, 273, 298, 299, 300, 301}
 UNITS = {'1/min': 'rpm', '%IN': '%', '% IN': '%', 'kHz': ''}
@@ -53,6 +59,8 @@ class Line:
     name: str
     index: int
     hexadecimal: str
+    #: As printed here or above: one cell is that of all rows until the next one.
+    format: str
     access: str
     meaning: str
 
@@ -64,13 +72,15 @@ def lines() -> list[Line]:
     start = text.index(next(line for line in text if line.startswith('DISPLAY VALUES')))
     end = next(number for number, line in enumerate(text) if line.startswith('Conversion list'))
     found: list[Line] = []
+    format_ = ''
     for line in text[start:end]:
         cells = [cell.strip() for cell in line.split('\t')]
         access = [cell for cell in cells if re.fullmatch(r'R ?/ ?[W-]', cell)]
         if re.match(r'(\d{3}|-)\t', line) and re.fullmatch(r'\d+', cells[2]):
-            rest = cells[cells.index(access[0]) + 1 :]
+            before, rest = cells[4 : cells.index(access[0])], cells[cells.index(access[0]) + 1 :]
+            format_ = ''.join(before) or format_
             meaning = ' '.join(filter(None, rest))
-            found.append(Line(*cells[:2], int(cells[2]), cells[3], access[0], meaning))
+            found.append(Line(*cells[:2], int(cells[2]), cells[3], format_, access[0], meaning))
         elif found and not HEADING.fullmatch(line.strip()):
             found[-1].meaning += '\n' + ' '.join(cell for cell in cells if cell not in access)
     return found
@@ -86,11 +96,16 @@ def meaning_of(line: Line) -> str:
     return meaning_of(next(one for one in lines() if one.number == number))
 
 
-def plain(printed: str) -> str:
-    """A text without subscripts and signs of the typesetter, in a shape that can be compared."""
+def typed(printed: str) -> str:
+    """A text without subscripts and signs of the typesetter."""
     for sign, meant in SIGNS.items():
         printed = printed.replace(sign, meant)
-    return re.sub(r'[{}$_ ]', '', printed)
+    return re.sub(' +', ' ', re.sub(r'[{}$_]', '', printed)).strip()
+
+
+def plain(printed: str) -> str:
+    """The same without blanks, which are others in the names of the list."""
+    return typed(printed).replace(' ', '')
 
 
 def spans_in(text: str) -> list[tuple[Fraction, Fraction, Fraction | None]]:
@@ -117,8 +132,9 @@ def labels_in(text: str) -> dict[int, str]:
     parts = re.split(r'\b(\d+)(?:\.00)? ?= ?', text)
     # the text recognition has taken some capital I for a small l
     return {
-        int(code): plain(label.replace('\n', ' '))
-        .replace('lxt', 'Ixt').removesuffix('(dependsonS1)').rstrip('/')
+        int(code): typed(label.replace('\n', ' '))
+        .replace('lxt', 'Ixt').replace('I max', 'Imax').replace(' ≠ ', '≠')
+        .removesuffix('(depends on S1)').rstrip(' /')
         for code, label in zip(parts[1::2], parts[2::2], strict=True)
     }
 
@@ -144,10 +160,15 @@ def list_of_movitrac() -> Iterator[Fact]:
             yield f'{row.key} unit', UNITS.get(unit, unit), row.unit
         writable = 'W' in line.access and line.index not in ONLY_READ
         yield f'{row.key} access', Access.READ_WRITE if writable else Access.READ, row.access
+        if writable:
+            # what is only read are words of bits, too
+            place = row.at('movitrac')
+            ours = place.number.name.lstrip(ascii_lowercase), place.factor
+            yield f'{row.key} format', FORMATS[line.format], ours
         if row.labels:
             # what is reserved has its code beside it, and a frequency its unit
             ours = {
-                code: plain(re.sub(r' \(\d+\)$| kHz$', '', label))
+                code: re.sub(r' \(\d+\)$| kHz$', '', label)
                 for code, label in row.labels.items()
             }
             yield f'{row.key} labels', labels_of(line), ours
@@ -166,9 +187,7 @@ def list_of_movitrac() -> Iterator[Fact]:
         row = FAMILY[f'status.option_x{card}']
         printed = (line.split('\t') for line in manual(4) if f'Option at X{card}: Bit' in line)
         byte, _, _, labels, *_ = next(cells for cells in printed if cells[0][:4] == 'Byte')
-        yield f'{row.key} labels', labels_in(labels), {
-            code: plain(label) for code, label in row.labels.items()
-        }
+        yield f'{row.key} labels', labels_in(labels), dict(row.labels)
         # byte 0 comes first [C72]
         three = bytes([0] * int(byte.removeprefix('Byte ')) + [3]).ljust(4, b'\0')
         yield f'{row.key} byte', 3, row.at('movitrac').number.decode(three)

@@ -9,10 +9,9 @@ from collections.abc import Iterator
 from fractions import Fraction
 import re
 
-from manual_text import Fact, between, manual
-
 from nfo_sinus_driver.catalog import Access, load_family
 from nfo_sinus_driver.families.sinus_optimal.words import Control, Mode, Smode, Status
+from support.manual_text import Fact, between, manual
 
 OPTIMAL = load_family('sinus_optimal')
 #: What the scaling column says, as unit and factor.

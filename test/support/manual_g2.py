@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 import re
 
-from manual_text import Fact, between, manual
-
 from nfo_sinus_driver.catalog import Access, Address, Parameter, load_family
+from support.manual_text import Fact, between, manual
 
 G2 = load_family('sinus_g2')
 
@@ -234,6 +233,12 @@ def labels_of(row: Parameter, line: Line) -> dict[int, str]:
     return labels
 
 
+def default_of(scale: str) -> Fraction:
+    """What one count is as a drive comes from the factory [M0 §8.3]; of RegScl by [M2 table 1]."""
+    tenths = f'Factory default for {scale} is 1/10.' in manual(0) or scale == 'RegScl'
+    return Fraction(1, 10) if tenths else Fraction(1)
+
+
 def factor_of(row: Parameter, protocol: str, line: Line) -> tuple[str, object, object]:
     """How the unit is printed, what that says, and what the catalog has."""
     text = re.sub(r'</?sup>|\s|\*', '', line.cells[2]) if len(line.cells) > 2 else ''
@@ -245,7 +250,7 @@ def factor_of(row: Parameter, protocol: str, line: Line) -> tuple[str, object, o
     if scaled:
         # torque is in percent of the nominal one, never in Nm [C13]
         unit = {'Nm': '%', 'Unit': ''}.get(scaled[1], scaled[1])
-        return 'scaled', (scaled[2], unit), (row.scale, row.unit)
+        return 'scaled', (scaled[2], unit, default_of(scaled[2])), (row.scale, row.unit, factor)
     if divided:
         unit = divided[1] if divided[1] in UNITS else divided[1].lower()
         return 'divided', Fraction(UNITS[unit][row.unit]) / 10 ** int(divided[2]), factor
@@ -269,13 +274,25 @@ def counts_of(text: str) -> tuple[int | None, int | None]:
     return low, high
 
 
+def rows_of_old_manual() -> Iterator[list[str]]:
+    """The rows of [M2 table 1]: id, name, description, range, decimals, unit and type."""
+    for cells in between(manual(2), 'ID\tName\tDescription', 'Table 1.'):
+        if re.fullmatch(r'E[0-9A-F]{4}', cells[0]) and len(cells) == 7 and cells[1]:
+            yield cells
+
+
+def addresses_on(protocol: str) -> tuple[int, int]:
+    """The range of Address [M0 §6.1.2, §6.2.2]; CANopen has no greater node id [C10]."""
+    ranges = re.findall(r"'Address' .* Valid range is (\d+) to (\d+)", '\n'.join(manual(0)))
+    low, high = map(int, ranges[0 if protocol == 'classic' else 1])
+    return low, min(high, 127) if protocol == 'canopen' else high
+
+
 def old_manual_of_g2() -> Iterator[Fact]:
     """[M2 table 1]: names, ranges, decimals, units, types, codes and descriptions."""
     by_id = {row.at('classic').index: row for row in G2.values() if 'classic' in row.addresses}
     seen: dict[bool, set[str]] = {True: set(), False: set()}
-    for cells in between(manual(2), 'ID\tName\tDescription', 'Table 1.'):
-        if not (re.fullmatch(r'E[0-9A-F]{4}', cells[0]) and len(cells) == 7 and cells[1]):
-            continue
+    for cells in rows_of_old_manual():
         row = by_id[int(cells[0][1:], 16)]
         yield cells[0], squashed(cells[1]), squashed(row.name)
         init = 'Init' if row.stopped else 'Init/Run'
@@ -291,6 +308,10 @@ def old_manual_of_g2() -> Iterator[Fact]:
     missing = {row.key for row in G2.settings if not row.labels} - seen[False]
     # newer than that manual [C21], as BusType is
     yield 'missing', {'control.f_sleep', 'error.short_c_err_cnt'}, missing
+    for key in missing:
+        yield f'range of {key}', (None, None), (G2[key].minimum, G2[key].maximum)
+    address = G2['serial.address']
+    yield 'addresses', addresses_on('modbus'), (address.minimum, address.maximum)
     yield 'enumerations', 29, len(seen[True])
     # the range of the set-points, in raw counts too, for each mode of control [C33]
     text = '\n'.join(manual(2))
