@@ -129,6 +129,7 @@ def test_apply_parameters_false_only_reports(bench: Bench) -> None:
     assert Wire(bench).writes() == []
 
 
+@needs('local')
 def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
     # it runs by its terminals from power-up on
     drive = bench.simulator('--set', 'control.auto_start=ON', paced=False)
