@@ -28,6 +28,7 @@ setup(
             'families/*/*.csv',
             'families/*/*.vfd.yaml',
             'families/*/*/*.csv',
+            'simulator/*.st',
         ]
     },
     data_files=[

@@ -4,7 +4,7 @@
 """
 A PLC between a master on Modbus TCP and drives on its fieldbus, which speak telegram 1.
 
-It runs the program of :mod:`plc_program` in cycles, and exchanges telegrams with the drives in
+It runs the program of ``config/telegram1/`` in cycles, and exchanges telegrams with the drives in
 another rhythm. Modbus requests come in between; the registers are there for them all the time,
 whatever became of the drives. It is given the time, as everything here.
 """
@@ -13,30 +13,37 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 import random
 from typing import Any
 
-from nfo_sinus_driver.simulator import modbus, plc_mailbox, telegram1
+from nfo_sinus_driver.simulator import modbus, telegram1
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.memory import Reason, Refused
-from nfo_sinus_driver.simulator.plc_mailbox import Mailbox, RosMailbox
-from nfo_sinus_driver.simulator.plc_program import (
-    FIRST_WRITTEN,
-    REGISTERS,
-    Block,
-    More,
-    RosTelegram1,
-)
 from nfo_sinus_driver.simulator.plc_records import Records
+from nfo_sinus_driver.simulator.structured_text import load
 from nfo_sinus_driver.simulator.timing import Timing
 
 #: The name of the telegram in the tables of the families.
 TELEGRAM = 'telegram1'
 _UNITS = range(1, 248)
 _LAST_REGISTER = 0xFFFF
-#: How many registers a block has, by its layout.
-_REGISTERS = {1: REGISTERS, 2: plc_mailbox.FIRST + plc_mailbox.REGISTERS}
-_GAP = (0,) * (plc_mailbox.FIRST - REGISTERS)
+#: How many registers a block has, by its layout, and the first of its mailbox.
+_REGISTERS, _MAILBOX = {1: 11, 2: 28}, 16
+_GAP = (0,) * (_MAILBOX - _REGISTERS[1])
+#: Those that the driver writes.
+_WORDS_OF_ROS, _REQUESTS_OF_ROS = frozenset(range(8, 11)), frozenset(range(_MAILBOX, 22))
+
+
+@cache
+def program() -> Mapping[str, Any]:
+    """Return the structures and function blocks that are shipped, by their names there."""
+    found: dict[str, Any] = {}
+    for name in ('ros_telegram1.st', 'ros_mailbox.st'):
+        # a link to that in config/, of which an installed package has a copy
+        found |= load((Path(__file__).parent / name).read_text('utf-8'), name)
+    return found
 
 
 def _option(option: str, default: Any, text: str) -> Any:
@@ -121,26 +128,25 @@ class Channel:
     One drive on the fieldbus of the PLC, and its block.
 
     :ivar register: the first of the block.
+    :ivar program: ``FB_RosTelegram1``, whose ``block`` Modbus shows.
+    :ivar mailbox: ``FB_RosMailbox`` with +16 to +27; in layout 1 they do not show.
     :ivar cut_until: until when the fieldbus does not reach the drive (s).
-    :ivar mailbox: +16 to +27, with the programs that serve it; in layout 1 it does not show.
-    :ivar more: the last three words of a longer telegram.
     """
 
     drive: SimulatedDrive
     server: telegram1.Server
     unit: int
     register: int
-    block: Block
-    program: RosTelegram1
+    program: Any
+    mailbox: Any
+    records: Records
     released: bool
-    zsw1: int = 0
-    actual: int = 0
-    exchanged: bool = False
     cut_until: float = field(default=float('-inf'))
-    mailbox: Mailbox = field(default_factory=Mailbox)
-    mailbox_program: RosMailbox = field(default_factory=RosMailbox)
-    records: Records = field(default_factory=Records)
-    more: More | None = None
+
+    @property
+    def block(self) -> Any:
+        """The registers that the driver and the PLC share, but those of the mailbox."""
+        return self.program.block
 
     def reaches(self, now: float) -> bool:
         """Whether the fieldbus reaches the drive."""
@@ -152,25 +158,27 @@ class Channel:
         if not self.reaches(now):
             return
         program, server = self.program, self.server
-        self.zsw1, self.actual = server.exchange(program.stw1, program.setpoint)
-        self.more = server.more if server.longer else None
-        self.exchanged = True
+        program.zsw1, program.actual = server.exchange(program.stw1, program.setpoint)
+        more = server.more if server.longer else None
+        program.more_valid = more is not None
+        program.more1, program.more2, program.more3 = more or (0, 0, 0)
+        program.exchanged = True
 
     def run(self, now: float) -> None:
         """Run the programs once."""
-        self.program(
-            self.block, self.zsw1, self.actual, self.exchanged, self.released, self.more
-        )
-        self.exchanged = False
+        self.program.release = self.released
+        self.program()
+        self.program.exchanged = False
         reached = self.reaches(now) and self.server.parameters is not None
-        self.mailbox_program(self.mailbox, reached, *self.records.ended)
-        self.records.run(now, self.mailbox_program, self.server.parameters if reached else None)
+        self.mailbox.access = reached
+        self.mailbox()
+        self.records.run(now, self.mailbox, self.server.parameters if reached else None)
 
     @property
     def registers(self) -> tuple[int, ...]:
         """What stands in the block, as many registers as its layout has."""
-        block = self.block.registers()
-        return block if self.program.layout == 1 else block + _GAP + self.mailbox.registers()
+        words = (*self.block.registers(), *_GAP, *self.mailbox.mailbox.registers())
+        return words[: _REGISTERS[self.program.layout]]
 
     def put(self, offset: int, words: tuple[int, ...]) -> None:
         """
@@ -178,14 +186,13 @@ class Channel:
 
         :raises Refused: ADDRESS: one of them is not.
         """
-        written = range(offset, offset + len(words))
-        if written[0] >= FIRST_WRITTEN and written[-1] < REGISTERS:
+        written = set(range(offset, offset + len(words)))
+        if written <= _WORDS_OF_ROS:
             self.block.put(offset, words)
-            return
-        first = plc_mailbox.FIRST
-        if written[0] < first or written[-1] >= first + plc_mailbox.WRITTEN:
+        elif written <= _REQUESTS_OF_ROS:
+            self.mailbox.mailbox.put(offset - _MAILBOX, words)
+        else:
             raise Refused(Reason.ADDRESS, f'the PLC writes some of +{offset} on itself')
-        self.mailbox.put(offset - first, words)
 
     def describe(self) -> dict[str, Any]:
         """Return what stands in the block, and what the program says; it can be JSON."""
@@ -230,25 +237,24 @@ class Plc:
         self.stopped_until = until
         for address, channel in self.channels.items():
             fresh = self._channel(channel.drive, channel.unit, channel.register)
-            for name in ('block', 'program', 'mailbox', 'mailbox_program', 'records'):
+            for name in ('program', 'mailbox', 'records'):
                 setattr(self.channels[address], name, getattr(fresh, name))
 
     def _channel(self, drive: SimulatedDrive, unit: int, register: int) -> Channel:
         server = drive.servers.get(TELEGRAM)
         if not isinstance(server, telegram1.Server):
             raise ValueError(f'{drive.model.name} does not speak {TELEGRAM}')
-        program = RosTelegram1(
-            lambda: self._now,
-            lost_clears=server.lost_clears,
-            lost_sets=server.lost_sets,
-            ros_time=self.setting.ros_time,
-            drive_time=self.setting.drive_time,
-            layout=self.setting.layout,
-        )
         server.longer = self.setting.longer_telegram
-        released = self.setting.released
-        records = Records(self.setting.access_time)
-        return Channel(drive, server, unit, register, Block(), program, released, records=records)
+        shipped, clock = program(), lambda: self._now
+        one = shipped['FB_RosTelegram1'](clock)
+        one.lost_clears, one.lost_sets = server.lost_clears, server.lost_sets
+        one.ros_time, one.drive_time = self.setting.ros_time, self.setting.drive_time
+        one.layout = self.setting.layout
+        mailbox = shipped['FB_RosMailbox'](clock)
+        records = Records(shipped['FB_RosParameter'](clock), self.setting.access_time)
+        return Channel(
+            drive, server, unit, register, one, mailbox, records, self.setting.released
+        )
 
     @property
     def units(self) -> list[Unit]:

@@ -10,49 +10,54 @@ and keeps the response until it is fetched.
 
 from __future__ import annotations
 
+from typing import Any
+
 from nfo_sinus_driver.simulator.parameter_channel import ParameterChannel
-from nfo_sinus_driver.simulator.plc_mailbox import RECORD, RosMailbox, RosParameter
+
+#: Bytes of a record.
+_RECORD = 16
 
 
 class Records:
     """
     The two blocks for one drive, with the program that asks by them.
 
+    :param program: ``FB_RosParameter``.
     :param seconds: how long each takes (s).
     """
 
-    def __init__(self, seconds: float = 0.02) -> None:
+    def __init__(self, program: Any, seconds: float = 0.02) -> None:
+        self._program = program
         self._seconds = seconds
-        self._program = RosParameter()
         #: Which of the two is under way, and until when.
         self._busy = ''
         self._until = 0.0
         #: What the drive has answered.
         self._response: bytes | None = None
 
-    @property
-    def ended(self) -> tuple[bool, int, int, int]:
-        """Whether an access has ended, and with what."""
-        one = self._program
-        return one.done, one.result, one.high, one.low
+    def run(self, now: float, mailbox: Any, drive: ParameterChannel | None) -> None:
+        """
+        Run once.
 
-    def run(self, now: float, mailbox: RosMailbox, drive: ParameterChannel | None) -> None:
-        """Run once; ``drive`` is what answers there, ``None`` while it is not reached."""
+        :param mailbox: ``FB_RosMailbox``, which wants an access, and is given its result.
+        :param drive: what answers there, ``None`` while it is not reached.
+        """
         program = self._program
         ended = self._ended(now)
-        sent = fetched = failed = not_yet = False
-        if ended and drive is None:
-            failed = True
-        elif ended == 'write':
-            sent = True
-            assert drive is not None
+        written, read, reached = ended == 'write', ended == 'read', drive is not None
+        if written and drive is not None:
             self._response = drive.answer(bytes(program.record[: program.length]))
-        elif ended == 'read':
-            fetched = self._response is not None
-            not_yet = not fetched
-        response = [*(self._response or b''), *[0] * RECORD][:RECORD]
-        write_failed, read_failed = failed and ended == 'write', failed and ended == 'read'
-        program(mailbox, sent, write_failed, fetched, not_yet, read_failed, response)
+        program.request, program.command = mailbox.request, mailbox.command
+        program.pnu, program.sub_index = mailbox.pnu, mailbox.sub_index
+        program.value_high, program.value_low = mailbox.value_high, mailbox.value_low
+        program.written, program.write_failed = written and reached, written and not reached
+        there = self._response is not None
+        program.came, program.not_yet = read and reached and there, read and reached and not there
+        program.read_failed = read and not reached
+        program.response = [*(self._response or b''), *[0] * _RECORD][:_RECORD]
+        program()
+        mailbox.done, mailbox.done_result = program.done, program.result
+        mailbox.done_high, mailbox.done_low = program.high, program.low
 
     def _ended(self, now: float) -> str:
         """Return which of the two has ended just now, and begin what REQ asks for."""
