@@ -564,7 +564,7 @@ class Profile:
     :ivar identify: parameters that tell its drives from those of other makers, and the values by
         which they do.
     :ivar vendor: how the name of its maker begins in function 43; ``''``: not known.
-    :ivar told_by: a parameter that no other family has there; ``''``: there is none.
+    :ivar identified_by: a parameter that no other family has there; ``''``: there is none.
     :ivar writes_and_reads: it has Modbus function 23.
     :ivar releases: what its stop mode is where an ordinary stop releases the motor.
     :ivar older: its firmware that lacks parameters.
