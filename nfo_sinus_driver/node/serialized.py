@@ -16,8 +16,6 @@ import struct
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from rclpy.serialization import serialize_message
-from std_msgs.msg import Float32, Header
 
 #: Plain CDR in little-endian order, and no options.
 _HEAD = b'\x00\x01\x00\x00'
@@ -30,11 +28,8 @@ _FLOAT = struct.Struct('<4sf')
 
 
 def float32(value: float) -> bytes:
-    """Return a Float32."""
-    try:
-        return _FLOAT.pack(_HEAD, value)
-    except OverflowError:
-        return bytes(serialize_message(Float32(data=value)))
+    """Return a Float32 (OverflowError: it is too great for one)."""
+    return _FLOAT.pack(_HEAD, value)
 
 
 class Stamped:
@@ -45,7 +40,6 @@ class Stamped:
     """
 
     def __init__(self, type_: type) -> None:
-        self._type = type_
         kinds = type_.get_fields_and_field_types()
         if kinds.pop('header', '') != 'std_msgs/Header' or not _CODES.keys() >= {*kinds.values()}:
             raise TypeError(f'{type_.__name__} has fields that cannot be packed')
@@ -56,7 +50,11 @@ class Stamped:
         self._struct = functools.lru_cache(64)(self._struct_for)
 
     def pack(self, stamp: Time, frame_id: str, fields: Mapping[str, Any]) -> bytes:
-        """Return a message; what is not in ``fields`` has its default."""
+        """
+        Return a message; what is not in ``fields`` has its default.
+
+        :raises OverflowError: a number is too great for its field; or a struct.error.
+        """
         values: list[Any] = [_HEAD, stamp.sec, stamp.nanosec]
         lengths = []
         given = map(fields.get, self._names, self._defaults)
@@ -66,12 +64,7 @@ class Stamped:
                 values.append(len(value) + 1)
                 lengths.append(len(value) + 1)
             values.append(value)
-        try:
-            return self._struct(tuple(lengths)).pack(*values)
-        except (OverflowError, struct.error):
-            # rclpy knows what becomes of a value that is too great
-            header = Header(stamp=stamp, frame_id=frame_id)
-            return bytes(serialize_message(self._type(header=header, **fields)))
+        return self._struct(tuple(lengths)).pack(*values)
 
     def _struct_for(self, lengths: tuple[int, ...]) -> struct.Struct:
         return struct.Struct('<4s' + ''.join(_aligned(self._codes, iter(lengths))))

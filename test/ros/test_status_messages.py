@@ -68,7 +68,7 @@ def _values(type_: type) -> st.SearchStrategy[dict[str, Any]]:
         'boolean': st.booleans(),
         'uint8': st.integers(0, 0xFF),
         'uint32': st.integers(0, 0xFFFFFFFF),
-        'float': st.floats(),
+        'float': st.floats(width=32),
         'double': st.floats(),
         'string': st.text(st.characters(blacklist_characters='\0', codec='utf-8'), max_size=9),
     }
@@ -94,9 +94,16 @@ def test_what_is_packed_is_what_rclpy_serializes(type_: type, data: st.DataObjec
         assert str(deserialize_message(packed, type_)) == str(deserialize_message(expected, type_))
 
 
-@given(st.floats())
+@given(st.floats(width=32))
 def test_a_float_is_packed_as_rclpy_serializes_it(value: float) -> None:
     assert float32(value) == serialize_message(Float32(data=value))
+
+
+def test_a_value_that_is_too_great_is_no_message() -> None:
+    with pytest.raises(OverflowError):
+        float32(1e39)
+    with pytest.raises(OverflowError):
+        Stamped(DriveStatus).pack(Time(), '', {'actual': -1e39})
 
 
 def test_a_message_with_other_fields_is_not_packed() -> None:
