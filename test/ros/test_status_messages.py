@@ -16,9 +16,10 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32, Header
 
-from nfo_sinus_driver.catalog import families, load_profile
+from nfo_sinus_driver.catalog import Kind, families, load_profile
 from nfo_sinus_driver.drive import StopReason
 from nfo_sinus_driver.node.messages import drive_status, error_log_entry
+from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.serialized import Stamped, float32
 
 
@@ -110,3 +111,24 @@ def test_a_message_with_other_fields_is_not_packed() -> None:
     for type_ in (JointState, Float32):
         with pytest.raises(TypeError):
             Stamped(type_)
+
+
+@pytest.mark.parametrize('change', [
+    {'connected': False}, {'enabled': True}, {'text': '5 Overload'}, {'kind': Kind.FAULT},
+    {'stop': 'a reason'},
+], ids=lambda change: next(iter(change)))
+def test_what_is_new_or_subscribed_to_is_published_at_once(change: dict[str, Any]) -> None:
+    plain = {
+        'connected': True, 'enabled': False, 'text': '24 Stop', 'kind': Kind.STATUS, 'stop': None
+    }
+    reporter: Any = SimpleNamespace(_heard=False, _newest=None)
+
+    def is_urgent(**fields: Any) -> bool:
+        return Reporter._is_urgent(reporter, SimpleNamespace(**fields))  # type: ignore[arg-type]
+
+    assert is_urgent(**plain)
+    assert not is_urgent(**plain)
+    assert is_urgent(**{**plain, **change})
+    assert not is_urgent(**{**plain, **change})
+    reporter._heard = True
+    assert is_urgent(**{**plain, **change})

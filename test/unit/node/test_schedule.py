@@ -12,6 +12,7 @@ import time
 
 import pytest
 
+from nfo_sinus_driver.node import publish_queue
 from nfo_sinus_driver.node.publish_queue import PublishQueue, Schedule
 
 #: Far longer than anything here takes, s.
@@ -187,6 +188,31 @@ def test_what_may_wait_does_so_for_a_moment_only_and_in_its_order(queue: Publish
     for _ in range(2):
         assert published.acquire(timeout=PATIENCE)
     assert done == [0, 1, 2]
+
+
+def test_what_is_urgent_does_not_wait(
+    queue: PublishQueue, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(publish_queue, '_LONGEST_WAIT', 3600.0)
+    ready, both = threading.Event(), threading.Event()
+    done: list[int] = []
+    # from now on the thread wakes only when it is woken
+    queue.put(ready.set)
+    assert ready.wait(PATIENCE)
+
+    def publish(number: int) -> None:
+        done.append(number)
+        if number:
+            both.set()
+
+    stream = queue.stream(publish, bool)
+    time.sleep(0.2)
+    stream(0)
+    time.sleep(0.3)
+    assert done == []
+    stream(1)
+    assert both.wait(PATIENCE)
+    assert done == [0, 1]
 
 
 def test_a_stream_that_may_wait_loses_nothing_for_it(queue: PublishQueue) -> None:
