@@ -11,6 +11,7 @@ it, and reports how long that kept the line.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+import itertools
 import math
 from typing import Literal, NamedTuple
 
@@ -151,9 +152,10 @@ class Scheduler:
         """Return what goes next of one rank; what is for a unit that is missing by now waits."""
         queue = self._queues[rank]
         while True:
-            entry = next(iter(queue), None)
-            if self._unanswered is not None:
-                entry = next((one for one in queue if not self._is_unanswered(one)), None)
+            others = queue if self._unanswered is None else itertools.filterfalse(
+                self._is_unanswered, queue
+            )
+            entry = next(iter(others), None)
             if entry is None or rank == _MISSING or self._rank(entry) != _MISSING:
                 return entry
             del queue[entry]
