@@ -46,16 +46,15 @@ _SETTINGS = {
 
 
 @pytest.fixture(scope='module')
-def idle(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> Iterator[Bench]:
-    """A drive at rest and its driver, for the tests that leave both as they are."""
+def idle(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> Iterator[Client]:
+    """A client of a driver and its drive at rest, for the tests that leave both as they are."""
     with (
         own_domain() as domain,
         Bench(domain, tmp_path_factory.mktemp('idle'), connection) as bench,
     ):
         bench.simulator()
-        bench.driver(*FULL_RATE)
-        bench.client().connected()
-        yield bench
+        bench.driver()
+        yield bench.client().connected()
 
 
 def _stamps_increase(client: Client, topic: str) -> bool:
@@ -248,14 +247,16 @@ def test_diagnostics_of_a_run_name_its_fault_and_cry_over_no_stop_that_goes_well
 
 
 @needs('direct')
-def test_inv_st_is_there_for_late_comers(idle: Bench) -> None:
-    late = idle.client()
-    late.wait_for('inv_st', lambda m: m.text == idle.drives.stopped, 'the inverter status')
+def test_inv_st_is_there_for_late_comers(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver()
+    bench.client().connected()
+    late = bench.client()
+    late.wait_for('inv_st', lambda m: m.text == bench.drives.stopped, 'the inverter status')
 
 
-def test_quality_of_service(idle: Bench) -> None:
-    client = idle.client().connected()
-    node = client.node
+def test_quality_of_service(idle: Client) -> None:
+    node = idle.node
     for topic in TOPICS:
         publishers = functools.partial(node.get_publishers_info_by_topic, f'/nfo_sinus/{topic}')
         (info,) = wait_until(publishers, f'the publisher of {topic}')
@@ -268,15 +269,17 @@ def test_quality_of_service(idle: Bench) -> None:
 
 
 @needs('direct')
-def test_the_settings_have_their_defaults_and_descriptions(idle: Bench) -> None:
-    client = idle.client().connected()
+def test_the_settings_have_their_defaults_and_descriptions(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver(*FULL_RATE)
+    client = bench.client().connected()
     names = client.parameter_names()
-    for name, default in {**_SETTINGS, 'model': idle.connection.model}.items():
+    for name, default in {**_SETTINGS, 'model': bench.connection.model}.items():
         assert name in names
         assert client.parameter(name) == default
         assert client.descriptor(name).description
     assert client.descriptor('setpoint_timeout').floating_point_range[0].to_value == 3600
-    bus = idle.client('/nfo_sinus_bus')
+    bus = bench.client('/nfo_sinus_bus')
     assert bus.parameter('response_timeout') == 0.2
     assert bus.parameter('drives') == ['nfo_sinus']
     assert bus.descriptor('port').read_only
@@ -296,14 +299,13 @@ def test_the_settings_have_their_defaults_and_descriptions(idle: Bench) -> None:
     ],
 )
 def test_a_setting_that_makes_no_sense_is_refused_with_the_reason(
-    idle: Bench, name: str, value: object, reason: str
+    idle: Client, name: str, value: object, reason: str
 ) -> None:
-    client = idle.client().connected()
-    before = client.parameter(name)
-    result = client.set_parameters(**{name: value})
+    before = idle.parameter(name)
+    result = idle.set_parameters(**{name: value})
     assert not result.successful
     assert reason in result.reason
-    assert client.parameter(name) == before
+    assert idle.parameter(name) == before
 
 
 def test_settings_take_effect_at_once_and_integers_are_taken_for_doubles(bench: Bench) -> None:
