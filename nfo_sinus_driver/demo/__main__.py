@@ -134,6 +134,8 @@ def _sequence(bag: Path | None) -> Iterator[DemoSequence]:
         executor.add_node(sequence)
         stack.enter_context(spinning(executor))
         yield sequence
+        if bag is not None:
+            recorder.catch_up()
 
 
 def _output_folder() -> Path:

@@ -41,8 +41,6 @@ from nfo_sinus_driver.version import VERSION
 _PATIENCE = 5.0
 #: No other drive comes when none has for so long, s.
 _QUIET = 2.0
-#: How long what was sent before the end may be on its way, s.
-_ON_ITS_WAY = 0.5
 #: How long a signal may wait that came to another thread: Python handles it in the main one, but
 #: does not wake it (s). That is where it comes when the process was suspended.
 _POLL_SIGNALS = 0.2
@@ -207,7 +205,7 @@ def _wait(recorder: Recorder, seconds: float) -> None:
     # what was recorded is now closed and drawn, and that must not be cut short
     handle_signals(signal.SIG_IGN)
     # the end overtakes messages: a subscriber does not know which are yet to come
-    time.sleep(_ON_ITS_WAY)
+    recorder.catch_up()
 
 
 def _sleep_until(end: float) -> None:
@@ -236,7 +234,7 @@ def _record_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         '--for', type=_seconds, default=math.inf, dest='seconds', metavar='SECONDS',
-        help=f'end it after so long, and {_ON_ITS_WAY:g} s for what is on its way then',
+        help='end it after so long, and once that is written which has come by then',
     )
     parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
     return parser

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+import math
 from pathlib import Path
 import time
 from typing import Any
@@ -24,6 +25,8 @@ from nfo_sinus_driver.node.qos import LATCHED, NEWEST, RELIABLE, ROSOUT, newest
 _EVENT = '_service_event'
 #: How many messages may wait while the machine is busy with something else.
 _DEPTH = 1000
+#: How long what was sent before the end may be on its way, s.
+_ON_ITS_WAY = 0.5
 
 
 def topics_of(*drives: str) -> dict[str, tuple[type, QoSProfile]]:
@@ -91,6 +94,9 @@ class Recorder(Node):
         self._error: Exception | None = None
         self._count = 0
         self._began = time.monotonic()
+        #: When the last message was written that came before a moment, ns, of the system's clock.
+        self._written = self._began
+        self._until = math.inf
         try:
             self._bag = bags.create(folder, remarks)
         except OSError as error:
@@ -102,6 +108,13 @@ class Recorder(Node):
     def silent(self) -> list[str]:
         """The drives of which no status has been received."""
         return list(self._silent)
+
+    def catch_up(self) -> None:
+        """Wait until what was sent by now is in the bag: on a busy machine much of it waits."""
+        self._written = time.monotonic() + _ON_ITS_WAY
+        self._until = time.time_ns() + _ON_ITS_WAY * 1e9
+        while (left := self._written + _ON_ITS_WAY - time.monotonic()) > 0:
+            time.sleep(left)
 
     def __enter__(self) -> Recorder:
         return self
@@ -145,6 +158,8 @@ class Recorder(Node):
             self._heard(drive)
 
     def _write(self, topic: str, stamp: int, data: bytes) -> None:
+        if stamp < self._until:
+            self._written = max(self._written, time.monotonic())
         if self._error is not None:
             return
         try:

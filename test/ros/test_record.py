@@ -115,6 +115,33 @@ def test_the_run_of_any_drive_is_recorded_and_drawn(bench: Bench) -> None:
     assert again.returncode == 2 and 'is there already' in again.stderr
 
 
+@needs('own')
+def test_what_a_slow_machine_has_not_written_yet_is_in_the_bag_at_its_end(bench: Bench) -> None:
+    program = """
+import sys, time
+from nfo_sinus_driver.demo import record, recording
+write = recording.Recorder._write
+recording.Recorder._write = lambda *message: time.sleep(0.05) or write(*message)
+sys.exit(record.main())
+"""
+    bench.simulator(*bench.drives.ramps(1))
+    bench.driver()
+    client = bench.client().connected()
+    command = [sys.executable, '-c', program, '--output', str(bench.folder / 'slow')]
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(bench.domain)}
+    recorder = Process(command, environment, bench.folder / 'record.log')
+    bench.callback(recorder.end)
+    wait_until(lambda: 'is heard' in recorder.text, 'the recorder listens')
+    with client.run_at(20.0):
+        client.wait_for('status', lambda status: abs(status.actual - 20) < 0.1, 'it runs')
+    assert client.call('stop').success
+    client.wait_for('status', lambda status: abs(status.actual) < 0.1, 'it stands')
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 0, recorder.text
+    [run] = read(bench.folder / 'slow' / 'ride', ['/nfo_sinus'])
+    assert max(run.actual.values) > 19 and abs(run.actual.values[-1]) < 0.1
+
+
 @pytest.mark.slow
 @needs('own')
 def test_all_drives_are_recorded_and_it_is_explained_why_they_stopped(bench: Bench) -> None:
