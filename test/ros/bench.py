@@ -184,15 +184,16 @@ class Process:
             self.signal(signal.SIGINT)
         try:
             self.wait()
-        except subprocess.TimeoutExpired:
+        except subprocess.TimeoutExpired as late:
+            said = _last_words(self)
             self._process.kill()
             self._process.wait()
-            raise
+            raise AssertionError(f'{late}: {said}') from None
 
 
-def _last_words(driver: Process) -> str:
-    said = driver.text[-2000:]
-    return f'the driver says at last:\n{said}\nand its threads are at\n{driver.stacks()[:20000]}'
+def _last_words(process: Process) -> str:
+    said = process.text[-2000:]
+    return f'it says at last:\n{said}\nand its threads are at\n{process.stacks()[:20000]}'
 
 
 def _last_seen(view: Terminal) -> str:
