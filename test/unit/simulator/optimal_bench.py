@@ -10,12 +10,10 @@ from nfo_sinus_driver.simulator.modbus import server
 
 STATOR_FREQUENCY = 0x0400
 CONTROL_FREQUENCY = 0x0518
-ROTOR_SPEED = 0x0264
 CONTROL_SPEED = 0x0260
 MODE = 0x0294
 SMODE = 0x0298
 INPUT_FREQUENCY = 0x03FC
-INPUT_SPEED = 0x025C
 STATUS_WITH_ACK = 0x02A4
 STATUS = 0x02A5
 DRIVE_CONTROL = 0x0254
@@ -33,7 +31,6 @@ DISABLED = 1 << 6
 ALARM = 1 << 7
 FROM_BUS = 1 << 9
 REACHED = 1 << 10
-LIMIT = 1 << 11
 SLEEP = 1 << 12
 BRAKE = 1 << 13
 REVERSE = 1 << 14
@@ -58,12 +55,6 @@ class OptimalBench:
     def write(self, register, value):
         pdu = struct.pack('>BHH', 6, register, value & 0xFFFF)
         assert self.ask(pdu) == pdu
-
-    def refusal(self, register, value):
-        """Return the exception code that a write is answered with."""
-        pdu = self.ask(struct.pack('>BHH', 6, register, value & 0xFFFF))
-        assert pdu[0] == 0x86, pdu.hex()
-        return pdu[1]
 
     @property
     def bits(self):

@@ -1,49 +1,39 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Faults of a G2, their acknowledgement, a bus that falls silent, and tuning [M0 table 18]."""
+"""What a G2 alone does: what it refuses, drops and restarts by itself, and DriveControl [M0]."""
 
 import pytest
 
 from nfo_sinus_driver.catalog import Kind, load_family
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.memory import Reason
-from nfo_sinus_driver.simulator.sinus.control_unit import SinusVariant
+from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import PROCEDURES, TRIES
 
 MODEL = load_family('sinus_g2')
 FAULTS = [code for code in range(48) if MODEL.status_code(code).kind is Kind.FAULT]
-SERIAL = {14, 15}
 KEEPS = {'run_command_in_fault': 'keeps'}
+STANDBY = 0x4006  # NetCtrl, quick stop and voltage
+FORWARD = 0xC07F  # NetRef, NetCtrl, ramp generator, switched on, enabled
 
 
 def acknowledge(bench):
     return bench.read('fieldbus.inv_st_with_ack')
 
 
-def test_every_fault_stops_the_motor_shows_and_drops_or_keeps_the_run_command(make_bench):
-    for code in FAULTS:
-        for variant in ({}, KEEPS):
-            bench = make_bench(**variant)
-            bench.run(20, 2)
-            bench.drive.trip(code)
-            assert (bench.running, bench.state) == (False, 'FAULT_REACTION_ACTIVE'), code
-            assert bench.read('fieldbus.drive_status') & 0x8008 == 0x8008
-            bench.drive.advance(0.1)
-            assert (bench.state, bench.inv_st) == ('FAULTED', code)
-            assert bench.read('fieldbus.drive_status') & 0x8008 == 0x0008
-            assert bench.read('fieldbus.mode') == (1 if code in SERIAL else 3)
-            bench.drive.advance(10)
-            assert (bench.inv_st, bench.drive.motor.turning) == (code, False)
-            assert (acknowledge(bench), bench.drive.control_unit.ack_reads) == (code, 1)
-            bench.drive.advance(1)
-            assert bench.running is (variant is KEEPS and code not in SERIAL), code
-            # Sio Fail goes by MODE = Stop alone
-            expected = {14: 14, 15: 24}.get(code, 39 if bench.running else 37)
-            assert bench.inv_st == expected, code
-    for code in (0, 24, 27, 38, 45, 99):
-        with pytest.raises(ValueError, match='no fault'):
-            bench.drive.trip(code)
+def test_a_new_address_counts_from_the_next_power_on_or_at_once_with_auto_reset(bench):
+    bench.write('serial.address', 9)
+    assert bench.drive.address == 1
+    bench.drive.power_cycle()
+    bench.drive.advance(3)
+    assert bench.drive.address == 9
+    bench.write('serial.auto_reset', True)
+    bench.write('serial.address', 7)
+    assert bench.drive.address == 7
+
+
+# ---- faults ----
 
 
 def test_what_is_commanded_in_a_fault_is_dropped_with_the_last_fault(make_bench):
@@ -55,23 +45,21 @@ def test_what_is_commanded_in_a_fault_is_dropped_with_the_last_fault(make_bench)
     acknowledge(bench)
     assert (bench.drive.control_unit.scmd, bench.drive.faults.codes) == (0x101, [3])
     bench.drive.faults.end_causes()
-    assert bench.inv_st == 3, 'it is still to be acknowledged'
     acknowledge(bench)
     bench.drive.advance(1)
     assert not bench.running
     assert [entry.code for entry in bench.drive.faults.log] == [3, 5]
     bench = make_bench()
     bench.drive.control_unit.press('start')
-    bench.drive.advance(1)
-    assert bench.running
     bench.drive.trip(5)
-    bench.drive.advance(5)
     acknowledge(bench)
     bench.drive.advance(1)
     assert not bench.running, 'what the keypad has started, too'
-
-
-def test_reading_sio_err_drops_what_was_commanded_in_a_serial_fault(make_bench):
+    bench.mode(2)
+    bench.drive.trip(5)
+    acknowledge(bench)
+    bench.drive.advance(1)
+    assert bench.running, 'the terminals command all the time'
     for variant, runs in [({}, False), (KEEPS, True)]:
         bench = make_bench(**variant)
         bench.drive.trip(14)
@@ -79,30 +67,17 @@ def test_reading_sio_err_drops_what_was_commanded_in_a_serial_fault(make_bench):
         bench.scmd(0x101)
         bench.drive.read_raw('fieldbus.sio_err')
         bench.drive.advance(1)
-        assert bench.running == runs
+        assert bench.running == runs, 'of a serial fault, by reading SioErr'
 
 
-def test_without_a_fault_the_acknowledging_read_is_counted_and_drops_nothing(bench):
+def test_02a4h_alone_acknowledges_and_without_a_fault_it_drops_nothing(bench):
     bench.run(20, 5)
     assert acknowledge(bench) == 38
     bench.drive.advance(1)
     assert (bench.running, bench.drive.control_unit.ack_reads) == (True, 1)
     bench.drive.trip(3)
-    for _ in range(3):
-        assert bench.read('fieldbus.inv_st') == 3, 'the other read acknowledges nothing'
+    assert bench.read('fieldbus.inv_st') == bench.read('fieldbus.inv_st') == 3
     assert bench.drive.control_unit.ack_reads == 1
-
-
-def test_the_start_delay_runs_again_after_a_fault(make_bench):
-    bench = make_bench(**KEEPS)
-    bench.write('control.run_dly', 3)
-    bench.run(20, 10)
-    bench.drive.trip(5)
-    bench.drive.advance(10)
-    acknowledge(bench)
-    assert bench.inv_st == 25
-    bench.drive.advance(3.1)
-    assert bench.running
 
 
 WRITES = [
@@ -130,12 +105,6 @@ def test_what_is_refused_while_a_fault_is_active_is_an_option(make_bench):
         assert bench.running is (refused == 'all'), 'elsewhere MODE has taken the command back'
 
 
-def test_a_variant_that_there_is_not():
-    for name, _, _ in SinusVariant.options():
-        with pytest.raises(ValueError, match=f'{name}: choose one of'):
-            SinusVariant(**{name: 'sometimes'})
-
-
 def test_sio_fail_is_acknowledged_by_mode_stop_alone(make_bench):
     bench = make_bench(refuses_in_fault='all')
     bench.run(20, 5)
@@ -149,76 +118,7 @@ def test_sio_fail_is_acknowledged_by_mode_stop_alone(make_bench):
     assert (bench.inv_st, bench.running) == (37, False)
 
 
-def test_a_fault_is_acknowledged_by_the_rising_bit_of_drive_control(bench):
-    bench.write('fieldbus.drive_control', 0x4006)
-    for state in ('READY_TO_SWITCH_ON', 'FAULTED'):  # the second time there is no edge
-        bench.drive.trip(5)
-        bench.drive.advance(1)
-        bench.write('fieldbus.drive_control', 0x4086)
-        assert bench.state == state
-
-
-def test_the_log_keeps_what_happened_when(bench):
-    for code in [5] * 40 + [7]:
-        bench.drive.trip(code)
-        acknowledge(bench)
-        bench.drive.advance(36)
-    log = bench.drive.faults.log
-    assert (len(log), log[0].code, log[1].code) == (32, 7, 5)
-    assert log[0].op_time - log[1].op_time == pytest.approx(0.01)
-
-
-def test_a_power_cycle_ends_a_fault_whose_cause_is_gone(bench):
-    bench.drive.trip(5)
-    bench.drive.trip(7, cause_present=True)
-    for codes, inv_st in (([7], 7), ([], 24)):
-        bench.drive.power_cycle(0.1)
-        bench.drive.advance(1)
-        assert (bench.drive.faults.codes, bench.inv_st) == (codes, inv_st)
-        bench.drive.faults.end_causes()
-
-
-def test_a_fault_under_the_terminals_runs_again_when_acknowledged(bench):
-    bench.mode(2)
-    bench.drive.advance(5)
-    bench.drive.trip(5)
-    bench.drive.advance(5)
-    assert bench.read('fieldbus.mode') == 2
-    acknowledge(bench)
-    assert bench.running
-
-
-# ---- SioTot and AutoStop ----
-
-
-def watched(bench, *, auto_stop=True, sio_tot=2.0):
-    bench.write('serial.sio_tot', sio_tot)
-    bench.write('serial.auto_stop', auto_stop)
-    bench.write('control.retard', 60.0)
-    bench.run(20, 0.5)
-    bench.drive.heard()
-    return bench
-
-
-def test_a_silent_bus_stops_the_motor_with_auto_stop_and_a_time(make_bench):
-    bench = watched(make_bench())
-    for _ in range(10):
-        bench.drive.advance(1.5)
-        bench.drive.heard()
-    bench.drive.silence(5)  # it hears nothing either
-    bench.drive.advance(1.9)
-    assert bench.running
-    bench.drive.advance(0.2)
-    assert (bench.running, bench.inv_st, bench.read('fieldbus.mode')) == (False, 14, 1)
-    bench.drive.advance(15)
-    assert not bench.drive.motor.turning
-    for settings in ({'auto_stop': False}, {'sio_tot': 0}):
-        bench = watched(make_bench(), **settings)
-        bench.drive.advance(60)
-        assert (bench.inv_st, bench.read('status.frq_act')) == (38, 20), settings
-
-
-def test_the_time_counts_from_taking_control(bench):
+def test_the_time_of_a_silent_bus_counts_from_taking_control(bench):
     bench.write('serial.sio_tot', 1.0)
     bench.write('serial.auto_stop', True)
     bench.mode(2)
@@ -242,22 +142,17 @@ def restarting(bench, code=5, tries=1):
     return bench
 
 
-def test_a_fault_with_tries_ends_by_itself_and_the_motor_runs_again(make_bench):
+def test_a_fault_with_tries_alone_ends_by_itself_and_the_motor_runs_again(make_bench):
     for code in TRIES:
         bench = restarting(make_bench(), code)
         bench.drive.trip(code, cause_present=True)
         bench.drive.advance(4)
-        assert bench.inv_st == code
         bench.drive.faults.end_causes()
         bench.drive.advance(1.9)
         assert (bench.inv_st, bench.running) == (code, False), 'it counts from there'
         bench.drive.advance(0.3)
         assert (bench.inv_st, bench.running) == (39, True), code
         assert bench.drive.control_unit.ack_reads == 0
-        assert [entry.code for entry in bench.drive.faults.log] == [code]
-
-
-def test_no_other_fault_ends_by_itself(make_bench):
     for code in (*sorted(set(FAULTS) - set(TRIES)), 5):
         bench = restarting(make_bench(), tries=int(code != 5))
         bench.drive.trip(code)
@@ -277,29 +172,64 @@ def test_the_tries_are_used_up_unless_it_runs_well_for_a_while(bench):
     acknowledge(bench)
     bench.scmd(0x101)
     bench.drive.advance(11)
-    assert bench.running
     bench.drive.trip(5)
     bench.drive.advance(5)
     assert bench.running, 'it has run well for TrTime'
 
 
+# ---- DriveControl; its states are in test_g2_state_machine.py ----
+
+
+def under_control(bench, *words):
+    bench.write('status.frq_set', 20)
+    for word in words:
+        bench.write('fieldbus.drive_control', word)
+
+
 def test_a_control_word_needs_bit_0_low_after_a_fault_that_ended_by_itself(make_bench):
-    for in_fault, state in ((0xC07F, 'SWITCH_ON_DISABLED'), (0xC07E, 'READY_TO_SWITCH_ON')):
+    for in_fault, state in ((FORWARD, 'SWITCH_ON_DISABLED'), (0xC07E, 'READY_TO_SWITCH_ON')):
         bench = make_bench()
         bench.write('error.overload_err_cnt', 1)
         bench.write('error.rst_dly', 2)
-        bench.write('fieldbus.drive_control', 0x4006)
-        bench.write('fieldbus.drive_control', 0xC07F)
+        under_control(bench, STANDBY, FORWARD)
         assert bench.running
         bench.drive.trip(5)
-        bench.write('fieldbus.drive_control', in_fault)  # not refused: it is how it is reset
+        # not refused: it is how it is reset
+        bench.write('fieldbus.drive_control', in_fault)
         bench.drive.advance(10)
         assert (bench.running, bench.state) == (False, state)
         bench.write('fieldbus.drive_control', 0xD07F)  # bit 12: auto init
         assert bench.running
 
 
-# ---- tuning ----
+def test_the_bits_of_the_ramp_generator_and_the_run_input(make_bench):
+    for bit, frequency in ((4, 0), (5, 10), (6, 0)):
+        bench = make_bench()
+        under_control(bench, STANDBY, FORWARD)
+        bench.drive.advance(1)
+        under_control(bench, FORWARD & ~(1 << bit))
+        bench.drive.advance(5)
+        assert bench.read('status.frq_act') == pytest.approx(frequency, abs=0.2), bit
+        assert bench.running
+    bench.drive.set_run_input(False)
+    bench.drive.advance(5)
+    assert not bench.running
+    bench.drive.set_run_input(True)
+    assert bench.running
+
+
+def test_without_net_ctrl_a_word_does_nothing_and_the_mask_changes_bits_of_it(bench):
+    under_control(bench, 0x000F)
+    assert (bench.read('fieldbus.mode'), bench.running) == (1, False)
+    under_control(bench, STANDBY)
+    for mask, word in (((0xFFFF, 0x0001), STANDBY | 1), ((0xFFFE, 0x0000), STANDBY)):  # AND, OR
+        server(bench.drive).write(0x250, mask)
+        assert (bench.read('fieldbus.drive_control'), bench.read('fieldbus.mode')) == (word, 3)
+    under_control(bench, 0)
+    assert bench.read('fieldbus.mode') == 1
+
+
+# ---- tuning; what each procedure finds is in test/unit/drive/test_tuning.py ----
 
 
 def settings(bench):
@@ -311,35 +241,24 @@ def begin(bench, code=Scmd.FULL_TUNING):
     bench.scmd(code)
 
 
-def test_each_procedure_takes_its_time_and_changes_its_parameters(make_bench):
+def test_a_procedure_takes_its_time_and_changes_what_it_finds_alone(make_bench):
     for code, shown in ((0x201, 45), (0x301, 45), (0x401, 46), (0x501, 47)):
         bench = make_bench()
         before = settings(bench)
         begin(bench, code)
-        assert (bench.inv_st, bench.read('fieldbus.mode')) == (28, 0)
         bench.drive.advance(PROCEDURES[code].seconds - 0.1)
-        assert bench.inv_st == 28 and settings(bench) == before
+        assert (bench.inv_st, bench.read('fieldbus.mode')) == (28, 0)
+        assert settings(bench) == before
         bench.drive.advance(0.2)
         assert (bench.inv_st, bench.read('fieldbus.mode')) == (shown, 3), code
         after = settings(bench)
         assert {key for key in after if after[key] != before[key]} == set(PROCEDURES[code].finds)
         assert bench.drive.writes == {}, 'it is not the bus that wrote them'
-        bench.scmd(0)
-        assert bench.inv_st == 37
-
-
-def test_a_tuning_that_fails_is_a_fault_and_changes_nothing(bench):
     before = settings(bench)
-    for code in (16, 17):
-        bench.drive.control_unit.fail_tuning(code)
-        begin(bench)
-        bench.drive.advance(10)
-        assert (bench.inv_st, bench.drive.faults.log[0].code) == (code, code)
-        assert settings(bench) == before
-        acknowledge(bench)
+    bench.drive.control_unit.fail_tuning(16)
     begin(bench)
     bench.drive.advance(10)
-    assert bench.inv_st == 45, 'the next one succeeds'
+    assert bench.inv_st == 16 and settings(bench) == before
     with pytest.raises(ValueError, match=r'16, 17'):
         bench.drive.control_unit.fail_tuning(5)
 
@@ -349,8 +268,9 @@ def test_a_stop_alone_is_taken_meanwhile_or_is_refused(make_bench):
         bench = make_bench(**variant)
         before = settings(bench)
         begin(bench)
-        with bench.refuses(Reason.STATE):
-            bench.scmd(Scmd.FIELDBUS)
+        for key, code in (('mode', 1), ('mode', 2), ('mode', 3), ('scmd', Scmd.FIELDBUS)):
+            with bench.refuses(Reason.STATE):
+                bench.write(f'fieldbus.{key}', code)
         if variant:
             with bench.refuses(Reason.STATE):
                 bench.scmd(Scmd.STOP)
@@ -362,7 +282,7 @@ def test_a_stop_alone_is_taken_meanwhile_or_is_refused(make_bench):
         assert (settings(bench) == before) is not bool(variant)
 
 
-def test_what_else_ends_it(make_bench):
+def test_what_else_ends_a_tuning(make_bench):
     for what in (
         lambda drive: drive.set_run_input(False),
         lambda drive: drive.control_unit.press('stop'),
@@ -378,10 +298,8 @@ def test_what_else_ends_it(make_bench):
         assert settings(bench) == before
 
 
-def test_it_needs_bus_control_a_motor_that_stands_run_and_no_fault(make_bench):
+def test_a_tuning_needs_a_motor_that_stands_run_and_no_fault(make_bench):
     bench = make_bench()
-    with bench.refuses(Reason.STATE):
-        bench.scmd(Scmd.FULL_TUNING)
     bench.run(20, 5)
     with bench.refuses(Reason.STATE):
         bench.scmd(Scmd.FULL_TUNING)
@@ -391,10 +309,8 @@ def test_it_needs_bus_control_a_motor_that_stands_run_and_no_fault(make_bench):
     bench.scmd(Scmd.PAR_CALC)
     assert bench.inv_st == 28, 'only the calculation begins'
     bench = make_bench()
-    bench.mode(3)
     bench.drive.trip(5)
-    bench.scmd(Scmd.FULL_TUNING)
-    assert bench.read('fieldbus.mode') == 3
+    begin(bench)
     acknowledge(bench)
     bench.drive.advance(1)
     assert bench.inv_st == 37
