@@ -5,6 +5,8 @@
 
 import struct
 
+from hypothesis import strategies as st
+
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.movitrac import Movitrac
 
@@ -49,6 +51,14 @@ def select(index, value, address=0):
 def long_select(index, value, address=0):
     """Write 8 bytes."""
     return summed(struct.pack('>BBH', 0xAD, address, index) + value)
+
+
+#: Any frame of a master.
+requests = st.one_of(
+    st.builds(enquiry, st.integers(0, 0xFFFF), st.integers(0, 63)),
+    st.builds(select, st.integers(0, 0xFFFF), st.binary(min_size=4, max_size=4)),
+    st.builds(long_select, st.integers(0, 0xFFFF), st.binary(min_size=8, max_size=8)),
+)
 
 
 def data(index, value):

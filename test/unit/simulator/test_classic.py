@@ -6,13 +6,11 @@
 from classic_bench import ACK, NAK, RUN, SIO_FAIL, ClassicBench, bcc, enquiry, reply, select
 from hypothesis import given, settings, strategies as st
 import pytest
-from support.addresses import packed
 from support.examples import examples
 
 from nfo_sinus_driver.simulator import classic as classic_frames
 from nfo_sinus_driver.simulator.classic import Classic, LineError, Message
 from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.line import Receiver
 from nfo_sinus_driver.simulator.modbus import server
 
 #: "A SELECT message to address 1 which gives parameter 25 the value of 100" ([M0 §6.1.3], [M2 §5]).
@@ -68,56 +66,6 @@ def test_what_is_wrong_with_a_message():
         assert Classic.unwrap(frame) is None
 
 
-@given(st.integers(0, 0xFFFF), st.integers(0, 0xFFFF), st.data())
-def test_a_flipped_bit_is_noticed(id_, value, data):
-    frame = bytearray(select(f'E{id_:04X}', value))
-    # a letter's case apart (bit 5), which the BCC does notice
-    bit = data.draw(st.integers(8 * 3, 8 * len(frame) - 1))
-    frame[bit // 8] ^= 1 << bit % 8
-    assert classic_frames.parse(bytes(frame)).wrong
-
-
-def arrived(*chunks, pause=0.001):
-    """What the receiver makes of bytes that come in chunks."""
-    receive = Receiver(Classic(), 0.0, 1.0)
-    out = []
-    for number, chunk in enumerate(chunks):
-        out += receive.feed(chunk, pause * number)
-    out += receive.take(1000)
-    return [one.data for one in out]
-
-
-def test_a_check_sum_may_be_any_control_character():
-    found = {}
-    for value in range(0x200):
-        for id_ in ('E0019', 'E000A', 'E00AB'):
-            frame = select(id_, value)
-            found.setdefault(frame[-1], frame)
-    assert set(range(0x10)) <= set(found)
-    for frame in found.values():
-        assert arrived(frame + frame) == [frame, frame]
-        assert arrived(*(bytes([byte]) for byte in frame)) == [frame]
-
-
-def test_an_eot_or_a_second_of_silence_begins_anew():
-    asked = enquiry('E00E9')
-    for rubbish in (b'\x00', b'abc', b'\x04', b'\x04!', b'\x04!E00'):
-        assert arrived(rubbish + asked) == [rubbish, asked]
-    # a SELECT that lacks nothing but its check sum takes the EOT
-    assert arrived(EXAMPLE[:-1] + asked) == [EXAMPLE[:-1] + b'\x04', asked[1:]]
-    assert arrived(EXAMPLE[:7], asked, pause=1.1) == [EXAMPLE[:7], asked]
-    assert arrived(EXAMPLE[:7], EXAMPLE[7:], pause=0.9) == [EXAMPLE]
-
-
-@given(st.lists(st.binary(max_size=20), max_size=10))
-def test_no_byte_is_lost_and_a_message_after_silence_is_found(chunks):
-    receive = Receiver(Classic(), 0.0, 1.0)
-    out = [one.data for n, chunk in enumerate(chunks) for one in receive.feed(chunk, 0.001 * n)]
-    out += [one.data for one in receive.take(100)]
-    assert b''.join(out) == b''.join(chunks)
-    assert [one.data for one in receive.feed(EXAMPLE, 200)] == [EXAMPLE]
-
-
 @given(st.binary(max_size=30), st.sampled_from([4.21, 4.38]))
 @settings(max_examples=examples(200))
 def test_whatever_comes_the_answer_is_one_of_the_three(data, sw_ver):
@@ -161,47 +109,11 @@ def test_upper_and_lower_case():
 # ---- values ----
 
 
-def test_a_coarse_value_is_kept_and_read_back_and_a_finer_one_is_rounded():
-    for id_, key, coarse, value in (
-        ('E0008', 'motor.p_nom', 75, 0.75),
-        ('E0011', 'motor.i_nom', 21, 2.1),
-        ('E0015', 'motor.cos_phi', 77, 0.77),
-        ('E0002', 'motor.r_stat', 1234, 12.34),
-        ('E0004', 'motor.l_main', 4321, 0.4321),
-        ('E0005', 'motor.i_magn', 123, 1.23),
-        ('E001D', 'control.accel', 123, 12.3),
-        ('E001C', 'control.retard', 5000, 500),
-        ('E0049', 'pi_reg.t_min', -100, -100),
-        ('E0052', 'pi_reg.reg_amp', -1, -1),
-        ('E000A', 'pi_reg.unit', 3, 'bar'),
-        ('E005E', 'output.f_max', 32000, 32000),
-    ):
-        bench = ClassicBench()
-        assert bench.write(id_, coarse) == ACK
-        assert bench.read(id_) == coarse & 0xFFFF
-        assert bench.drive.peek(key) == pytest.approx(value)
-        assert bench.drive.writes[key] == 1
+def test_a_value_that_is_finer_than_the_protocol_is_rounded():
     for fine, coarse in ((5.004, 50), (5.05, 51), (5.149, 51), (4.951, 50)):
         bench = ClassicBench(settings={'control.accel': fine})
         assert bench.read('E001D') == coarse
         assert bench.drive.peek('control.accel') == fine
-
-
-def test_every_parameter_agrees_with_the_catalog():
-    bench, wrong = ClassicBench(), []
-    for key, parameter in bench.drive.model.items():
-        if 'classic' not in parameter.addresses or parameter.access.value not in ('r', 'rw'):
-            continue
-        words = [bench.read(f'E{id_:04X}') for id_ in parameter.at('classic').numbers]
-        value, shown = bench.drive.peek(key), parameter.decode(packed(*words), 'classic')
-        if isinstance(value, float):
-            step = float(parameter.factor('classic')) + 1e-9
-            if 'modbus' in parameter.addresses:
-                step = max(step, float(parameter.factor('modbus')))
-            value = pytest.approx(value, abs=step)
-        if shown != value:
-            wrong.append((key, shown, value))
-    assert not wrong
 
 
 def test_firmware_and_what_is_measured():
@@ -251,20 +163,11 @@ def test_the_setpoint_is_that_of_the_control_mode():
 
 
 @both
-def test_a_run(dialect):
+def test_who_has_control_is_shown_by_the_codes_and_texts_of_the_firmware(dialect):
     bench = ClassicBench(dialect)
-    assert bench.read('E00E9') == 24
-    bench.run(250)
-    bench.drive.advance(1)
-    assert bench.read('E00E9') == 39
-    bench.drive.advance(10)
-    assert (bench.read('E00E9'), bench.read('E00B6')) == (38, 250)
-    assert bench.write('E00AD', 0) == ACK
-    bench.drive.advance(10)
+    bench.write('E0029', 3)
     assert bench.read('E00E9') == 37
     assert bench.drive.control_unit.status_text == {'2.03': 'Bus Stby', '5.0': 'Sio Stby'}[dialect]
-    assert bench.write('E0029', 1) == ACK
-    assert bench.read('E00E9') == 24
     server(bench.drive).write(0x294, [3])
     assert bench.read('E00E9') == {'2.03': 37, '5.0': 41}[dialect], 'over Modbus'
 
@@ -287,15 +190,6 @@ def test_commands_of_newer_and_of_older_firmware():
             assert bench.write('E00AD', command) == answer
             if command != 0x900:
                 assert bench.drive.control_unit.scmd == (RUN if answer == NAK else 0)
-
-
-def test_drive_control_acknowledges_in_spite_of_a_fault():
-    bench = ClassicBench()
-    bench.drive.trip(5)
-    bench.drive.advance(1)
-    assert bench.write('E007C', 0x4006) == bench.write('E007C', 0x4086) == ACK
-    assert bench.read('E00E9') != 5
-    assert bench.read('E007D') & 8 == 0
 
 
 @both
@@ -455,11 +349,8 @@ def test_stop_in_spite_of_a_serial_fault():
 def test_silence_is_a_serial_fault(dialect):
     bench = ClassicBench(dialect, settings={'serial.sio_tot': 1.0, 'serial.auto_stop': True})
     bench.run()
-    for _ in range(4):
-        bench.drive.advance(0.6)
-        assert bench.read('E00E9') in (38, 39)
     bench.drive.advance(1.1)
-    assert (bench.read('E00E9'), bench.read('E0029')) == (SIO_FAIL, 1)
+    assert bench.read('E00E9') == SIO_FAIL
     assert (bench.read('E00AC'), bench.read('E00E9')) == (TIMEOUT, 24)
     for frame, flags in [(select('E0029', 1), 0), (DAMAGED, TIMEOUT)]:
         bench.read('E00AC')
@@ -468,15 +359,6 @@ def test_silence_is_a_serial_fault(dialect):
         bench.drive.faults.take_sio_err()
         bench.drive.advance(0.2)
         assert bench.flags == flags, 'a damaged message does not count as heard'
-
-
-def test_the_keypad_takes_over():
-    bench = ClassicBench()
-    bench.run()
-    bench.drive.control_unit.press('stop')
-    assert bench.read('E0029') == 1
-    assert bench.write('E00AD', RUN) == NAK
-    assert bench.flags == NOT_PERMITTED
 
 
 # ---- older firmware ----

@@ -100,6 +100,14 @@ def test_every_choice_is_possible_and_no_other(model: str) -> None:
             simulated_drive(model, **{option.name: 'sideways'})
 
 
+@pytest.mark.parametrize('model', simulated())
+def test_it_would_take_all_that_it_leaves_the_factory_with(model: str) -> None:
+    drive = simulated_drive(model)
+    assert not drive.motor.driven
+    for parameter in drive.memory.model.settings:
+        drive.memory.check(parameter, drive.memory.raw(parameter.key))
+
+
 @every_drive
 def test_a_fault_releases_the_motor_until_it_is_acknowledged(model: str) -> None:
     way = WAYS[model]

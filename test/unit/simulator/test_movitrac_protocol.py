@@ -14,6 +14,7 @@ from movitrac_drive_bench import (
     long_data,
     long_select,
     nack,
+    requests,
     select,
     summed,
 )
@@ -29,12 +30,6 @@ IS_25_5 = bytes.fromhex('C8 00 04 00 00 25 50 41')
 T11_UP_TO_3_7 = bytes.fromhex('A9 00 00 19 00 00 03 70 35')
 DONE = bytes.fromhex('D2 D2')
 N2_OFFSET, LIMIT_SWITCH_CW, USER_MENU = 98, 1001, 270
-
-requests = st.one_of(
-    st.builds(enquiry, st.integers(0, 0xFFFF), st.integers(0, 63)),
-    st.builds(select, st.integers(0, 0xFFFF), st.binary(min_size=4, max_size=4)),
-    st.builds(long_select, st.integers(0, 0xFFFF), st.binary(min_size=8, max_size=8)),
-)
 
 
 @pytest.fixture
@@ -65,14 +60,11 @@ def test_what_a_master_and_a_drive_say():
     assert movitrac_frames.refuse(ReturnCode.TOO_LARGE) == bytes.fromhex('F3 15 08') == nack(0x15)
 
 
-@given(requests, st.integers(0, 12), st.integers(1, 255), st.binary(max_size=20))
-def test_a_frame_is_cut_where_it_ends_and_a_damaged_byte_is_noticed(frame, place, change, rest):
+@given(requests, st.binary(max_size=20))
+def test_a_frame_is_cut_where_it_ends(frame, rest):
     assert Movitrac.cut(frame + rest) == len(frame)
     assert not any(Movitrac.cut(frame[:count]) for count in range(1, len(frame)))
     assert Movitrac.unwrap(frame).body == frame
-    damaged = bytearray(frame)
-    damaged[place % len(frame)] ^= change
-    assert Movitrac.unwrap(bytes(damaged)) is None
 
 
 @given(st.lists(st.sampled_from(sorted({*range(256)} - {0xB5, 0xA9, 0xAD})), min_size=1), requests)
