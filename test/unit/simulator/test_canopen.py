@@ -4,16 +4,9 @@
 """Simulated drives on a CAN bus: services, faults of the bus, and what the manual leaves open."""
 
 from can_bus_bench import Bus
-from hypothesis import given, strategies as st
 import pytest
-from support.addresses import packed, words_of
 
-from nfo_sinus_driver.catalog import Access, load_family
 from nfo_sinus_driver.simulator.can_frames import Frame, bits
-from nfo_sinus_driver.simulator.family import load, simulated_drive
-from nfo_sinus_driver.simulator.memory import Refused
-from nfo_sinus_driver.simulator.modbus import server as modbus_server
-from nfo_sinus_driver.simulator.sdo import Abort, AbortCode
 
 READ_VENDOR, READ_DATA = '4018100100000000', bytes.fromhex('4018100100000000')
 VENDOR = '431810011b000000'
@@ -421,85 +414,9 @@ def test_where_the_error_log_stands():
             assert where != name or bus.read(first)[3] == EXT_FAIL
 
 
-def test_every_choice_is_possible_and_no_other():
-    for option in load('sinus_g2').options:
-        for choice in option.choices:
-            assert there(Bus(**{option.name: choice}), MODE)
-        with pytest.raises(ValueError, match=f'{option.name}: choose one of'):
-            Bus(**{option.name: 'nonsense'})
+def test_what_younger_firmware_has_and_what_is_not_implemented_is_absent():
     for version, answer in ((4.38, '43'), (4.30, '80')):
         bus = Bus(settings={'fieldbus.sw_ver': version})
-        assert bus.sdo('40e9200000000000')[:2] == answer, 'what younger firmware has'
-
-
-# ---- two protocols at one drive ----
-
-PLACED = [one for one in load_family('sinus_g2').values() if 'canopen' in one.addresses]
-READABLE = [one for one in PLACED if 'modbus' in one.addresses and one.access is not Access.WRITE]
-WRITABLE = [
-    one for one in READABLE if one.access is Access.READ_WRITE and not one.key.startswith('serial.')
-]
-
-
-def same(parameter, one, other):
-    """Return whether two values are alike, to the coarser step of two protocols."""
-    if parameter.kind is not float:
-        return one == other
-    step = float(max(parameter.factor('modbus'), parameter.factor('canopen')))
-    return one == pytest.approx(other, abs=step)
-
-
-def by_modbus(drive, parameter):
-    place = parameter.at('modbus')
-    words = modbus_server(drive).read(place.index, place.codec.size // 2)
-    return parameter.decode(packed(*words), 'modbus')
-
-
-def by_canopen(drive, parameter):
-    place = parameter.at('canopen')
-    data = drive.servers['canopen'].read(place.index, place.sub_index or 0)
-    # in any size
-    number = int.from_bytes(data, 'little', signed=place.number.signed)
-    return parameter.decode(place.number.encode(number), 'canopen')
-
-
-def test_both_read_the_same_in_each_size():
-    for types in ('table', 'narrow', 'wide'):
-        drive = simulated_drive('sinus_g2', canopen_types=types)
-        for one in READABLE:
-            found = by_canopen(drive, one), by_modbus(drive, one)
-            assert same(one, *found), (types, one.key, found)
+        assert bus.sdo('40e9200000000000')[:2] == answer
     for place in ((0x6045, 0), (0x6072, 0), (0x2FFF, 0)):
-        with pytest.raises(Abort) as refused:
-            drive.servers['canopen'].read(*place)
-        assert refused.value.code is AbortCode.NO_OBJECT
-
-
-@given(st.sampled_from(WRITABLE), st.booleans(), st.data())
-def test_what_one_writes_the_other_reads(parameter, first, data):
-    drive = simulated_drive('sinus_g2')
-    place = parameter.at('modbus' if first else 'canopen')
-    number = place.number
-    codes = [int(code) for code in parameter.labels]
-    raw = st.sampled_from(codes) if codes else st.integers(number.minimum, number.maximum)
-    encoded = number.encode(data.draw(raw))
-    before = by_canopen(drive, parameter)
-    try:
-        if first:
-            modbus_server(drive).write(place.index, words_of(encoded))
-        else:
-            drive.servers['canopen'].write(place.index, place.sub_index or 0, encoded)
-    except (Refused, Abort):
-        assert by_canopen(drive, parameter) == before
-    else:
-        assert same(parameter, by_canopen(drive, parameter), by_modbus(drive, parameter))
-
-
-def test_a_motor_that_one_starts_the_other_stops():
-    bus = running(always_heard=True)
-    modbus = modbus_server(bus.drive)
-    assert modbus.read(0x2A5, 1) in ((38,), (39,))
-    modbus.write(0x298, [0])
-    bus.wait(5.0)
-    assert bus.read(INV_ST, 2) == b'\x25\x00'
-    assert not bus.drive.motor.driven
+        assert not there(bus, *place)

@@ -4,9 +4,11 @@
 """What a G2 alone does: what it refuses, drops and restarts by itself, and DriveControl [M0]."""
 
 import pytest
+from support.addresses import packed
 
-from nfo_sinus_driver.catalog import Kind, load_family
+from nfo_sinus_driver.catalog import Access, Kind, load_family
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
+from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import PROCEDURES, TRIES
@@ -31,6 +33,46 @@ def test_a_new_address_counts_from_the_next_power_on_or_at_once_with_auto_reset(
     bench.write('serial.auto_reset', True)
     bench.write('serial.address', 7)
     assert bench.drive.address == 7
+
+
+# ---- one drive by four protocols ----
+
+READ_BY = {
+    'modbus': lambda drive, place: packed(
+        *server(drive).read(place.index, place.codec.size // 2)
+    ),
+    'classic': lambda drive, place: packed(*map(drive.servers['classic'].enquiry, place.numbers)),
+    # in any size
+    'canopen': lambda drive, place: place.number.encode(
+        int.from_bytes(
+            drive.servers['canopen'].read(place.index, place.sub_index or 0), 'little',
+            signed=place.number.signed,
+        )
+    ),
+    'profibus': lambda drive, place: place.number.encode(
+        drive.servers['telegram1'].parameters.entries[place.index, place.sub_index or 0].read()
+    ),
+}  # fmt: skip
+
+
+def test_all_protocols_read_the_same():
+    for types in ('table', 'narrow', 'wide'):
+        drive = simulated_drive('sinus_g2', canopen_types=types)
+        for key, raw in (('fieldbus.mode', 3), ('status.frq_set', 123), ('fieldbus.scmd', 0x101)):
+            drive.write_raw(key, raw)
+        drive.advance(8)
+        for one in drive.model.values():
+            protocols = READ_BY.keys() & one.addresses.keys()
+            if one.access is Access.WRITE or 'modbus' not in protocols:
+                continue
+            seen = {by: one.decode(READ_BY[by](drive, one.at(by)), by) for by in protocols}
+            first = seen['modbus']
+            for by, value in seen.items():
+                if one.kind is float:
+                    step = float(max(one.factor('modbus'), one.factor(by)))
+                    assert value == pytest.approx(first, abs=step + 1e-9), (one.key, by)
+                else:
+                    assert value == first, (one.key, by)
 
 
 # ---- faults ----

@@ -116,20 +116,6 @@ def test_motor_runs_in_operation_alone_at_hundredths_of_a_hertz(bench):
     assert bench.actual == pytest.approx(6000, abs=1), 'it has no sign: 0xFC18 is 645.36 Hz'
 
 
-def test_stop_goes_by_the_stop_mode():
-    for bits, state in ((DISABLE, S3), (QUICK, S1)):
-        for mode in ('Dec', 'Free-Run'):
-            bench = Bench({'adv.stop_mode': mode})
-            bench.go(S4, seconds=4.0)
-            bench.bits(bits)
-            assert bench.state == state
-            bench.wait(0.1)
-            assert bench.motor.driven == (mode == 'Dec')
-            assert bench.motor.turning
-            bench.wait(6.0)
-            assert (bench.motor.driven, bench.actual) == (False, 0)
-
-
 def test_coast_stop_releases_the_motor_even_on_the_way_down(bench):
     bench.go(S4, seconds=4.0)
     bench.bits(DISABLE)
@@ -183,12 +169,6 @@ def test_it_says_operation_although_the_keypad_commands():
     assert not bench.motor.driven
 
 
-def test_it_follows_the_reference_that_the_keypad_chooses():
-    bench = Bench({'drv.freq_ref_src': 'Keypad-1', 'drv.frequency': 12.5})
-    bench.go(S4, seconds=4.0)
-    assert bench.actual == pytest.approx(1250, abs=1)
-
-
 def test_the_other_telegram_is_no_exchange():
     assert Bench().server.online
     assert not Bench({'com.opt_para_13': 'Vendor Specific Telegram'}).server.online
@@ -213,16 +193,6 @@ def test_fault_coasts_and_wants_one_edge_of_bit_7(bench):
     bench.drive.trip(12)
     bench.wait(0.1)
     assert bench.zsw1 & 0x08, 'the bit that still stands is no edge'
-
-
-def test_a_fault_whose_cause_lasts_stays(bench):
-    bench.drive.trip(15, cause_present=True)
-    bench.bits(OFF | 0x80)
-    assert bench.zsw1 & 0x08
-    bench.drive.faults.end_causes()
-    bench.bits(OFF)
-    bench.bits(OFF | 0x80)
-    assert not bench.zsw1 & 0x08
 
 
 # --- keypad, power, lost command ---

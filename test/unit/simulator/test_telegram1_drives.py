@@ -11,7 +11,7 @@ from telegram_bench import TelegramBench as Bench
 # Optimal: bits of STW1 and ZSW1, copied from [M1]
 SWITCH_ON, ENABLE, ACK, PLC = 1 << 0, 1 << 3, 1 << 7, 1 << 10
 READY, OPERATING, ENABLED, FAULT = 1 << 0, 1 << 1, 1 << 2, 1 << 3
-DISABLED, CONTROLLED, REACHED, REVERSE, STOPPING = 1 << 6, 1 << 9, 1 << 10, 1 << 14, 1 << 15
+DISABLED, CONTROLLED = 1 << 6, 1 << 9
 FULL = 8192
 
 # G2: DriveControl [M0 table 14] and the masks of [M0 table 16]
@@ -60,54 +60,12 @@ def test_a_bit_that_comes_too_early_does_nothing():
         assert not bench.zsw1 & OPERATING and not bench.motor.driven, words
 
 
-def test_a_bit_that_is_taken_away_ends_the_run():
-    for word in (PLC | ENABLE, PLC, PLC | SWITCH_ON, 0, ENABLE | SWITCH_ON):
-        bench = running_optimal()
-        bench.send(word)
-        bench.wait(0.2)
-        assert bench.zsw1 & STOPPING and bench.zsw1 & OPERATING, word
-        bench.wait(6.0)
-        assert not bench.motor.driven and not bench.zsw1 & (STOPPING | OPERATING), word
-        if word == PLC | ENABLE:
-            assert bench.step(PLC | ENABLE | SWITCH_ON) & OPERATING
-
-
-def test_bits_1_and_2_are_echoes():
-    bench = Bench('sinus_optimal')
-    for sent, shown in ((1 << 1, 1 << 4), (1 << 2, 1 << 5), (0x6, 0x30), (0, 0)):
-        bench.step(PLC | sent)
-        assert bench.zsw1 & 0x30 == shown
-
-
-def test_setpoint_is_a_share_of_nominal_frequency_or_speed():
-    bench = running_optimal(0, 0.0, **{'control.accel': 1.0, 'control.retard': 1.0})
-    for setpoint, frequency in (
-        (FULL, 50), (-FULL, -50), (FULL // 2, 25), (1, 50 / FULL), (24576, 150), (32767, 150)
-    ):
+def test_the_setpoint_has_a_limit():
+    bench = running_optimal(0, 0.0, **{'control.accel': 1.0})
+    for setpoint, frequency in ((1, 50 / FULL), (24576, 150), (32767, 150), (-32768, -150)):
         bench.send(bench.word, setpoint)
-        bench.wait(4.0)
+        bench.wait(0.1)
         assert bench.motor.demand == pytest.approx(frequency, rel=1e-6)
-        if abs(frequency) <= 50:
-            assert bench.actual == pytest.approx(setpoint, abs=2)
-            assert bench.zsw1 & REACHED
-        assert bool(bench.zsw1 & REVERSE) == (setpoint < 0)
-    bench = running_optimal(FULL, **{'control.mode': 'Speed'})
-    bench.wait(3.0)
-    assert bench.motor.speed == pytest.approx(1500, abs=3)
-    assert bench.actual == pytest.approx(FULL, abs=20)
-
-
-def test_fault_and_its_acknowledgement_by_an_edge():
-    bench = running_optimal()
-    bench.drive.trip(12)
-    bench.wait(0.1)
-    assert bench.zsw1 & FAULT and not bench.motor.driven
-    bench.step(PLC)
-    bench.step(PLC | ACK)
-    assert not bench.zsw1 & FAULT
-    bench.drive.trip(12)
-    bench.wait(0.1)
-    assert bench.zsw1 & FAULT, 'a bit that still stands is no edge'
 
 
 def test_who_takes_control_at_the_drive_keeps_it():
@@ -120,6 +78,20 @@ def test_who_takes_control_at_the_drive_keeps_it():
         assert not bench.motor.driven, key
         assert bool(bench.zsw1 & CONTROLLED) == (key == 'run input')
         assert bool(bench.zsw1 & DISABLED) == (key != 'stop')
+
+
+def test_a_fault_is_acknowledged_by_an_edge_and_then_it_stands():
+    for bench, acknowledge in ((running_optimal(), PLC | ACK), (running_g2(), G2_STANDBY | ACK)):
+        bench.drive.trip(12)
+        bench.wait(1.0)
+        bench.step(acknowledge & ~ACK)
+        assert bench.zsw1 & FAULT
+        assert not bench.step(acknowledge) & FAULT
+        bench.wait(2.0)
+        assert not bench.motor.driven
+        bench.drive.trip(12)
+        bench.wait(0.1)
+        assert bench.zsw1 & FAULT, 'a bit that still stands is no edge'
 
 
 def test_after_a_power_cycle_a_standing_word_does_nothing():
@@ -155,57 +127,12 @@ def running_g2(word=G2_FORWARD, setpoint=200, **settings):
     return bench
 
 
-def test_g2_goes_through_its_states_by_drive_control():
-    bench = Bench('sinus_g2', telegram_words='drivecontrol')
-    assert bench.step(0) & 0xC04F == 0x0040
-    assert bench.step(G2_STANDBY) & 0xC06F == 0x0021
-    assert bench.step(G2_ON) & 0xC06F == 0x0023
-    assert bench.step(G2_FORWARD, 100) & 0xC06F == 0x0027
-    assert bench.zsw1 & 0x0300 == 0x0300, 'control and reference from the net'
-    bench.wait(4.0)
-    assert bench.actual == 100
-    assert bench.motor.frequency == pytest.approx(10.0)
-    assert bench.step(G2_STANDBY) & 0xC06F == 0x8027, 'SHUTDOWN'
-    bench.wait(3.0)
-    assert bench.zsw1 & 0xC06F == 0x0021
-    bench = running_g2(G2_REVERSE)
-    assert (bench.zsw1 & 0xC06F, bench.actual) == (0x4023, -200)
-
-
 def test_g2_needs_a_positive_edge_of_bit_0():
     for words, run in (('drivecontrol', G2_FORWARD), ('profidrive', 0x047F)):
         bench = Bench('sinus_g2', telegram_words=words)
         bench.step(run, 200)
         bench.wait(3.0)
         assert not bench.motor.driven and bench.zsw1 & 0x40, words
-
-
-def test_g2_values_are_those_of_its_setpoint_registers():
-    for mode, setpoint in (('Freque', 200), ('Speed', 600)):
-        bench = running_g2(setpoint=setpoint, **{'control.mode': mode})
-        turned = bench.motor.frequency * 10 if mode == 'Freque' else bench.motor.speed
-        assert bench.actual == pytest.approx(setpoint, abs=2), mode
-        assert turned == pytest.approx(setpoint, abs=2), mode
-
-
-def test_g2_quick_stop_coasts():
-    for missing in (0x02, 0x04):
-        bench = running_g2()
-        bench.send(G2_FORWARD & ~missing)
-        bench.wait(0.02)
-        assert bench.motor.turning and not bench.motor.driven
-
-
-def test_g2_fault_and_its_acknowledgement():
-    bench = running_g2()
-    bench.drive.trip(5)
-    bench.wait(1.0)
-    assert bench.zsw1 & 0xC04F == 0x0008
-    bench.step(G2_STANDBY)
-    bench.step(G2_STANDBY | 0x80)
-    assert bench.zsw1 & 0xC06F == 0x0021
-    bench.wait(2.0)
-    assert not bench.motor.driven
 
 
 def test_g2_speaks_profidrive():
