@@ -12,8 +12,8 @@ from hypothesis import given, strategies as st
 import pytest
 
 from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.interface import Address, LineSettings, Refused
-from nfo_sinus_driver.link.sdo import Download, Upload
+from nfo_sinus_driver.link.interface import Address, LineSettings
+from nfo_sinus_driver.link.sdo import Upload
 from nfo_sinus_driver.simulator.can_frames import Frame, bits
 from nfo_sinus_driver.simulator.lawicel import Adapter
 from nfo_sinus_driver.simulator.sdo import Abort, AbortCode, Server
@@ -303,27 +303,6 @@ def uploaded(node):
     while upload.request is not None:
         assert upload.take(node.answer(upload.request))
     return upload.value
-
-
-@given(st.binary(max_size=200))
-def test_the_driver_reads_and_writes_any_value(value):
-    objects = Objects(bytes(len(value)))
-    node = Server(objects)
-    if value:
-        download = Download(5, *PLACE, value)
-        while download.request is not None:
-            assert not objects.writes, 'written before it was whole'
-            assert download.take(node.answer(download.request))
-        assert objects.writes == [value]
-    assert uploaded(node) == value
-
-
-def test_the_driver_understands_each_refusal():
-    for code in AbortCode:
-        upload = Upload(5, 0x2014, 0)
-        answer = Server(Objects(refusal=code)).answer(upload.request)
-        with pytest.raises(Refused, match=f'{code:08X}h'):
-            upload.take(answer)
 
 
 MESSAGES = st.one_of(

@@ -60,6 +60,13 @@ def test_a_bit_that_comes_too_early_does_nothing():
         assert not bench.zsw1 & OPERATING and not bench.motor.driven, words
 
 
+def test_bits_1_and_2_are_echoes():
+    bench = Bench('sinus_optimal')
+    for sent, shown in ((1 << 1, 1 << 4), (1 << 2, 1 << 5), (0x6, 0x30), (0, 0)):
+        bench.step(PLC | sent)
+        assert bench.zsw1 & 0x30 == shown
+
+
 def test_the_setpoint_has_a_limit():
     bench = running_optimal(0, 0.0, **{'control.accel': 1.0})
     for setpoint, frequency in ((1, 50 / FULL), (24576, 150), (32767, 150), (-32768, -150)):
