@@ -203,10 +203,14 @@ def test_the_error_log(dialect):
     bench.drive.trip(8)
     assert (bench.read('E0200'), bench.read('E0201')) == (0xABCD, 0x0801)
     assert [bench.read(f'E{0x201 + 2 * entry:04X}') >> 8 for entry in range(4)] == [8, 5, 7, 0]
+    assert server(bench.drive).read(0xC000, 2) == (0xABCD, 0x0801), 'over Modbus'
     size = {'2.03': 32, '5.0': 128}[dialect]
     assert bench.read(f'E{0x200 + 2 * size - 1:04X}') == 0
     assert bench.say(enquiry(f'E{0x200 + 2 * size:04X}')) == NAK
-    assert server(bench.drive).read(0xC000, 2) == (0xABCD, 0x0801), 'over Modbus'
+    for _ in range(size):
+        bench.drive.trip(5)
+        bench.drive.faults.acknowledge()
+    assert len(bench.drive.faults.log) == size, 'the oldest are gone'
 
 
 # ---- refusals ----
@@ -302,6 +306,14 @@ def test_a_fault_blocks_every_select_and_no_enquiry():
         assert (bench.read('E00E8'), bench.drive.control_unit.ack_reads) == (5, 1)
         assert bench.read('E00E9') not in (5, SIO_FAIL)
         assert bench.write('E0029', 1) == ACK
+
+
+def test_drive_control_acknowledges_in_spite_of_a_fault():
+    bench = ClassicBench()
+    bench.drive.trip(5)
+    bench.drive.advance(1)
+    assert bench.write('E007C', 0x4006) == bench.write('E007C', 0x4086) == ACK
+    assert bench.read('E00E9') != 5
 
 
 @both

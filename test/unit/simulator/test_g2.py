@@ -75,6 +75,30 @@ def test_all_protocols_read_the_same():
                     assert value == first, (one.key, by)
 
 
+# ---- what it follows ----
+
+
+def test_every_control_mode_follows_its_own_set_point(make_bench):
+    for mode, key, setpoint, measured in (
+        ('Speed', 'status.spd_set', -700, 'status.spd_act'),
+        ('Torque', 'status.trq_set', 10, 'status.trq_act'),
+        ('PI-Reg', 'status.reg_set', 60.0, 'status.reg_act'),
+    ):
+        bench = make_bench(settings={'control.mode': mode})
+        bench.mode(3)
+        bench.write(key, setpoint)
+        bench.scmd(0x101)
+        bench.drive.advance(15)
+        assert bench.read(measured) == pytest.approx(setpoint, abs=0.5), mode
+
+
+def test_the_status_word_says_whether_the_reference_comes_from_the_bus(bench):
+    bench.mode(3)
+    for code, bits in ((Scmd.FIELDBUS, 0x300), (Scmd.TERMINAL, 0x200), (Scmd.FIX_1_F, 0x200)):
+        bench.scmd(code)
+        assert bench.read('fieldbus.drive_status') & 0x300 == bits
+
+
 # ---- faults ----
 
 

@@ -144,6 +144,7 @@ def test_an_option_card_brings_terminals(bench):
     assert bench.word(m.TERMINALS) & 0x40000
     bench.run(10.0)
     assert bench.running
+    assert bench.word(m.TERMINALS) & 0x300 == 0x300, 'brake released, ready'
 
 
 def test_the_keypad_takes_over_and_gives_back(bench):
@@ -172,7 +173,10 @@ def test_the_keypad_takes_over_and_gives_back(bench):
 
 
 def test_a_rising_bit_resets_in_remote_control_alone(running):
+    assert running.read(m.FAULT_T0) == 0
     trip(running, OVERCURRENT)
+    trip(running, OVERCURRENT)
+    assert running.read(m.FAULT_T1) == 0, 'remembered once'
     running.bits(RESET)
     assert running.fault == 0
     trip(running, OVERCURRENT)
