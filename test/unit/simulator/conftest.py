@@ -24,11 +24,19 @@ PATIENCE, SOON = 60.0, 2.0
 MOST = 256
 
 
-class Bench:
-    """A drive on the bench: commands by name, and time that passes by command."""
+#: The run command of a Sinus, and its set-point in Frequency mode.
+KEYS = {
+    'sinus_g2': ('fieldbus.scmd', 'status.frq_set'),
+    'sinus_optimal': ('fieldbus.smode', 'fieldbus.input_freq_setpoint'),
+}
 
-    def __init__(self, **options):
-        self.drive = simulated_drive(**options)
+
+class Bench:
+    """A Sinus on the bench: commands by name, and time that passes by command."""
+
+    def __init__(self, model='sinus_g2', **options):
+        self.drive = simulated_drive(model, **options)
+        self._command, self._setpoint = KEYS[model]
 
     def write(self, key, value):
         parameter = self.drive.model[key]
@@ -45,12 +53,15 @@ class Bench:
         self.write('fieldbus.mode', code)
 
     def scmd(self, code):
-        self.write('fieldbus.scmd', code)
+        self.write(self._command, code)
+
+    def setpoint(self, hertz):
+        self.write(self._setpoint, hertz)
 
     def run(self, setpoint, seconds=0.0):
         """Take control, run by the bus, and let time pass."""
         self.mode(3)
-        self.write('status.frq_set', setpoint)
+        self.setpoint(setpoint)
         self.scmd(0x101)
         self.drive.advance(seconds)
 
@@ -68,6 +79,11 @@ class Bench:
     @property
     def inv_st(self):
         return self.read('fieldbus.inv_st')
+
+    def shown(self, seconds=0.0):
+        """The inverter status after a time."""
+        self.drive.advance(seconds)
+        return self.inv_st
 
     @property
     def running(self):
