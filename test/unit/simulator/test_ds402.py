@@ -62,6 +62,10 @@ def test_it_starts_in_three_steps_and_coasts_without_voltage() -> None:
 def test_reverse_is_the_sign_and_shows_the_same_states() -> None:
     bus = running(-300)
     assert bus.drive.motor.frequency == pytest.approx(-10.0, abs=0.1)
+    # by SCMD, analog reverse, it has a bit of its own in DriveStatus
+    bus.write(SCMD, 0, word(0x005))
+    bus.wait(5.0)
+    assert bus.drive.motor.frequency == pytest.approx(-30.0, abs=0.1)
     assert number(bus, STATUS) & 0x6F == 0x27
 
 

@@ -115,6 +115,7 @@ def test_parameters_of_a_g2_are_read_and_written_by_pnu():
     assert asked(bench, 4, 1, 2000)[:2] == (4, 2)
     assert asked(bench, 5, 2, 1007, 0, 0xFFFF) == (5, 1, 0, 2), 'f-Nom: out of its range'
     assert asked(bench, 6, 2, 944, 0, 1) == (6, 1, 0, 1), 'only to be read'
+    assert asked(bench, 7, 1, 1028, 9) == (7, 2, 0, 3), 'it has no such sub-index'
 
 
 def test_without_the_fieldbus_and_of_a_drive_without_pnus_there_is_no_access():

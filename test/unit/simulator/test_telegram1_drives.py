@@ -145,7 +145,7 @@ def test_g2_needs_a_positive_edge_of_bit_0():
 def test_g2_speaks_profidrive():
     # standard telegram 1: STW1 0476h, 0477h, 047Fh lead through S1 to S4 [C111]
     bench = Bench('sinus_g2')
-    assert bench.step(0) & 0x047 == 0x40
+    assert bench.step(0) & 0x247 == 0x40
     assert bench.step(0x0476) & 0x277 == 0x231
     assert bench.step(0x0477) & 0x047 == 0x03
     assert bench.step(0x047F, 100) & 0x8047 == 0x8007, 'bit 15: pulses enabled'
