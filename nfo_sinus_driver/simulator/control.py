@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The control channel of a running simulator: JSON objects, one a line, over a Unix socket.
+The control channel of a running simulator: a Unix socket, a connection for each request.
 
-A request names a ``verb`` and its ``arguments``; the answer has ``ok`` and either ``result`` or
-``error``, a text for people.
+A request is a line of JSON with a ``verb`` and its ``arguments``; the answer is one with ``ok`` and
+either ``result`` or ``error``, a text for people.
 """
 
 from __future__ import annotations
@@ -24,10 +24,8 @@ from typing import Any
 
 #: The longest path that a Unix socket takes, on Linux.
 _LONGEST = 107
-#: How often a state that is waited for is asked for, s: each time costs both ends a millisecond.
+#: How often a state that is waited for is asked for, s: it costs both ends two milliseconds.
 _PERIOD = 0.02
-
-Handler = Callable[[str, dict[str, Any]], Any]
 
 
 class ControlError(Exception):
@@ -56,27 +54,15 @@ def require_free(path: str) -> None:
     )
 
 
-class _Server(socketserver.ThreadingMixIn, socketserver.UnixStreamServer):
-    daemon_threads = True
-    block_on_close = False
-    handler: Handler
-    connections: set[socket.socket]
-    #: Clients that come at once wait here; a full queue would turn them away.
-    request_queue_size = 128
+class _Request(socketserver.StreamRequestHandler):
+    server: ControlServer
 
-
-class _Connection(socketserver.StreamRequestHandler):
     def handle(self) -> None:
-        assert isinstance(self.server, _Server)
-        self.server.connections.add(self.connection)
         # a client that goes away is no error
         with contextlib.suppress(ConnectionError):
-            for line in self.rfile:
-                self.wfile.write(self._answer(line).encode() + b'\n')
-        self.server.connections.discard(self.connection)
+            self.wfile.write(self._answer(self.rfile.readline()).encode() + b'\n')
 
     def _answer(self, line: bytes) -> str:
-        assert isinstance(self.server, _Server)
         try:
             request = json.loads(line)
             result = self.server.handler(request['verb'], request.get('arguments') or {})
@@ -86,7 +72,7 @@ class _Connection(socketserver.StreamRequestHandler):
             return json.dumps({'ok': False, 'error': str(text)})
 
 
-class ControlServer:
+class ControlServer(socketserver.ThreadingUnixStreamServer):
     """
     Serves the control channel in threads of its own.
 
@@ -95,46 +81,47 @@ class ControlServer:
     :raises ControlError: a live simulator has it, or it cannot be made.
     """
 
-    def __init__(self, path: str, handler: Handler) -> None:
-        self.path = path
+    daemon_threads = True
+    block_on_close = False
+    #: Clients that come at once wait here; a full queue would turn them away.
+    request_queue_size = 128
+
+    def __init__(self, path: str, handler: Callable[[str, dict[str, Any]], Any]) -> None:
         require_free(path)
-        place = Path(path)
-        if place.exists() and not place.is_socket():
+        self._place = Path(path)
+        if self._place.exists() and not self._place.is_socket():
             raise ControlError(f'{path} is no socket: choose another --control')
         if len(path.encode()) > _LONGEST:
             raise ControlError(f'{path} is too long for a socket: choose another --control')
+        self.handler = handler
         try:
-            place.unlink(missing_ok=True)
-            self._server = _Server(path, _Connection)
+            self._place.unlink(missing_ok=True)
+            super().__init__(path, _Request)
         except OSError as error:
             raise ControlError(
                 f'cannot make the control channel {path} ({error.strerror}): '
                 'choose another --control'
             ) from error
-        self._server.handler = handler
-        self._server.connections = set()
-        self._thread = threading.Thread(
-            target=self._server.serve_forever, kwargs={'poll_interval': 0.1}, daemon=True
-        )
-        self._thread.start()
+        threading.Thread(
+            target=self.serve_forever, kwargs={'poll_interval': 0.1}, daemon=True
+        ).start()
 
     def close(self) -> None:
         """Stop serving and remove the socket."""
-        self._server.shutdown()
-        self._server.server_close()
-        for connection in list(self._server.connections):
-            with contextlib.suppress(OSError):
-                connection.shutdown(socket.SHUT_RDWR)
-        Path(self.path).unlink(missing_ok=True)
+        self.shutdown()
+        self.server_close()
+        self._place.unlink(missing_ok=True)
 
 
 class Client:
-    """Speaks to a running simulator by its control channel; a ControlError says why not."""
+    """
+    Speaks to a running simulator by its control channel; a ControlError says why not.
+
+    It may be a context manager, with nothing to close.
+    """
 
     def __init__(self, path: str) -> None:
         self.path = path
-        self._socket: socket.socket | None = None
-        self._buffer = b''
 
     @classmethod
     def at_link(cls, link: str) -> Client:
@@ -178,48 +165,25 @@ class Client:
         """Send a request and return its result."""
         request = json.dumps({'verb': verb, 'arguments': arguments}).encode() + b'\n'
         try:
-            if self._socket is None:
-                self._socket = self._connected()
-            self._socket.sendall(request)
-            answer = json.loads(self._line(self._socket))
+            with socket.socket(socket.AF_UNIX) as connection:
+                connection.settimeout(10.0)
+                connection.connect(self.path)
+                connection.sendall(request)
+                line = connection.makefile('rb').readline()
+            if not line:
+                raise ConnectionResetError('it went away')
         except OSError as error:
-            self.close()
             raise ControlError(
                 f'no simulator listens at {self.path}: start one there, or name the right one '
                 f'with --link or --control ({error.strerror or error})'
             ) from error
+        answer = json.loads(line)
         if not answer['ok']:
             raise ControlError(answer['error'])
         return answer['result']
-
-    def close(self) -> None:
-        """Hang up; the next call connects again."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
-        self._buffer = b''
 
     def __enter__(self) -> Client:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def _connected(self) -> socket.socket:
-        connection = socket.socket(socket.AF_UNIX)
-        connection.settimeout(10.0)
-        try:
-            connection.connect(self.path)
-        except OSError:
-            connection.close()
-            raise
-        return connection
-
-    def _line(self, connection: socket.socket) -> bytes:
-        while b'\n' not in self._buffer:
-            data = connection.recv(65536)
-            if not data:
-                raise ConnectionResetError('it went away')
-            self._buffer += data
-        line, self._buffer = self._buffer.split(b'\n', 1)
-        return line
+        """Do nothing: a connection is for one request."""

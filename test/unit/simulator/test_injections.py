@@ -173,7 +173,6 @@ def test_a_client_says_when_there_is_no_simulator(link, folder):
     simulator.stop()
     with pytest.raises(ControlError, match='no simulator listens'):
         client.state()
-    client.close()
     with pytest.raises(ControlError, match='too long'):
         Simulator(control=str(folder / ('x' * 120)))
 
