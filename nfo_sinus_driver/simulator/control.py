@@ -54,6 +54,14 @@ def require_free(path: str) -> None:
     )
 
 
+def words(verb: str, *values: object, **flags: bool) -> list[str]:
+    """Return an injection as it is typed; a value that is a boolean is on or off."""
+    texts = [('off', 'on')[one] if isinstance(one, bool) else str(one) for one in values]
+    # behind the dashes alone a negative number is no option
+    chosen = [f'--{name}' for name, on in flags.items() if on]
+    return [verb, *chosen, *(['--', *texts] if texts else [])]
+
+
 class _Request(socketserver.StreamRequestHandler):
     server: ControlServer
 
@@ -139,10 +147,10 @@ class Client:
         return {int(address): state for address, state in states.items()}
 
     def inject(
-        self, what: str, *values: object, address: int | None = None, **arguments: object
+        self, verb: str, *values: object, address: int | None = None, **flags: bool
     ) -> None:
         """Let something happen: a verb of ``simulator inject`` with its arguments."""
-        self.call('inject', what=what, values=values, address=address, arguments=arguments)
+        self.call('inject', words=words(verb, *values, **flags), address=address)
 
     def wait_for(
         self,

@@ -78,6 +78,8 @@ class ControlUnit(abc.ABC):
     setpoints: ClassVar[frozenset[str]] = frozenset()
     #: What a factory reset leaves as it is: without them it would not hear the line any more.
     line_settings: ClassVar[frozenset[str]] = frozenset()
+    #: The keys that can be pressed.
+    keys: ClassVar[Sequence[str]] = ()
 
     def __init__(
         self, memory: Memory, address: int, variant: Variant, faults: Faults | None = None
@@ -158,6 +160,9 @@ class ControlUnit(abc.ABC):
     def nameplate(self) -> Nameplate:
         """Return the motor's data; by default those of a motor of 1.5 kW."""
         return Nameplate()
+
+    def press(self, key: str) -> None:
+        """Take one of :attr:`keys`."""
 
     # ---- the line ----
 

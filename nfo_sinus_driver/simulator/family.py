@@ -15,13 +15,14 @@ from dataclasses import dataclass, field
 import functools
 import importlib
 import importlib.util
+import operator
 
 from nfo_sinus_driver.catalog import Family, Value, families, is_described, load_family
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator.control_unit import ControlUnit, Option, Variant
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.injections import Injection, Injections, injections_of
+from nfo_sinus_driver.simulator.injections import INJECTIONS, Injection
 from nfo_sinus_driver.simulator.memory import Memory
 
 
@@ -35,7 +36,7 @@ class SimulatedFamily:
     :ivar factory: what leaves the factory otherwise than at the least value, in engineering units.
     :ivar machine: adds to the tables what a drive of this family keeps beside.
     :ivar servers: makes what answers the requests to a drive, by the protocols of the tables.
-    :ivar injections: what can be made to happen to it.
+    :ivar injections: what else can be made to happen to it.
     :ivar line: how its line leaves the factory, where that is not as usual of its protocol.
     """
 
@@ -46,7 +47,7 @@ class SimulatedFamily:
     servers: Mapping[str, Callable[[SimulatedDrive], object]] = field(
         default_factory=lambda: {'modbus': modbus.Server}
     )
-    injections: type[Injections] = Injections
+    injections: Mapping[str, Injection] = field(default_factory=dict)
     line: Mapping[str, int | str] = field(default_factory=dict)
 
     @property
@@ -124,11 +125,9 @@ def _kinds() -> Mapping[str, SimulatedFamily]:
 
 def every_injection() -> Mapping[str, Injection]:
     """Return what can be made to happen to a drive of any family."""
-    found: dict[str, Injection] = {}
-    for family in _kinds().values():
-        for name, one in injections_of(family.injections).items():
-            found[name] = found[name].joined(one) if name in found else one
-    return found
+    return functools.reduce(
+        operator.or_, (family.injections for family in _kinds().values()), INJECTIONS
+    )
 
 
 def every_option() -> Mapping[str, tuple[str, tuple[str, ...]]]:

@@ -27,7 +27,7 @@ from nfo_sinus_driver.simulator.family import (
     machine_of,
     simulated,
 )
-from nfo_sinus_driver.simulator.injections import Argument, parse_setting
+from nfo_sinus_driver.simulator.injections import Parser, add_verbs, parse_setting
 from nfo_sinus_driver.simulator.plc import PlcSetting
 from nfo_sinus_driver.simulator.ports import PortError
 from nfo_sinus_driver.simulator.simulator import Simulator
@@ -364,22 +364,22 @@ examples:
 
 def inject(argv: Sequence[str]) -> int:
     """Run the command and return its exit status; ``argv`` begins behind ``inject``."""
-    options = _inject_parser().parse_args(argv)
-    if options.control is not None:
-        path = options.control
-    elif options.link is not None or options.tcp is not None:
-        path = control_path(options.link, options.tcp)
-    else:
-        _inject_parser().error('say which simulator: --link, --tcp or --control')
+    parser = _inject_parser()
     try:
-        with Client(path) as client:
-            if options.verb == 'state':
-                _put(json.dumps(_state(client, options.address), indent=2, ensure_ascii=False))
-            else:
-                names = [argument.name for argument in every_injection()[options.verb].arguments]
-                given = {name: getattr(options, name) for name in names}
-                for address in options.address or (None,):
-                    client.inject(options.verb, address=address, **given)
+        options = parser.parse_args(argv)
+        if options.control is None and options.link is None and options.tcp is None:
+            raise ValueError('say which simulator: --link, --tcp or --control')
+    except ValueError as error:
+        parser.exit(2, f'{parser.prog}: error: {error}\n')
+    client = Client(options.control or control_path(options.link, options.tcp))
+    try:
+        if options.verb == 'state':
+            _put(json.dumps(_state(client, options.address), indent=2, ensure_ascii=False))
+            return 0
+        # the simulator has the same parser of words
+        typed = _which_parser().parse_known_args(argv)[1]
+        for address in options.address or (None,):
+            client.call('inject', words=typed, address=address)
     except ControlError as error:
         print(f'simulator inject: {error}', file=sys.stderr)
         return 1
@@ -403,13 +403,9 @@ def _state(client: Client, addresses: Sequence[int]) -> Mapping[Any, Any]:
     return {one: client.state(one) for one in addresses} or client.states()
 
 
-def _inject_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog='simulator inject',
-        description='Makes something happen to a running simulator.',
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def _which_parser() -> Parser:
+    """Return what takes the options that say to which simulator something happens."""
+    parser = Parser(add_help=False)
     parser.add_argument('--link', metavar='PATH', help='the pseudo-terminal that it serves')
     parser.add_argument('--tcp', type=int, metavar='PORT', help='the TCP port that it serves')
     parser.add_argument('--control', metavar='PATH', help='its control channel')
@@ -420,25 +416,17 @@ def _inject_parser() -> argparse.ArgumentParser:
         metavar='LIST',
         help='the drives, such as 1-10,20; needed where there are several and it happens to one',
     )
-    verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True)
-    for name, verb in every_injection().items():
-        sub = verbs.add_parser(name, help=verb.help, description=verb.help)
-        for argument in verb.arguments:
-            _add(sub, argument)
-    text = 'print the state of the drives as JSON'
-    verbs.add_parser('state', help=text, description=text)
     return parser
 
 
-def _add(parser: argparse.ArgumentParser, argument: Argument) -> None:
-    if argument.type is bool:
-        parser.add_argument(f'--{argument.name}', action='store_true', help=argument.help)
-        return
-    parser.add_argument(
-        argument.name,
-        type=argument.type if argument.type in (int, float) else str,
-        help=argument.help,
-        nargs=None if argument.required else '?',
-        default=None if argument.required else argument.default,
-        choices=argument.choices or None,
+def _inject_parser() -> Parser:
+    parser = Parser(
+        prog='simulator inject',
+        description='Makes something happen to a running simulator.',
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        parents=[_which_parser()],
     )
+    text = 'print the state of the drives as JSON'
+    add_verbs(parser, every_injection()).add_parser('state', help=text, description=text)
+    return parser

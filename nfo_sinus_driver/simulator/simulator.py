@@ -15,11 +15,17 @@ import time
 from typing import Any
 
 from nfo_sinus_driver.families import USUAL
-from nfo_sinus_driver.simulator.control import ControlServer, control_path, require_free
+from nfo_sinus_driver.simulator.control import ControlServer, control_path, require_free, words
 from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, Endpoint, endpoint, parse_endpoint
 from nfo_sinus_driver.simulator.family import load, simulated_drive
-from nfo_sinus_driver.simulator.injections import injections_of, the_drive
+from nfo_sinus_driver.simulator.injections import (
+    INJECTIONS,
+    Parser,
+    Target,
+    add_verbs,
+    the_drive,
+)
 from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
 from nfo_sinus_driver.simulator.timing import sharpen_timers
@@ -102,8 +108,9 @@ class Simulator:
             if one.tables not in drive.servers:
                 raise ValueError(f'{model} does not speak {one.protocol}')
         self.plc = _plc_before(self.drives, endpoints, plc)
-        self._kind = load(model).injections
-        self._injections = injections_of(self._kind)
+        self._injections = {**INJECTIONS, **load(model).injections}
+        self._parser = Parser()
+        add_verbs(self._parser, self._injections)
         self.lock = threading.RLock()
         self.control: str | None = None
         self.failure: Exception | None = None
@@ -191,22 +198,19 @@ class Simulator:
         return {address: self.state(address) for address in self.drives}
 
     def inject(
-        self, what: str, *values: object, address: int | None = None, **arguments: object
+        self, verb: str, *values: object, address: int | None = None, **flags: bool
     ) -> None:
-        """Let something happen: see :class:`~nfo_sinus_driver.simulator.injections.Injections`."""
-        if what not in self._injections:
-            known = ', '.join(self._injections)
-            raise ValueError(f'unknown injection {what!r}: choose one of {known}')
-        try:
-            bound = self._injections[what].bind(values, arguments)
-        except ValueError as error:
-            raise ValueError(f'{what} {error}') from None
+        """Let something happen: a verb of ``simulator inject`` with its arguments."""
+        self._inject(words(verb, *values, **flags), address)
+
+    def _inject(self, typed: Sequence[str], address: int | None) -> None:
+        given = self._parser.parse_args(typed)
         with self.lock:
             now = time.monotonic()
             if address is not None or len(self.drives) == 1:
                 self._catch_up(the_drive(self.drives, address), now)
-            target = self._kind(self.line, self.drives, self.plc, address, now)
-            getattr(target, what.replace('-', '_'))(**bound)
+            target = Target(self.line, self.drives, self.plc, address, now)
+            self._injections[given.verb].do(target, given)
             if self._thread is not None:
                 os.write(self._wake_write, b'.')
 
@@ -224,10 +228,7 @@ class Simulator:
         if verb == 'states':
             return self.states()
         if verb == 'inject':
-            named = arguments.get('arguments') or {}
-            address = arguments.get('address')
-            values = arguments.get('values') or ()
-            return self.inject(arguments['what'], *values, address=address, **named)
+            return self._inject(arguments['words'], arguments.get('address'))
         raise ValueError(f'unknown request {verb!r}')
 
     def _run(self) -> None:

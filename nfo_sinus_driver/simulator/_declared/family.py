@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import replace
 import functools
 from pathlib import Path
-from typing import Annotated, Literal
 
 from nfo_sinus_driver.catalog.declared import read
 from nfo_sinus_driver.simulator._declared.control_unit import (
@@ -17,22 +16,19 @@ from nfo_sinus_driver.simulator._declared.control_unit import (
 )
 from nfo_sinus_driver.simulator._declared.server import Server
 from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Injections
+from nfo_sinus_driver.simulator.injections import SWITCH, Injection, assign
 
-
-class DeclaredInjections(Injections):
-    """What else can be made to happen to it."""
-
-    def local(self, state: Annotated[Literal['on', 'off'], 'on or off']) -> None:
-        """Let keypad or terminals take control, or give it back."""
-        unit = self._drive.control_unit
-        assert isinstance(unit, DeclaredControlUnit)
-        unit.local = state == 'on'
-
+_INJECTIONS = {
+    'local': Injection(
+        'let keypad or terminals take control, or give it back',
+        lambda at, given: assign(at.unit, local=given.state == 'on'),
+        SWITCH,
+    )
+}
 
 #: What all of them have in common.
 ANY = SimulatedFamily(
-    control_unit=DeclaredControlUnit, variant=DeclaredVariant, injections=DeclaredInjections
+    control_unit=DeclaredControlUnit, variant=DeclaredVariant, injections=_INJECTIONS
 )
 
 

@@ -82,6 +82,7 @@ class MovitracControlUnit(ControlUnit):
     """
 
     line_settings = frozenset({_ADDRESS, _RESPONSE_TIME})
+    keys = ('manual', 'automatic', 'reset', *KEYS)
 
     faults: MovitracFaults
     variant: MovitracVariant
@@ -212,11 +213,7 @@ class MovitracControlUnit(ControlUnit):
             self.reset()
 
     def press(self, key: str) -> None:
-        """
-        Press a key of the keypad on X4: those for a direction count in manual operation.
-
-        :param key: ``manual``, ``automatic``, ``reset`` or one of :data:`~.commands.KEYS`.
-        """
+        """Press a key of the keypad on X4: those for a direction count in manual operation."""
         if key in KEYS:
             self._commands.key = KEYS[key]
         elif key == 'reset':

@@ -12,14 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Literal
 
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
 from nfo_sinus_driver.catalog.codec import BitField, SignedBcd, codec_of
 from nfo_sinus_driver.simulator import movitrac
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Injections
+from nfo_sinus_driver.simulator.injections import Injection, argument, assign
 from nfo_sinus_driver.simulator.movitrac import Nack, ReturnCode
 from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS, SETPOINT
 from nfo_sinus_driver.simulator.movitrac31.control_unit import MovitracControlUnit
@@ -185,39 +184,19 @@ class Server(movitrac.Server):
             raise Nack(code, f'{key} does not go with the other settings')
 
 
-class MovitracInjections(Injections):
-    """What else can be made to happen to a MOVITRAC 31..; ValueError: there is no such terminal."""
-
-    def terminal(
-        self,
-        number: Annotated[int, 'of the terminal, such as 41'],
-        state: Annotated[Literal['closed', 'open'], 'closed or open'],
-    ) -> None:
-        """Close or open a binary input."""
-        self._unit.switch(number, state == 'closed')
-
-    def keypad(
-        self,
-        key: Annotated[
-            Literal['manual', 'automatic', 'reset', 'cw', 'ccw', 'stop'], 'the key'
-        ],
-    ) -> None:
-        """
-        Press a key: manual and automatic choose who commands, cw, ccw and stop count in manual
-        operation; reset.
-        """
-        self._unit.press(key)
-
-    def ambient(self, temperature: Annotated[float, 'in °C, such as -15']) -> None:
-        """Change the temperature around the drive."""
-        self._unit.ambient = temperature
-
-    @property
-    def _unit(self) -> MovitracControlUnit:
-        unit = self._drive.control_unit
-        assert isinstance(unit, MovitracControlUnit)
-        return unit
-
+_INJECTIONS = {
+    'terminal': Injection(
+        'close or open a binary input',
+        lambda at, given: at.unit.switch(given.number, given.state == 'closed'),
+        argument('number', 'of the terminal, such as 41', type=int),
+        argument('state', 'closed or open', choices=('closed', 'open')),
+    ),
+    'ambient': Injection(
+        'change the temperature around the drive',
+        lambda at, given: assign(at.unit, ambient=given.temperature),
+        argument('temperature', 'in °C, such as -15', type=float),
+    ),
+}
 
 FAMILY = SimulatedFamily(
     control_unit=MovitracControlUnit,
@@ -225,5 +204,5 @@ FAMILY = SimulatedFamily(
     factory=_FACTORY,
     machine=_machine,
     servers={_PROTOCOL: Server},
-    injections=MovitracInjections,
+    injections=_INJECTIONS,
 )

@@ -164,6 +164,7 @@ class SinusControlUnit(ControlUnit):
     run_command: ClassVar[str]
     run_codes: ClassVar[Collection[int]]
     line_settings = LINE_SETTINGS
+    keys = tuple(KEYS)
 
     faults: SinusFaults
     variant: SinusVariant

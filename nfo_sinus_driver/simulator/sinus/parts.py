@@ -5,11 +5,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from argparse import Namespace
 
 from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator.classic import LineError
-from nfo_sinus_driver.simulator.injections import Injections
+from nfo_sinus_driver.simulator.injections import Injection, Target, argument
 from nfo_sinus_driver.simulator.modbus import KNOWN
 from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
 
@@ -28,22 +28,17 @@ class ModbusServer(modbus.Server):
         return super().treats(function) if chosen == KNOWN else chosen
 
 
-class SinusInjections(Injections):
-    """What else can be made to happen to a Sinus."""
+def _serial_error(at: Target, given: Namespace) -> None:
+    flags = {flag.bit_length() - 1: flag for flag in LineError}
+    if given.bit not in flags:
+        raise ValueError(f'SioErr has no bit {given.bit}, only {", ".join(map(str, flags))}')
+    at.unit.serial_error(flags[given.bit])
 
-    def keypad(self, key: Annotated[Literal['stop', 'ext', 'start'], 'stop, ext or start']) -> None:
-        """Press a key: stop (STOP), ext (SHIFT+STOP: to the terminals), start (run locally)."""
-        self._unit.press(key)
 
-    def sio_error(self, bit: Annotated[int, 'bit of SioErr, such as 1: parity']) -> None:
-        """Let something go wrong on the line: a flag of SioErr, Sio Fail under bus control."""
-        flags = {flag.bit_length() - 1: flag for flag in LineError}
-        if bit not in flags:
-            raise ValueError(f'SioErr has no bit {bit}, only {", ".join(map(str, flags))}')
-        self._unit.serial_error(flags[bit])
-
-    @property
-    def _unit(self) -> SinusControlUnit:
-        unit = self._drive.control_unit
-        assert isinstance(unit, SinusControlUnit)
-        return unit
+INJECTIONS = {
+    'sio-error': Injection(
+        'let something go wrong on the line: a flag of SioErr, Sio Fail under bus control',
+        _serial_error,
+        argument('bit', 'bit of SioErr, such as 1: parity', type=int),
+    ),
+}

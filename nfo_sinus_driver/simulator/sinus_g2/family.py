@@ -5,10 +5,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.sinus.parts import SinusInjections
+from nfo_sinus_driver.simulator.injections import Injection, argument, assign
+from nfo_sinus_driver.simulator.sinus import parts
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import FACTORY, G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.firmware import G2Variant
 from nfo_sinus_driver.simulator.sinus_g2.servers import (
@@ -18,24 +17,19 @@ from nfo_sinus_driver.simulator.sinus_g2.servers import (
     TelegramServer,
 )
 
-
-class G2Injections(SinusInjections):
-    """What else can be made to happen to a G2."""
-
-    def torn(self, times: Annotated[int, 'how many times'] = 1) -> None:
-        """Let a counter carry just after Classic has read one of its two words."""
-        server = self._drive.servers['classic']
-        assert isinstance(server, ClassicServer)
-        server.tears += times
-
-    def tuning_fails(
-        self, code: Annotated[int, 'InvSt code: 16 (TunFailP) or 17 (TunFailM)']
-    ) -> None:
-        """Let the next tuning end with a fault."""
-        unit = self._drive.control_unit
-        assert isinstance(unit, G2ControlUnit)
-        unit.fail_tuning(code)
-
+INJECTIONS = {
+    **parts.INJECTIONS,
+    'torn': Injection(
+        'let a counter carry just after Classic has read one of its two words',
+        lambda at, given: assign(at.drive.servers['classic'], tears=given.times),
+        argument('times', 'how many times', type=int, default=1),
+    ),
+    'tuning-fails': Injection(
+        'let the next tuning end with a fault',
+        lambda at, given: at.unit.fail_tuning(given.code),
+        argument('code', 'InvSt code: 16 (TunFailP) or 17 (TunFailM)', type=int),
+    ),
+}
 
 FAMILY = SimulatedFamily(
     control_unit=G2ControlUnit,
@@ -47,5 +41,5 @@ FAMILY = SimulatedFamily(
         'canopen': CanopenServer,
         'telegram1': TelegramServer,
     },
-    injections=G2Injections,
+    injections=INJECTIONS,
 )

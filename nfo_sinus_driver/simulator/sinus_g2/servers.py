@@ -95,7 +95,11 @@ _FLAGS: Mapping[Reason, LineError] = {
 
 
 class ClassicServer(classic.Server):
-    """The Classic side of one G2; so many times yet a counter ``tears`` while it is read."""
+    """
+    The Classic side of one G2.
+
+    :ivar tears: how many times yet a counter carries while it is read.
+    """
 
     def __init__(self, drive: SimulatedDrive) -> None:
         assert isinstance(drive.control_unit, G2ControlUnit)

@@ -163,6 +163,7 @@ class SinusHControlUnit(ControlUnit):
     :ivar fieldbus: the telegrams.
     """
 
+    keys = ('start', 'stop', 'reset')
     variant: SinusHVariant
     word: Stw1
     setpoint: float

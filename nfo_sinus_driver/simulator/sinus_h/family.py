@@ -6,12 +6,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Literal
 
 from nfo_sinus_driver.simulator import telegram1
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Injections
 from nfo_sinus_driver.simulator.memory import Refused
 from nfo_sinus_driver.simulator.parameter_channel import (
     Entries,
@@ -137,23 +135,10 @@ _WARNING = 1 << 4
 _MESSAGES = 64
 
 
-class SinusHInjections(Injections):
-    """What else can be made to happen to a Sinus H."""
-
-    def keypad(
-        self, key: Annotated[Literal['start', 'stop', 'reset'], 'start, stop or reset']
-    ) -> None:
-        """Press a key: start and stop of the keypad, reset of a fault."""
-        unit = self._drive.control_unit
-        assert isinstance(unit, SinusHControlUnit)
-        unit.press(key)
-
-
 FAMILY = SimulatedFamily(
     control_unit=SinusHControlUnit,
     variant=SinusHVariant,
     factory=keypad.FACTORY,
     machine=keypad.with_keypad,
     servers={'telegram1': Server},
-    injections=SinusHInjections,
 )

@@ -80,5 +80,5 @@ FAMILY = SimulatedFamily(
     factory=FACTORY,
     machine=_machine,
     servers={'modbus': ModbusServer, 'telegram1': TelegramServer},
-    injections=parts.SinusInjections,
+    injections=parts.INJECTIONS,
 )

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import enum
-from typing import Annotated, Any
+from typing import Any
 
 from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
 from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Injections
+from nfo_sinus_driver.simulator.injections import Injection, argument
 from nfo_sinus_driver.simulator.memory import Memory
 
 
@@ -100,17 +100,17 @@ class AcmeControlUnit(ControlUnit):
         return {'code': self.status_code, 'word': int(self._word)}
 
 
-class AcmeInjections(Injections):
-    """What else can be made to happen to it."""
-
-    def heat(self, lasts: Annotated[bool, 'it stays so'] = False) -> None:
-        """Let it be too hot."""
-        self._drive.trip(70, cause_present=lasts)
-
+INJECTIONS = {
+    'heat': Injection(
+        'let it be too hot',
+        lambda at, given: at.drive.trip(70, cause_present=given.lasts),
+        argument('--lasts', 'it stays so', action='store_true'),
+    )
+}
 
 FAMILY = SimulatedFamily(
     control_unit=AcmeControlUnit,
     variant=AcmeVariant,
     factory={'ramp.up': 1.0},
-    injections=AcmeInjections,
+    injections=INJECTIONS,
 )
