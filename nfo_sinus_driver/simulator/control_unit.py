@@ -24,6 +24,7 @@ from nfo_sinus_driver.simulator.timing import Timing
 
 def choice(usual: str, *others: str, text: str) -> str:
     """Return a field of a :class:`Variant`: what it can be, and what that decides."""
+    text = f'{text} (default: {usual})' if usual else text
     found: str = field(default=usual, metadata={'choices': (usual, *others), 'text': text})
     return found
 

@@ -155,6 +155,8 @@ def endpoint(
         raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
     if link is not None and tcp is not None:
         raise ValueError('link and tcp exclude each other: a line is at one of both')
+    if tcp is not None and not 0 <= tcp <= 65535:
+        raise ValueError(f'TCP port {tcp} is not possible: 0 (any free one) to 65535')
     row = PROTOCOLS[protocol]
     if row.kind is not None and not row.kind.serial:
         if link is not None:
@@ -172,7 +174,5 @@ def parse_endpoint(text: str) -> Endpoint:
     """Return the end typed as ``PROTOCOL``, ``PROTOCOL:LINK`` or ``PROTOCOL:PORT``."""
     protocol, _, place = text.partition(':')
     if place.isascii() and place.isdigit():
-        if int(place) > 65535:
-            raise ValueError(f'TCP port {place} is not possible: 0 (any free one) to 65535')
         return endpoint(protocol, tcp=int(place))
     return endpoint(protocol, link=place or None)

@@ -10,7 +10,7 @@ does, as ``FAMILY``. No file imports such a folder: :func:`load` finds it by its
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 import functools
 import importlib
@@ -49,11 +49,6 @@ class SimulatedFamily:
     )
     injections: Mapping[str, Injection] = field(default_factory=dict)
     line: Mapping[str, int | str] = field(default_factory=dict)
-
-    @property
-    def options(self) -> tuple[Option, ...]:
-        """What can be chosen of a drive."""
-        return self.variant.options()
 
 
 def simulated() -> tuple[str, ...]:
@@ -101,7 +96,7 @@ def simulated_drive(
     :raises ValueError: an unknown model, parameter or option, or a value that is not possible.
     """
     family = load(model)
-    known = {option.name for option in family.options}
+    known = {option.name for option in family.variant.options()}
     for option in options:
         if option not in known:
             raise ValueError(f'{model} has no option {option}')
@@ -117,35 +112,21 @@ def simulated_drive(
     )
 
 
-def _kinds() -> Mapping[str, SimulatedFamily]:
+def _kinds() -> Sequence[SimulatedFamily]:
     """Return all families, and what those have in common that files describe."""
     described = importlib.import_module(f'{__package__}._declared.family').ANY
-    return {**{name: load(name) for name in simulated()}, 'a file': described}
+    return [*map(load, simulated()), described]
 
 
 def every_injection() -> Mapping[str, Injection]:
     """Return what can be made to happen to a drive of any family."""
-    return functools.reduce(
-        operator.or_, (family.injections for family in _kinds().values()), INJECTIONS
-    )
+    return functools.reduce(operator.or_, (one.injections for one in _kinds()), INJECTIONS)
 
 
-def every_option() -> Mapping[str, tuple[str, tuple[str, ...]]]:
-    """Return what can be chosen of a drive of any family by name: a text, and the choices."""
+def every_option() -> Collection[Option]:
+    """Return what can be chosen of a drive of any family, as the first that has it shows it."""
     found: dict[str, Option] = {}
-    usual: dict[str, dict[str, str]] = {}
-    for model, family in _kinds().items():
-        for option in family.options:
+    for family in _kinds():
+        for option in family.variant.options():
             found.setdefault(option.name, option)
-            usual.setdefault(option.name, {})[option.choices[0]] = model
-    return {
-        name: (f'{option.text}{_usual(usual[name])}', tuple(filter(None, option.choices)))
-        for name, option in found.items()
-    }
-
-
-def _usual(usual: Mapping[str, str]) -> str:
-    """Return what is chosen by default, by the families where they differ."""
-    if len(usual) == 1:
-        return f' (default: {next(iter(usual))})' if '' not in usual else ''
-    return f' (default: {", ".join(f"{what} of {model}" for what, model in usual.items())})'
+    return found.values()

@@ -13,7 +13,7 @@ import json
 import os
 import signal
 import sys
-from typing import Any, NoReturn
+from typing import Any
 
 from nfo_sinus_driver.catalog import CatalogError, Value, with_factory_line
 from nfo_sinus_driver.catalog.finding import find
@@ -61,20 +61,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments[:1] == ['inject']:
         return inject(arguments[1:])
     parser = _parser(with_experts='--help-all' in arguments)
-    options = parser.parse_args(arguments)
-    if options.help_all:
-        parser.print_help()
-        return 0
-    with _signals_that_quit():
-        try:
-            simulator = _simulator(options)
-        except ValueError as error:
-            parser.error(str(error))
-        except (PortError, ControlError, OSError) as error:
-            print(f'simulator: {error}', file=sys.stderr)
-            return 1
-        with simulator:
+    try:
+        options = parser.parse_args(arguments)
+        with _signals_that_quit(), _simulator(options) as simulator:
             return _serve(simulator)
+    except (ValueError, CatalogError) as error:
+        parser.exit(2, f'simulator: error: {error}\n')
+    except (PortError, ControlError, OSError) as error:
+        print(f'simulator: {error}', file=sys.stderr)
+        return 1
 
 
 def _serve(simulator: Simulator) -> int:
@@ -121,17 +116,17 @@ def _simulator(options: argparse.Namespace) -> Simulator:
     :raises ControlError: another simulator is there.
     """
     given = {name: value for name, value in vars(options).items() if value is not None}
-    del given['help_all']
+    model = given['model'] = find(family) if (family := given.pop('family', '')) else options.model
     plc = {name: given.pop(name) for name in _OF_THE_PLC if name in given}
     # the line is as the options say, or else as the drive leaves the factory
     line = {name: given.pop(name, None) for name in ('protocol', 'baud_rate', 'char_format')}
-    line = {**_USUAL_LINE, **with_factory_line(line, load(options.model).line)}
+    line = {**_USUAL_LINE, **with_factory_line(line, load(model).line)}
     return Simulator(
         given.pop('address', [line['address']]),
         protocol=line['protocol'],
         baud=line['baud_rate'],
         char_format=line['char_format'],
-        settings=_settings(options.model, given.pop('set')),
+        settings=_settings(model, given.pop('set', ())),
         plc=PlcSetting(**plc) if plc else None,
         **given,
     )
@@ -161,22 +156,6 @@ def _addresses(text: str) -> list[int]:
     return found
 
 
-def _tcp(text: str) -> int:
-    port = int(text, 10)
-    if not 0 <= port <= 65535:
-        raise argparse.ArgumentTypeError(f'{text} is not possible: 0 (any free one) to 65535')
-    return port
-
-
-def _family(text: str) -> str:
-    try:
-        found = find(text)
-        machine_of(found)
-    except (ValueError, CatalogError) as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-    return found
-
-
 def _seconds(text: str) -> float:
     seconds = float(text)
     if not 0 <= seconds < 1e6:
@@ -197,159 +176,88 @@ def _span(text: str) -> tuple[float, float]:
     return _seconds(low), _seconds(high if colon else low)
 
 
-def _parser(*, with_experts: bool = False) -> argparse.ArgumentParser:
-    """Return the parser; its help shows what the manuals leave open only ``with_experts``."""
-    parser = _Parser(
+def _parser(*, with_experts: bool = False) -> Parser:
+    """
+    Return the parser: an option is an argument of :class:`Simulator` or of :class:`PlcSetting`.
+
+    Its help shows what the manuals leave open only ``with_experts``.
+    """
+    parser = Parser(
         prog='simulator',
         description='Simulates whole drives on a pseudo-terminal or TCP port.',
         epilog=_EPILOG,
     )
-    parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
-    _add_line(parser)
-    _add_drives(parser)
-    _add_plc(parser)
-    parser.add_argument(
-        '--help-all', action='store_true', help='show what can be chosen of a drive, too'
-    )
-    for name, (text, choices) in every_option().items():
-        shown = text if with_experts else argparse.SUPPRESS
-        parser.add_argument(f'--{name.replace("_", "-")}', choices=choices, help=shown)
-    return parser
+    flag, off, repeated = ({'action': how} for how in ('store_true', 'store_false', 'append'))
+    seconds = {'type': _seconds, 'metavar': 'SECONDS'}
+    path, no_help = {'metavar': 'PATH'}, argparse.SUPPRESS
 
+    def add(name: str, text: str, **how: Any) -> None:
+        parser.add_argument(name, help=text, **how)
 
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong with an option, without the usage: that is longer than a screen."""
-
-    def error(self, message: str) -> NoReturn:
-        """Leave the program."""
-        self.exit(2, f'{self.prog}: error: {message}\n')
-
-
-def _add_line(parser: argparse.ArgumentParser) -> None:
-    """Add what the line is."""
-    add = parser.add_argument
-    add('--protocol', choices=PROTOCOLS, help='default: modbus_rtu; with --family as its file says')
-    add('--model', default=USUAL, choices=simulated(), help=f'default: {USUAL}')
-    add(
-        '--family',
-        type=_family,
-        dest='model',
-        metavar='FILE',
-        help='in place of --model: a drive that a file describes, NAME.vfd.yaml; its name, its '
-        'path, or package://name/path',
-    )
-    add(
-        '--address',
-        type=_addresses,
-        action='extend',
-        metavar='LIST',
-        help='addresses of the drives, as their protocol has them, such as 1-10,20; may be '
+    add('--version', 'the version', action='version', version=f'nfo_sinus_driver {VERSION}')
+    add('--help-all', 'show what can be chosen of a drive, too', action='help')
+    # ---- the line ----
+    add('--protocol', 'default: modbus_rtu; with --family as its file says', choices=PROTOCOLS)
+    add('--model', f'default: {USUAL}', default=USUAL, choices=simulated())
+    add('--family', 'in place of --model: a drive that a file describes, NAME.vfd.yaml; its name, '
+        'its path, or package://name/path', metavar='FILE')
+    add('--address', 'addresses of the drives, as their protocol has them, such as 1-10,20; may be '
         'repeated (default: 1; with --family as its file says)',
-    )
-    add('--link', metavar='PATH', help='symbolic link to make to the pseudo-terminal')
-    add('--tcp', type=_tcp, metavar='PORT', help='serve a TCP port of 127.0.0.1 (0: any free one)')
-    add(
-        '--also',
-        action='append',
-        default=[],
-        metavar='PROTOCOL:PLACE',
-        help='serve the same drives by another protocol as well, at a link or TCP port; may be '
-        'repeated',
-    )
+        type=_addresses, action='extend', metavar='LIST')
+    add('--link', 'symbolic link to make to the pseudo-terminal', **path)
+    add('--tcp', 'serve a TCP port of 127.0.0.1 (0: any free one)', type=int, metavar='PORT')
+    add('--also', 'serve the same drives by another protocol as well, at a link or TCP port; may '
+        'be repeated', **repeated, metavar='PROTOCOL:PLACE')
     # the name of older versions
-    add('--baud', dest='baud_rate', type=int, help=argparse.SUPPRESS)
-    add(
-        '--baud-rate',
-        type=int,
-        help='default: 19200, of classic and movitrac 9600, of canopen 125000 (bit/s); with '
-        '--family as its file says',
-    )
-    add(
-        '--char-format',
-        metavar='FORMAT',
-        help='default: 8E1, of classic and modbus_ascii 7E1, of movitrac 8N1; with --family as its '
-        'file says',
-    )
-    add('--echo', action='store_true', help='return every byte, as a half-duplex adapter does')
-    _add_seconds(
-        parser,
-        '--gateway-timeout',
-        f'how long the gateway of modbus_tcp waits for a drive (default: {GATEWAY_TIMEOUT})',
-        default=GATEWAY_TIMEOUT,
-    )
-    add('--paced', action='store_true', help='bytes take the time they take on a real line')
-    _add_seconds(
-        parser,
-        '--turnaround',
-        'how long a drive takes before it answers (default: 0)',
-        default=0.0,
-    )
-    add('--trace', metavar='FILE', help='write every frame with its time, one JSON object a line')
-    add(
-        '--control',
-        default='',
-        metavar='PATH',
-        help='socket of the control channel (default: LINK.control; without --link in the '
-        "system's temporary folder)",
-    )
-
-
-def _add_drives(parser: argparse.ArgumentParser) -> None:
-    """Add how the drives are set."""
-    add = parser.add_argument
-    add(
-        '--set',
-        action='append',
-        default=[],
-        metavar='NAME=VALUE',
-        help='a parameter other than factory, by its name in the table of parameters; may be '
-        'repeated',
-    )
-    add(
-        '--no-run-input',
-        dest='run_input',
-        action='store_false',
-        help='the digital input RUN is not active',
-    )
-    _add_seconds(
-        parser,
-        '--boot-time',
-        'how long a drive is silent after power-on (default: 2)',
-        default=2.0,
-    )
-    add(
-        '--serial',
-        dest='serial_numbers',
-        action='append',
-        default=[],
-        metavar='TEXT',
-        help='serial number of a drive, at most 16 characters; once for each drive, in the order '
-        'of their addresses (default: made of the address)',
-    )
-
-
-def _add_plc(parser: argparse.ArgumentParser) -> None:
-    """Add how a PLC before the drives is programmed."""
-    typed: dict[str, dict[str, Any]] = {
-        'blocks': {'type': _block, 'action': 'append', 'metavar': 'UNIT:REGISTER'},
-        'answer_time': {'type': _span, 'metavar': 'LEAST:MOST'},
-        'layout': {'type': int, 'choices': (1, 2)},
-    }
-    for one in dataclasses.fields(PlcSetting):
-        text = one.metadata['text']
-        how = typed.get(one.name, {'type': _seconds, 'metavar': 'SECONDS'})
-        if isinstance(one.default, bool):
-            how = {'action': 'store_false' if one.default else 'store_true'}
-        elif isinstance(one.default, (int, float)):
-            text = f'{text} (default: {one.default:g})'
-        option = one.metadata['option']
-        parser.add_argument(option, dest=one.name, default=None, help=text, **how)
-
-
-def _add_seconds(
-    parser: argparse.ArgumentParser, option: str, text: str, **more: Any
-) -> None:
-    parser.add_argument(option, type=_seconds, metavar='SECONDS', help=text, **more)
+    add('--baud', no_help, dest='baud_rate', type=int)
+    add('--baud-rate', 'default: 19200, of classic and movitrac 9600, of canopen 125000 (bit/s); '
+        'with --family as its file says', type=int)
+    add('--char-format', 'default: 8E1, of classic and modbus_ascii 7E1, of movitrac 8N1; with '
+        '--family as its file says', metavar='FORMAT')
+    add('--echo', 'return every byte, as a half-duplex adapter does', **flag)
+    add('--gateway-timeout', 'how long the gateway of modbus_tcp waits for a drive (default: '
+        f'{GATEWAY_TIMEOUT})', **seconds)
+    add('--paced', 'bytes take the time they take on a real line', **flag)
+    add('--turnaround', 'how long a drive takes before it answers (default: 0)', **seconds)
+    add('--trace', 'write every frame with its time, a JSON object a line', metavar='FILE')
+    add('--control', 'socket of the control channel (default: LINK.control; without --link in the '
+        "system's temporary folder)", default='', **path)
+    # ---- the drives ----
+    add('--set', 'a parameter other than factory, by its name in the table of parameters; may be '
+        'repeated', **repeated, metavar='NAME=VALUE')
+    add('--no-run-input', 'the digital input RUN is not active', dest='run_input', **off)
+    add('--boot-time', 'how long a drive is silent after power-on (default: 2)', **seconds)
+    add('--serial', 'serial number of a drive, at most 16 characters; once for each drive, in the '
+        'order of their addresses (default: made of the address)',
+        dest='serial_numbers', **repeated, metavar='TEXT')
+    # ---- the PLC before them, over telegram1 ----
+    add('--block', 'where the PLC has the block of a drive, once for each drive, in the order of '
+        "their addresses (default: at unit ADDRESS, register 0); these are telegram1's",
+        dest='blocks', type=_block, **repeated, metavar='UNIT:REGISTER')
+    add('--plc-cycle', 'cycle of the program of the PLC (default: 0.01)', dest='cycle', **seconds)
+    add('--exchange-time', 'from one telegram between PLC and drive to the next (default: 0.02)',
+        dest='exchange', **seconds)
+    add('--ros-time', "how long the driver's life counter may stand still for the PLC (default: 1)",
+        **seconds)
+    add('--drive-time', 'how long the PLC takes the data of a drive for valid that it does not '
+        'reach (default: 0.5)', **seconds)
+    add('--answer-time', 'how long the PLC takes to answer (s), such as 0.05:0.4 (default: 0)',
+        type=_span, metavar='LEAST:MOST')
+    add('--no-function-23', 'the PLC refuses function 23',
+        dest='write_and_read', **off, default=None)
+    add('--not-released', 'the PLC does not release the drives to ROS',
+        dest='released', **off, default=None)
+    add('--layout', 'layout of the blocks of the PLC; 2 has a mailbox for parameters (default: 1)',
+        type=int, choices=(1, 2))
+    add('--access-time', "how long each of the PLC's WRREC and RDREC takes (default: 0.02)",
+        **seconds)
+    add('--longer-telegram', 'the PLC exchanges the longer telegram that a family has beside the '
+        'standard one', **flag, default=None)
+    # ---- what the manuals leave open ----
+    for option in every_option():
+        add(f'--{option.name.replace("_", "-")}', option.text if with_experts else no_help,
+            choices=tuple(filter(None, option.choices)))
+    return parser
 
 
 _EXAMPLES = """

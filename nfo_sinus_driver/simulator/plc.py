@@ -46,57 +46,35 @@ def program() -> Mapping[str, Any]:
     return found
 
 
-def _option(option: str, default: Any, text: str) -> Any:
-    """Return a field that is an option of the command line, too."""
-    return field(default=default, metadata={'option': option, 'text': text})
-
-
 @dataclass(frozen=True)
 class PlcSetting:
     """
-    How a PLC is programmed; each field is an option of the command line.
+    How a PLC is programmed; times in s.
 
+    :ivar blocks: unit and register of the block of each drive; empty: register 0 of a unit each.
+    :ivar cycle: of the program; :ivar exchange: from one telegram to the next.
+    :ivar ros_time: how long the driver's life counter may stand still.
+    :ivar drive_time: how long the data of a drive are valid that is not reached.
+    :ivar answer_time: how long an answer takes, at least and at most.
+    :ivar write_and_read: function 23 is not refused.
+    :ivar released: the drives are released to ROS.
+    :ivar layout: of the blocks; 2 has a mailbox for parameters, of which each record takes
+        ``access_time``.
+    :ivar longer_telegram: the telegram is the longer one that a family has beside the standard one.
     :raises ValueError: a time or a block that cannot be.
     """
 
-    blocks: Sequence[tuple[int, int]] = _option(
-        '--block',
-        (),
-        'where the PLC has the block of a drive, once for each drive, in the order of their '
-        "addresses (default: at unit ADDRESS, register 0); these are telegram1's",
-    )
-    cycle: float = _option('--plc-cycle', 0.01, 'cycle of the program of the PLC')
-    exchange: float = _option(
-        '--exchange-time', 0.02, 'from one telegram between PLC and drive to the next'
-    )
-    ros_time: float = _option(
-        '--ros-time', 1.0, "how long the driver's life counter may stand still for the PLC"
-    )
-    drive_time: float = _option(
-        '--drive-time',
-        0.5,
-        'how long the PLC takes the data of a drive for valid that it does not reach',
-    )
-    answer_time: tuple[float, float] = _option(
-        '--answer-time',
-        (0.0, 0.0),
-        'how long the PLC takes to answer (s), such as 0.05:0.4 (default: 0)',
-    )
-    write_and_read: bool = _option('--no-function-23', True, 'the PLC refuses function 23')
-    released: bool = _option(
-        '--not-released', True, 'the PLC does not release the drives to ROS'
-    )
-    layout: int = _option(
-        '--layout', 1, 'layout of the blocks of the PLC; 2 has a mailbox for parameters'
-    )
-    access_time: float = _option(
-        '--access-time', 0.02, "how long each of the PLC's WRREC and RDREC takes"
-    )
-    longer_telegram: bool = _option(
-        '--longer-telegram',
-        False,
-        'the PLC exchanges the longer telegram that a family has beside the standard one',
-    )
+    blocks: Sequence[tuple[int, int]] = ()
+    cycle: float = 0.01
+    exchange: float = 0.02
+    ros_time: float = 1.0
+    drive_time: float = 0.5
+    answer_time: tuple[float, float] = (0.0, 0.0)
+    write_and_read: bool = True
+    released: bool = True
+    layout: int = 1
+    access_time: float = 0.02
+    longer_telegram: bool = False
 
     def __post_init__(self) -> None:
         for name in ('cycle', 'exchange', 'ros_time', 'drive_time', 'access_time'):

@@ -113,7 +113,9 @@ class SinusVariant(Variant):
     #: drive ends by itself starts the motor in either case: that is what RstDly and ErrCnt are for.
     #: So do the terminals, whose RUN stands. With DriveControl the G2's state machine decides.
     run_command_in_fault: str = choice(
-        'drops', 'keeps', text='what an acknowledged fault does to a run command'
+        'drops',
+        'keeps',
+        text='what an acknowledged fault does to a run command; others than a G2 keep it',
     )
     #: In whatever protocol: all but DriveControl and MODE = Stop in a serial fault, or the run
     #: command [C98]. Classic refuses all whatever this says [M0 §6.1.5].

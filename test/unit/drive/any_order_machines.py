@@ -220,7 +220,7 @@ _TERMINALS = (41, 42)
 #: option cards, which change nothing here.
 SWITCHES = {
     option.name: st.sampled_from(option.choices)
-    for option in load('movitrac31').options
+    for option in load('movitrac31').variant.options()
     if option.name != 'option_card'
 }
 

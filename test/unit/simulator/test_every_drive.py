@@ -93,7 +93,7 @@ def test_every_family_is_here_but_those_behind_a_fieldbus_alone() -> None:
 
 @pytest.mark.parametrize('model', simulated())
 def test_every_choice_is_possible_and_no_other(model: str) -> None:
-    for option in load(model).options:
+    for option in load(model).variant.options():
         for choice in option.choices:
             simulated_drive(model, **{option.name: choice})
         with pytest.raises(ValueError, match=f'{option.name}: choose one of'):
