@@ -62,77 +62,65 @@ PROTOCOLS: Mapping[str, _Row] = {
 }
 
 
-@dataclass(frozen=True)
 class Endpoint:
     """
-    One end of a line.
+    One end of a line; what is not given is the protocol's default.
 
-    :ivar protocol: the name of its protocol.
+    :param link: a symbolic link to its pseudo-terminal.
+    :param tcp: its TCP port, in place of a pseudo-terminal.
+    :raises ValueError: no line can be so.
+
+    :ivar tables: the name of its protocol in the tables of the families.
+    :ivar spoken: the protocol that the drives themselves speak.
     :ivar timing: speed and format; of :class:`ModbusTcp` those of the line behind the gateway, of
         a CAN bus the bit rate alone.
-    :ivar link: a symbolic link to its pseudo-terminal, if it has one.
-    :ivar tcp: its TCP port, if it has one.
+    :ivar can_echo: a half-duplex adapter can be at the line.
+    :ivar through_plc: a PLC stands between the line and the drives.
     """
 
-    protocol: str
-    timing: Timing
-    link: str | None = None
-    tcp: int | None = None
-
-    @property
-    def tables(self) -> str:
-        """The name of its protocol in the tables of the families."""
-        return self._row.tables
-
-    @property
-    def spoken(self) -> str:
-        """The protocol that the drives themselves speak."""
-        return self.tables if self._row.kind is None else self._row.kind.spoken
-
-    @property
-    def can_echo(self) -> bool:
-        """Whether a half-duplex adapter can be at the line."""
-        return self._row.kind is not None and self._row.kind.serial
-
-    def make(self, gateway_timeout: float) -> Protocol:
-        """Return the protocol of a serial line; a gateway waits so long for a drive (s)."""
-        assert self._row.kind is not None
-        return self._row.kind(gateway_timeout)
-
-    @property
-    def through_plc(self) -> bool:
-        """Whether a PLC stands between the line and the drives."""
-        return self.protocol == ThroughPlc.name
-
-    def open(self) -> Port:
-        """Return its port (PortError: it cannot be had)."""
-        return PtyPort(self.link) if self.tcp is None else TcpPort(self.tcp)
-
-    def wire(
+    def __init__(
         self,
-        port: Port,
-        drives: Sequence[SimulatedDrive],
-        stations: Sequence[Station],
-        clock: Callable[[], float],
+        protocol: str,
         *,
-        gateway_timeout: float,
-        echo: bool,
-        **how: Any,
-    ) -> Wire:
-        """
-        Return the line on its port.
+        link: str | None = None,
+        tcp: int | None = None,
+        baud: int | None = None,
+        char_format: str | None = None,
+    ) -> None:
+        if protocol not in PROTOCOLS:
+            raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
+        if link is not None and tcp is not None:
+            raise ValueError('link and tcp exclude each other: a line is at one of both')
+        row = PROTOCOLS[protocol]
+        self.can_echo = row.kind is not None and row.kind.serial
+        if row.kind is not None and not row.kind.serial:
+            if link is not None:
+                raise ValueError(f'{protocol} needs a TCP port, not a link')
+            tcp = tcp or 0
+        if tcp is not None and not 0 <= tcp <= 65535:
+            raise ValueError(f'TCP port {tcp} is not possible: 0 (any free one) to 65535')
+        self.timing = Timing(row.baud if baud is None else baud, char_format or row.char_format)
+        if self.timing.char_format[0] not in row.data_bits:
+            has = self.timing.char_format
+            raise ValueError(f'{protocol} has {row.data_bits} data bits, {has} has not')
+        if row.bauds and self.timing.baud not in row.bauds:
+            rates = ', '.join(map(str, row.bauds))
+            raise ValueError(f'{self.timing.baud} bit/s: choose one of {rates}')
+        self.protocol = protocol
+        self.tables = row.tables
+        self.spoken = row.tables if row.kind is None else row.kind.spoken
+        self.through_plc = row.kind is ThroughPlc
+        self.tcp = tcp
+        self._link = link
+        self._row = row
 
-        :param stations: who is at a line of bytes: the drives, or what stands before them.
-        :param how: what :class:`Line` and :class:`CanLine` take alike.
-        """
-        if self._row.kind is None:
-            return CanLine(port, Adapter(), drives, self.timing, **how)
-        protocol = self.make(gateway_timeout)
-        return Line(port, protocol, stations, self.timing, clock, echo=echo, **how)
-
-    @property
-    def _row(self) -> _Row:
-        return PROTOCOLS[self.protocol]
+    @classmethod
+    def parse(cls, text: str) -> Endpoint:
+        """Return the end typed as ``PROTOCOL``, ``PROTOCOL:LINK`` or ``PROTOCOL:PORT``."""
+        protocol, _, place = text.partition(':')
+        if place.isascii() and place.isdigit():
+            return cls(protocol, tcp=int(place))
+        return cls(protocol, link=place or None)
 
     def check(self, address: int) -> None:
         """Look whether an address is one of the protocol (ValueError: it is not)."""
@@ -141,38 +129,29 @@ class Endpoint:
             span = f'{possible.start} to {possible.stop - 1}'
             raise ValueError(f'address {address} is not possible: {span} over {self.protocol}')
 
+    def open(self) -> Port:
+        """Return its port (PortError: it cannot be had)."""
+        return PtyPort(self._link) if self.tcp is None else TcpPort(self.tcp)
 
-def endpoint(
-    protocol: str,
-    *,
-    link: str | None = None,
-    tcp: int | None = None,
-    baud: int | None = None,
-    char_format: str | None = None,
-) -> Endpoint:
-    """Return an end of a line; what is not given is the protocol's default."""
-    if protocol not in PROTOCOLS:
-        raise ValueError(f'unknown protocol {protocol!r}: choose one of {", ".join(PROTOCOLS)}')
-    if link is not None and tcp is not None:
-        raise ValueError('link and tcp exclude each other: a line is at one of both')
-    if tcp is not None and not 0 <= tcp <= 65535:
-        raise ValueError(f'TCP port {tcp} is not possible: 0 (any free one) to 65535')
-    row = PROTOCOLS[protocol]
-    if row.kind is not None and not row.kind.serial:
-        if link is not None:
-            raise ValueError(f'{protocol} needs a TCP port, not a link')
-        tcp = tcp or 0
-    timing = Timing(row.baud if baud is None else baud, char_format or row.char_format)
-    if timing.char_format[0] not in row.data_bits:
-        raise ValueError(f'{protocol} has {row.data_bits} data bits, {timing.char_format} has not')
-    if row.bauds and timing.baud not in row.bauds:
-        raise ValueError(f'{timing.baud} bit/s: choose one of {", ".join(map(str, row.bauds))}')
-    return Endpoint(protocol, timing, link, tcp)
+    def wire(
+        self,
+        port: Port,
+        drives: Sequence[SimulatedDrive],
+        stations: Sequence[Station],
+        clock: Callable[[], float],
+        *,
+        gateway_timeout: float = GATEWAY_TIMEOUT,
+        echo: bool = False,
+        **how: Any,
+    ) -> Wire:
+        """
+        Return the line on its port.
 
-
-def parse_endpoint(text: str) -> Endpoint:
-    """Return the end typed as ``PROTOCOL``, ``PROTOCOL:LINK`` or ``PROTOCOL:PORT``."""
-    protocol, _, place = text.partition(':')
-    if place.isascii() and place.isdigit():
-        return endpoint(protocol, tcp=int(place))
-    return endpoint(protocol, link=place or None)
+        :param stations: who is at a line of bytes: the drives, or what stands before them.
+        :param gateway_timeout: how long a gateway waits for a drive (s).
+        :param how: what :class:`Line` and :class:`CanLine` take alike.
+        """
+        if self._row.kind is None:
+            return CanLine(port, Adapter(), drives, self.timing, **how)
+        protocol = self._row.kind(gateway_timeout)
+        return Line(port, protocol, stations, self.timing, clock, echo=echo, **how)

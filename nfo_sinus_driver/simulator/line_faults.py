@@ -12,36 +12,28 @@ import random
 ANSWER_FAULTS = ('noise', 'damage', 'delay', 'drop', 'double')
 #: Those that an answer does not survive where a gateway reads it, and what the trace calls them.
 _NOTES = {'noise': 'noise', 'damage': 'damaged', 'drop': 'lost'}
+#: How long each is, how far it is from one to the next, and since when (s).
+_NO_BURSTS = (0.0, 1.0, 0.0)
 
 
 @dataclass
-class _Pending:
-    what: str
-    address: int | None
-    left: int
-    seconds: float
-
-
-@dataclass(frozen=True)
-class _Rate:
-    """What happens to a share of all answers, by chance."""
+class _Fault:
+    """What happens to some answers: to so many of a drive or of any, or to a share by chance."""
 
     what: str
-    share: float
     seconds: float
-    chance: random.Random
+    address: int | None = None
+    left: int = 0
+    share: float = 0.0
+    chance: random.Random | None = None
 
-
-@dataclass(frozen=True)
-class _Bursts:
-    """Noise that drowns everything, again and again (s)."""
-
-    seconds: float
-    period: float
-    since: float
-
-    def struck(self, now: float) -> bool:
-        return (now - self.since) % self.period >= self.period - self.seconds
+    def strikes(self, address: int) -> bool:
+        """Whether it happens to the next answer of a drive."""
+        if self.chance is not None:
+            return self.chance.random() < self.share
+        strikes = self.left > 0 and self.address in (None, address)
+        self.left -= strikes
+        return strikes
 
 
 @dataclass(frozen=True)
@@ -67,16 +59,16 @@ class LineFaults:
         self._bits = bits
         self._whole = whole
         self.dead_until = float('-inf')
-        self._bursts: _Bursts | None = None
-        self._rates: dict[str, _Rate] = {}
-        self._pending: list[_Pending] = []
+        self._bursts = _NO_BURSTS
+        self._rates: dict[str, _Fault] = {}
+        self._pending: list[_Fault] = []
         self._random = random.Random(seed)
 
     def add(
         self, what: str, times: int = 1, address: int | None = None, seconds: float = 0.0
     ) -> None:
         """Spoil the next answers, of one drive or any, by one of :data:`ANSWER_FAULTS`."""
-        self._pending.append(_Pending(what, address, times, seconds))
+        self._pending.append(_Fault(what, seconds, address, times))
 
     def set_rate(
         self, what: str, share: float, seed: int | None = None, seconds: float = 0.0
@@ -93,36 +85,33 @@ class LineFaults:
         if not 0.0 <= share <= 1.0:
             raise ValueError(f'a share of {share:g}: it is 0 to 1')
         chance = self._random if seed is None else random.Random(seed)
-        self._rates[what] = _Rate(what, share, seconds, chance)
+        self._rates[what] = _Fault(what, seconds, share=share, chance=chance)
 
     def set_bursts(self, seconds: float, period: float, now: float) -> None:
         """Let the line carry nothing for so long in every period, first after one of them."""
         if not 0.0 <= seconds <= period:
             raise ValueError(f'bursts of {seconds:g} s every {period:g} s: they would never end')
-        self._bursts = _Bursts(seconds, period, now) if seconds else None
+        self._bursts = (seconds, period, now) if seconds else _NO_BURSTS
 
     def dead(self, now: float) -> bool:
         """Whether the line carries nothing now."""
-        return now < self.dead_until or (self._bursts is not None and self._bursts.struck(now))
+        seconds, period, since = self._bursts
+        return now < self.dead_until or (now - since) % period >= period - seconds
 
     def heal(self) -> None:
         """Forget them all."""
         self._pending.clear()
         self._rates.clear()
-        self._bursts = None
+        self._bursts = _NO_BURSTS
         self.dead_until = float('-inf')
 
     def alter(self, address: int, frame: bytes, instead: Reply | None = None) -> list[Reply]:
         """Return what goes on the line for an answer; ``instead`` of none what a gateway says."""
         replies = [Reply(frame)]
-        for fault in list(self._pending):
-            if fault.address in (None, address):
+        for fault in [*self._pending, *self._rates.values()]:
+            if fault.strikes(address):
                 replies = [new for reply in replies for new in self._spoiled(fault, reply, instead)]
-                fault.left -= 1
-        self._pending = [fault for fault in self._pending if fault.left > 0]
-        for rate in self._rates.values():
-            if rate.chance.random() < rate.share:
-                replies = [new for reply in replies for new in self._spoiled(rate, reply, instead)]
+        self._pending = [fault for fault in self._pending if fault.left]
         return replies
 
     def noise(self) -> bytes:
@@ -131,7 +120,7 @@ class LineFaults:
         mask = (1 << self._bits) - 1
         return bytes(byte & mask for byte in noise)
 
-    def _spoiled(self, fault: _Pending | _Rate, reply: Reply, instead: Reply | None) -> list[Reply]:
+    def _spoiled(self, fault: _Fault, reply: Reply, instead: Reply | None) -> list[Reply]:
         if fault.what in _NOTES and instead is not None:
             delay = reply.delay + instead.delay
             return [replace(instead, delay=delay, note=_noted(reply, _NOTES[fault.what]))]

@@ -17,7 +17,7 @@ from typing import Any
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.simulator.control import ControlServer, control_path, require_free, words
 from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
-from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, Endpoint, endpoint, parse_endpoint
+from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, Endpoint
 from nfo_sinus_driver.simulator.family import load, simulated_drive
 from nfo_sinus_driver.simulator.injections import (
     INJECTIONS,
@@ -93,8 +93,8 @@ class Simulator:
         plc: PlcSetting | None = None,
         **options: Any,
     ) -> None:
-        first = endpoint(protocol, link=link, tcp=tcp, baud=baud, char_format=char_format)
-        endpoints = [first, *map(parse_endpoint, also)]
+        first = Endpoint(protocol, link=link, tcp=tcp, baud=baud, char_format=char_format)
+        endpoints = [first, *map(Endpoint.parse, also)]
         if echo and not first.can_echo:
             raise ValueError(f'{protocol} has no echo')
         _require_possible(addresses, endpoints)

@@ -19,7 +19,7 @@ from nfo_sinus_driver.link.modbus_tcp import TcpLink
 from nfo_sinus_driver.link.movitrac import LONGEST_RESPONSE_TIME
 from nfo_sinus_driver.link.protocols import link_class, protocol_of
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
-from nfo_sinus_driver.simulator.endpoints import endpoint
+from nfo_sinus_driver.simulator.endpoints import Endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
@@ -105,7 +105,7 @@ class Line:
         paced: bool = True,
         plc: Mapping[str, Any] | None = None,
     ) -> None:
-        self._end = end = endpoint(protocol, baud=baud or {'modbus_rtu': 57600}.get(protocol))
+        self._end = end = Endpoint(protocol, baud=baud or {'modbus_rtu': 57600}.get(protocol))
         self.clock = clock
         options = {'boot_time': 0.2, **options}
         self.drives: dict[int, SimulatedDrive] = {

@@ -8,7 +8,7 @@ import re
 from typing import Any
 
 from nfo_sinus_driver.simulator.can_frames import Frame
-from nfo_sinus_driver.simulator.endpoints import endpoint
+from nfo_sinus_driver.simulator.endpoints import Endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
 
 _LINE = re.compile(rb'([tr])([0-9A-F]{3})(\d)((?:[0-9A-F]{2})*)\r')
@@ -56,7 +56,7 @@ class Bus:
     ) -> None:
         self.now = 100.0
         self.port = FakePort()
-        way = endpoint('canopen', baud=rate)
+        way = Endpoint('canopen', baud=rate)
         self.drives = {
             node: simulated_drive(model, node, settings=settings, boot_time=boot_time, **options)
             for node in nodes
@@ -69,12 +69,9 @@ class Bus:
             list(self.drives.values()),
             (),
             lambda: self.now,
-            gateway_timeout=0.0,
             paced=paced,
             turnaround=turnaround,
-            echo=False,
             always_heard=always_heard,
-            trace=None,
         )
         self.frames: list[tuple[float, Frame]] = []
         # no master hears their boot-up

@@ -11,9 +11,9 @@ from classic_bench import enquiry, reply
 import movitrac_drive_bench as movitrac
 import pytest
 
-from nfo_sinus_driver.simulator.endpoints import endpoint
+from nfo_sinus_driver.simulator.endpoints import Endpoint
 from nfo_sinus_driver.simulator.family import simulated_drive
-from nfo_sinus_driver.simulator.line import Line, Trace
+from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.line_faults import LineFaults, Reply
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii, ModbusRtu, ModbusTcp
 
@@ -76,7 +76,7 @@ class Rig:
         drive=None, **options,
     ):  # fmt: skip
         self.now = 100.0
-        way = endpoint(protocol, baud=baud)
+        way = Endpoint(protocol, baud=baud)
         self.words, self.timing = WORDS[protocol], way.timing
         model = self.words.model
         self.drives = [simulated_drive(model, one, **(drive or {})) for one in addresses]
@@ -86,9 +86,9 @@ class Rig:
             one.advance_to(self.now)
         self.port = FakePort(lambda: self.now)
         self.stream = io.StringIO()
-        self.line = Line(
-            self.port, way.make(wait), self.drives, way.timing, lambda: self.now,
-            trace=Trace(self.stream), **options,
+        self.line = way.wire(
+            self.port, self.drives, self.drives, lambda: self.now,
+            gateway_timeout=wait, trace=Trace(self.stream), **options,
         )
 
     def ask(self, frame=None, seconds=0.0):
