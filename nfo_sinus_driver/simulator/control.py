@@ -10,7 +10,7 @@ either ``result`` or ``error``, a text for people.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import contextlib
 import json
 import os
@@ -54,7 +54,7 @@ def require_free(path: str) -> None:
     )
 
 
-def words(verb: str, *values: object, **flags: bool) -> list[str]:
+def typed(verb: str, *values: object, **flags: bool) -> list[str]:
     """Return an injection as it is typed; a value that is a boolean is on or off."""
     texts = [('off', 'on')[one] if isinstance(one, bool) else str(one) for one in values]
     # behind the dashes alone a negative number is no option
@@ -73,11 +73,10 @@ class _Request(socketserver.StreamRequestHandler):
     def _answer(self, line: bytes) -> str:
         try:
             request = json.loads(line)
-            result = self.server.handler(request['verb'], request.get('arguments') or {})
+            result = self.server.verbs[request['verb']](**request.get('arguments', {}))
             return json.dumps({'ok': True, 'result': result})
         except (ValueError, KeyError, TypeError) as error:
-            text = error.args[0] if isinstance(error, KeyError) and error.args else error
-            return json.dumps({'ok': False, 'error': str(text)})
+            return json.dumps({'ok': False, 'error': str(error)})
 
 
 class ControlServer(socketserver.ThreadingUnixStreamServer):
@@ -85,7 +84,7 @@ class ControlServer(socketserver.ThreadingUnixStreamServer):
     Serves the control channel in threads of its own.
 
     :param path: the socket's path; a dead simulator's socket there is replaced.
-    :param handler: carries out a verb with its arguments; raises ``ValueError`` to refuse.
+    :param verbs: what carries out each, with its arguments; raises ``ValueError`` to refuse.
     :raises ControlError: a live simulator has it, or it cannot be made.
     """
 
@@ -94,14 +93,14 @@ class ControlServer(socketserver.ThreadingUnixStreamServer):
     #: Clients that come at once wait here; a full queue would turn them away.
     request_queue_size = 128
 
-    def __init__(self, path: str, handler: Callable[[str, dict[str, Any]], Any]) -> None:
+    def __init__(self, path: str, verbs: Mapping[str, Callable[..., object]]) -> None:
         require_free(path)
         self._place = Path(path)
         if self._place.exists() and not self._place.is_socket():
             raise ControlError(f'{path} is no socket: choose another --control')
         if len(path.encode()) > _LONGEST:
             raise ControlError(f'{path} is too long for a socket: choose another --control')
-        self.handler = handler
+        self.verbs = verbs
         try:
             self._place.unlink(missing_ok=True)
             super().__init__(path, _Request)
@@ -150,7 +149,7 @@ class Client:
         self, verb: str, *values: object, address: int | None = None, **flags: bool
     ) -> None:
         """Let something happen: a verb of ``simulator inject`` with its arguments."""
-        self.call('inject', words=words(verb, *values, **flags), address=address)
+        self.call('inject', words=typed(verb, *values, **flags), address=address)
 
     def wait_for(
         self,

@@ -61,12 +61,11 @@ def simulated() -> tuple[str, ...]:
 def load(name: str) -> SimulatedFamily:
     """Return what the folder of a family says; a ValueError lists the families there are."""
     if is_described(name):
-        made = importlib.import_module(f'{__package__}._declared.family').family_of(name)
-        assert isinstance(made, SimulatedFamily)
-        return made
-    if name not in simulated():
+        family = importlib.import_module(f'{__package__}._declared.family').family_of(name)
+    elif name in simulated():
+        family = importlib.import_module(f'{__package__}.{name}.family').FAMILY
+    else:
         raise ValueError(f'unknown model {name!r}: choose one of {", ".join(simulated())}')
-    family = importlib.import_module(f'{__package__}.{name}.family').FAMILY
     assert isinstance(family, SimulatedFamily)
     return family
 

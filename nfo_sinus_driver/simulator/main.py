@@ -285,9 +285,9 @@ def inject(argv: Sequence[str]) -> int:
             _put(json.dumps(_state(client, options.address), indent=2, ensure_ascii=False))
             return 0
         # the simulator has the same parser of words
-        typed = _which_parser().parse_known_args(argv)[1]
+        words = _which_parser().parse_known_args(argv)[1]
         for address in options.address or (None,):
-            client.call('inject', words=typed, address=address)
+            client.call('inject', words=words, address=address)
     except ControlError as error:
         print(f'simulator inject: {error}', file=sys.stderr)
         return 1

@@ -15,7 +15,7 @@ import time
 from typing import Any
 
 from nfo_sinus_driver.families import USUAL
-from nfo_sinus_driver.simulator.control import ControlServer, control_path, require_free, words
+from nfo_sinus_driver.simulator.control import ControlServer, control_path, require_free, typed
 from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, Endpoint
 from nfo_sinus_driver.simulator.family import load, simulated_drive
@@ -40,22 +40,11 @@ class Simulator:
     """
     Simulated drives on one line, or on several; a context manager.
 
+    Arguments are the options of the command ``simulator``, which explains them, but for these:
+
     :param addresses: one drive for each.
-    :param model: the drive family, by the name of its folder.
-    :param protocol: one of :data:`~nfo_sinus_driver.simulator.endpoints.PROTOCOLS`.
-    :param link: a symbolic link to the pseudo-terminal; without it, only the device.
-    :param tcp: serve this TCP port of 127.0.0.1 instead (0: any free one).
     :param baud: of the line and of the drives; by default the protocol's.
-    :param char_format: likewise.
-    :param also: more lines to the same drives, each as ``PROTOCOL:LINK`` or ``PROTOCOL:TCP_PORT``.
-    :param echo: the first line returns every byte it gets, as a half-duplex adapter does.
-    :param gateway_timeout: how long the gateway of Modbus TCP waits for a drive (s).
-    :param paced: bytes take the time they take on a real line.
-    :param turnaround: how long a drive takes before it answers (s).
-    :param trace: a file to write every frame to.
     :param control: path of the control channel; ``''`` for the default one, ``None`` for none.
-    :param serial_numbers: of the first drives, in the order of their addresses; the rest have
-        their own.
     :param plc: how the PLC is programmed, where one stands before the drives.
     :param options: what else :func:`~nfo_sinus_driver.simulator.family.simulated_drive` takes:
         ``settings``, ``run_input``, ``boot_time``, and what can be chosen of this family.
@@ -146,7 +135,9 @@ class Simulator:
             if control == '':
                 control = control_path(tcp=int(self.port.rpartition(':')[2]))
             if control is not None:
-                server = ControlServer(control, self._control)
+                server = ControlServer(
+                    control, {'state': self.state, 'states': self.states, 'inject': self._inject}
+                )
                 stack.callback(server.close)
                 self.control = control
             # nothing went wrong: keep it all until stop()
@@ -201,10 +192,10 @@ class Simulator:
         self, verb: str, *values: object, address: int | None = None, **flags: bool
     ) -> None:
         """Let something happen: a verb of ``simulator inject`` with its arguments."""
-        self._inject(words(verb, *values, **flags), address)
+        self._inject(typed(verb, *values, **flags), address)
 
-    def _inject(self, typed: Sequence[str], address: int | None) -> None:
-        given = self._parser.parse_args(typed)
+    def _inject(self, words: Sequence[str], address: int | None = None) -> None:
+        given = self._parser.parse_args(words)
         with self.lock:
             now = time.monotonic()
             if address is not None or len(self.drives) == 1:
@@ -221,15 +212,6 @@ class Simulator:
 
     def _catch_up(self, drive: SimulatedDrive, now: float) -> None:
         (self.plc or drive).advance_to(now)
-
-    def _control(self, verb: str, arguments: dict[str, Any]) -> Any:
-        if verb == 'state':
-            return self.state(arguments.get('address'))
-        if verb == 'states':
-            return self.states()
-        if verb == 'inject':
-            return self._inject(arguments['words'], arguments.get('address'))
-        raise ValueError(f'unknown request {verb!r}')
 
     def _run(self) -> None:
         try:
