@@ -1,13 +1,10 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The PLC between a master and the drives: in virtual time, and as a process on a TCP port."""
+"""The PLC between a master and the drives: in virtual time, and in a thread on a TCP port."""
 
 import contextlib
-import json
 import struct
-import subprocess
-import sys
 import time
 
 from pymodbus.client import ModbusTcpClient
@@ -235,7 +232,7 @@ def test_a_unit_hears_everything_and_answers_within_its_time():
     assert unit.listening
 
 
-# --- as a process, or a thread, to a foreign master ---
+# --- as a thread, to a foreign master ---
 
 
 class Master:
@@ -325,31 +322,3 @@ def test_no_plc_no_injection():
         with pytest.raises(ValueError, match=r'no PLC.*--protocol telegram1'):
             simulator.inject(*verb)
     simulator.stop()
-
-
-def test_command(tmp_path):
-    control, trace = tmp_path / 'control', tmp_path / 'trace'
-    command = [sys.executable, '-m', 'nfo_sinus_driver.simulator']
-    options = ['--protocol', 'telegram1', '--model', 'sinus_h', '--tcp', '0', '--boot-time', '0']
-    options += ['--address', '3', '--address', '4', '--block', '1:0', '--block', '1:16']
-    options += ['--answer-time', '0.01:0.02', '--set', 'prt.lost_cmd_mode=Dec']
-    options += ['--control', str(control), '--trace', str(trace)]
-    with subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True) as process:
-        try:
-            said = process.stdout.readline()
-            assert 'telegram1' in said
-            port = said.partition(' on ')[2].partition(',')[0]
-            with Master(port) as master:
-                master.until(lambda found: found[0] & 0x47 == 0x01, 0x0476, 0)
-            inject = [*command, 'inject', '--control', str(control)]
-            cut = [*inject, '--address', '4', 'fieldbus-cut', '5']
-            assert subprocess.run(cut, check=False).returncode == 0
-            done = subprocess.run([*inject, 'state'], capture_output=True, text=True, check=True)
-            state = json.loads(done.stdout)
-            assert state['3']['plc']['register'] == 0
-            assert state['4']['plc']['register'] == 16
-            assert state['4']['parameters']['prt.lost_cmd_mode'] == 'Dec'
-            directions = {json.loads(line)['direction'] for line in trace.open()}
-            assert directions == {'request', 'answer'}
-        finally:
-            process.terminate()

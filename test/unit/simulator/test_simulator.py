@@ -305,6 +305,7 @@ def test_the_format_is_the_protocols_and_the_firmware_the_dialects():
 def test_impossible_simulators():
     classic, canopen = {'protocol': 'classic'}, {'protocol': 'canopen'}
     optimal = {'model': 'sinus_optimal'}
+    movitrac31 = {'model': 'movitrac31', 'protocol': 'movitrac'}
     for options, text in (
         ({'addresses': (0,)}, '1 to 247'),
         ({'addresses': (248,)}, '1 to 247'),
@@ -318,7 +319,9 @@ def test_impossible_simulators():
         ({'link': '/tmp/x', 'tcp': 0}, 'exclude each other'),
         ({'settings': {'control.acel': 1}}, "no parameter 'control.acel'"),
         ({'settings': {'control.accel': 1000}}, 'out of range'),
+        ({'settings': {'serial.address': 2}}, 'with --address'),
         ({'serial_numbers': ['1', '2']}, '2 serial numbers for 1 drives'),
+        ({'serial_numbers': ['0123456789ABCDEFG']}, 'at most 16 characters'),
         ({'newer_functions': 'unknown'}, 'known, refused, silent'),
         ({**classic, 'addresses': (95,)}, '1 to 94'),
         ({'also': ['classic'], 'addresses': (95,)}, '1 to 94'),
@@ -344,6 +347,12 @@ def test_impossible_simulators():
         ({**canopen, **optimal}, 'sinus_optimal does not speak canopen'),
         ({**canopen, 'canopen_types': 'long'}, 'canopen_types: choose one of'),
         ({'model': 'movitrac31'}, 'movitrac31 does not speak modbus_rtu'),
+        ({**movitrac31, 'addresses': [64]}, '0 to 63'),
+        ({**movitrac31, 'baud': 19200}, '9600 8N1'),
+        ({**movitrac31, 'char_format': '8E1'}, '9600 8N1'),
+        ({**movitrac31, 'settings': {'serial.inverter_address': 2}}, 'with --address'),
+        ({**movitrac31, 'enable_bit': 'sometimes'}, 'anded'),
+        ({'tcp': 70000}, '65535'),
     ):
         with pytest.raises(ValueError, match=text):
             Simulator(**options)
