@@ -22,8 +22,6 @@ import threading
 import time
 from typing import Any
 
-#: The longest path that a Unix socket takes, on Linux.
-_LONGEST = 107
 #: How often a state that is waited for is asked for, s: it costs both ends two milliseconds.
 _PERIOD = 0.02
 
@@ -98,15 +96,13 @@ class ControlServer(socketserver.ThreadingUnixStreamServer):
         self._place = Path(path)
         if self._place.exists() and not self._place.is_socket():
             raise ControlError(f'{path} is no socket: choose another --control')
-        if len(path.encode()) > _LONGEST:
-            raise ControlError(f'{path} is too long for a socket: choose another --control')
         self.verbs = verbs
         try:
             self._place.unlink(missing_ok=True)
             super().__init__(path, _Request)
         except OSError as error:
             raise ControlError(
-                f'cannot make the control channel {path} ({error.strerror}): '
+                f'cannot make the control channel {path} ({error.strerror or error}): '
                 'choose another --control'
             ) from error
         threading.Thread(

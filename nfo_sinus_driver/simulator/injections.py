@@ -40,7 +40,13 @@ class Target:
     @property
     def drive(self) -> SimulatedDrive:
         """The drive (ValueError: which?)."""
-        return the_drive(self.drives, self.address)
+        known = ', '.join(map(str, self.drives))
+        if self.address is None and len(self.drives) > 1:
+            raise ValueError(f'say which drive, with --address: {known}')
+        address = next(iter(self.drives)) if self.address is None else self.address
+        if address not in self.drives:
+            raise ValueError(f'no drive has address {address}, only {known}')
+        return self.drives[address]
 
     @property
     def unit(self) -> Any:
@@ -95,6 +101,11 @@ def _spoil(at: Target, given: argparse.Namespace) -> None:
     at.line.faults.add(given.verb, given.times, at.address, getattr(given, 'seconds', 0.0))
 
 
+def _set(at: Target, given: argparse.Namespace) -> None:
+    value = parse_setting(at.drive.memory.model, given.key, given.value)
+    at.drive.set_from_keypad(given.key, value)
+
+
 def _press(at: Target, given: argparse.Namespace) -> None:
     keys = at.unit.keys
     if given.key not in keys:
@@ -108,124 +119,71 @@ _TIMES = argument('times', 'how many answers', type=int, default=1)
 
 INJECTIONS: Mapping[str, Injection] = {
     # ---- to a drive ----
-    'fault': Injection(
-        'let a fault happen: the motor coasts until it is acknowledged',
+    'fault': Injection('let a fault happen: the motor coasts until it is acknowledged',
         lambda at, given: at.drive.trip(given.code, cause_present=given.standing),
         argument('code', 'status code of the fault, such as 5', type=int),
-        argument('--standing', 'its cause lasts until ack-cause-gone', action='store_true'),
-    ),
+        argument('--standing', 'its cause lasts until ack-cause-gone', action='store_true')),
     'ack-cause-gone': Injection(
         'take away the causes of all faults, so that they can be acknowledged',
-        lambda at, given: at.drive.faults.end_causes(),
-    ),
-    'run': Injection(
-        'switch the digital input RUN',
-        lambda at, given: at.drive.set_run_input(given.state == 'on'),
-        SWITCH,
-    ),
-    'keypad': Injection(
-        'press a key of the keypad',
-        _press,
-        argument(
-            'key',
-            'stop (STOP), ext (SHIFT+STOP: to the terminals), start (run locally); of a MOVITRAC '
-            'manual, automatic (who commands), cw, ccw, stop (they count in manual operation) or '
-            'reset; of a Sinus H start, stop, reset',
-        ),
-    ),
-    'set': Injection(
-        'change a parameter at the keypad',
-        lambda at, given: at.drive.set_from_keypad(
-            given.key, parse_setting(at.drive.memory.model, given.key, given.value)
-        ),
+        lambda at, given: at.drive.faults.end_causes()),
+    'run': Injection('switch the digital input RUN',
+        lambda at, given: at.drive.set_run_input(given.state == 'on'), SWITCH),
+    'keypad': Injection('press a key of the keypad', _press,
+        argument('key', 'stop (STOP), ext (SHIFT+STOP: to the terminals), start (run locally); of '
+            'a MOVITRAC manual, automatic (who commands), cw, ccw, stop (they count in manual '
+            'operation) or reset; of a Sinus H start, stop, reset')),
+    'set': Injection('change a parameter at the keypad', _set,
         argument('key', 'its name, as in the table of parameters'),
-        argument('value', 'in its own unit, such as 7'),
-    ),
-    'factory-reset': Injection(
-        'give the parameters their factory values, but those of the line',
-        lambda at, given: at.drive.factory_reset(),
-    ),
-    'load': Injection(
-        'change the load of the motor',
+        argument('value', 'in its own unit, such as 7')),
+    'factory-reset': Injection('give the parameters their factory values, but those of the line',
+        lambda at, given: at.drive.factory_reset()),
+    'load': Injection('change the load of the motor',
         lambda at, given: assign(at.drive.motor, load=given.share),
-        argument('share', 'torque at nominal speed, 1 is the nominal torque', type=float),
-    ),
-    'power-cycle': Injection(
-        'take the mains away and give them back',
+        argument('share', 'torque at nominal speed, 1 is the nominal torque', type=float)),
+    'power-cycle': Injection('take the mains away and give them back',
         lambda at, given: at.drive.power_cycle(given.seconds),
-        argument(
-            'seconds', 'how long it is silent (default: its boot time)', type=float, default=None
-        ),
-    ),
-    'silence': Injection(
-        'let the drive neither hear nor answer',
-        lambda at, given: at.drive.silence(given.seconds),
-        _SECONDS,
-    ),
+        argument('seconds', 'how long it is silent (default: its boot time)',
+            type=float, default=None)),
+    'silence': Injection('let the drive neither hear nor answer',
+        lambda at, given: at.drive.silence(given.seconds), _SECONDS),
     # ---- to the line ----
-    'line-dead': Injection(
-        'let the line carry nothing, either way',
-        lambda at, given: assign(at.line.faults, dead_until=at.now + given.seconds),
-        _SECONDS,
-    ),
+    'line-dead': Injection('let the line carry nothing, either way',
+        lambda at, given: assign(at.line.faults, dead_until=at.now + given.seconds), _SECONDS),
     'hangup': Injection(
         'let the port disappear and come back, like a USB adapter that is pulled out',
         lambda at, given: at.line.hang_up(at.now + given.seconds),
-        argument('seconds', 'for how many seconds (default: 1)', type=float, default=1.0),
-    ),
+        argument('seconds', 'for how many seconds (default: 1)', type=float, default=1.0)),
     'noise': Injection('put noise before the next answers', _spoil, _TIMES),
     'damage': Injection('flip a bit in the next answers', _spoil, _TIMES),
     'drop': Injection('lose the next answers; the requests are carried out', _spoil, _TIMES),
     'double': Injection('send the next answers twice', _spoil, _TIMES),
-    'delay': Injection(
-        'send the next answers late',
-        _spoil,
-        _TIMES,
-        argument('seconds', 'how late (default: 0.5)', type=float, default=0.5),
-    ),
-    'noise-rate': Injection(
-        'spoil a share of all answers by chance, until heal',
+    'delay': Injection('send the next answers late', _spoil, _TIMES,
+        argument('seconds', 'how late (default: 0.5)', type=float, default=0.5)),
+    'noise-rate': Injection('spoil a share of all answers by chance, until heal',
         lambda at, given: at.line.faults.set_rate(
-            given.what, given.share, given.seed, given.seconds
-        ),
+            given.what, given.share, given.seed, given.seconds),
         argument('what', 'what happens to them', choices=ANSWER_FAULTS),
         argument('share', 'of all answers, such as 0.03; 0 ends it', type=float),
         argument('seed', 'a number, for the same answers in every run', type=int, default=None),
-        argument('seconds', 'how late they come, for delay', type=float, default=0.5),
-    ),
-    'burst': Injection(
-        'let the line carry nothing for a while again and again, until heal',
+        argument('seconds', 'how late they come, for delay', type=float, default=0.5)),
+    'burst': Injection('let the line carry nothing for a while again and again, until heal',
         lambda at, given: at.line.faults.set_bursts(given.seconds, given.period, at.now),
         argument('seconds', 'how long; 0 ends it', type=float),
-        argument('period', 'from one to the next (s, default: 5)', type=float, default=5.0),
-    ),
-    'traffic': Injection(
-        'on a CAN bus: let others send frames that no node here takes',
+        argument('period', 'from one to the next (s, default: 5)', type=float, default=5.0)),
+    'traffic': Injection('on a CAN bus: let others send frames that no node here takes',
         lambda at, given: at.line.set_traffic(given.rate, at.now),
-        argument('rate', 'how many a second, such as 1000; 0 ends it', type=float),
-    ),
+        argument('rate', 'how many a second, such as 1000; 0 ends it', type=float)),
     'heal': Injection('end all faults of the line', lambda at, given: at.line.faults.heal()),
     # ---- to a PLC, and the fieldbus behind it ----
-    'fieldbus-cut': Injection(
-        'let no telegram pass between the PLC and the drive',
-        lambda at, given: assign(at.channel, cut_until=at.now + given.seconds),
-        _SECONDS,
-    ),
-    'plc-restart': Injection(
-        'let the PLC be off, and begin anew with its registers 0',
-        lambda at, given: at.plc.restart(at.now + given.seconds),
-        _SECONDS,
-    ),
+    'fieldbus-cut': Injection('let no telegram pass between the PLC and the drive',
+        lambda at, given: assign(at.channel, cut_until=at.now + given.seconds), _SECONDS),
+    'plc-restart': Injection('let the PLC be off, and begin anew with its registers 0',
+        lambda at, given: at.plc.restart(at.now + given.seconds), _SECONDS),
     'plc-stop': Injection(
         "let the PLC's program and fieldbus stand; its registers are still answered",
-        lambda at, given: assign(at.plc, stopped_until=at.now + given.seconds),
-        _SECONDS,
-    ),
-    'release': Injection(
-        'let the PLC release the drive to ROS, or not',
-        lambda at, given: assign(at.channel, released=given.state == 'on'),
-        SWITCH,
-    ),
+        lambda at, given: assign(at.plc, stopped_until=at.now + given.seconds), _SECONDS),
+    'release': Injection('let the PLC release the drive to ROS, or not',
+        lambda at, given: assign(at.channel, released=given.state == 'on'), SWITCH),
 }
 
 
@@ -245,18 +203,6 @@ def add_verbs(parser: argparse.ArgumentParser, injections: Mapping[str, Injectio
         for argument_, how in injection.arguments:
             one.add_argument(argument_, **how)
     return verbs
-
-
-def the_drive(drives: Mapping[int, SimulatedDrive], address: int | None) -> SimulatedDrive:
-    """Return the drive at an address, without one the only one (ValueError: which?)."""
-    known = ', '.join(map(str, drives))
-    if address is None:
-        if len(drives) > 1:
-            raise ValueError(f'say which drive, with --address: {known}')
-        return next(iter(drives.values()))
-    if address not in drives:
-        raise ValueError(f'no drive has address {address}, only {known}')
-    return drives[address]
 
 
 def parse_setting(model: Family, key: str, text: str) -> Value:

@@ -32,21 +32,20 @@ class PtyPort:
 
     def __init__(self, link: str | None = None) -> None:
         self._link = Path(link) if link else None
-        self._ends: tuple[int, int] | None = None
+        #: That of the simulator, and the one that a master opens; none while it is hung up.
+        self._ends: list[int] = []
         self._device = ''
         self.come_back()
         self.name = str(self._link or self._device)
 
     def filenos(self) -> list[int]:
         """The descriptors to wait on for reading."""
-        return [self._ends[0]] if self._ends else []
+        return self._ends[:1]
 
     def receive(self) -> bytes:
         """Return what has arrived."""
-        if self._ends is None:
-            return b''
         try:
-            return os.read(self._ends[0], 4096)
+            return os.read(self._ends[0], 4096) if self._ends else b''
         except OSError as error:
             if error.errno in (errno.EAGAIN, errno.EIO):
                 return b''
@@ -54,37 +53,32 @@ class PtyPort:
 
     def send(self, data: bytes) -> None:
         """Send; what does not fit because it is not read is lost."""
-        if self._ends is not None:
+        if self._ends:
             with contextlib.suppress(BlockingIOError):
                 os.write(self._ends[0], data)
 
     def hang_up(self) -> None:
         """Close the pseudo-terminal; the link goes with it."""
-        if self._ends is None:
-            return
-        if self._link is not None and self._points_here():
+        if self._ends and self._link is not None and self._points_here():
             self._link.unlink()
-        for end in self._ends:
-            os.close(end)
-        self._ends = None
+        while self._ends:
+            os.close(self._ends.pop())
 
     def come_back(self) -> None:
         """Open a pseudo-terminal and put the link on it."""
-        if self._ends is not None:
+        if self._ends:
             return
         far, near = os.openpty()
+        self._ends = [far, near]
         # whoever opens it sets the line as he needs it; until then no byte is to be changed
         tty.setraw(near)
         os.set_blocking(far, False)
-        self._ends = far, near
         self._device = os.ttyname(near)
         if self._link is not None:
             try:
                 _put_link(self._link, self._device)
             except BaseException:
-                os.close(far)
-                os.close(near)
-                self._ends = None
+                self.hang_up()
                 raise
 
     def _points_here(self) -> bool:

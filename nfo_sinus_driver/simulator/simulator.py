@@ -19,13 +19,7 @@ from nfo_sinus_driver.simulator.control import ControlServer, control_path, requ
 from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
 from nfo_sinus_driver.simulator.endpoints import GATEWAY_TIMEOUT, Endpoint
 from nfo_sinus_driver.simulator.family import load, simulated_drive
-from nfo_sinus_driver.simulator.injections import (
-    INJECTIONS,
-    Parser,
-    Target,
-    add_verbs,
-    the_drive,
-)
+from nfo_sinus_driver.simulator.injections import INJECTIONS, Parser, Target, add_verbs
 from nfo_sinus_driver.simulator.line import Trace
 from nfo_sinus_driver.simulator.plc import Plc, PlcSetting
 from nfo_sinus_driver.simulator.timing import sharpen_timers
@@ -177,12 +171,10 @@ class Simulator:
     def state(self, address: int | None = None) -> dict[str, Any]:
         """Return the state of a drive as it is now; without an address, of the only one."""
         with self.lock:
-            drive = the_drive(self.drives, address)
-            self._catch_up(drive, time.monotonic())
-            if self.plc is None:
-                return describe(drive)
-            (channel,) = (one for one in self.plc.channels.values() if one.drive is drive)
-            return {**describe(drive), 'plc': channel.describe()}
+            at = self._at(address)
+            (self.plc or at.drive).advance_to(at.now)
+            found = describe(at.drive)
+            return found if self.plc is None else {**found, 'plc': at.channel.describe()}
 
     def states(self) -> dict[int, dict[str, Any]]:
         """Return the states of all drives, by the addresses they began with."""
@@ -197,11 +189,10 @@ class Simulator:
     def _inject(self, words: Sequence[str], address: int | None = None) -> None:
         given = self._parser.parse_args(words)
         with self.lock:
-            now = time.monotonic()
+            at = self._at(address)
             if address is not None or len(self.drives) == 1:
-                self._catch_up(the_drive(self.drives, address), now)
-            target = Target(self.line, self.drives, self.plc, address, now)
-            self._injections[given.verb].do(target, given)
+                (self.plc or at.drive).advance_to(at.now)
+            self._injections[given.verb].do(at, given)
             if self._thread is not None:
                 os.write(self._wake_write, b'.')
 
@@ -210,8 +201,9 @@ class Simulator:
         """What has to catch up with the clock; a PLC sees to its drives."""
         return list(self.drives.values()) if self.plc is None else [self.plc]
 
-    def _catch_up(self, drive: SimulatedDrive, now: float) -> None:
-        (self.plc or drive).advance_to(now)
+    def _at(self, address: int | None) -> Target:
+        """Return a drive as it is now; without an address, the only one."""
+        return Target(self.line, self.drives, self.plc, address, time.monotonic())
 
     def _run(self) -> None:
         try:

@@ -19,11 +19,8 @@ from nfo_sinus_driver.simulator.family import SimulatedFamily
 from nfo_sinus_driver.simulator.injections import SWITCH, Injection, assign
 
 _INJECTIONS = {
-    'local': Injection(
-        'let keypad or terminals take control, or give it back',
-        lambda at, given: assign(at.unit, local=given.state == 'on'),
-        SWITCH,
-    )
+    'local': Injection('let keypad or terminals take control, or give it back',
+        lambda at, given: assign(at.unit, local=given.state == 'on'), SWITCH)
 }
 
 #: What all of them have in common.

@@ -185,17 +185,13 @@ class Server(movitrac.Server):
 
 
 _INJECTIONS = {
-    'terminal': Injection(
-        'close or open a binary input',
+    'terminal': Injection('close or open a binary input',
         lambda at, given: at.unit.switch(given.number, given.state == 'closed'),
         argument('number', 'of the terminal, such as 41', type=int),
-        argument('state', 'closed or open', choices=('closed', 'open')),
-    ),
-    'ambient': Injection(
-        'change the temperature around the drive',
+        argument('state', 'closed or open', choices=('closed', 'open'))),
+    'ambient': Injection('change the temperature around the drive',
         lambda at, given: assign(at.unit, ambient=given.temperature),
-        argument('temperature', 'in °C, such as -15', type=float),
-    ),
+        argument('temperature', 'in °C, such as -15', type=float)),
 }
 
 FAMILY = SimulatedFamily(

@@ -19,16 +19,12 @@ from nfo_sinus_driver.simulator.sinus_g2.servers import (
 
 INJECTIONS = {
     **parts.INJECTIONS,
-    'torn': Injection(
-        'let a counter carry just after Classic has read one of its two words',
+    'torn': Injection('let a counter carry just after Classic has read one of its two words',
         lambda at, given: assign(at.drive.servers['classic'], tears=given.times),
-        argument('times', 'how many times', type=int, default=1),
-    ),
-    'tuning-fails': Injection(
-        'let the next tuning end with a fault',
+        argument('times', 'how many times', type=int, default=1)),
+    'tuning-fails': Injection('let the next tuning end with a fault',
         lambda at, given: at.unit.fail_tuning(given.code),
-        argument('code', 'InvSt code: 16 (TunFailP) or 17 (TunFailM)', type=int),
-    ),
+        argument('code', 'InvSt code: 16 (TunFailP) or 17 (TunFailM)', type=int)),
 }
 
 FAMILY = SimulatedFamily(
