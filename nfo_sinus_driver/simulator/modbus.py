@@ -8,17 +8,12 @@ from __future__ import annotations
 import abc
 from collections.abc import Mapping, Sequence
 import functools
-from typing import ClassVar
 
 from nfo_sinus_driver.catalog import Family, Parameter, to_bytes, to_words
 from nfo_sinus_driver.simulator import pymodbus_compat
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.protocol import Station
-
-#: How a drive treats a function.
-KNOWN, REFUSED, SILENT = 'known', 'refused', 'silent'
-TREATMENTS = (KNOWN, REFUSED, SILENT)
 
 READ = 3
 READ_INPUT = 4
@@ -40,14 +35,15 @@ _MOST_WRITTEN_WITH_READ = 121
 
 
 class Requests(abc.ABC):
-    """What a unit does with Modbus requests; its registers are elsewhere."""
+    """
+    What a unit does with Modbus requests; its registers are elsewhere.
 
-    #: The functions that it has.
-    functions: ClassVar[frozenset[int]]
+    :ivar functions: those that it has; others are refused.
+    :ivar silent: those that get no answer at all.
+    """
 
-    def treats(self, function: int) -> str:
-        """Return which of :data:`TREATMENTS` a function gets."""
-        return KNOWN if function in self.functions else REFUSED
+    functions: frozenset[int]
+    silent: frozenset[int] = frozenset()
 
     def slave_id(self) -> bytes:
         """Return what function 17 reports."""
@@ -80,10 +76,9 @@ class Requests(abc.ABC):
     def answer(self, pdu: bytes) -> bytes:
         """Carry out a request PDU and return the answer PDU; empty if it stays silent."""
         function = pdu[0] if pdu else 0
-        treated = self.treats(function)
-        if treated == SILENT:
+        if function in self.silent:
             return b''
-        if treated == REFUSED:
+        if function not in self.functions:
             return pymodbus_compat.encode_exception(function, Reason.FUNCTION)
         try:
             return self._carry_out(function, pdu[1:])

@@ -312,12 +312,9 @@ class Registers(modbus.Requests):
     functions = frozenset((modbus.READ, modbus.WRITE_MULTIPLE, modbus.WRITE_AND_READ))
 
     def __init__(self, plc: Plc, unit: int) -> None:
-        self._refused = () if plc.setting.write_and_read else (modbus.WRITE_AND_READ,)
+        if not plc.setting.write_and_read:
+            self.functions -= {modbus.WRITE_AND_READ}
         self._channels = [one for one in plc.channels.values() if one.unit == unit]
-
-    def treats(self, function: int) -> str:
-        """Return how a function is treated."""
-        return modbus.REFUSED if function in self._refused else super().treats(function)
 
     def read(self, register: int, count: int) -> tuple[int, ...]:
         """Return registers of a block (Refused: ADDRESS)."""

@@ -37,6 +37,8 @@ class Server(modbus.Requests):
         self._commands = self._unit.command_places
         self._at = dict(self._places(file, coils=False))
         self._coils = dict(self._places(file, coils=True))
+        # what the file does not write by is refused
+        self.functions -= {modbus.WRITE_SINGLE, modbus.WRITE_MULTIPLE} - set(file.line.write)
 
     @staticmethod
     def _places(file: Description, *, coils: bool) -> Mapping[int, tuple[Parameter, int]]:
@@ -50,13 +52,6 @@ class Server(modbus.Requests):
                 # a setting rather than the command that writes the same register
                 found.setdefault(address.index + number, (parameter, number))
         return found
-
-    def treats(self, function: int) -> str:
-        """Refuse the functions by which the file says that nothing is written."""
-        written = {modbus.WRITE_SINGLE: 6, modbus.WRITE_MULTIPLE: 16}
-        if written.get(function, 6) not in self._file.line.write and function in written:
-            return modbus.REFUSED
-        return super().treats(function)
 
     # ---- registers ----
 

@@ -23,7 +23,6 @@ from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.simulator.classic import LineError
 from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused
-from nfo_sinus_driver.simulator.modbus import TREATMENTS
 from nfo_sinus_driver.simulator.motor import Nameplate
 from nfo_sinus_driver.simulator.sinus.serial_side import (
     LINE_SETTINGS,
@@ -105,7 +104,9 @@ class SinusVariant(Variant):
     """One way to read the manuals; by default a G2 that follows [M0 table 16]."""
 
     newer_functions: str = choice(
-        *TREATMENTS,
+        'known',
+        'refused',
+        'silent',
         text='how drives treat functions 17, 23 and 43, which older ones do not have',
     )
     #: What is kept starts the motor by itself when the fault is over; what is dropped, also by an

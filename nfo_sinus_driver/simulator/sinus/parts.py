@@ -9,8 +9,8 @@ from argparse import Namespace
 
 from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator.classic import LineError
+from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.injections import Injection, Target, argument
-from nfo_sinus_driver.simulator.modbus import KNOWN
 from nfo_sinus_driver.simulator.sinus.control_unit import SinusControlUnit
 
 #: What only the newer firmware of a G2 has [C57].
@@ -20,12 +20,14 @@ NEWER = frozenset((modbus.REPORT_SLAVE_ID, modbus.WRITE_AND_READ, modbus.ENCAPSU
 class ModbusServer(modbus.Server):
     """The Modbus side of one Sinus, whose newer functions can be refused or unheard of."""
 
-    def treats(self, function: int) -> str:
-        """Return how the drive treats a function."""
-        unit = self.drive.control_unit
-        assert isinstance(unit, SinusControlUnit)
-        chosen = unit.variant.newer_functions if function in NEWER else KNOWN
-        return super().treats(function) if chosen == KNOWN else chosen
+    def __init__(self, drive: SimulatedDrive) -> None:
+        super().__init__(drive)
+        assert isinstance(drive.control_unit, SinusControlUnit)
+        newer = drive.control_unit.variant.newer_functions
+        if newer != 'known':
+            self.functions -= NEWER
+        if newer == 'silent':
+            self.silent = NEWER
 
 
 def _serial_error(at: Target, given: Namespace) -> None:
