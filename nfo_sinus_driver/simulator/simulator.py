@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 import contextlib
+import functools
 import itertools
 import os
 import select
@@ -92,8 +93,7 @@ class Simulator:
                 raise ValueError(f'{model} does not speak {one.protocol}')
         self.plc = _plc_before(self.drives, endpoints, plc)
         self._injections = {**INJECTIONS, **load(model).injections}
-        self._parser = Parser()
-        add_verbs(self._parser, self._injections)
+        self._parser = _parser_of(model)
         self.lock = threading.RLock()
         self.control: str | None = None
         self.failure: Exception | None = None
@@ -249,6 +249,14 @@ class Simulator:
     def _due(self) -> float:
         """When one of the lines has something to do."""
         return min(line.due for line in self.lines)
+
+
+@functools.cache
+def _parser_of(model: str) -> Parser:
+    """Return what takes the words of an injection; it takes a while to make."""
+    parser = Parser()
+    add_verbs(parser, {**INJECTIONS, **load(model).injections})
+    return parser
 
 
 def _require_possible(addresses: Sequence[int], endpoints: Sequence[Endpoint]) -> None:
