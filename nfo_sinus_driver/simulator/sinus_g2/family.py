@@ -17,7 +17,7 @@ from nfo_sinus_driver.simulator.sinus_g2.servers import (
     TelegramServer,
 )
 
-INJECTIONS = {
+_INJECTIONS = {
     **parts.INJECTIONS,
     'torn': Injection('let a counter carry just after Classic has read one of its two words',
         lambda at, given: assign(at.drive.servers['classic'], tears=given.times),
@@ -37,5 +37,5 @@ FAMILY = SimulatedFamily(
         'canopen': CanopenServer,
         'telegram1': TelegramServer,
     },
-    injections=INJECTIONS,
+    injections=_INJECTIONS,
 )
