@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+import contextlib
 import dataclasses
 from datetime import datetime
 import importlib.util
@@ -14,7 +15,6 @@ import itertools
 import math
 import os
 import queue
-import shutil
 import sys
 import threading
 import time
@@ -39,22 +39,21 @@ from nfo_sinus_driver.view.picture import (
     line_view,
 )
 
-#: What is measured: its name, as in the messages of the driver, its width and its decimals.
+#: What is measured, by its name in the messages of the driver; its width and its decimals.
 _VALUES = {
-    Role.ACTUAL_FREQUENCY: ('frequency', 6, 1),
-    Role.ACTUAL_SPEED: ('speed', 5, 0),
-    Role.OUTPUT_CURRENT: ('output_current', 6, 2),
-    Role.OUTPUT_VOLTAGE: ('output_voltage', 4, 0),
-    Role.OUTPUT_POWER: ('output_power', 5, 0),
-    Role.ACTUAL_TORQUE: ('torque', 4, 0),
-    Role.DC_LINK_VOLTAGE: ('dc_link_voltage', 4, 0),
+    'frequency': (Role.ACTUAL_FREQUENCY, 6, 1),
+    'speed': (Role.ACTUAL_SPEED, 5, 0),
+    'output_current': (Role.OUTPUT_CURRENT, 6, 2),
+    'output_voltage': (Role.OUTPUT_VOLTAGE, 4, 0),
+    'output_power': (Role.OUTPUT_POWER, 5, 0),
+    'torque': (Role.ACTUAL_TORQUE, 4, 0),
+    'dc_link_voltage': (Role.DC_LINK_VOLTAGE, 4, 0),
 }
 #: What stands above the figures of the line.
 _COLUMNS = (
     '', 'used', 'cycle', 'min', 'median', 'p99', 'max', 'requests', 'no answer', 'damaged',
     'refused', 'repeated',
 )
-_CLEAR_LINE = '\r\x1b[K'
 #: The view of the running driver: only there ROS is known.
 _ROS_VIEW = 'nfo_sinus_driver.node.monitor'
 #: How long the present reading may take at the end, s.
@@ -116,32 +115,25 @@ class Monitor(Verb):
 
 def _read(
     session: Session, drive: OfflineDrive
-) -> tuple[InverterStatus, Mapping[Role, float]]:
+) -> tuple[InverterStatus, Mapping[str, float]]:
     """Read the status of a drive and what it measures; NaN for what it has not got."""
     if drive.state.nameplate.identity is None:
         drive.identify(thoroughly=False)
 
-    async def measure() -> tuple[InverterStatus, Mapping[Role, float]]:
+    async def measure() -> tuple[InverterStatus, Mapping[str, float]]:
         status = await drive.state.read_status(Priority.POLL, retry=False)
         values = dict.fromkeys(_VALUES, math.nan)
-        for role in _VALUES:
+        for name, (role, _, _) in _VALUES.items():
             key = drive.model.key(role)
-            if not drive.params.reaches(key):
-                continue
-            try:
-                values[role] = await drive.params.read_number(key, Priority.POLL, retry=False)
-            except Refused:
-                # it has none
-                continue
+            # a drive that refuses it has none
+            with contextlib.suppress(Refused):
+                if drive.params.reaches(key):
+                    values[name] = await drive.params.read_number(key, Priority.POLL, retry=False)
         return status, values
 
     found = drive.do(measure)
     session.polled(drive.address)
     return found
-
-
-def _by_name(values: Mapping[Role, float]) -> dict[str, float]:
-    return {name: values[role] for role, (name, _, _) in _VALUES.items()}
 
 
 # --- as lines ---------------------------------------------------------------------------------
@@ -150,12 +142,11 @@ def _by_name(values: Mapping[Role, float]) -> dict[str, float]:
 def _show_lines(
     options: argparse.Namespace, session: Session, drives: Sequence[OfflineDrive]
 ) -> int:
-    one_line = sys.stdout.isatty() and not options.json and len(drives) == 1
     answered = False
     try:
         for turn in itertools.count(1):
             started = time.monotonic()
-            shown = [_show_line(drive, session, options, one_line=one_line) for drive in drives]
+            shown = [_show_line(drive, session, options) for drive in drives]
             answered = all(shown)
             if turn == options.count:
                 break
@@ -163,19 +154,13 @@ def _show_lines(
     except KeyboardInterrupt:
         # this is how one ends it
         answered = True
-    finally:
-        if one_line:
-            print()
     return int(not answered)
 
 
-def _show_line(
-    drive: OfflineDrive, session: Session, options: argparse.Namespace, *, one_line: bool
-) -> bool:
+def _show_line(drive: OfflineDrive, session: Session, options: argparse.Namespace) -> bool:
     """Print one line; return whether the drive answered."""
     now = datetime.now().astimezone()
     facts: dict[str, object] = {'connected': False}
-    answered = False
     try:
         status, values = _read(session, drive)
     except DriveError as error:
@@ -183,36 +168,31 @@ def _show_line(
             raise
         text = say(error)
     else:
-        answered = True
         facts = {
             'connected': True,
             'code': status.code,
             'text': drive.state.text,
             'kind': drive.state.kind.value,
             'state': status.state.name,
-            **_by_name(values),
+            **values,
         }
         text = _line(drive, values)
     if options.json:
         # the names are those of BusStatistics
         figures = dataclasses.asdict(session.statistics(drive.address))
         whole = {'time': now.isoformat(), 'address': drive.address, **facts, 'statistics': figures}
-        put(as_json(whole))
-        return answered
-    address = f'{drive.address:>3}  ' if options.addresses else ''
-    text = f'{now:%H:%M:%S}  {address}{text}'
-    if one_line:
-        width = shutil.get_terminal_size().columns - 1
-        print(f'{_CLEAR_LINE}{text[:width]}', end='', flush=True)
+        text = as_json(whole)
     else:
-        put(text)
-    return answered
+        address = f'{drive.address:>3}  ' if options.addresses else ''
+        text = f'{now:%H:%M:%S}  {address}{text}'
+    put(text)
+    return facts['connected'] is True
 
 
-def _line(drive: OfflineDrive, values: Mapping[Role, float]) -> str:
+def _line(drive: OfflineDrive, values: Mapping[str, float]) -> str:
     cells = [f'{drive.state.describe():<18}']
-    for role, (_, width, decimals) in _VALUES.items():
-        value, key = values[role], drive.model.key(role)
+    for name, (role, width, decimals) in _VALUES.items():
+        value, key = values[name], drive.model.key(role)
         number = '-' if math.isnan(value) else f'{value:.{decimals}f}'
         unit = drive.model[key].unit if key in drive.model else ''
         cells.append(f'{number:>{width}} {unit}')
@@ -324,16 +304,16 @@ class LineSource:
             self._log(drive, Level.ERROR, say(error))
             self._set(drive, Condition.SILENT, 'not connected')
             return
-        shown, named = drive.state.describe(), _by_name(values)
+        shown = drive.state.describe()
         grave = status.kind is not Kind.STATUS
         self._log(drive, Level.WARNING if grave else Level.INFO, shown)
-        runs = status.runs or status.tuning or status.state in _RUNS or abs(named['frequency']) > 0
+        runs = status.runs or status.tuning or status.state in _RUNS or abs(values['frequency']) > 0
         usual = Condition.RUNS if runs else Condition.STANDS
         self._set(
             drive, _CONDITIONS.get(status.kind, usual), shown,
             cause=status.listed.description if grave else '', remedy=status.listed.remedy,
-            requires_ack=status.listed.requires_ack, unit='Hz', actual=named['frequency'],
-            measured=Measured(**named),
+            requires_ack=status.listed.requires_ack, unit='Hz', actual=values['frequency'],
+            measured=Measured(**values),
             line=line_view(_name(drive), self._session.statistics(drive.address)),
         )
 

@@ -19,7 +19,7 @@ _TWO = """
 /**/drive_10: {ros__parameters: {address: 2}}
 """
 #: What the key for the row above sends.
-_UP = '\x1b[A'
+_UP = '\x1bOA'
 
 
 def start(bench: Bench) -> object:

@@ -50,7 +50,8 @@ class Terminal(contextlib.ExitStack):
             preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
             env={
                 **(os.environ if environment is None else environment),
-                'TERM': 'xterm-256color',
+                # of that of xterm pyte does not know all
+                'TERM': 'screen-256color',
                 'LC_ALL': 'C.UTF-8',
                 'PYTHONUTF8': '1',
             },
@@ -76,6 +77,13 @@ class Terminal(contextlib.ExitStack):
     def press(self, keys: str) -> None:
         """Type something."""
         os.write(self._end, keys.encode())
+
+    def resize(self, columns: int, rows: int) -> None:
+        """Make the window of another size; it is drawn anew."""
+        with self._lock:
+            self._screen.reset()
+            self._screen.resize(rows, columns)
+        fcntl.ioctl(self._other, termios.TIOCSWINSZ, struct.pack('4H', rows, columns, 0, 0))
 
     def signal(self, number: int) -> None:
         """Send the program a signal."""

@@ -49,9 +49,7 @@ ON_NOBLE = {
 OPTIONAL = {
     'nfo_sinus_driver/demo/bags_rosbags.py': {'rosbags'},
     'nfo_sinus_driver/node/doctor.py': {'ros2doctor'},
-    'nfo_sinus_driver/view/app.py': {'rich', 'textual'},
     'test/ros/stand_ins/rosbag2_py.py': {'rosbags'},
-    'test/unit/view/test_app.py': {'textual'},
 }
 
 
@@ -104,15 +102,15 @@ def test_the_extras_of_pip_have_what_the_commands_without_ros_import() -> None:
     }
     # where the name for pip is not that of the module
     for_pip = {'serial': 'pyserial', 'yaml': 'pyyaml'}
-    # which simulator/pymodbus_compat.py looks up by name, and what textual brings along
-    by_name, brought = {'cli': set(), 'simulator': {'pymodbus'}}, {'rich'}
+    # which simulator/pymodbus_compat.py looks up by name
+    by_name = {'cli': set(), 'simulator': {'pymodbus'}}
     for extra, rooms in (
         ('cli', ('bus', 'catalog', 'cli', 'drive', 'families', 'link', 'view')),
         ('simulator', ('catalog', 'families', 'simulator')),
     ):
         folders = [ROOT / 'nfo_sinus_driver' / room for room in rooms]
         modules = {name for one in folders for path in one.rglob('*.py') for name in imported(path)}
-        needed = modules - {'nfo_sinus_driver'} - brought | by_name[extra]
+        needed = modules - {'nfo_sinus_driver'} | by_name[extra]
         assert {for_pip.get(name, name) for name in needed} == extras[extra], extra
 
 

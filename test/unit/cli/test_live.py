@@ -53,6 +53,22 @@ def test_however_it_is_ended_the_terminal_is_as_it_was(bench: Bench, end: int | 
         terminal.wait_for('median')
 
 
+def test_it_fits_any_window_and_no_key_of_the_terminal_stops_it(bench: Bench) -> None:
+    with view(bench, '--addresses', '1,2', '--period', 0.05) as terminal:
+        terminal.wait_for('2 standing', 'q quit')
+        # it would stop all that is drawn, and suspend the program
+        terminal.press('\x13\x1a')
+        # a key that is none here, though it ends in a letter that is one
+        terminal.press('\x1b[1;5q')
+        for columns, rows, text in (
+            (120, 40, '│ drive 1'), (30, 8, '2 drives'), (3, 1, '2'), (80, 24, 'q quit'),
+        ):
+            terminal.resize(columns, rows)
+            terminal.wait_for(text)
+        terminal.press('q')
+        assert terminal.wait() == 0
+
+
 def test_one_that_is_not_there_is_reported_without_a_view(bench: Bench) -> None:
     with view(bench, '--address', 7, '--response-timeout', 0.05, '--retries', 0) as terminal:
         assert terminal.wait() == 1
@@ -66,21 +82,14 @@ def test_lines_where_they_are_requested(bench: Bench) -> None:
         assert terminal.wait() == 0
 
 
-def test_without_its_library_it_goes_on_line_by_line(bench: Bench) -> None:
-    program = """
-import importlib.metadata as metadata, sys
-known = metadata.version
-def version(name):
-    if name == 'textual':
-        raise metadata.PackageNotFoundError(name)
-    return known(name)
-metadata.version = version
-from nfo_sinus_driver.cli.main import main
-sys.exit(main())
-"""
-    command = [sys.executable, '-c', program, *bench.options, 'monitor', '--period', '0.05']
-    with Terminal(command) as terminal:
-        terminal.wait_for('the view needs the library textual', 'pip install', '24 Stop')
+@pytest.mark.parametrize('setting', ['TERM=dumb', 'LC_ALL=C'])
+def test_where_the_view_cannot_be_drawn_it_goes_on_line_by_line(
+    bench: Bench, setting: str
+) -> None:
+    # or Python takes another one than C
+    environment = ['env', 'PYTHONCOERCECLOCALE=0', setting]
+    with Terminal([*environment, *COMMAND, *bench.options, 'monitor']) as terminal:
+        terminal.wait_for('the view ', ': export ', '24 Stop')
         terminal.press('\x03')
         assert terminal.wait() == 0
 

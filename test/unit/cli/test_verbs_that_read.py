@@ -414,12 +414,6 @@ def test_monitor_ends_with_ctrl_c(bench: Bench, through: tuple[str, ...]) -> Non
     assert process.returncode == 0
 
 
-def test_monitor_is_one_line_on_a_terminal(bench: Bench) -> None:
-    done = bench.on_terminal('monitor', '--count', 3, '--period', 0.05)
-    assert done.status == 0
-    assert done.err.count('\r\x1b[K') == 3 and done.err.count('\n') == 3
-
-
 # --- the port -------------------------------------------------------------------------------------
 
 

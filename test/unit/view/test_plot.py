@@ -8,10 +8,8 @@ from __future__ import annotations
 import math
 
 from hypothesis import given, strategies as st
-import pytest
 
-pytest.importorskip('textual', minversion='3')
-from nfo_sinus_driver.view.app import plot, span
+from nfo_sinus_driver.view.plot import plot, span
 
 _VALUES = st.lists(st.floats(-1e6, 1e6) | st.just(math.nan), max_size=100)
 
