@@ -94,7 +94,7 @@ def _start_driver(context):
             package='nfo_sinus_driver',
             executable='driver',
             namespace=LaunchConfiguration('namespace'),
-            # a launch that fails or is killed leaves nobody to stop the motors
+            # a launch that fails or is killed leaves no process that stops the motors
             arguments=['--end-with', str(os.getpid())],
             parameters=[params_file, *overrides],
             ros_arguments=['--log-level', LaunchConfiguration('log_level')],

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A folder with a file for each drive in which something has to be put back, whoever is killed."""
+"""A folder with a file for each drive in which something has to be put back, even after a kill."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ class Integer(Number):
 
 
 class BitField(Number):
-    """Some bits of a number; whoever writes it joins it with the others."""
+    """Some bits of a number; a writer joins them with the others."""
 
     def __init__(self, name: str, whole: Integer, low: int, high: int) -> None:
         if whole.signed or not low <= high < whole.maximum.bit_length():

@@ -84,7 +84,7 @@ class Family(Mapping[str, Parameter]):
     :ivar error_logs: where its error log stands, by protocol; empty where no manual says.
     :ivar profile: how it is commanded, and what is to be known of it beside its tables.
     :ivar unlisted: what any other status code means; ``None``: nothing is known of it.
-    :ivar unused: what the file of a described drive says without any effect.
+    :ivar unused: what stands in the file of a described drive without any effect.
     """
 
     name: str
@@ -192,7 +192,7 @@ class Family(Mapping[str, Parameter]):
         if isinstance(value, str):
             return not parameter.labels or value in parameter.labels.values()
         if math.isnan(value):
-            # the drive says that there is none
+            # the drive reports that there is none
             return True
         low, high = parameter.minimum, parameter.maximum
         most = math.inf if role is None else self.profile.most.get(role, math.inf)

@@ -87,7 +87,7 @@ class InverterStatus:
 
     @functools.cached_property
     def facts(self) -> Fact:
-        """What the drive says of itself; only those in :attr:`valid` count."""
+        """What the drive reports of itself; only those in :attr:`valid` count."""
         if self.word is not None:
             facts = self.model.profile.status_word.facts(self.word, self.listed.kind)
             return facts | Fact.REVERSE if self._has_sign and self.frequency < 0 else facts

@@ -116,7 +116,7 @@ class Parameter:
         is a fault.
     :ivar option: the option cards of which the drive needs one for it to do anything, or ``''``.
     :ivar source: where in the manuals it stands.
-    :ivar none: the raw number by which the drive says that there is no value, or ``None``.
+    :ivar none: the raw number by which the drive reports that there is no value, or ``None``.
     """
 
     key: str

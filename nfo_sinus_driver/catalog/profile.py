@@ -196,7 +196,7 @@ class SetpointTarget:
         value itself; infinite where it is unknown.
     :ivar ends: the two parameters between which the drive takes set-points, if it has such.
     :ivar older_most: as ``most``, of the family's :class:`OlderDialect`.
-    :ivar followed: the parameter that reports what the drive follows, whoever gave it; ``''``:
+    :ivar followed: the parameter that reports what the drive follows, from any source; ``''``:
         :attr:`key` does.
     """
 
@@ -299,7 +299,7 @@ class Holder(enum.Enum):
     LOCAL = enum.auto()
     #: It cannot be taken now.
     INHIBITED = enum.auto()
-    #: The drive says what its manual does not.
+    #: The drive reports what its manual does not list.
     UNKNOWN = enum.auto()
 
 
@@ -382,7 +382,7 @@ class ControlMethod(abc.ABC):
 
     @abc.abstractmethod
     def in_control(self) -> Steps[bool]:
-        """Return whether the bus has control of the drive, from us or from whom was here before."""
+        """Return whether the bus has control, taken by this session or an earlier one."""
 
     @abc.abstractmethod
     def holder(self) -> Steps[Holder]:
@@ -415,7 +415,7 @@ class ControlMethod(abc.ABC):
     @abc.abstractmethod
     def stop(self, control_mode: str) -> Steps[None]:
         """
-        Take the run command back and write set-point 0, each step by itself [C126].
+        Remove the run command and write set-point 0; each is tried even if the other fails [C126].
 
         Does nothing to a drive that is not under bus control; refused if it is and keeps the run
         command.
@@ -423,10 +423,10 @@ class ControlMethod(abc.ABC):
 
     def remove_leftover(self) -> Steps[None]:
         """
-        Take back a run command of an earlier session, in a drive that the bus does not control.
+        Remove a run command of an earlier session from a drive that the bus does not control.
 
-        It would start the motor once the bus has control, whoever gives it. Here there is nothing
-        to be done: control is taken by a write of ours alone, and the stop is the next.
+        It would start the motor once the bus has control, whichever way. Here there is nothing
+        to be done: control is taken by a write of the driver alone, and the stop is the next.
         """
         yield from ()
 
@@ -464,7 +464,7 @@ class ControlMethod(abc.ABC):
 
     def _stop_by(self, command: Steps[None], *others: Steps[None]) -> Steps[None]:
         """
-        Take a run command back, then do the others, whatever the drive refuses of all this.
+        Remove a run command, then do the others, whatever the drive refuses of all this.
 
         Where the run command is refused and the bus has no control, nothing more is done.
 
@@ -510,7 +510,7 @@ class ControlMethod(abc.ABC):
 @dataclass(frozen=True)
 class Product:
     """
-    Who a drive says it is by its parameters; ``''`` is what it does not report.
+    What a drive identifies itself as by its parameters; ``''`` is what it does not report.
 
     :ivar vendor: who made it.
     :ivar model: its product name and size.
@@ -555,8 +555,8 @@ class Profile:
     :ivar holders: who has control, by the value of the control source.
     :ivar methods: the ways to command it, by name; the first one is the usual one.
     :ivar setpoints: where set-points go, by control mode.
-    :ivar in_charge: finds out by which control method the bus has control of a drive, from whom was
-        here before; given the status that was seen last, or ``None``.
+    :ivar in_charge: finds out by which control method the bus has control of a drive, taken by an
+        earlier session; given the last status, or ``None``.
     :ivar broadcast_stop: releases the motors of all drives of a line that has a broadcast.
     :ivar names_itself: it reports who it is by Modbus functions 43 and 17.
     :ivar product: reads who it is, where parameters report that; :class:`NotPossible` if it is none

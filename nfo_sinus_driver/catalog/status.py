@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What a drive says of itself and what it has, in terms that mean the same in every family.
+What a drive reports of itself and what it has, in terms that mean the same in every family.
 
 The same bit and the same code say different things ([C49] to [C55]): a family's tables and a
 :class:`StatusWord` turn them into facts, states and meanings.
@@ -48,7 +48,7 @@ class Meaning(_LookedUp):
     KEYPAD = 'keypad'
     #: Of these two: the motor is driven.
     LOCAL_RUNNING = 'local_running'
-    #: The motor is driven, whoever commands.
+    #: The motor is driven, under any control.
     RUNNING = 'running'
     #: It does not say who controls.
     ANONYMOUS = 'anonymous'
@@ -150,7 +150,7 @@ class StatusWord:
     :ivar frequency_beside: the frequency comes in the telegram of the status word, and is read with
         every status.
     :ivar runs_by_turning: a run command shows only while the motor turns: at set-point 0 an enabled
-        drive says the same as one without.
+        drive reports the same as one without.
     :ivar sizes: which of frequency and speed are measured without a sign; REVERSE reports it, or,
         where no bit means that, nothing does.
     """

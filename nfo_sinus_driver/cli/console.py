@@ -154,7 +154,7 @@ def put_columns(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> 
 _CALLS = Calls(
     acknowledge='type nfo-sinus ack',
     enable='run it again',
-    # at its end a command takes back what it has written
+    # at its end a command restores what it has written
     quick_stop='release the motor by a terminal',
     program='command',
     drive_timeout='--drive-timeout',

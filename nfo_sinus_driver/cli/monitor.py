@@ -324,7 +324,7 @@ class LineSource:
         self._views[drive.address] = view, time.monotonic()
 
     def _log(self, drive: OfflineDrive, level: Level, text: str) -> None:
-        """Put it into the log, if it is not what the last line about this drive says."""
+        """Put it into the log, if the last line about this drive is another one."""
         if self._logged.get(drive.address) != text:
             self._logged[drive.address] = text
             self._notes.put(Note(time.time(), level, _name(drive), text))

@@ -31,7 +31,7 @@ LINE = ('protocol', 'baud_rate', 'char_format', 'address')
 DEFAULTS = {name: SETTINGS[name].default for name in LINE_AND_DRIVE}
 #: What every verb has besides, where nothing else was typed or filled in.
 USUAL = {'yes': False, 'may_take_control': False}
-#: What is as short as it can be for each of 247 addresses.
+#: Defaults of a scan: a short time-out, no retries.
 OF_SCAN = {'response_timeout': 0.1, 'retries': 0}
 
 

@@ -244,7 +244,7 @@ class _Run:
             if confirmed:
                 stop = control.answer
                 control.screen.say(say(stop))
-                # whoever ended it so is in a hurry, or not there any more
+                # an operator who ended it so is in a hurry, or not there any more
                 hurry = signal not in ('', 'SIGINT') or control.screen.gone
                 given_back = control.give_back(_SHUTDOWN_TIMEOUT if hurry else math.inf)
                 confirmed = not self._drive.stop_waits

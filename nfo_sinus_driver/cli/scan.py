@@ -153,7 +153,7 @@ def _lines(options: argparse.Namespace) -> Sequence[tuple[int, str]]:
     if protocol.rates_disturb:
         if options.all_settings:
             raise UsageError(
-                f'--all-settings: on {protocol.name} a wrong bit rate disturbs everybody else, so '
+                f'--all-settings: on {protocol.name} a wrong bit rate disturbs all other nodes, so '
                 'none is tried; say --baud-rate'
             )
         return [(options.baud_rate or protocol.baud_rate, '')]
@@ -308,7 +308,7 @@ def _timeout(model: str) -> str:
 
 
 def _named(facts: Mapping[str, str]) -> str:
-    """Return what a drive says of itself, fit for a comment."""
+    """Return what a drive reports of itself, fit for a comment."""
     names = {'product': '', 'firmware': 'firmware ', 'serial number': 'serial '}
     text = ', '.join(f'{name}{facts[fact]}' for fact, name in names.items() if facts[fact])
     return ''.join(char if char.isprintable() else ' ' for char in text)

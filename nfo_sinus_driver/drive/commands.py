@@ -290,7 +290,7 @@ class Commands:
         await carry_out(self._method.stop(control_mode), self._params, Priority.STOP)
 
     async def remove_leftover(self) -> None:
-        """Take back a run command of an earlier session, while the bus has no control."""
+        """Remove a run command of an earlier session, while the bus has no control."""
         await carry_out(self._method.remove_leftover(), self._params, Priority.STOP)
 
     async def quick_stop(self, control_mode: str) -> None:

@@ -569,7 +569,7 @@ class Controller:
         """
         Stop a motor that runs under bus control and was not enabled since.
 
-        Where the bus has no control, take back what would run the motor once it has.
+        Where the bus has no control, remove what would run the motor once it has.
         """
         state, status = self._state, self._state.status
         if await self.method.in_control(Priority.SERVICE):

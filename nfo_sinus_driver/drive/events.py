@@ -107,7 +107,7 @@ class Cause(enum.Enum):
     """Over CANopen [any request takes control](drives/sinus_g2.md#what-differs). Do not monitor
     such a drive over CANopen"""
     UNLISTED_MODEL = (
-        'this drive says that it is a {model}, which the manual of the {title} does not list: '
+        'this drive identifies itself as a {model}, which the manual of the {title} does not list: '
         'check the model before the motor runs'
     )
     """Compare its nameplate with `model`. It is connected all the same"""
@@ -233,7 +233,7 @@ class Cause(enum.Enum):
     """The file of the drive says `keeps_run: true`, and no answer came for 0.4 s. Check its mains
     and the line, enable"""
     DRIVE_STARTING = 'the drive is starting ({status}): it was switched off and on; check its mains'
-    RESTARTED = 'the drive has started anew, as its boot-up message says: check its mains'
+    RESTARTED = 'the drive restarted: its boot-up message was received; check its mains'
     """The drive lost its power. Check its mains, enable"""
     KEYPAD_IN_CONTROL = 'the keypad has control now and runs the motor ({status}): press STOP there'
     OTHERS_IN_CONTROL = (
@@ -307,7 +307,7 @@ class Cause(enum.Enum):
     port and cable"""
     NO_ANSWER_YET = 'no answer yet'
     """The stop did not reach the drive. Check the line"""
-    DRIVE_SAYS = 'the drive says {status}'
+    DRIVE_SAYS = 'the drive still runs: its status is {status}'
     """The drive has the stop and still runs: another master or its terminals command it"""
     UNKNOWN_STATUS = (
         'its status ({status}) is none that its manual or its file lists, and shows nothing: look '
@@ -322,8 +322,7 @@ class Cause(enum.Enum):
     """The drive answered the stop and did not carry it out, or its status says that it runs for
     another reason. The driver releases the motor if it can"""
     STILL_TURNS = (
-        'the drive says {status}, and yet the motor turns at {now:.4g} {unit} and does not slow '
-        'down'
+        'the status is {status}, yet the motor turns at {now:.4g} {unit} and does not slow down'
     )
     """Does a load drive the motor? Does the drive measure something else, or run by other bits? The
     driver releases the motor"""
@@ -574,7 +573,7 @@ class Cause(enum.Enum):
     """The driver ended meanwhile. Compare: `nfo-sinus diff`"""
     WANTED_BUT_REFUSED = 'not applied from the parameter file: {why}'
     """The rest was written. Do what the reason says; clean up, start the driver again"""
-    NOT_AS_WANTED = '{key} is {has} in the drive, but {wanted} was given: not changed'
+    NOT_AS_WANTED = '{key} is {has} in the drive, the parameter file has {wanted}: not changed'
     """It was changed elsewhere, or `apply_parameters` is false. Set it, or correct the file"""
     WANTED_BUT_MISSING = 'this drive has no {keys}: not applied'
     """Remove it from the file"""
@@ -596,7 +595,7 @@ class Cause(enum.Enum):
     )
     """Press STOP at the drive"""
     CONTROL_INHIBITED = (
-        '{what}: the drive lets no one take control now ({status}; {name} is Inhibit)'
+        '{what}: control of the drive cannot be taken now ({status}; {name} is Inhibit)'
     )
     """The drive tunes already, perhaps by its keypad. Wait"""
     NO_STANDBY = '{what}: the drive does not stand by: {status}'

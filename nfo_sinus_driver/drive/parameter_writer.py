@@ -20,7 +20,7 @@ from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.link import LinkError, Refused
 
 _SERVICE = Priority.SERVICE
-#: How often a value that the drive refuses to take back is written.
+#: How often an old value that the drive refuses is written.
 _TRIES = 3
 #: How a drive refuses what it may accept after other settings have changed.
 _AS_THINGS_ARE = (Refused.ILLEGAL_VALUE, Refused.SETTINGS_CONFLICT)

@@ -368,7 +368,7 @@ class Poller:
 
     @property
     def yields(self) -> bool:
-        """It leaves the line to a drive whose settings are read for the first time."""
+        """Whether it polls seldom while another drive's settings are first read."""
         return self._bus.reads_another_first(self._unit) and self._is_idle
 
     @property

@@ -352,7 +352,7 @@ class Setpoint:
             if len(self._keys) > 1:
                 self._bus.request(self._slot)
         elif transfer.source is not None and self._gives_up_combining(error):
-            # if the set-point itself is wrong, the drive says so now
+            # if the set-point itself is wrong, the drive refuses this, too
             self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
             assert transfer.data is not None

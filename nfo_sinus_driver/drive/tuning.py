@@ -48,8 +48,8 @@ class Tuned:
     """
     How a procedure ended.
 
-    :ivar success: the drive says that it has finished.
-    :ivar how: what the drive says, or what went wrong.
+    :ivar success: the drive reports that it has finished.
+    :ivar how: what the drive reports, or what went wrong.
     :ivar changes: the parameters that have changed, whether it has finished or not.
     """
 

@@ -295,9 +295,9 @@ class TcpLink(ModbusLink):
         self._closings += 1
         if self._is_closed_each_time:
             self.remarks.add(
-                f'{self._name} closes the connection after each answer: it is opened anew for each '
-                'request, which takes longer; look in the settings of the gateway for one that '
-                'keeps connections open'
+                f'{self._name} closes the connection after each answer: it is opened again for '
+                'each request, which takes longer; look in the settings of the gateway for one '
+                'that keeps connections open'
             )
 
     # --- one transaction --------------------------------------------------------------------------

@@ -4,7 +4,7 @@
 """
 Requests on one serial line: send, wait, and decide whether to believe the answer.
 
-:class:`RequestLink` has what all protocols do alike; each adds its messages. :class:`CodecLink`
+:class:`RequestLink` has what all protocols share; each adds its messages. :class:`CodecLink`
 serves those whose codec distinguishes answers from requests.
 """
 

@@ -113,5 +113,5 @@ def _check(url: str) -> None:
         port.from_url(url)
     except (OSError, ValueError, LookupError):
         raise ValueError(
-            f'port {url!r}: leave away {"?" + parts.query!r}, which is no option of {kind}://'
+            f'port {url!r}: omit {"?" + parts.query!r}, which is no option of {kind}://'
         ) from None

@@ -104,7 +104,7 @@ class Setpoints:
                 self._warned_of_joint = True
                 self._log.warning(
                     f'{self._joint_command} has no joint {self._joint.name}, only '
-                    f'{", ".join(message.name) or "none"}: ignored; joint_name says what ours is'
+                    f'{", ".join(message.name) or "none"}: ignored; joint_name is the name to use'
                 )
             return
         if not message.velocity:

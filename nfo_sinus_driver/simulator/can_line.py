@@ -120,7 +120,7 @@ class CanLine(Wire):
         """Take bytes that were read at ``now``."""
         for said in self._adapter.take(data):
             if isinstance(said, Frame):
-                # it is acknowledged by whoever has power, also a node that is not meant
+                # every node that has power acknowledges it, also one that is not meant
                 sent = self._carries(now) and any(drive.listening for drive in self._drives)
                 if sent:
                     self._put(said, now, _Else.MASTER)

@@ -30,7 +30,7 @@ _NETWORK_MANAGEMENT = 0x000
 _EVERY_NODE = 0
 _MILLISECOND = 0.001
 _NEVER = float('inf')
-#: The emergencies: whoever is watched is silent, and an end of it.
+#: The emergencies: the watched node is silent, and an end of it.
 _WATCHED_IS_SILENT, _NO_ERROR = 0x8130, 0x0000
 #: Bits of the error register (1001h).
 _GENERIC, _COMMUNICATION = 0x01, 0x10
@@ -127,7 +127,7 @@ class Profile301:
 @dataclass
 class _Settings:
     """
-    What a node forgets when it starts anew.
+    What a node forgets when it restarts.
 
     :ivar beat: how often it sends its heartbeat, s; 0: never.
     :ivar beat_at: when the next one is due.
@@ -136,7 +136,7 @@ class _Settings:
     :ivar guard_ms: how often it expects to be guarded, ms.
     :ivar life_factor: how many times that it may be left alone.
     :ivar toggle: the bit that changes with each answer to guarding.
-    :ivar watch_until: when the silence of whoever is watched has lasted too long.
+    :ivar watch_until: when the silence of the watched node has lasted too long.
     :ivar is_lost: it has.
     """
 

@@ -5,7 +5,7 @@
 The Classic protocol: messages, whom they are for, and what comes back ([M0 §6.1], [M2]).
 
 Messages are cut by their length: a check sum may be any control character, EOT among them. What a
-drive says to one is its :class:`Server`'s business.
+drive answers is its :class:`Server`'s business.
 """
 
 from __future__ import annotations

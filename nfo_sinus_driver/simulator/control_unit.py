@@ -174,7 +174,7 @@ class ControlUnit(abc.ABC):
 
     def set_to(self, lines: Sequence[tuple[str, Timing]]) -> None:
         """
-        Be set to the first of some lines, if there is anything to set, and be reached by all.
+        Configure the serial settings, if there are any, for ``lines[0]``; answer on all of them.
 
         :param lines: of each, the protocol that the drive speaks there, speed and format.
         :raises ValueError: it cannot be.

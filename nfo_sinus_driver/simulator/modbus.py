@@ -230,7 +230,7 @@ def server(station: Station) -> Requests:
 
 
 def is_write(pdu: bytes) -> bool:
-    """Whether a request only writes, so that it may go to everybody."""
+    """Whether a request only writes, so that it may be broadcast."""
     return pdu[:1] in (bytes([WRITE_SINGLE]), bytes([WRITE_MULTIPLE]))
 
 

@@ -35,11 +35,11 @@ _MOST_IN_TCP = 254
 
 
 class _Modbus(Protocol):
-    """What the three have in common: an address, a PDU, and that only writes are for everybody."""
+    """What the three have in common: an address, a PDU, and that only writes are broadcast."""
 
     @staticmethod
     def concerns(station: Station, request: Request) -> bool:
-        """Whether the drive is meant; only writes are for everybody."""
+        """Whether the drive is meant; only writes are broadcast."""
         return request.address == station.address or _for_all(request)
 
     def answer(self, station: Station, request: Request) -> bytes:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The MOVITRAC's serial protocol: frames, and what a drive says to them [M4 §2.1].
+The MOVITRAC's serial protocol: frames, and what a drive answers [M4 §2.1].
 
 A frame is known by its first byte, the start delimiter, and is cut by the length that goes with it:
 nothing else marks its end. One with a wrong sum, or for another address, is not answered.

@@ -70,7 +70,7 @@ class PtyPort:
             return
         far, near = os.openpty()
         self._ends = [far, near]
-        # whoever opens it sets the line as he needs it; until then no byte is to be changed
+        # the program that opens it configures it; until then no byte is to be changed
         tty.setraw(near)
         os.set_blocking(far, False)
         self._device = os.ttyname(near)

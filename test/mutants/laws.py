@@ -169,7 +169,7 @@ LAWS = (
     ),
     Mutant(
         2,
-        'the run command is not taken back before an acknowledgement',
+        'the run command is not removed before an acknowledgement',
         G2,
         'one(Write(self._command, Scmd.STOP, retry=False))',
         'one(Read(MODE))',
@@ -726,7 +726,7 @@ LAWS = (
     ),
     Mutant(
         2,
-        'a motor that starts anew after a silence goes on',
+        'a motor that starts again after a silence goes on',
         CONTROLLER,
         'self._why_stopped(status) or self._why_slower(status, before)',
         'self._why_stopped(status)',
@@ -840,7 +840,7 @@ LAWS = (
     ),
     Mutant(
         11,
-        'a port that is opened anew has the same drives behind it',
+        'a port that is opened again has the same drives behind it',
         'nfo_sinus_driver/bus/worker.py',
         'self.silences.opened(self.now(), lost=lost)',
         'self.silences.opened(self.now(), lost=False)',

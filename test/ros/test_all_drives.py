@@ -35,8 +35,8 @@ def running(simulator) -> list[bool]:
 
 @needs('watched', 'reverse')
 def test_all_drives_are_enabled_and_stopped_but_the_one_that_is_only_watched(bench: Bench) -> None:
-    simulator, everybody = start(bench)
-    answer = everybody.call('enable_all')
+    simulator, every_drive = start(bench)
+    answer = every_drive.call('enable_all')
     assert answer.success, answer.message
     assert 'left: enabled' in answer.message and 'right: enabled' in answer.message
     assert 'watched' not in answer.message
@@ -47,7 +47,7 @@ def test_all_drives_are_enabled_and_stopped_but_the_one_that_is_only_watched(ben
             lambda: all(abs(simulator.state(address)['frequency']) > 15.0 for address in (1, 2)),
             'both are fast',
         )
-        answer = everybody.call('stop_all')
+        answer = every_drive.call('stop_all')
         assert answer.success, answer.message
         assert 'left: stopp' in answer.message and 'right: stopp' in answer.message
         wait_until(lambda: running(simulator) == [False, False, False], 'both stand')
@@ -59,17 +59,17 @@ def test_all_drives_are_enabled_and_stopped_but_the_one_that_is_only_watched(ben
 
 @needs('watched')
 def test_one_that_cannot_be_reached_is_named_and_the_others_stop(bench: Bench) -> None:
-    simulator, everybody = start(bench)
-    assert everybody.call('enable_all').success
+    simulator, every_drive = start(bench)
+    assert every_drive.call('enable_all').success
     with bench.client('/left').setpoints(20.0):
         wait_until(lambda: simulator.state(1)['turning'], 'it turns')
         simulator.inject('silence', 3600.0, address=2)
-        answer = everybody.call('disable_all')
+        answer = every_drive.call('disable_all')
     assert not answer.success
     assert answer.message.startswith('right: the stop is NOT confirmed'), answer.message
     assert 'left: stop' in answer.message
     wait_until(lambda: not simulator.state(1)['turning'], 'it stands')
-    answer = everybody.call('enable_all')
+    answer = every_drive.call('enable_all')
     assert not answer.success
     assert answer.message.startswith('right: '), answer.message
     assert 'left: enabled' in answer.message

@@ -94,8 +94,8 @@ right: {ros__parameters: {address: 2, scale: 0.04, unit: m/s}}
 """)
     bench.driver('--params-file', str(parameters))
     left, right = (bench.client(name).connected() for name in ('/left', '/right'))
-    everybody = bench.client('/nfo_sinus_bus')
-    publisher = everybody.node.create_publisher(Float32, '/nfo_sinus_bus/setpoint_all', 1)
+    every_drive = bench.client('/nfo_sinus_bus')
+    publisher = every_drive.node.create_publisher(Float32, '/nfo_sinus_bus/setpoint_all', 1)
 
     def publishing(condition: Callable[[], object], what: str) -> None:
         def published() -> object:
@@ -104,7 +104,7 @@ right: {ros__parameters: {address: 2, scale: 0.04, unit: m/s}}
 
         wait_until(published, what, period=0.05)
 
-    assert everybody.call('enable_all').success
+    assert every_drive.call('enable_all').success
     publishing(
         lambda: all(
             abs(simulator.state(one)['frequency'] - hertz) < 0.2
@@ -113,5 +113,5 @@ right: {ros__parameters: {address: 2, scale: 0.04, unit: m/s}}
         'each has 0.4 m/s',
     )
     assert [one.messages['status'][-1].unit for one in (left, right)] == ['m/s', 'm/s']
-    assert everybody.call('stop_all').success
+    assert every_drive.call('stop_all').success
     wait_until(lambda: not any(simulator.state(one)['turning'] for one in (1, 2)), 'both stand')

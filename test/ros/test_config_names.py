@@ -226,7 +226,7 @@ def test_all_may_read_and_only_one_may_command(policy: Policy, services: Names) 
     changing = {'enable', 'stop', 'set_parameters', 'set_parameters_atomically', 'change_state'}
     assert {f'/nfo_sinus/{name}' for name in changing} <= set(services)
     assert not {f'/nfo_sinus/{name}' for name in changing} & policy[_ANYBODY]['request']
-    # and what only reads is for anybody, all of it
+    # and what only reads is for every process, all of it
     reading = {name for name in services if re.search(r'/(get|list|describe)_\w+$', name)}
     assert policy[_ANYBODY]['request'] == reading
 

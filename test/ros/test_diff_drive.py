@@ -163,10 +163,10 @@ def start(bench: Bench, *arguments: str) -> tuple:
     )
     for wheel in _WHEELS:
         bench.client(f'/{wheel}').connected()
-    everybody = bench.client('/nfo_sinus_bus')
-    answer = everybody.call('enable_all')
+    every_drive = bench.client('/nfo_sinus_bus')
+    answer = every_drive.call('enable_all')
     assert answer.success, answer.message
-    return simulator, everybody, components(_FOLDER / 'robot.urdf')
+    return simulator, every_drive, components(_FOLDER / 'robot.urdf')
 
 
 def _line(bench: Bench) -> tuple[str, ...]:

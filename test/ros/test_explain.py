@@ -55,7 +55,7 @@ def status(at: float, reason: int = 0, text: str = '', *, enabled: bool = False)
 
 
 def statuses() -> Iterator[tuple[float, DriveStatus]]:
-    """Yield what the drive says: it is enabled every ten seconds, and stopped four later."""
+    """Yield what the drive reports: it is enabled every ten seconds, and stopped four later."""
     yield 0.0, status(0.0)
     for number, (name, text) in enumerate(_STOPS.items()):
         enabled_at = 10.0 * number + 1.0

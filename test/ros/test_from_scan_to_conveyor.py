@@ -106,8 +106,8 @@ def test_the_driver_starts_with_what_a_scan_has_written(bench: Bench) -> None:
     for address in (1, 2, 3):
         client = bench.client(f'/drive_{address}').connected()
         assert client.parameter('address') == address
-    everybody = bench.client('/nfo_sinus_bus')
-    assert everybody.call('enable_all').success
+    every_drive = bench.client('/nfo_sinus_bus')
+    assert every_drive.call('enable_all').success
     with bench.client('/drive_2').setpoints(20.0):
         wait_until(lambda: frequencies(simulator) == [0, 20, 0], 'the second turns')
     assert 'unknown' not in bench.log and 'no such parameter' not in bench.log
@@ -130,7 +130,7 @@ def test_the_file_for_32_drives_starts_as_many(bench: Bench) -> None:
 
     wait_until(all_there, 'every drive has a node', timeout=3 * PATIENCE)
     assert {int(seen[name]['address']) for name in names} == set(range(1, 33))
-    assert 'nobody knows' not in bench.log and 'is no parameter' not in bench.log
+    assert 'is no parameter' not in bench.log
 
 
 @pytest.mark.every_connection

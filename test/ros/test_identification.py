@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who a drive says it is, in log and diagnostics; and what it costs where it does not tell."""
+"""What a drive identifies itself as, in log and diagnostics; what it costs where it does not."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from nfo_sinus_driver.demo.bench import own_domain
 
-#: What a drive says of itself that turns at its set-point.
+#: What a drive reports of itself that turns at its set-point.
 _RUNNING = (
     'ready', 'switched_on', 'operation_enabled', 'network_control', 'network_reference',
     'setpoint_reached',

@@ -52,7 +52,7 @@ class Manager:
             up = transition in _UP
             for client in self.clients if up else reversed(self.clients):
                 client.change_state(transition)
-                # it believes the state, and not the answer
+                # it goes by the state, and not by the answer
                 if _state(client) != _AFTER[transition]:
                     return False
         return True
@@ -77,9 +77,9 @@ def start(bench: Bench) -> tuple:
 
 
 def test_start_pause_resume_reset_and_shutdown(bench: Bench) -> None:
-    simulator, manager, everybody = start(bench)
+    simulator, manager, every_drive = start(bench)
     assert manager.go(_UP), 'startup'
-    answer = everybody.call('enable_all')
+    answer = every_drive.call('enable_all')
     assert answer.success, answer.message
     left, right = manager.clients
     with left.setpoints(20.0), right.setpoints(20.0):
@@ -96,7 +96,7 @@ def test_start_pause_resume_reset_and_shutdown(bench: Bench) -> None:
             lambda: not any(simulator.state(address)['turning'] for address in (1, 2)),
             'they are not enabled',
         )
-        assert everybody.call('enable_all').success
+        assert every_drive.call('enable_all').success
         wait_until(lambda: simulator.state(1)['turning'], 'it turns')
         assert manager.go(_DOWN), 'reset'
     assert not any(simulator.state(address)['turning'] for address in (1, 2))

@@ -196,7 +196,7 @@ def test_callers_of_a_drive_that_is_gone_do_not_delay_the_stop_of_its_neighbour(
             time.sleep(0.02)
         asked = len(bench.frames())
         assert good.call('stop').success
-        wait_until(lambda: all(call.done() for call in calls), 'everybody is answered')
+        wait_until(lambda: all(call.done() for call in calls), 'every call is answered')
         assert not any(call.result().success for call in calls)
     requests = [frame for frame in bench.frames()[asked:] if frame['direction'] == 'request']
     asked_of = [

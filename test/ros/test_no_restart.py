@@ -112,7 +112,7 @@ def _adapter_unplugged(bench: Bench, drive: Simulated, client: Client) -> None:
     client.wait_for('status', lambda status: status.connected, 'the port is back')
 
 
-def _mode_changed_by_somebody(bench: Bench, drive: Simulated, client: Client) -> None:
+def _mode_changed_at_the_drive(bench: Bench, drive: Simulated, client: Client) -> None:
     bench.drives.run_by_terminals(drive)
     client.wait_for('status', lambda status: not status.enabled, 'it is disabled')
     bench.drives.end_run_by_terminals(drive)
@@ -142,7 +142,7 @@ def _disable(bench: Bench, drive: Simulated, client: Client) -> None:
         _power_cycle,
         _line_gone_for_five_seconds,
         _adapter_unplugged,
-        pytest.param(_mode_changed_by_somebody, marks=needs('direct')),
+        pytest.param(_mode_changed_at_the_drive, marks=needs('direct')),
         _stop_service,
         _quick_stop_service,
         _disable,

@@ -86,7 +86,7 @@ def test_parameters_go_with_cleanup_and_come_back_as_they_are(bench: Bench) -> N
 
 def _dump(client: Client) -> dict[str, object]:
     """Return all parameters of the node, as ``ros2 param dump`` does."""
-    # that one is rclpy's own, and no node at all takes it back
+    # that one is rclpy's own, and no node at all removes it
     return values(client, *sorted(client.parameter_names() - {'start_type_description_service'}))
 
 

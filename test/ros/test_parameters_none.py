@@ -26,7 +26,7 @@ def test_a_dump_has_the_nodes_own_parameters_and_loads_again(bench: Bench) -> No
     client = bench.client().connected()
     wire = Wire(bench)
     wire.writes()
-    # that one is rclpy's own, and no node at all takes it back
+    # that one is rclpy's own, and no node at all removes it
     names = client.parameter_names() - {'start_type_description_service'}
     assert not names & _SETTINGS.keys()
     assert client.set_parameters(poll_rate=20.0, setpoint_max=30.0).successful

@@ -95,7 +95,7 @@ def test_what_differs_is_written_once_and_drift_is_left_alone(bench: Bench) -> N
     drive.inject('set', 'control.accel', 8.0)
     assert client.call('refresh_parameters').success
     wait_until(lambda: client.parameter('control.accel') == 8.0, 'the change shows')
-    text = 'control.accel is 8 s in the drive, but 6 was given: not changed'
+    text = 'control.accel is 8 s in the drive, the parameter file has 6: not changed'
     says_once(driver, text)
     _drifts(client, 'control.accel: 6 -> 8 s')
     status, _ = _diagnosis(client)
@@ -120,7 +120,7 @@ def test_apply_parameters_false_only_reports(bench: Bench) -> None:
     )
     client = bench.client().connected()
     _drifts(client, 'control.accel: 6 -> 5 s')
-    text = 'control.accel is 5 s in the drive, but 6 was given: not changed'
+    text = 'control.accel is 5 s in the drive, the parameter file has 6: not changed'
     says_once(driver, text)
     assert 'motor.u_nom' not in driver.text
     assert client.parameter('control.accel') == 5.0

@@ -42,7 +42,7 @@ def _agree(client: Client, drive: Stubborn) -> None:
 
 
 def _stands(drive: Stubborn) -> None:
-    """Wait until the motor stands and the drive says so."""
+    """Wait until the drive reports that the motor stands."""
     wait_until(lambda: drive.simulator.state()['state'] == 'READY_TO_SWITCH_ON', 'it stands')
 
 
@@ -72,7 +72,7 @@ def _refusing(name: str, reason: Reason) -> Callable[[str, str], None]:
     return happens
 
 
-# --- what the drive says ------------------------------------------------------------------------
+# --- what the drive reports ---------------------------------------------------------------------
 
 
 @pytest.mark.parametrize('reason', Reason)

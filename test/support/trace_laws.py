@@ -168,12 +168,12 @@ class _Judge:
             self._running.discard(unit)
 
     def _call(self, request: Request) -> Iterator[str]:
-        """Judge what is said to everybody: a stop, or a set-point where all have been enabled."""
+        """Judge what is broadcast: a stop, or a set-point where all have been enabled."""
         places, words = self._places, request.words
         if _stops(request, places):
             self._running.clear()
         elif request.place not in places.setpoints:
-            yield 'a call to everybody that is neither a stop nor a set-point'
+            yield 'a broadcast that is neither a stop nor a set-point'
         elif self._known - self._running:
             yield f'a set-point for all, but {sorted(self._known - self._running)} are not enabled'
         else:

@@ -156,7 +156,7 @@ private:
     if (status_.fault) {
       return "the drive has a fault: see " + drive_ + "/inv_st";
     }
-    return status_.enabled ? "" : "not enabled, or stopped by somebody else";
+    return status_.enabled ? "" : "not enabled, or stopped by another client";
   }
 
   // Handle messages until a condition holds; false: not in this time, or interrupted.

@@ -325,7 +325,7 @@ class Commands:
             )
 
     def _check_stop(self, name: str) -> None:
-        """Ensure that a stop takes back what run has left."""
+        """Ensure that a stop removes what run has left."""
         line = self._control[name].line
         run, stop, place = dict(self._run), self._left_by(name), self._direction_place
         if self._direction is not None and place is not None:

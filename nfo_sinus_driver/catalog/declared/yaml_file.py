@@ -196,7 +196,7 @@ def load(path: Path) -> tuple[Node, Problems]:
 
 
 class _Converter:
-    """Turns the nodes of the parser into ours."""
+    """Converts PyYAML nodes."""
 
     def __init__(self, problems: Problems) -> None:
         self._problems = problems

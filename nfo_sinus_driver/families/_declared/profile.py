@@ -117,7 +117,7 @@ class Declared(ControlMethod):
             yield from _carry_out(drive.stop, head=True)
 
     def remove_leftover(self) -> Steps[None]:
-        """Write the stop, which takes a run bit back that would count once the line has control."""
+        """Write the stop, which removes a run bit that would count once the line has control."""
         if not self._drive.stop_disturbs_local:
             yield from try_steps(_each(self._drive.stop, retry=True))
 
@@ -138,7 +138,7 @@ class Declared(ControlMethod):
         yield from _carry_out(self._drive.run, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
-        """Take the run command back and write set-point 0, each step by itself [C126]."""
+        """Remove the run command and write set-point 0; each is tried even if the other fails."""
         yield from self._stop_by(_each(self._drive.stop), self._setpoint.zero(retry=False))
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
@@ -149,7 +149,7 @@ class Declared(ControlMethod):
         return self._stop_by(_each(steps, retry=True), self._setpoint.zero(retry=True))
 
     def release(self) -> Steps[None]:
-        """Give control back, if the file says how; the run command is taken back in any case."""
+        """Give control back, if the file says how; the run command is removed in any case."""
         if (yield from self.in_control()):
             yield from _carry_out(self._drive.stop)
             yield from _carry_out(self._drive.release)

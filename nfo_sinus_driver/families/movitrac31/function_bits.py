@@ -153,7 +153,7 @@ class FunctionBits(ByLine):
 
     def remove_leftover(self) -> Steps[None]:
         """
-        Take back a direction, which would count once P841 is set to Remote control at the keypad.
+        Remove a direction, which would count once P841 is set to Remote control at the keypad.
 
         Until then the bits do not count; with a fieldbus no manual says whose they are.
         """

@@ -40,8 +40,8 @@ def read_product() -> Steps[Product]:
     type_ = yield from read_if_there(_TYPE)
     if type_ in _OTHERS:
         raise NotPossible(
-            f'this drive says that it is a {type_} (index 271), whose parameters are others: model '
-            f'movitrac31 is for a {_OURS}'
+            f'this drive identifies itself as a {type_} (index 271), whose parameters are '
+            f'others: model movitrac31 is for a {_OURS}'
         )
     size = yield from read_if_there(_OUTPUT_STAGE)
     software = yield from read_if_there(_SOFTWARE)

@@ -113,7 +113,7 @@ _LINE_FAULTS = {
     10: 'the value is out of range',
     14: 'receive buffer overrun',
 }
-_NOT_NOW = 'the drive lets no one take control now (MODE is Inhibit: tuning?)'
+_NOT_NOW = 'control of the drive cannot be taken now (MODE is Inhibit: tuning?)'
 #: Why a serial fault is left that MODE = Stop would end.
 _CONTROLLED_ELSEWHERE = (
     'the serial fault is still active: keypad or terminals have control, which MODE = Stop, the '
@@ -181,7 +181,7 @@ class ModeScmd(_G2):
     _soonest: ClassVar[Write] = Write(MODE, Mode.STOP)
 
     def in_control(self) -> Steps[bool]:
-        """Return whether the bus has control of the drive, from us or from whom was here before."""
+        """Return whether the bus has control, taken by this session or an earlier one."""
         mode: int = yield Read(MODE)
         return mode == Mode.BUS
 
@@ -214,7 +214,7 @@ class ModeScmd(_G2):
 
     def stop(self, control_mode: str) -> Steps[None]:
         """
-        Take the run command back and write set-point 0, each step by itself [C126].
+        Remove the run command and write set-point 0; each is tried even if the other fails [C126].
 
         Does nothing to a drive that is under the control of its keypad or terminals. Refused
         although the bus has control or, under Inhibit, nothing reports which: it may be tuning
@@ -322,7 +322,7 @@ class DriveControl(_G2):
         self._ready = _READY | Control.NET_REF if reference == 'fieldbus' else _READY
 
     def in_control(self) -> Steps[bool]:
-        """Return whether the network has control, by us or by whom was here before."""
+        """Return whether the network has control, taken by this session or an earlier one."""
         return bool(int((yield Read(STATUS_WORD))) & words.Status.CTRL_FROM_NET)
 
     def take_control(self) -> Steps[None]:
@@ -372,10 +372,10 @@ class DriveControl(_G2):
 
     def stop(self, control_mode: str) -> Steps[None]:
         """
-        Take the run command back, so that the drive goes to SHUTDOWN, and write set-point 0.
+        Remove the run command, so that the drive goes to SHUTDOWN, and write set-point 0.
 
-        Each step by itself [C126]. Does nothing to a drive that is not under bus control: who has
-        control stays as it is.
+        Each is tried even if the other fails [C126]. Does nothing to a drive that is not under bus
+        control: who has control stays as it is.
         """
         zeroes = (target.zero(retry=False) for target in self._targets(control_mode))
         yield from self._stop_by(self._change_or_write(~_RUN, Control(0)), *zeroes)
@@ -415,7 +415,7 @@ class DriveControl(_G2):
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
         """
-        Acknowledge a fault by one rising edge of bit 7, whoever has control [M0 table 16].
+        Acknowledge a fault by one rising edge of bit 7, under any control [M0 table 16].
 
         A serial fault by MODE = Stop alone first, else by reading SioErr [C99]. Over Classic
         nothing can be written while any fault is active, so that reading has to do [M0 §6.1.5]; the
@@ -465,7 +465,7 @@ class DriveControl(_G2):
         try:
             word = Control(int((yield Read(CONTROL_WORD, retry=retry))))
         except Refusal:
-            # what it has of ours, then, but never to who has control by keypad or terminals
+            # then what the driver wrote last, but never while keypad or terminals have control
             if not (yield from self.perhaps_in_control()):
                 raise
         yield Write(CONTROL_WORD, word & keep | add, retry=retry)

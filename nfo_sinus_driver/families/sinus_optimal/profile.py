@@ -140,7 +140,7 @@ class DriveControl(ControlMethod):
     )
 
     def in_control(self) -> Steps[bool]:
-        """Return whether the bus has control, by us or by whom was here before."""
+        """Return whether the bus has control, taken by this session or an earlier one."""
         return bool(int((yield Read(STATUS_WORD))) & words.Status.CONTROL_FROM_BUS)
 
     def holder(self) -> Steps[Holder]:
@@ -196,7 +196,7 @@ class DriveControl(ControlMethod):
         try:
             word = int((yield Read(CONTROL_WORD, retry=retry)))
         except Refusal:
-            # what it has of ours, then, but never to who has control by keypad or terminals
+            # then what the driver wrote last, but never while keypad or terminals have control
             if not (yield from self.perhaps_in_control()):
                 raise
         yield Write(CONTROL_WORD, word & ~_RUN, retry=retry)
@@ -208,7 +208,7 @@ class DriveControl(ControlMethod):
 
     def release(self) -> Steps[None]:
         """
-        Take Enable back, and keep the bus control.
+        Remove Enable, and keep the bus control.
 
         Without it the terminals would have control, and a RUN input that is active might start the
         motor; [M1] names no way to give control back.

@@ -155,7 +155,7 @@ class MovitracControlUnit(ControlUnit):
         return True
 
     def validate(self, key: str) -> None:
-        """Refuse a setting that needs what is not so, and take note of the others."""
+        """Refuse a setting that needs what is not so; record the others."""
         needs = self.variant.settings_need
         if needs == 'output_off' and self.motor.driven:
             raise Nack(ReturnCode.NOT_INHIBITED, 'the motor is driven')

@@ -4,7 +4,7 @@
 """
 How a Sinus is commanded, what reference it follows, and what its display says of it.
 
-Here stands what the families do alike; what each does its own way is behind
+Here stands what the families share; what each does its own way is behind
 :class:`SinusControlUnit`. Where the manuals leave the drive's behaviour open, it does what makes a
 careless driver fail: a run command stands through a lost RUN input, a set-point through a power
 cycle, and MODE = Ext or Auto starts the motor; or what its variant says.
@@ -330,7 +330,7 @@ class SinusControlUnit(ControlUnit):
             self._drop_run_command()
 
     def _drop_run_command(self) -> None:
-        """Forget the run command, whoever gave it; the terminals give theirs all the time."""
+        """Forget the run command, from any source; the terminals give theirs all the time."""
         self.scmd = _STOP
         if self.source is Source.KEYPAD:
             self.take(Source.STOP)
@@ -380,7 +380,7 @@ class SinusControlUnit(ControlUnit):
         return self.serial.address
 
     def set_to(self, lines: Sequence[tuple[str, Timing]]) -> None:
-        """Be set to the first of some lines, and be reached by all."""
+        """Configure the serial settings for ``lines[0]``; answer on all of them."""
         self.serial.set_to(lines)
 
     def hears(self, protocol: str, timing: Timing) -> bool:

@@ -173,7 +173,7 @@ class G2ControlUnit(SinusControlUnit):
         self.self_restart.tripped(code)
 
     def hold_bus_mode(self) -> None:
-        """Be in bus mode, and come back to it whoever takes control, while that module talks."""
+        """Be in bus mode, and come back to it when control is taken, while that module talks."""
         if not self._is_held:
             self._is_held = True
             self.settle()
@@ -384,7 +384,7 @@ class G2ControlUnit(SinusControlUnit):
         """Carry out what stands: control word, state machine, power stage, demand."""
         self._settle()
         if self._is_held and self.tuning is None and not self.on_bus and not self.faults.serial:
-            # whoever takes control ends a run; bus mode is entered again at once [M0 §6.4]
+            # to take control ends a run; bus mode is entered again at once [M0 §6.4]
             self.take(Source.SCMD)
             self._settle()
 

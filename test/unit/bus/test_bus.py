@@ -146,7 +146,7 @@ def test_equals_take_turns_in_the_order_they_came(bus: Bus, link: FakeLink) -> N
 
 
 def test_stop_waits_for_one_transaction_at_most(bus: Bus, link: FakeLink) -> None:
-    # everybody asks without end, in more steps than one
+    # all ask without end, in more steps than one
     ended = threading.Event()
 
     async def chatter(number: int, priority: Priority) -> None:

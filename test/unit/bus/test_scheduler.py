@@ -301,7 +301,7 @@ def test_between_two_stops_without_an_answer_the_most_urgent_has_its_turn(
     retry = Waiting(cast(Task, 'retry'), Transfer(4, register(1), Priority.POLL))
     for waiting in (retry, *map(entry, _BACKGROUND)):
         scheduler.add(waiting)
-    # it costs so much that everybody else has a claim on the line
+    # it costs so much that every other request has a claim on the line
     for _ in range(5):
         scheduler.add(silent)
         assert scheduler.take() is silent

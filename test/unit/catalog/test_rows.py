@@ -205,7 +205,7 @@ def test_every_row_is_one_that_may_be() -> None:
                 row.description and re.match(r'M\d ', row.source),
                 all(0 <= number <= 0xFFFF for number in numbers),
                 all(place.source[0] == 'M' for place in row.addresses.values()),
-                # the drive says what is possible of what can only be read
+                # the drive reports what is possible of what can only be read
                 row.access is not Access.READ or name == 'movitrac31' or row.minimum is None,
                 plain == labels and not any(',' in label or '|' in label for label in labels),
                 not labels or name == 'movitrac31' or (row.unit, row.decimals) == ('', 0),

@@ -231,7 +231,7 @@ class History:
             return math.inf
         return max(self._whole_since, self._watched_at)
 
-    # --- what the simulated drive says ------------------------------------------------------------
+    # --- what the simulated drive reports ---------------------------------------------------------
 
     @property
     def running(self) -> bool:

@@ -27,7 +27,7 @@ def test_a_fault_that_holds_the_stop_does_not_keep_the_line_busy_while_it_connec
         state.fault(BUS_FAIL, standing=True)
         state.clean_up()
         state.run_by_another(wait=0.0)
-        # the new driver takes the run command back, is refused, and must still get to connect
+        # the new driver removes the run command, is refused, and must still get to connect
         state.kill(wait=0.1)
         assert state.rig.notes.snapshot is not None and state.rig.notes.snapshot.connected
     finally:

@@ -180,7 +180,7 @@ def test_run_input_is_missing() -> None:
     with Rig(options={'run_input': False}).connect() as rig:
         assert 'its RUN input (DIN1) is not active' in rig.answer(rig.drive.enable())
         rig.pass_time(0.5)
-        # the run command that waits for RUN is taken back
+        # the run command that waits for RUN is removed
         assert rig.far.control_unit.scmd == 0
         rig.far.set_run_input(True)
         rig.assert_only_enable_helps()

@@ -29,7 +29,7 @@ _TELLS = (
     *(Role.STATUS_WORD, Role.STATUS_CODE, Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED),
     *(Role.CONTROL_SOURCE, Role.LOCAL_OPERATION),
 )
-#: Nothing else takes these run commands back [C51], [C96]: set-point 0 is all that is left, and
+#: Nothing else removes these run commands [C51], [C96]: set-point 0 is all that is left, and
 #: where the reference is a terminal's not even that.
 _NO_OTHER_WAY = {
     'optimal': 'fieldbus.smode',

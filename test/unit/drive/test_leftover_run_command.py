@@ -51,7 +51,7 @@ def set_local(rig: Rig, *, local: bool) -> None:
 def test_it_is_taken_back_as_the_driver_connects(name: str, monitor: bool) -> None:
     with left_in_local(SHIPPED[name], in_local='keeps') as rig:
         if monitor:
-            # the motor starts where nothing takes it back, which makes this a test
+            # the motor starts where nothing removes it, which makes this a test
             rig.reset(control_method='monitor')
             rig.kill()
             rig.begin()

@@ -210,7 +210,7 @@ def test_no_turn_at_an_acknowledgement(switch: str) -> None:
 
 
 def turn_with_a_slow_ramp(rig: Rig, value: float) -> None:
-    """Turn; a drive that starts anew then has not come far when it is heard again."""
+    """Turn; a drive that restarts then has not come far when it is heard again."""
     rig.turn(value)
     rig.far.set_from_keypad('ramp.t11_up', 3.0)
     rig.pass_time(0.5)

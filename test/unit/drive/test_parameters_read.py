@@ -283,7 +283,7 @@ def test_a_wanted_state_is_written_where_it_differs_or_only_reported(
     rig.result(parameters.apply({ACCEL: 7}, write=False))
     assert [str(drift) for drift in parameters.drift] == [f'{ACCEL}: 7 -> 0.3 s']
     assert texts(rig, Cause.NOT_AS_WANTED) == [
-        f'{ACCEL} is 0.3 s in the drive, but 7 was given: not changed'
+        f'{ACCEL} is 0.3 s in the drive, the parameter file has 7: not changed'
     ]
     assert not rig.far.writes
     rig.far.memory.put(SWITCH, 2)
@@ -325,7 +325,7 @@ def test_a_drift_is_reported_once_and_not_undone(rig: Rig, parameters: Parameter
     rig.far.set_from_keypad(RETARD, 9)
     rig.pass_time(2 * ROUND)
     assert texts(rig, Cause.NOT_AS_WANTED) == [
-        f'{ACCEL} is 9 s in the drive, but 7 was given: not changed'
+        f'{ACCEL} is 9 s in the drive, the parameter file has 7: not changed'
     ]
     assert [str(drift) for drift in parameters.drift] == [f'{ACCEL}: 7 -> 9 s']
     assert far(rig, ACCEL) == [9]

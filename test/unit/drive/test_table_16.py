@@ -212,7 +212,7 @@ def test_words_of_table_14(reference: str, net_ref: int) -> None:
         # NetCtrl, power, no quick stop, ramp; bit 0 low first, then SwitchOn, then the direction
         assert rig.written(CONTROL) == [net_ref | 0x4076, net_ref | 0x4077, net_ref | 0x407F]
         rig.answer(rig.drive.stop())
-        # SwitchOn and both directions are taken back by AND, and nothing is added by OR
+        # SwitchOn and both directions are removed by AND, and nothing is added by OR
         assert set(rig.written(MASK)) == {0x0000DFF6}
         rig.answer(rig.drive.quick_stop())
         # no longer DisableQuickStop; OverrideCoast
@@ -279,7 +279,7 @@ MISLED: list[tuple[str, list[Control], str]] = [
     ('EQ QD', [FORWARD & QUICK_STOP], STOPPED),
     ('EQ QD', [FORWARD & ~Control.NET_CTRL], LOST),
     ('EX', [POWER | RAMP], STOPPED),
-    # and on by the driver, which takes bit 0 back
+    # and on by the driver, which removes bit 0
     ('EB BX', [ON], STOPPED),
     ('EB BQ', [ON, ON & WITHOUT_VOLTAGE], STOPPED),
     ('EB BQ', [ON, ON & QUICK_STOP], STOPPED),

@@ -225,7 +225,7 @@ def test_quick_stop_releases_a_sinus_h(echo_bits: str) -> None:
     with Rig(SINUS_H, parameters=ramp, options={'echo_bits': echo_bits}) as rig:
         rig.turn()
         assert rig.answer(rig.drive.quick_stop()) == 'released: the motor coasts'
-        # bit 1 alone is taken back from SwitchOFF: out of S4 to S1 [M3 §6]
+        # bit 1 alone is removed from SwitchOFF: out of S4 to S1 [M3 §6]
         assert words(rig.line.frames)[-1] == 0x0474
         assert rig.far.control_unit.report()['state'] == 'S1'
         assert not rig.far.motor.driven and rig.far.motor.turning
@@ -246,7 +246,7 @@ def test_rapid_stop_of_a_sinus_h_is_adv_8(stop_mode: str, answer: str, echo_bits
     with Rig(SINUS_H, parameters=ramp, options={'echo_bits': echo_bits}) as rig:
         rig.turn()
         assert rig.answer(rig.drive.rapid_stop()) == answer
-        # bit 2 alone is taken back from SwitchOFF: out of S4 to S1 [M3 §6]
+        # bit 2 alone is removed from SwitchOFF: out of S4 to S1 [M3 §6]
         assert words(rig.line.frames)[-1] == 0x0472
         assert rig.far.control_unit.report()['state'] == 'S1'
         assert rig.far.motor.driven == (stop_mode == 'Dec')

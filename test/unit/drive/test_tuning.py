@@ -65,7 +65,7 @@ def test_each_procedure_is_done_and_what_it_changed_is_reported(connection: str)
             assert changed
             assert {one.key: (one.old, one.new) for one in result.changes} == changed
             assert str(result.changes[0]) in said(result)
-            # every stage, as the drive says
+            # every stage, as the drive reports
             codes = list(dict.fromkeys(one.status.code for one, _ in news if one.status))
             assert codes[-1] == code and news[-1][0].text == text
             assert TUNING in codes or procedure is Procedure.CALCULATE
@@ -122,7 +122,7 @@ def test_mode_inhibit_is_no_take_over_and_control_is_given_back_as_it_was_found(
         assert rig.drive.snapshot.text == 'Tuning'
         assert not future.done()
         assert not rig.notes.said('stopped') and not rig.drive.stop_unconfirmed
-        # the run command was not taken back behind the tuning
+        # the run command was not removed behind the tuning
         assert rig.written(SCMD)[-1] == Scmd.FULL_TUNING
         assert rig.result(future).success
         assert rig.far.control_unit.mode == Mode.BUS

@@ -123,7 +123,7 @@ def test_what_else_there_is_takes_control_from_the_terminals_and_releases_the_mo
     begun = *removed, early, to_control
     inhibited = Write(BITS, INHIBIT), None
     assert play(method.force_stop('Freque'), *begun, inhibited, (Read(MODE), REMOTE_CONTROL))
-    # the drive says that it has taken it, but ignores it
+    # the drive confirms it, but ignores it
     assert not play(
         method.force_stop('Freque'), *begun, inhibited, (Read(MODE), REMOTE_SETPOINT)
     )

@@ -58,5 +58,5 @@ class Bench:
         return [number for _, number, _, _ in self.drive.requests]
 
     def answer_of(self, index: int) -> bytes:
-        """What the drive says to the request with this index."""
+        """What the drive answers to the request with this index."""
         return packed(self.drive.word(self.asked[index], index))

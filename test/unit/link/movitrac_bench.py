@@ -57,5 +57,5 @@ class Bench:
         return [index for _, index, _, _ in self.drive.requests]
 
     def answer_of(self, number: int) -> bytes:
-        """What the drive says to the request with this number."""
+        """What the drive answers to the request with this number."""
         return self.drive.value(self.asked[number], number)

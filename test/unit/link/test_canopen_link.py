@@ -327,7 +327,7 @@ def test_a_node_that_started_anew_is_made_operational_again(reads: int) -> None:
     bench = Bench()
     bench.write(A)
     bench.bus.now += 1
-    # another one produces a heartbeat, and others start anew
+    # another one produces a heartbeat, and others restart
     for identifier, data in ((0x705, b'\x05'), (0x706, b'\0'), (0x700, b'\0')):
         bench.bus.arrive(bench.bus.now, Frame(identifier, data))
     bench.write(A)

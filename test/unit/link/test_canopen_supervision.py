@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How nodes notice that the client is gone, and the client that a node has started anew."""
+"""How nodes notice that the client is gone, and the client that a node has restarted."""
 
 from __future__ import annotations
 

@@ -589,8 +589,8 @@ def test_device_server_that_is_not_there(server: Server) -> None:
         ('socket://127.0.0.1:x', 'lacks a host or a port'),
         ('socket://127.0.0.1:0', '1 to 65535'),
         ('rfc2217://127.0.0.1:65536', '1 to 65535'),
-        ('socket://127.0.0.1:1?fast', r"leave away '\?fast', which is no option of socket://"),
-        ('rfc2217://127.0.0.1:1?timeout=x', r"leave away '\?timeout=x'"),
+        ('socket://127.0.0.1:1?fast', r"omit '\?fast', which is no option of socket://"),
+        ('rfc2217://127.0.0.1:1?timeout=x', r"omit '\?timeout=x'"),
     ],
 )
 def test_url_that_can_lead_nowhere_is_refused_at_once(url: str, why: str) -> None:

@@ -168,7 +168,7 @@ def test_what_is_refused_while_a_fault_is_active_is_an_option(make_bench):
         assert bench.inv_st == 5
         acknowledge(bench)
         bench.drive.advance(1)
-        assert bench.running is (refused == 'all'), 'elsewhere MODE has taken the command back'
+        assert bench.running is (refused == 'all'), 'elsewhere MODE has removed the command'
 
 
 def test_sio_fail_is_acknowledged_by_mode_stop_alone(make_bench):

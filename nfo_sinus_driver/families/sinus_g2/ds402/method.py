@@ -66,7 +66,7 @@ class Ds402(ControlMethod):
     needs = (CONTROL_WORD, STATUS_WORD, MODE_OF_OPERATION)
 
     def in_control(self) -> Steps[bool]:
-        """Return whether the bus has control of the drive, from us or from whom was here before."""
+        """Return whether the bus has control, taken by this session or an earlier one."""
         return bool(int((yield Read(STATUS_WORD))) & words.Status.REMOTE)
 
     def holder(self) -> Steps[Holder]:
@@ -108,7 +108,7 @@ class Ds402(ControlMethod):
         :raises NotPossible: it is tuning.
         """
         if (yield from self.holder()) is Holder.INHIBITED:
-            raise NotPossible('the drive lets no one take control now (MODE is Inhibit: tuning?)')
+            raise NotPossible('control of the drive cannot be taken now (MODE is Inhibit: tuning?)')
         if not (yield from self.in_control()):
             yield Write(_MODE, Mode.BUS)
             yield from try_steps(one(Write(CONTROL_WORD, words.SHUTDOWN, head=True)))

@@ -94,7 +94,7 @@ class DriveControl(ControlMethod):
         yield Write(_WORD, Word.REMOTE | Word.RUN, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
-        """Take the run command back, and write set-point 0, each by itself."""
+        """Remove the run command, and write set-point 0, each by itself."""
         if (yield from self.perhaps_in_control()):
             command = one(Write(_WORD, Word.REMOTE, retry=False))
             yield from self._stop_by(command, _FREQUENCY.zero(retry=False))
@@ -105,7 +105,7 @@ class DriveControl(ControlMethod):
             yield Write(_WORD, 0)
 
     def remove(self, control_mode: str) -> Steps[Removal]:
-        """Take the run command back, and write set-point 0, each by itself."""
+        """Remove the run command, and write set-point 0, each by itself."""
         command = yield from try_steps(one(Write(_WORD, Word.REMOTE)))
         setpoint = yield from try_steps(self.zero_setpoint(control_mode))
         if command:

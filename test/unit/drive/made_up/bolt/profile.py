@@ -102,7 +102,7 @@ class FunctionBits(ControlMethod):
         yield Write(_BITS, Bit.RUN, retry=False)
 
     def stop(self, control_mode: str) -> Steps[None]:
-        """Take the run command back, and write set-point 0, each by itself."""
+        """Remove the run command, and write set-point 0, each by itself."""
         if (yield from self.perhaps_in_control()):
             yield from self._stop_by(
                 one(Write(_BITS, 0, retry=False)), _FREQUENCY.zero(retry=False)
@@ -113,7 +113,7 @@ class FunctionBits(ControlMethod):
         yield Write(_BITS, 0)
 
     def remove(self, control_mode: str) -> Steps[Removal]:
-        """Take the run command back, and write set-point 0, each by itself."""
+        """Remove the run command, and write set-point 0, each by itself."""
         command = yield from try_steps(one(Write(_BITS, 0)))
         setpoint = yield from try_steps(self.zero_setpoint(control_mode))
         if command:
