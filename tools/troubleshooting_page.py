@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 import inspect
 from pathlib import Path
 import re
@@ -17,8 +18,11 @@ from types import SimpleNamespace
 from nfo_sinus_driver.drive import Cause, Report
 from nfo_sinus_driver.node.wording import Wording
 
-#: All but the rows of causes, which take the place of a line ``{causes}`` in their section.
-BY_HAND = Path(__file__).resolve().parents[1] / 'docs' / 'troubleshooting.md.in'
+_ROOT = Path(__file__).resolve().parents[1]
+_PACKAGE = _ROOT / 'nfo_sinus_driver'
+#: All but the rows of causes, which take the place of a line ``{causes}`` in their section, and the
+#: ends of long messages: one that begins so has ``[…]`` there.
+BY_HAND = _ROOT / 'docs' / 'troubleshooting.md.in'
 _MADE = (
     '<!-- Made from docs/troubleshooting.md.in, and the causes in nfo_sinus_driver/drive/events.py,'
     ' by `make pages`: change those. -->\n\n'
@@ -48,11 +52,54 @@ def page() -> str:
             rows.setdefault(section, []).append(f'| {shown} | {remedy} |')
     lines: list[str] = []
     section = ''
-    for line in BY_HAND.read_text(encoding='utf-8').splitlines():
+    for line in by_hand().splitlines():
         section = line.lstrip('# ') if line.startswith('#') else section
         lines += rows.pop(section) if line == '{causes}' else [line]
     assert not rows, f'{BY_HAND} has no {{causes}} in {list(rows)}'
     return _MADE + '\n'.join([*lines, ''])
+
+
+def by_hand() -> str:
+    """Return what is written by hand, with each message whole."""
+    text = BY_HAND.read_text(encoding='utf-8')
+    return re.sub(r'`([^`]+)\[…\]', lambda found: f'`{_whole(found[1])}', text)
+
+
+def _whole(beginning: str) -> str:
+    """Return the one text of the driver that begins so."""
+    found = [shown for shown in _shown_texts() if shown.startswith(beginning)]
+    assert len(found) == 1, f'{BY_HAND}: {beginning} begins {len(found)} messages, not one'
+    return found[0]
+
+
+@cache
+def _shown_texts() -> set[str]:
+    """Return every text of the driver, with ``…`` for each value."""
+    modules = [node for _, node in nodes() if isinstance(node, ast.Module)]
+    return {'…'.join(parts) for module in modules for parts in texts(module)}
+
+
+@cache
+def nodes() -> list[tuple[str, ast.AST]]:
+    """Return what has the texts that an operator may read; simulator and cli have own pages."""
+    paths = {path.relative_to(_PACKAGE).as_posix(): path for path in _PACKAGE.rglob('*.py')}
+    return [
+        (name, node)
+        for name, path in paths.items() if not name.startswith(('simulator/', 'cli/'))
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8')))
+    ]
+
+
+def texts(node: ast.AST) -> Iterator[tuple[str, ...]]:
+    """Yield the fixed parts of texts and f-strings; what logging puts in is a value, too."""
+    if isinstance(node, ast.JoinedStr):
+        values = [one.value if isinstance(one, ast.Constant) else '%s' for one in node.values]
+        yield tuple(re.split('%[sdr]', ''.join(map(str, values))))
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield tuple(re.split('%[sdr]', node.value))
+    else:
+        for child in ast.iter_child_nodes(node):
+            yield from texts(child)
 
 
 def remedies() -> Iterator[tuple[str, list[Cause], str]]:

@@ -5,14 +5,14 @@
 Every warning, error and refusal of the driver has an entry in ``docs/troubleshooting.md``.
 
 Those of causes are made of them. The others stand in ``docs/troubleshooting.md.in``: code in the
-first column of a table of messages, the whole text with ``…`` or an example for each value.
+first column of a table of messages, the whole text with ``…`` or an example for each value, or its
+beginning.
 """
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator
-from functools import cache
 import re
 import runpy
 
@@ -20,9 +20,9 @@ from support.places import ROOT
 
 from nfo_sinus_driver.link import LinkError, Refused
 
-PACKAGE = ROOT / 'nfo_sinus_driver'
 _TOOL = runpy.run_path(str(ROOT / 'tools' / 'troubleshooting_page.py'))
-BY_HAND = _TOOL['BY_HAND'].read_text(encoding='utf-8')
+BY_HAND = _TOOL['by_hand']()
+nodes, texts = _TOOL['nodes'], _TOOL['texts']
 #: Modules whose ``ValueError`` no operator reads: it is of a table, which every test loads, or of
 #: the file of a drive, and is reported with its line; of a frame that no request makes; of what the
 #: node asks before.
@@ -45,29 +45,6 @@ SPEAKING = {
     *('error', 'warning', 'warn', 'fatal', 'critical', 'exception'), *kinds_of(LinkError),
     *('NodeError', 'NotPossible', 'ValueError', 'RuntimeError', 'StepError', 'RecordingError'),
 }
-
-
-@cache
-def nodes() -> list[tuple[str, ast.AST]]:
-    """All that an operator may read of; the simulator and the command line have their own pages."""
-    paths = {path.relative_to(PACKAGE).as_posix(): path for path in PACKAGE.rglob('*.py')}
-    return [
-        (name, node)
-        for name, path in paths.items() if not name.startswith(('simulator/', 'cli/'))
-        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8')))
-    ]
-
-
-def texts(node: ast.AST) -> Iterator[Parts]:
-    """The fixed parts of the texts and f-strings; what logging puts in is a value, too."""
-    if isinstance(node, ast.JoinedStr):
-        values = [one.value if isinstance(one, ast.Constant) else '%s' for one in node.values]
-        yield tuple(re.split('%[sdr]', ''.join(map(str, values))))
-    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-        yield tuple(re.split('%[sdr]', node.value))
-    else:
-        for child in ast.iter_child_nodes(node):
-            yield from texts(child)
 
 
 def name_of(node: ast.AST) -> str:
