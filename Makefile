@@ -135,7 +135,7 @@ docs: .venv/docs/installed ## the documentation as a site, in site/; every link 
 	@.venv/docs/bin/sphinx-build -q -W -E --keep-going -b html -c docs . site
 	@echo 'site/index.html'
 
-pages: setup ## write what is made in docs/: parameters, settings, manuals, troubleshooting
+pages: setup ## write what is made in docs/: parameters, settings, states, manuals, troubleshooting
 	@PYTHONPATH=. .venv/bin/python tools/pages.py
 
 build: ## build both packages again

@@ -18,9 +18,7 @@ copyright = 'the nfo_sinus_driver authors, Apache License 2.0'
 # what a link may point to inside a page: every heading that there is
 myst_heading_anchors = 6
 if not _BY_ROSDOC2:
-    extensions = ['myst_parser', 'sphinxcontrib.mermaid']
-    # as GitHub shows it
-    myst_fence_as_directive = ['mermaid']
+    extensions = ['myst_parser']
     include_patterns = [
         *('*.md', 'CHANGELOG.rst', 'docs/*.md', 'docs/drives/*.md', 'benchmark/results.md')
     ]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import control_page
 import manuals_page
 import parameters_page
 import settings_page
@@ -18,6 +19,7 @@ DOCS = Path(__file__).resolve().parents[1] / 'docs'
 def pages() -> dict[Path, str]:
     """Return what each of them has to be."""
     return {
+        DOCS / 'control.md': control_page.page(),
         DOCS / 'interface.md': settings_page.page(),
         DOCS / 'manuals.md': manuals_page.page(),
         DOCS / 'parameters.md': parameters_page.page(),

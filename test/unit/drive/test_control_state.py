@@ -2,16 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The table of control: that the docs show it as it is, and that every row of it is visited in
-histories that the laws judge. What it allows: :mod:`test_control_table`.
+The table of control: every row of it is visited in histories that the laws judge.
+
+What it allows: :mod:`test_control_table`.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterator, Mapping
 import contextlib
-from pathlib import Path
 
 from any_order_machine import AnyOrder
 from any_order_machines import G2ModeScmd
@@ -21,43 +20,7 @@ from support.rig import Rig
 from nfo_sinus_driver.drive import Procedure, control_state
 from nfo_sinus_driver.drive.control_state import TRANSITIONS, ControlEvent, ControlState
 
-PAGE = Path(__file__).parents[3] / 'docs' / 'control.md'
 Row = tuple[ControlState, ControlEvent]
-
-
-def diagram() -> str:
-    """Return the table as a drawing, in the language of Mermaid."""
-    ways: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
-    for (before, event), after in TRANSITIONS.items():
-        ways[before.name, after.name].append(event.name)
-    lines = [f'    {one} --> {other}: {", ".join(events)}' for (one, other), events in ways.items()]
-    return '\n'.join(('```mermaid', 'stateDiagram-v2', '    [*] --> OFFLINE', *lines, '```'))
-
-
-def tables() -> str:
-    """Return what the states and the events mean, and the table, in Markdown."""
-    states = [f'| {state.name} | {state.value} |' for state in ControlState]
-    events = [f'| {event.name} | {event.value} |' for event in ControlEvent]
-    names = [state.name for state in ControlState]
-    rows = []
-    for event in ControlEvent:
-        cells = [TRANSITIONS.get((state, event)) for state in ControlState]
-        rows.append(f'| {event.name} | {" | ".join(cell.name if cell else "" for cell in cells)} |')
-    return '\n'.join(
-        (
-            *('| state | what it is |', '|---|---|', *states, ''),
-            *('| event | what it is |', '|---|---|', *events, ''),
-            f'| event | {" | ".join(names)} |',
-            f'|{"---|" * (len(names) + 1)}',
-            *rows,
-        )
-    )
-
-
-def test_the_page_shows_the_table_as_it_is() -> None:
-    page = PAGE.read_text(encoding='utf-8')
-    for part in (diagram(), tables()):
-        assert part in page, f'docs/control.md has to show:\n\n{part}'
 
 
 class Visited(dict[Row, ControlState]):
