@@ -42,7 +42,7 @@ setup(
     # are for `pip install` without ROS, which nfo-sinus, families and simulator do not need.
     extras_require={
         'cli': ['argcomplete', 'pyserial', 'PyYAML', 'tqdm'],
-        'simulator': ['pymodbus>=3.6.9', 'PyYAML'],
+        'simulator': ['pymodbus>=3.6.9,!=3.7.*', 'PyYAML'],
         'test': ['hypothesis', 'pytest'],
     },
     zip_safe=False,

@@ -102,15 +102,13 @@ def test_the_extras_of_pip_have_what_the_commands_without_ros_import() -> None:
     }
     # where the name for pip is not that of the module
     for_pip = {'serial': 'pyserial', 'yaml': 'pyyaml'}
-    # which simulator/pymodbus_compat.py looks up by name
-    by_name = {'cli': set(), 'simulator': {'pymodbus'}}
     for extra, rooms in (
         ('cli', ('bus', 'catalog', 'cli', 'drive', 'families', 'link', 'view')),
         ('simulator', ('catalog', 'families', 'simulator')),
     ):
         folders = [ROOT / 'nfo_sinus_driver' / room for room in rooms]
         modules = {name for one in folders for path in one.rglob('*.py') for name in imported(path)}
-        needed = modules - {'nfo_sinus_driver'} | by_name[extra]
+        needed = modules - {'nfo_sinus_driver'}
         assert {for_pip.get(name, name) for name in needed} == extras[extra], extra
 
 
