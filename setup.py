@@ -41,7 +41,7 @@ setup(
     # What it needs at run time stands in package.xml, under the names that rosdep knows. The extras
     # are for `pip install` without ROS, which nfo-sinus, families and simulator do not need.
     extras_require={
-        'cli': ['argcomplete', 'pyserial', 'PyYAML', 'tqdm'],
+        'cli': ['argcomplete', 'pyserial>=3.5', 'PyYAML', 'tqdm'],
         'simulator': ['pymodbus>=3.6.9,!=3.7.*', 'PyYAML'],
         'test': ['hypothesis', 'pytest'],
     },

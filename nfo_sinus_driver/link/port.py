@@ -10,6 +10,7 @@ from typing import Protocol
 
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.serial_port import SerialPort
+from nfo_sinus_driver.link.url_port import UrlPort
 
 #: A network address without the scheme of a URL.
 _HOST_AND_PORT = re.compile(r'[^/]+:\d+')
@@ -44,9 +45,6 @@ def port_of(name: str, settings: LineSettings) -> Port:
     if not name:
         raise ValueError('port is empty: name a device, such as /dev/ttyUSB0')
     if '://' in name:
-        # it loads pyserial, 0.4 MB that a driver on a device does not need
-        from nfo_sinus_driver.link.url_port import UrlPort
-
         return UrlPort(name, settings)
     if _HOST_AND_PORT.fullmatch(name):
         raise ValueError(

@@ -1,41 +1,40 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A serial port as a raw descriptor: exclusive, configured, read without delay."""
+"""A serial port: pyserial opens, locks and sets it; its descriptor is read and written here."""
 
 from __future__ import annotations
 
-import array
 import contextlib
 import errno
 import fcntl
 import os
 from pathlib import Path
 import select
-import struct
 import termios
 import time
 
+import serial
+from serial.rs485 import RS485Settings
+
 from nfo_sinus_driver.link.interface import LineSettings, PortError
 
-# Linux ioctls that Python's termios module lacks
-_TIOCGSERIAL = 0x541E
-_TIOCSSERIAL = 0x541F
-_TIOCGRS485 = 0x542E
-_TIOCSRS485 = 0x542F
-_ASYNC_LOW_LATENCY = 1 << 13
-_SER_RS485_ENABLED = 1 << 0
-_SER_RS485_RTS_ON_SEND = 1 << 1
-#: The flags are the fifth int of struct serial_struct.
-_SERIAL_STRUCT_INTS = 20
-_SERIAL_FLAGS = 4
-_RS485_STRUCT_INTS = 8
-#: Device numbers of pseudo-terminals, which have no parity and no baud rate to set.
+#: Device numbers of pseudo-terminals, which have no parity and no seven bits.
 _PTY_MAJORS = range(136, 144)
 #: The device that a process with the other end of one has open.
 _PTMX = os.makedev(5, 2)
 
 _READ_SIZE = 512
+
+
+class _Serial(serial.Serial):
+    """A port of pyserial, whose modem lines stay as the system sets them when it is opened."""
+
+    def _update_rts_state(self) -> None:
+        # pyserial sets both; with RTS some kernels turn on the transmitter of an RS-485 port
+        return
+
+    _update_dtr_state = _update_rts_state
 
 
 class SerialPort:
@@ -44,7 +43,7 @@ class SerialPort:
     def __init__(self, path: str, settings: LineSettings) -> None:
         self._path = path
         self._settings = settings
-        self._fd: int | None = None
+        self._port: _Serial | None = None
 
     def open(self) -> None:
         """
@@ -56,26 +55,36 @@ class SerialPort:
         """
         self._discard()
         self.close()
-        fd = _open_device(self._path)
+        settings = self._settings
+        pty = _is_pty(self._path)
+        port = _Serial(
+            baudrate=settings.baud_rate,
+            # the C library compares what it set with the result
+            bytesize=8 if pty else settings.data_bits,
+            parity='N' if pty else settings.parity,
+            stopbits=settings.stop_bits,
+            exclusive=True,
+        )
+        port.port = self._path
         try:
-            self._lock(fd)
-            self._configure(fd)
-            _prefer_low_latency(fd)
-            if self._settings.rs485:
-                _switch_transmitter_by_port(fd)
-            termios.tcflush(fd, termios.TCIOFLUSH)
+            port.open()
+            if not pty:
+                # the lock of pyserial stops those alone that look for it. A pseudo-terminal would
+                # keep this when closed, and then open for root alone
+                fcntl.ioctl(port.fileno(), termios.TIOCEXCL)
+            self._complete(port)
         except BaseException as error:
-            os.close(fd)
-            if isinstance(error, (OSError, termios.error)):
-                raise PortError(f'{self._path} cannot be opened: {error.args[-1]}') from error
+            port.close()
+            if isinstance(error, (OSError, ValueError, termios.error)):
+                raise self._not_opened(error) from error
             raise
-        self._fd = fd
+        self._port = port
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
-        fd, self._fd = self._fd, None
-        if fd is not None:
-            os.close(fd)
+        port, self._port = self._port, None
+        if port is not None:
+            port.close()
 
     def write(self, data: bytes) -> None:
         """Hand all bytes to the port (PortError: the port is gone)."""
@@ -108,9 +117,9 @@ class SerialPort:
 
     def _discard(self) -> None:
         """Discard what has not left: it must not leave later, and closing would wait for it."""
-        if self._fd is not None:
+        if self._port is not None:
             with contextlib.suppress(termios.error):
-                termios.tcflush(self._fd, termios.TCOFLUSH)
+                self._port.reset_output_buffer()
 
     @staticmethod
     def _write_some(fd: int, data: bytes) -> int:
@@ -120,73 +129,58 @@ class SerialPort:
             return 0
 
     def _descriptor(self) -> int:
-        if self._fd is None:
+        if self._port is None:
             raise PortError(f'{self._path} is not open')
-        return self._fd
+        fd: int = self._port.fileno()
+        return fd
 
     def _lost(self, error: OSError) -> PortError:
         return PortError(f'{self._path} was lost ({error.strerror}): is the adapter unplugged?')
 
-    def _lock(self, fd: int) -> None:
-        try:
-            # pyserial and other masters check flock; TIOCEXCL stops those that do not
-            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise _busy(self._path) from None
-        if not _is_pty(fd):
-            # a pseudo-terminal would keep it when closed, and then open for root alone
-            fcntl.ioctl(fd, termios.TIOCEXCL)
+    def _complete(self, port: _Serial) -> None:
+        """Do what pyserial does not, or does not do everywhere."""
+        # best effort, both: pseudo-terminals and some adapters have neither. Without low latency an
+        # FTDI adapter holds answers back for 16 ms; most switch their transmitter by themselves
+        with contextlib.suppress(ValueError):
+            port.set_low_latency_mode(True)
+        if self._settings.rs485:
+            with contextlib.suppress(ValueError):
+                port.rs485_mode = RS485Settings()
+        modes = termios.tcgetattr(port.fileno())
+        # a byte with wrong parity is dropped, so that the frame is too short to count; pyserial
+        # passes it on. A break empties no queue
+        modes[0] = termios.INPCK | termios.IGNPAR if self._settings.parity != 'N' else 0
+        # closing it would have the modem lines fall
+        modes[2] &= ~termios.HUPCL
+        termios.tcsetattr(port.fileno(), termios.TCSANOW, modes)
 
-    def _configure(self, fd: int) -> None:
-        settings = self._settings
-        rate = getattr(termios, f'B{settings.baud_rate}')
-        cflag = termios.CREAD | termios.CLOCAL
-        cflag |= termios.CS7 if settings.data_bits == 7 else termios.CS8
-        if settings.parity != 'N':
-            cflag |= termios.PARENB
-        if settings.parity == 'O':
-            cflag |= termios.PARODD
-        if settings.stop_bits == 2:
-            cflag |= termios.CSTOPB
-        # a byte with wrong parity is dropped, so that the frame is too short to count
-        iflag = termios.INPCK | termios.IGNPAR if settings.parity != 'N' else 0
-        cc = termios.tcgetattr(fd)[6]
-        cc[termios.VMIN] = 0
-        cc[termios.VTIME] = 0
-        try:
-            termios.tcsetattr(fd, termios.TCSANOW, [iflag, 0, cflag, 0, rate, rate, cc])
-        except termios.error as error:
-            # the C library compares what it set with the result, and a pseudo-terminal has neither
-            # parity nor seven bits
-            if not _is_pty(fd):
-                raise PortError(
-                    f'{self._path} cannot do {settings.baud_rate} bit/s {settings.char_format} '
-                    f'({error.args[-1]}): choose a rate and format that the adapter has'
-                ) from error
-
-
-def _open_device(path: str) -> int:
-    try:
-        fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
-    except FileNotFoundError:
-        whole = path.startswith('/')
-        remedy = 'is the adapter plugged in?' if whole else f'should it be /dev/{path}?'
-        raise PortError(
-            f'{path} does not exist: {remedy} Ports found: {", ".join(_ports()) or "none"}'
-        ) from None
-    except PermissionError:
-        raise PortError(
-            f'no permission to use {path}: add yourself to its group '
-            '(often: sudo usermod -aG dialout $USER, then log in again)'
-        ) from None
-    except OSError as error:
-        if error.errno == errno.EBUSY:
-            raise _busy(path) from None
-        raise PortError(f'{path} cannot be opened: {error.strerror}') from error
-    if not os.isatty(fd):
-        os.close(fd)
-        raise PortError(f'{path} is not a serial port')
-    return fd
+    def _not_opened(self, error: OSError | ValueError | termios.error) -> PortError:
+        """Return why the port was not opened, and what to do."""
+        path, settings = self._path, self._settings
+        # pyserial has the error of the system in its sentence
+        wraps = isinstance(error, (serial.SerialException, ValueError))
+        cause = error.__context__ if wraps and error.__context__ else error
+        number, reason = cause.args[0], cause.args[-1]
+        if number == errno.ENOENT:
+            whole = path.startswith('/')
+            remedy = 'is the adapter plugged in?' if whole else f'should it be /dev/{path}?'
+            found = ', '.join(_ports()) or 'none'
+            return PortError(f'{path} does not exist: {remedy} Ports found: {found}')
+        if number in (errno.EACCES, errno.EPERM):
+            return PortError(
+                f'no permission to use {path}: add yourself to its group '
+                '(often: sudo usermod -aG dialout $USER, then log in again)'
+            )
+        if number in (errno.EBUSY, errno.EAGAIN):
+            return _busy(path)
+        if number == errno.ENOTTY:
+            return PortError(f'{path} is not a serial port')
+        if number == errno.EINVAL:
+            return PortError(
+                f'{path} cannot do {settings.baud_rate} bit/s {settings.char_format} ({reason}): '
+                'choose a rate and format that the adapter has'
+            )
+        return PortError(f'{path} cannot be opened: {reason}')
 
 
 def _busy(path: str) -> PortError:
@@ -202,32 +196,11 @@ def _ports() -> list[str]:
     return sorted(names)
 
 
-def _is_pty(fd: int) -> bool:
-    return os.major(os.fstat(fd).st_rdev) in _PTY_MAJORS
-
-
-def _prefer_low_latency(fd: int) -> None:
-    """Request low latency; without it an FTDI adapter holds answers back for 16 ms."""
-    settings = array.array('i', [0] * _SERIAL_STRUCT_INTS)
+def _is_pty(path: str) -> bool:
     try:
-        fcntl.ioctl(fd, _TIOCGSERIAL, settings)
-        settings[_SERIAL_FLAGS] |= _ASYNC_LOW_LATENCY
-        fcntl.ioctl(fd, _TIOCSSERIAL, settings)
+        return os.major(os.stat(path).st_rdev) in _PTY_MAJORS
     except OSError:
-        # best effort: pseudo-terminals and some adapters do not support it
-        return
-
-
-def _switch_transmitter_by_port(fd: int) -> None:
-    """Let the port's driver switch the RS-485 transmitter with RTS, if it can."""
-    settings = array.array('I', struct.unpack('8I', bytes(4 * _RS485_STRUCT_INTS)))
-    try:
-        fcntl.ioctl(fd, _TIOCGRS485, settings)
-        settings[0] |= _SER_RS485_ENABLED | _SER_RS485_RTS_ON_SEND
-        fcntl.ioctl(fd, _TIOCSRS485, settings)
-    except OSError:
-        # best effort: most adapters switch by themselves and do not support it
-        return
+        return False
 
 
 def holders(path: str) -> list[str]:

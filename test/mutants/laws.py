@@ -40,6 +40,8 @@ REVERSES = ('test/unit/drive/test_table_16.py', '-k', 'reverse_is_bit_13')
 #: A port that is open and passes nothing.
 SILENCES = 'nfo_sinus_driver/bus/scheduler.py'
 MUTE_PORT = 'test/unit/drive/test_mute_port.py'
+SERIAL_PORT = 'nfo_sinus_driver/link/serial_port.py'
+PORTS = 'test/unit/link/test_link_ports.py'
 GATE = 'nfo_sinus_driver/drive/recognition.py'
 RECOGNISING = 'nfo_sinus_driver/drive/recognising.py'
 #: Whether a motor follows its set-points, and why it stopped.
@@ -531,6 +533,22 @@ LAWS = (
         ' and crc(buffer[start : end - 2]) == buffer[end - 2 : end]:',
         ':',
         ('test/unit/link/test_rtu_codec.py',),
+    ),
+    Mutant(
+        8,
+        'a byte with wrong parity counts as it came',
+        SERIAL_PORT,
+        'modes[0] = termios.INPCK | termios.IGNPAR if',
+        'modes[0] = 0 if',
+        (PORTS, '-k', 'nothing_of_an_earlier_program'),
+    ),
+    Mutant(
+        2,
+        'what has not left leaves after the port was opened again',
+        SERIAL_PORT,
+        '        self._discard()\n        self.close()',
+        '        self.close()',
+        (PORTS, '-k', 'an_open_port_is_opened_again'),
     ),
     Mutant(
         8,

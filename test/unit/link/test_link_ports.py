@@ -36,8 +36,11 @@ from nfo_sinus_driver.link.url_port import UrlPort
 #: No honest wait here takes this long, on any machine, s.
 PATIENCE = 30.0
 EVERY_BYTE = bytes(range(256))
-#: Whether a terminal is open for root alone (asm-generic/ioctls.h).
+#: Whether a terminal is open for root alone (asm-generic/ioctls.h), its settings with the rates as
+#: numbers, and its RS-485 mode.
 _TIOCGEXCL = 0x80045440
+_TCGETS2 = 0x802C542A
+_TIOCGRS485, _TIOCSRS485 = 0x542E, 0x542F
 
 
 class Pty:
@@ -145,27 +148,90 @@ def test_every_format_is_tolerated_by_a_pseudo_terminal(pty: Pty, char_format: s
     ],
 )
 def test_every_format_is_set(
-    pty: Pty, monkeypatch: pytest.MonkeyPatch, char_format: str, expected: int
+    pty: Pty, monkeypatch: pytest.MonkeyPatch, no_pty: None, char_format: str, expected: int
 ) -> None:
     # a pseudo-terminal keeps none of it
-    wanted: list[int] = []
-    monkeypatch.setattr(
-        serial_port.termios, 'tcsetattr', lambda fd, when, modes: wanted.append(modes[2])
-    )
+    kept = [termios.tcgetattr(pty.far)]
+    monkeypatch.setattr(termios, 'tcgetattr', lambda fd: [*kept[-1]])
+    monkeypatch.setattr(termios, 'tcsetattr', lambda fd, when, modes: kept.append(modes))
     port = SerialPort(pty.path, LineSettings(char_format=char_format))
     port.open()
     port.close()
     format_bits = termios.CSIZE | termios.PARENB | termios.PARODD | termios.CSTOPB
-    assert [cflag & format_bits for cflag in wanted] == [expected]
+    assert kept[-1][2] & format_bits == expected
 
 
-@pytest.mark.parametrize('baud', BAUD_RATES)
+@pytest.mark.parametrize('baud', [*BAUD_RATES, 115_200, 250_000])
 def test_every_baud_rate_is_set(pty: Pty, baud: int) -> None:
     port = SerialPort(pty.path, LineSettings(baud_rate=baud, char_format='8N1'))
     port.open()
-    attributes = termios.tcgetattr(pty.far)
-    assert attributes[4] == attributes[5] == getattr(termios, f'B{baud}')
+    # four words of flags, 20 bytes of characters, and the rates of both directions
+    settings = array.array('I', [0] * 11)
+    fcntl.ioctl(pty.far, _TCGETS2, settings)
+    assert list(settings[9:]) == [baud, baud]
     port.close()
+
+
+@pytest.mark.parametrize('baud', [19_200, 250_000])
+def test_nothing_of_an_earlier_program_is_left(pty: Pty, baud: int) -> None:
+    modes = termios.tcgetattr(pty.far)
+    modes[0] |= termios.BRKINT | termios.PARMRK | termios.IXOFF
+    modes[2] |= termios.HUPCL | termios.CRTSCTS
+    termios.tcsetattr(pty.far, termios.TCSANOW, modes)
+    port = SerialPort(pty.path, LineSettings(baud_rate=baud))
+    port.open()
+    flags, _, control, *_ = termios.tcgetattr(pty.far)
+    # a byte with wrong parity never comes, and a break is none
+    assert flags == termios.INPCK | termios.IGNPAR
+    # a modem line that falls when the port is closed resets some adapters
+    assert not control & (termios.HUPCL | termios.CRTSCTS)
+    port.close()
+
+
+def test_modem_lines_stay_as_they_are(pty: Pty, ioctls: list[int]) -> None:
+    port = SerialPort(pty.path, LineSettings(rs485=True))
+    for _ in range(2):
+        port.open()
+    port.close()
+    # RTS would have some ports transmit
+    assert ioctls and not {termios.TIOCMBIS, termios.TIOCMBIC, termios.TIOCMSET} & {*ioctls}
+
+
+@pytest.fixture
+def ioctls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """What was requested of descriptors."""
+    ioctl = fcntl.ioctl
+    requests: list[int] = []
+
+    def note(fd: int, request: int, *rest: object) -> object:
+        requests.append(request)
+        return ioctl(fd, request, *rest)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(fcntl, 'ioctl', note)
+    return requests
+
+
+def test_nothing_waits(pty: Pty, port: SerialPort, monkeypatch: pytest.MonkeyPatch) -> None:
+    def waits(*_: object) -> None:
+        pytest.fail('it waits')
+
+    for module, name in ((termios, 'tcdrain'), (termios, 'tcsendbreak'), (time, 'sleep')):
+        monkeypatch.setattr(module, name, waits)
+    own = set(map(int, descriptors()))
+    ours = {fd for fd in own if _is_at(fd, pty.path)} - {pty._near}
+    assert ours and not any(map(os.get_blocking, ours))
+    # more than a terminal takes, and never read
+    with contextlib.suppress(BlockingIOError):
+        while os.write(ours.copy().pop(), EVERY_BYTE):
+            pass
+    port.open()
+    port.close()
+
+
+def _is_at(fd: int, path: str) -> bool:
+    with contextlib.suppress(OSError):
+        return os.path.samestat(os.fstat(fd), os.stat(path))
+    return False
 
 
 def test_line_is_set_raw(pty: Pty) -> None:
@@ -193,11 +259,38 @@ def test_bytes_from_before_are_not_read(pty: Pty) -> None:
     port.close()
 
 
-def test_rs485_is_best_effort(pty: Pty) -> None:
+def test_rs485_is_best_effort(pty: Pty, ioctls: list[int]) -> None:
     port = SerialPort(pty.path, LineSettings(rs485=True))
     port.open()
+    assert _TIOCGRS485 in ioctls and _TIOCSRS485 not in ioctls
+    assert termios.tcgetattr(pty.far)[0] == termios.INPCK | termios.IGNPAR
     port.write(b'x')
     assert pty.receive(1) == b'x'
+    port.close()
+
+
+def test_rs485_is_switched_by_rts_and_keeps_the_delays_of_the_board(
+    pty: Pty, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ioctl = fcntl.ioctl
+    written: list[list[int]] = []
+
+    def rs485(fd: int, request: int, *rest: object) -> object:
+        if request not in (_TIOCGRS485, _TIOCSRS485):
+            return ioctl(fd, request, *rest)  # type: ignore[call-overload]
+        (settings,) = rest
+        assert isinstance(settings, array.array)
+        if request == _TIOCGRS485:
+            settings[1:3] = array.array(settings.typecode, [2, 3])
+        else:
+            written.append(settings.tolist())
+        return 0
+
+    monkeypatch.setattr(fcntl, 'ioctl', rs485)
+    port = SerialPort(pty.path, LineSettings(rs485=True))
+    port.open()
+    # SER_RS485_ENABLED and SER_RS485_RTS_ON_SEND (linux/serial.h)
+    assert written == [[3, 2, 3, 0, 0, 0, 0, 0]]
     port.close()
 
 
@@ -312,39 +405,96 @@ def test_a_pseudo_terminal_stays_open_to_others_than_root(pty: Pty, port: Serial
 def test_port_locked_as_pyserial_does(pty: Pty) -> None:
     other = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
     fcntl.flock(other, fcntl.LOCK_EX)
-    port = SerialPort(pty.path, LineSettings())
+    os.write(pty.far, b'its own')
+    modes = termios.tcgetattr(other)
+    port = SerialPort(pty.path, LineSettings(baud_rate=2400))
     with pytest.raises(PortError, match='is in use by another process'):
         port.open()
+    # what has it goes on as before
+    assert termios.tcgetattr(other) == modes and os.read(other, 100) == b'its own'
     os.close(other)
     port.open()
     port.close()
 
 
-def test_adapter_that_cannot_do_the_settings(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_programs_find_it_in_use(pty: Pty, ioctls: list[int], no_pty: None) -> None:
+    other = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
+    port = SerialPort(pty.path, LineSettings(char_format='8N1'))
+    port.open()
+    # those that look for a lock, and those that do not
+    with pytest.raises(BlockingIOError):
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    assert termios.TIOCEXCL in ioctls
+    fcntl.ioctl(other, termios.TIOCNXCL)
+    os.close(other)
+    port.close()
+
+
+@pytest.fixture
+def no_pty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pseudo-terminal is treated as any other port."""
+    monkeypatch.setattr(serial_port, '_is_pty', lambda _: False)
+
+
+def test_a_port_by_another_name_that_goes_and_comes_back(pty: Pty, tmp_path: Path) -> None:
+    # as udev does it with /dev/serial/by-id
+    name = tmp_path / 'by-id'
+    name.symlink_to(pty.path)
+    port = SerialPort(str(name), LineSettings())
+    port.open()
+    before = descriptors()
+    pty.hang_up()
+    name.unlink()
+    with pytest.raises(PortError, match=f'{name} was lost'):
+        read(port, 1)
+    with pytest.raises(PortError, match=f'{name} does not exist: is the adapter plugged in'):
+        port.open()
+    with pytest.raises(PortError, match='is not open'):
+        port.write(b'x')
+    assert len(descriptors()) < len(before)
+    again = Pty()
+    name.symlink_to(again.path)
+    port.open()
+    port.write(b'x')
+    assert again.receive(1) == b'x'
+    port.close()
+    again.hang_up()
+
+
+def test_adapter_that_cannot_do_the_settings(
+    pty: Pty, monkeypatch: pytest.MonkeyPatch, no_pty: None
+) -> None:
     def refuse(*_: object) -> None:
         raise termios.error(errno.EINVAL, 'Invalid argument')
 
     monkeypatch.setattr(serial_port.termios, 'tcsetattr', refuse)
-    monkeypatch.setattr(serial_port, '_is_pty', lambda fd: False)
     before = descriptors()
     with pytest.raises(PortError, match=r'cannot do 19200 bit/s 7O2 .* choose a rate and format'):
         SerialPort(pty.path, LineSettings(char_format='7O2')).open()
     assert descriptors() == before
 
 
-@pytest.mark.parametrize('call', ['tcgetattr', 'tcflush', 'tcsetattr'])
+@pytest.mark.parametrize(
+    ('call', 'works'),
+    [('tcgetattr', 0), ('tcgetattr', 1), ('tcflush', 0), ('tcsetattr', 0), ('tcsetattr', 1)],
+)
 def test_adapter_that_goes_away_while_it_is_opened(
-    pty: Pty, monkeypatch: pytest.MonkeyPatch, call: str
+    pty: Pty, monkeypatch: pytest.MonkeyPatch, no_pty: None, call: str, works: int
 ) -> None:
-    def gone(*_: object) -> None:
+    real = getattr(termios, call)
+    left = [real] * works
+
+    def gone(*arguments: object) -> object:
+        if left:
+            return left.pop()(*arguments)
         raise termios.error(errno.EIO, 'Input/output error')
 
-    monkeypatch.setattr(serial_port.termios, call, gone)
-    monkeypatch.setattr(serial_port, '_is_pty', lambda fd: False)
+    monkeypatch.setattr(termios, call, gone)
     before = descriptors()
-    with pytest.raises(PortError):
-        SerialPort(pty.path, LineSettings()).open()
-    assert descriptors() == before
+    with pytest.raises(PortError, match=f'{pty.path} cannot be opened: Input/output') as error:
+        SerialPort(pty.path, LineSettings(char_format='8N1')).open()
+    # closed, although what failed is kept
+    assert error.value and descriptors() == before
 
 
 def test_port_that_cannot_be_locked(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
