@@ -139,11 +139,12 @@ class SerialPort:
 
     def _complete(self, port: _Serial) -> None:
         """Do what pyserial does not, or does not do everywhere."""
-        # best effort, both: pseudo-terminals and some adapters have neither. Without low latency an
-        # FTDI adapter holds answers back for 16 ms; most switch their transmitter by themselves
+        # best effort: pseudo-terminals and some adapters do not support it
         with contextlib.suppress(ValueError):
+            # an FTDI adapter holds answers back for 16 ms without
             port.set_low_latency_mode(True)
         if self._settings.rs485:
+            # best effort: most adapters switch by themselves and do not support it
             with contextlib.suppress(ValueError):
                 port.rs485_mode = RS485Settings()
         modes = termios.tcgetattr(port.fileno())
