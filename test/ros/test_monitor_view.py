@@ -40,8 +40,9 @@ def test_a_fault_a_lost_line_and_stops_by_keys(bench: Bench, columns: int) -> No
     first = bench.client('/conveyor/drive_2').connected()
     second = bench.client('/conveyor/drive_10').connected()
     view = bench.view(columns=columns)
-    text = view.wait_for('2 drives', '■ 2 standing', 'drive_2', 'drive_10', '% used')
-    assert text.index('drive_2') < text.index('drive_10'), 'by their numbers'
+    view.wait_for('2 drives', '■ 2 standing', 'drive_2', 'drive_10', '% used')
+    # a screen may be read while it is drawn
+    wait_until(lambda: 0 < view.text.find('drive_2') < view.text.find('drive_10'), 'in order')
 
     assert first.enable().success and second.enable().success
     with first.setpoints(20.0), second.setpoints(25.0):
