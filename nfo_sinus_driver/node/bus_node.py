@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+import contextlib
 from dataclasses import replace
 import time
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import BusStatistics
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.exceptions import InvalidNodeNameException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.time import Time
@@ -25,9 +27,9 @@ from nfo_sinus_driver.node.all_drives import AllDrives
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.declaring import coerce, declare
 from nfo_sinus_driver.node.factory_settings import line_of
-from nfo_sinus_driver.node.overrides import families_of, require_parameter
+from nfo_sinus_driver.node.parameter_names import require_parameter
 from nfo_sinus_driver.node.qos import RELIABLE
-from nfo_sinus_driver.node.rclpy_internals import overrides_of
+from nfo_sinus_driver.node.rclpy_internals import given_to, overrides_of
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.node.stamps import Stamps
 from nfo_sinus_driver.setting import Setting
@@ -39,6 +41,17 @@ _LONGEST_OPENING = 0.5
 _LOOK_PERIOD = 0.005
 
 NAME = 'nfo_sinus_bus'
+
+
+def _families_of(names: Iterable[str]) -> Mapping[str, object]:
+    """Return the ``family`` that was given to the drives of these names, before they exist."""
+    found: dict[str, object] = {}
+    for name in names:
+        # an invalid name is refused when its node is created
+        with contextlib.suppress(InvalidNodeNameException):
+            given = given_to(name).get('family')
+            found[name] = given and given.value
+    return found
 
 
 class BusNode(Node):
@@ -54,7 +67,7 @@ class BusNode(Node):
         drives = declare(self, {'drives': known.pop('drives')})['drives']
         self.drive_names: list[str] = list(drives)
         names = [single_name] if single_name else self.drive_names
-        settings = BusSettings(**self._declare_line(known, families_of(names)))
+        settings = BusSettings(**self._declare_line(known, _families_of(names)))
         self._port = settings.port
         link = settings.open()
         limit = settings.max_requests if link.protocol.most_requests else 0.0

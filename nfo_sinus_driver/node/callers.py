@@ -72,10 +72,19 @@ class Call:
             time.sleep(_LOOK_PERIOD)
 
     def _look(self) -> bool:
-        clients = _clients(self._node, self._service)
-        if clients:
-            self._by.set_result(' or '.join(clients))
-        return bool(clients)
+        """Find the nodes that have a client of the service; return whether there is one."""
+        node, found = self._node, []
+        # the node may be destroyed meanwhile; the command is given already, whatever happens here
+        with contextlib.suppress(InvalidHandle, rclpy_implementation.RCLError):
+            for name, namespace in sorted(set(node.get_node_names_and_namespaces())):
+                # one may have ended meanwhile
+                with contextlib.suppress(NodeNameNonExistentError):
+                    clients = node.get_client_names_and_types_by_node(name, namespace)
+                    if any(called == self._service for called, _ in clients):
+                        found.append(f'{namespace.rstrip("/")}/{name}')
+        if found:
+            self._by.set_result(' or '.join(found))
+        return bool(found)
 
 
 def publish_calls(node: Node, service: Service) -> None:
@@ -83,16 +92,3 @@ def publish_calls(node: Node, service: Service) -> None:
     service.configure_introspection(
         node.get_clock(), RELIABLE, ServiceIntrospectionState.CONTENTS
     )
-
-
-def _clients(node: Node, service: str) -> list[str]:
-    found = []
-    # the node may be destroyed meanwhile; the command is given already, whatever happens here
-    with contextlib.suppress(InvalidHandle, rclpy_implementation.RCLError):
-        for name, namespace in sorted(set(node.get_node_names_and_namespaces())):
-            # one may have ended meanwhile
-            with contextlib.suppress(NodeNameNonExistentError):
-                clients = node.get_client_names_and_types_by_node(name, namespace)
-                if any(called == service for called, _ in clients):
-                    found.append(f'{namespace.rstrip("/")}/{name}')
-    return found

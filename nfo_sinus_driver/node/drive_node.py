@@ -29,7 +29,7 @@ from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
 from nfo_sinus_driver.node.messages import Joint
 from nfo_sinus_driver.node.other_lines import OtherLines, drive_of, is_elsewhere, stop_of
-from nfo_sinus_driver.node.overrides import did_you_mean
+from nfo_sinus_driver.node.parameter_names import did_you_mean
 from nfo_sinus_driver.node.rclpy_internals import overrides_of
 from nfo_sinus_driver.node.reporter import Reporter
 from nfo_sinus_driver.node.scale import Scale, require_factors

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import Family, Parameter as CatalogParameter, Value
 from nfo_sinus_driver.drive import Change, Drive
-from nfo_sinus_driver.node.overrides import require_parameter
+from nfo_sinus_driver.node.parameter_names import require_parameter
 from nfo_sinus_driver.node.rclpy_internals import overrides_of, writable
 from nfo_sinus_driver.node.wording import NodeError
 

@@ -1,32 +1,45 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What moves a managed node through its states, and what rclpy lacks for that."""
+"""What moves a managed node through its states: an operator, or autostart."""
 
 from __future__ import annotations
 
+import logging
 import threading
 
 from lifecycle_msgs.srv import ChangeState
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin
 
-from nfo_sinus_driver.node.autostart import Autostart
 from nfo_sinus_driver.node.rclpy_internals import change_state_service, state_label
+
+_log = logging.getLogger(__name__)
+
+#: How long autostart rests after a failed try, at first and at last, s: meanwhile an operator may
+#: change the lifecycle, and the drives that do respond have the bus.
+_REST = 1.0
+_LONGEST_REST = 4.0
 
 
 class Lifecycle:
     """
     The state of a managed node; autostart changes it until an operator does.
 
+    A try of autostart waits for the bus; so every drive has a thread for it, which ends when the
+    drive has started, and all are tried at once.
+
     :param node: one that is not served yet.
     """
 
     def __init__(self, node: LifecycleNodeMixin) -> None:
         self._node = node
-        self._autostart = Autostart(node.get_name(), self._try_to_start)
-        #: Why the last try of autostart failed.
-        self._complaint = ''
+        name = f'autostart of {node.get_name()}'
+        self._autostart = threading.Thread(target=self._try_to_start, name=name, daemon=True)
+        #: Autostart has started the drive, or has given up.
+        self._over = threading.Event()
+        #: Why autostart could not configure the node so far; ``''`` if it could or never tried.
+        self.complaint = ''
         # autostart changes the state from a thread of its own
         self._in_transition = threading.Lock()
         _reject_invalid_transitions(node, self._in_transition)
@@ -41,24 +54,20 @@ class Lifecycle:
         """Why the node is not active, and what to do."""
         if self.state == 'finalized':
             return 'the node was shut down: start the driver again'
-        if self._complaint:
-            return f'the drive has not answered yet: {self._complaint}'
+        if self.complaint:
+            return f'the drive has not answered yet: {self.complaint}'
         return f'the node is {self.state}: activate it first'
 
     @property
     def wanted(self) -> bool:
         """A client has configured the node, or autostart is trying to."""
-        return self.state != 'unconfigured' or self._autostart.going_on
-
-    @property
-    def complaint(self) -> str:
-        """Why autostart could not configure the node so far; ``''`` if it could or never tried."""
-        return self._complaint
+        trying = self._autostart.is_alive() and not self._over.is_set()
+        return self.state != 'unconfigured' or trying
 
     @property
     def by_operator(self) -> bool:
         """The transition that runs on this thread was not requested by autostart."""
-        return not self._autostart.trying
+        return threading.current_thread() is not self._autostart
 
     def start(self) -> None:
         """With ``autostart``, configure and activate the node as soon as the drive responds."""
@@ -67,17 +76,18 @@ class Lifecycle:
 
     def end(self) -> None:
         """End autostart; a try under way goes on."""
-        self._autostart.give_up()
+        self._over.set()
 
     def join(self, timeout: float) -> None:
         """Wait for the last try of autostart after :meth:`end`, for a limited time (s)."""
-        self._autostart.join(timeout)
+        if self._autostart.is_alive():
+            self._autostart.join(timeout)
 
     def note_transition(self) -> None:
         """Note a transition that works; one by an operator ends autostart."""
-        self._complaint = ''
+        self.complaint = ''
         if self.by_operator:
-            self._autostart.give_up()
+            self.end()
 
     def complain(self, why: str, *, known: bool) -> None:
         """Log why the drive cannot be configured, unless ``known``; in autostart each once."""
@@ -85,19 +95,26 @@ class Lifecycle:
         if self.by_operator:
             log.error(why)
             return
-        news, self._complaint = why != self._complaint, why
+        news, self.complaint = why != self.complaint, why
         if news and not known:
             log.error(f'{why}; retrying')
 
-    def _try_to_start(self) -> bool:
-        """Configure and activate; return whether the node is active."""
-        with self._in_transition:
-            # meanwhile a client may have taken the lifecycle over
-            if not self._autostart.over and self.state == 'unconfigured':
-                self._node.trigger_configure()
-            if not self._autostart.over and self.state == 'inactive':
-                self._node.trigger_activate()
-            return self.state == 'active'
+    def _try_to_start(self) -> None:
+        """Configure and activate, again and again until the node is active or it is over."""
+        rest = 0.0
+        while not self._over.wait(rest):
+            rest = min(rest + _REST, _LONGEST_REST)
+            try:
+                with self._in_transition:
+                    # meanwhile a client may have taken the lifecycle over
+                    if not self._over.is_set() and self.state == 'unconfigured':
+                        self._node.trigger_configure()
+                    if not self._over.is_set() and self.state == 'inactive':
+                        self._node.trigger_activate()
+                    if self.state == 'active':
+                        self.end()
+            except Exception:
+                _log.exception('error in an autostart; it is tried again')
 
 
 def _reject_invalid_transitions(node: LifecycleNodeMixin, in_transition: threading.Lock) -> None:

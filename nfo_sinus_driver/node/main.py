@@ -25,20 +25,15 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.validate_node_name import validate_node_name
 
 from nfo_sinus_driver.drive import Cause, DriveError
+from nfo_sinus_driver.node.arguments import process_to_end_with
 from nfo_sinus_driver.node.bus_node import NAME as BUS_NAME, BusNode
 from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 from nfo_sinus_driver.node.drive_node import DriveNode
 from nfo_sinus_driver.node.executor import NodeExecutor, end_all
 from nfo_sinus_driver.node.log_limit import limit_errors
 from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
-from nfo_sinus_driver.node.overrides import (
-    bus_overrides,
-    refuse_other_arguments,
-    take_out_end_with,
-    take_out_node_name,
-    unknown_nodes,
-    unknown_parameters,
-)
+from nfo_sinus_driver.node.parameter_names import unknown_nodes, unknown_parameters
+from nfo_sinus_driver.node.single_name import bus_overrides, take_out_node_name
 from nfo_sinus_driver.node.start import init_ros
 from nfo_sinus_driver.signals import ENDING, HeldSignals, OtherProcess, signal_name
 
@@ -314,11 +309,7 @@ def _run(
     single_name: str | None,
 ) -> int:
     try:
-        arguments, pid = take_out_end_with(arguments)
-        refuse_other_arguments(arguments)
-        starters = [] if parent is None else [parent]
-        if pid is not None:
-            starters.append(_starter(pid))
+        starters = [one for one in (parent, process_to_end_with(arguments)) if one is not None]
         init_ros(arguments)
         process = DriverProcess(arguments, single_name)
     except (ParameterException, ValueError, *_ARGUMENT_ERRORS) as error:
@@ -344,13 +335,6 @@ def _run(
         confirmed = process.stop(why)
         rclpy.shutdown()
     return 0 if confirmed else 1
-
-
-def _starter(pid: int) -> OtherProcess:
-    try:
-        return OtherProcess(pid)
-    except ProcessLookupError:
-        raise ValueError(f'--end-with {pid}: that process has ended already') from None
 
 
 def _await_end(

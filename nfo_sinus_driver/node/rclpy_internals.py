@@ -23,6 +23,15 @@ def overrides_of(node: Node) -> Mapping[str, Parameter]:
     return dict(node._parameter_overrides)
 
 
+def given_to(name: str) -> Mapping[str, Parameter]:
+    """Have ROS itself find what a node of a name gets: it knows files, wildcards and order."""
+    node = Node(name, enable_rosout=False, start_parameter_services=False)
+    try:
+        return overrides_of(node)
+    finally:
+        node.destroy_node()
+
+
 def change_state_service(node: LifecycleNodeMixin) -> Service:
     """Return the service ``~/change_state``, whose callback raises on an invalid transition."""
     return node._service_change_state

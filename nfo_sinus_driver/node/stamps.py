@@ -49,15 +49,14 @@ class Stamps:
 
     def _together(self) -> tuple[int, int]:
         """Return what both clocks show at once."""
-        nearest: tuple[int, int, int] | None = None
+        readings = []
         for _ in range(_READINGS):
             before, now, after = self._steady(), self._now(), self._steady()
-            if nearest is None or after - before < nearest[0]:
-                nearest = after - before, (before + after) // 2, now
-            if nearest[0] <= _NEAR:
+            readings.append((after - before, (before + after) // 2, now))
+            if after - before <= _NEAR:
                 break
-        assert nearest is not None
-        return nearest[1], nearest[2]
+        _, steady, now = min(readings)
+        return steady, now
 
 
 class Sequence:

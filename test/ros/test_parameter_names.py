@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import pytest
 
 from nfo_sinus_driver.catalog import families, load_family
-from nfo_sinus_driver.node.overrides import did_you_mean
+from nfo_sinus_driver.node.parameter_names import did_you_mean
 from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
 from nfo_sinus_driver.setting import Setting
 

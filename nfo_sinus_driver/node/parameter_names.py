@@ -1,0 +1,107 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Misspelt names: of parameters that no node has, and of nodes that are not here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+import itertools
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+import yaml
+
+from nfo_sinus_driver.node.rclpy_internals import overrides_of
+
+_PARAMS_FILE = '--params-file'
+_PARAMETERS = 'ros__parameters'
+
+
+def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
+    """Return a warning for each parameter that was given to a node that does not have it."""
+    nodes = list(nodes)
+    given = {node.get_name(): overrides_of(node).keys() for node in nodes}
+    known = {node.get_name(): declared_names(node) for node in nodes}
+    unknown: dict[str, list[str]] = {}
+    for node, names in given.items():
+        for name in names - known[node]:
+            # given to all of them, it reaches the right one, too
+            if not all(name in others for others in given.values()) or not _owners(name, known):
+                unknown.setdefault(name, []).append(node)
+    for name, nodes_of in sorted(unknown.items()):
+        owners = _owners(name, known)
+        of_these = {one for node in nodes_of for one in known[node]}
+        meant = f'; {owners[0]} has it' if owners else did_you_mean(name, of_these)
+        yield (
+            f'parameter {name} was given to {", ".join(sorted(nodes_of))}, but there is none of '
+            f'that name{meant}'
+        )
+
+
+def _owners(name: str, known: Mapping[str, set[str]]) -> list[str]:
+    """Return the nodes that have a parameter."""
+    return [node for node, names in known.items() if name in names]
+
+
+def declared_names(node: Node) -> set[str]:
+    """Return the parameters that a node has, or will have once its drive is connected."""
+    # those of a drive are declared when it is connected
+    later: Iterable[str] = getattr(node, 'later_parameters', ())
+    return set(node.get_parameters_by_prefix('')) | set(later)
+
+
+def require_parameter(node: Node, name: str, hint: str = '') -> None:
+    """
+    Make sure that a node has a parameter.
+
+    :param hint: added to the message about one that is missing.
+    :raises ValueError: it does not; rclpy refuses it too, but suggests no other name.
+    """
+    if not node.has_parameter(name):
+        near = did_you_mean(name, declared_names(node))
+        raise ValueError(f'{name}: there is no such parameter{hint}{near}')
+
+
+def unknown_nodes(arguments: list[str], names: Iterable[str]) -> Iterator[str]:
+    """Return a warning for each section of a parameter file that is of no node here."""
+    names = set(names)
+    for flag, path in itertools.pairwise(arguments):
+        if flag == _PARAMS_FILE:
+            for section in _sections(_load(path)):
+                name = section.rsplit('/', 1)[-1]
+                if '*' not in name and name not in names:
+                    yield (
+                        f'{path} has parameters for {section}, but the nodes here are '
+                        f'{", ".join(sorted(names))}{did_you_mean(name, names)}'
+                    )
+
+
+def _load(path: str) -> Any:
+    try:
+        return yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+    except (OSError, yaml.YAMLError):
+        # ROS has reported it by now
+        return None
+
+
+def _sections(tree: Any, prefix: str = '') -> Iterator[str]:
+    """Return the names of the nodes in a parameter file."""
+    if not isinstance(tree, dict):
+        return
+    for key, value in tree.items():
+        name = f'{prefix}/{key}'.replace('//', '/') if prefix else str(key)
+        if isinstance(value, dict) and _PARAMETERS in value:
+            yield name
+        else:
+            yield from _sections(value, name)
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return the end of a sentence about an unknown name: the closest known ones."""
+    # loaded only when needed: it takes 0.1 MB
+    import difflib
+
+    close = difflib.get_close_matches(name, list(known), n=2)
+    return f'; did you mean {" or ".join(close)}?' if close else ''
