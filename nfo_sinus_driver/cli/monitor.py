@@ -32,11 +32,9 @@ from nfo_sinus_driver.view.picture import (
     Condition,
     DriveView,
     Level,
-    LineView,
     Measured,
     Note,
     Picture,
-    line_view,
 )
 
 #: What is measured, by its name in the messages of the driver; its width and its decimals.
@@ -249,7 +247,7 @@ class LineSource:
         self._views: dict[int, tuple[DriveView, float]] = {}
         for drive in drives:
             self._set(drive, Condition.SILENT, 'being asked')
-        self._line: LineView | None = None
+        self._line: dict[str, Statistics] = {}
         self._logged: dict[int, str] = {}
         self._notes: queue.SimpleQueue[Note] = queue.SimpleQueue()
         self._closing = threading.Event()
@@ -266,7 +264,7 @@ class LineSource:
         notes = [self._notes.get() for _ in range(self._notes.qsize())]
         now = time.monotonic()
         views = [dataclasses.replace(view, age=now - at) for view, at in self._views.values()]
-        return Picture(views, [self._line] if self._line else [], notes)
+        return Picture(views, self._line, notes)
 
     def stop(self, name: str) -> None:
         """Ignore it: this view only looks."""
@@ -292,7 +290,7 @@ class LineSource:
                 if self._closing.is_set():
                     return
                 self._update(drive)
-            self._line = line_view('line', self._session.statistics())
+            self._line = {'line': self._session.statistics()}
             self._closing.wait(max(0.0, started + turn * self._period - time.monotonic()))
             # a line that is slower than that is read without a pause, and catches up with nothing
             started = max(started, time.monotonic() - turn * self._period)
@@ -314,7 +312,7 @@ class LineSource:
             cause=status.listed.description if grave else '', remedy=status.listed.remedy,
             requires_ack=status.listed.requires_ack, unit='Hz', actual=values['frequency'],
             measured=Measured(**values),
-            line=line_view(_name(drive), self._session.statistics(drive.address)),
+            line=self._session.statistics(drive.address),
         )
 
     def _set(

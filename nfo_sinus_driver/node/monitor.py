@@ -45,7 +45,6 @@ from nfo_sinus_driver.view.picture import (
     Measured,
     Note,
     Picture,
-    line_view,
 )
 
 #: How often the graph is searched for nodes, s.
@@ -222,11 +221,11 @@ class GraphSource:
         nodes = self._driver_nodes.values()
         return Picture(
             [_drive_view(node, now) for node in nodes if node.is_drive],
-            [
-                line_view(node.name, node.statistics)
+            {
+                node.name: node.statistics
                 for node in nodes
                 if node.is_line and node.statistics and not _is_gone(node, now)
-            ],
+            },
             sorted(notes, key=lambda note: -math.inf if math.isnan(note.at) else note.at),
             self.stops(now),
         )
@@ -374,9 +373,8 @@ def _drive_view(node: _DriverNode, now: float) -> DriveView:
     condition = _condition(node, now)
     if condition is Condition.GONE:
         return DriveView(node.name, condition, 'its driver is gone', age=now - node.updated_at)
-    statistics = node.statistics and line_view(node.name, node.statistics)
     if condition is Condition.SILENT:
-        return DriveView(node.name, condition, 'not connected', line=statistics)
+        return DriveView(node.name, condition, 'not connected', line=node.statistics)
     measured = Measured()
     fresh = max(_GONE_AFTER, 2 * node.telemetry_gap)
     if node.telemetry is not None and now - node.telemetry_at <= fresh:
@@ -396,7 +394,7 @@ def _drive_view(node: _DriverNode, now: float) -> DriveView:
         status.unit,
         now - node.updated_at,
         measured,
-        statistics,
+        node.statistics,
     )
 
 

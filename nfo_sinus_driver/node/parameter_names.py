@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 import itertools
 from pathlib import Path
 from typing import Any
@@ -24,25 +24,20 @@ def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
     nodes = list(nodes)
     given = {node.get_name(): overrides_of(node).keys() for node in nodes}
     known = {node.get_name(): declared_names(node) for node in nodes}
+    # given to all of them, it reaches the right one, too
+    reaches = set.intersection(*map(set, given.values())) & set().union(*known.values())
     unknown: dict[str, list[str]] = {}
     for node, names in given.items():
-        for name in names - known[node]:
-            # given to all of them, it reaches the right one, too
-            if not all(name in others for others in given.values()) or not _owners(name, known):
-                unknown.setdefault(name, []).append(node)
+        for name in names - known[node] - reaches:
+            unknown.setdefault(name, []).append(node)
     for name, nodes_of in sorted(unknown.items()):
-        owners = _owners(name, known)
+        owners = [node for node, names in known.items() if name in names]
         of_these = {one for node in nodes_of for one in known[node]}
         meant = f'; {owners[0]} has it' if owners else did_you_mean(name, of_these)
         yield (
             f'parameter {name} was given to {", ".join(sorted(nodes_of))}, but there is none of '
             f'that name{meant}'
         )
-
-
-def _owners(name: str, known: Mapping[str, set[str]]) -> list[str]:
-    """Return the nodes that have a parameter."""
-    return [node for node, names in known.items() if name in names]
 
 
 def declared_names(node: Node) -> set[str]:

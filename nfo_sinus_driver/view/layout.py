@@ -16,8 +16,8 @@ import unicodedata
 from nfo_sinus_driver.view.picture import (
     Condition,
     DriveView,
+    Figures,
     Level,
-    LineView,
     Measured,
     Note,
     Picture,
@@ -160,7 +160,7 @@ class Layout:
 
     def __init__(self, source: Source) -> None:
         self._source = source
-        self._picture = Picture((), (), ())
+        self._picture = Picture((), {}, ())
         self._drives: list[DriveView] = []
         self._chosen = ''
         #: The first drive in the table, and how many there is room for.
@@ -253,8 +253,10 @@ class Layout:
         if self._source.only_looks:
             head.append((f'  {self._source.only_looks}', 'dim'))
         head.append((f'  {self._source.title}', 'dim'))
-        lines = sorted(self._picture.lines, key=lambda line: -(line.timeouts + line.damaged))
-        return [head, *([(f'{line.name}: {_figures(line)}', 'dim')] for line in lines)]
+        lines = sorted(
+            self._picture.lines.items(), key=lambda line: -(line[1].timeouts + line[1].damaged)
+        )
+        return [head, *([(f'{name}: {_figures(line)}', 'dim')] for name, line in lines)]
 
     def _keys(self) -> Row:
         """Return what keys there are, without a stop where the source has none."""
@@ -367,7 +369,7 @@ def _in_full(drive: DriveView) -> Iterator[Row]:
     yield [('  '.join(one.replace(' ', '\N{NO-BREAK SPACE}') for one in known), '')]
 
 
-def _figures(line: LineView) -> str:
+def _figures(line: Figures) -> str:
     """Return how a line is doing, the worst first."""
     counts = (
         (line.timeouts, 'without answer'),

@@ -5,11 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 import math
-from typing import Protocol
+from typing import Any, Protocol
 
 NAN = math.nan
 
@@ -42,28 +42,8 @@ class Measured:
     motor_temperature: float = NAN
 
 
-@dataclass(frozen=True)
-class LineView:
-    """How a line is doing, or one drive on it; times in s, as in the message BusStatistics."""
-
-    name: str
-    utilisation: float = NAN
-    cycle_time: float = NAN
-    transactions: int = 0
-    timeouts: int = 0
-    damaged: int = 0
-    refused: int = 0
-    retries: int = 0
-    reconnects: int = 0
-    round_trip_median: float = NAN
-    round_trip_p99: float = NAN
-    round_trip_max: float = NAN
-
-
-def line_view(name: str, figures: object) -> LineView:
-    """Return what statistics say, whose fields have the names of those of BusStatistics."""
-    names = [one.name for one in fields(LineView) if one.name != 'name']
-    return LineView(name, **{one: getattr(figures, one) for one in names})
+#: How a line is doing, or one drive on it: what has the fields of the message BusStatistics.
+Figures = Any
 
 
 @dataclass(frozen=True)
@@ -91,7 +71,7 @@ class DriveView:
     unit: str = ''
     age: float = 0.0
     measured: Measured = field(default_factory=Measured)
-    line: LineView | None = None
+    line: Figures | None = None
 
 
 class Level(Enum):
@@ -117,12 +97,13 @@ class Picture:
     """
     All there is to show.
 
+    :ivar lines: each by its name.
     :ivar notes: only those that are new.
     :ivar stops: what is to be known of stops that were asked for here and are not confirmed.
     """
 
     drives: Sequence[DriveView]
-    lines: Sequence[LineView]
+    lines: Mapping[str, Figures]
     notes: Sequence[Note]
     stops: Sequence[str] = ()
 

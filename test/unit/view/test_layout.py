@@ -11,12 +11,12 @@ import math
 from hypothesis import given, strategies as st
 import pytest
 
+from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.view.layout import Layout, natural, short_names, wrapped
 from nfo_sinus_driver.view.picture import (
     Condition,
     DriveView,
     Level,
-    LineView,
     Measured,
     Note,
     Picture,
@@ -26,6 +26,7 @@ _RUNS = DriveView(
     '/drive', Condition.RUNS, '38 Bus Run', enabled=True, setpoint=30.0, actual=29.9, unit='Hz',
     measured=Measured(29.9, 881.0, 1.87, 231.0, 105.0, 20.0, 560.0, 23.0),
 )
+_LINE = Statistics(0.25, 0.052, 1000, 2, *[0] * 4, *[math.nan] * 5)
 _FAULT = replace(
     _RUNS, condition=Condition.FAULT, status='6 Overload', cause='too much for too long',
     remedy='check the load', requires_ack=True, enabled=False,
@@ -42,7 +43,7 @@ class View:
     def __init__(self, *drives: DriveView, only_looks: str = '') -> None:
         self.only_looks = only_looks
         self.stopped: list[str] = []
-        self._picture = Picture(drives, [LineView('/bus', 0.25, 0.052, 1000, timeouts=2)], ())
+        self._picture = Picture(drives, {'/bus': _LINE}, ())
         self._layout = Layout(self)
         self._layout.look()
 
