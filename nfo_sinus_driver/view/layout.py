@@ -93,7 +93,7 @@ _COLUMNS: tuple[tuple[str, int, Callable[[DriveView], str]], ...] = (
 
 
 def fitted(row: Row, width: int, *, fill: bool = False) -> Row:
-    """Return a row that is no wider, nor narrower with ``fill``; nothing in it controls."""
+    """Return a row that is no wider, nor narrower with ``fill``, without control characters."""
     fits: Row = []
     left = width
     for text, style in row:
@@ -101,9 +101,10 @@ def fitted(row: Row, width: int, *, fill: bool = False) -> Row:
         text = ''.join(one if one.isprintable() else ' ' for one in text)
         wide = [_columns_of(one) for one in text]
         if sum(wide) > left:
-            ends = [end for end in itertools.accumulate(wide) if end < left]
-            fits.append((f'{text[: len(ends)]}…'[:left], style))
-            return fits
+            kept = sum(end < left for end in itertools.accumulate(wide))
+            fits.append((f'{text[:kept]}…'[:left], style))
+            left -= min(left, sum(wide[:kept]) + 1)
+            break
         fits.append((text, style))
         left -= sum(wide)
     return [*fits, (' ' * left, '')] if fill else fits
@@ -260,9 +261,8 @@ class Layout:
 
     def _keys(self) -> Row:
         """Return what keys there are, without a stop where the source has none."""
-        keys = {'s': 'stop this drive', 'a': 'stop ALL'} if not self._source.only_looks else {}
-        keys |= {'n': 'next trouble', 'p': 'plot', 'q': 'quit'}
-        return [one for key, text in keys.items() for one in ((key, 'bold'), (f' {text}  ', ''))]
+        stops = '' if self._source.only_looks else 's stop this drive  a stop ALL  '
+        return [(f'{stops}n next trouble  p plot  q quit', 'bold')]
 
     def _log(self, width: int, height: int) -> list[Row]:
         rows: deque[Row] = deque(maxlen=height)
@@ -296,7 +296,8 @@ class Layout:
 
     def _full(self, width: int, height: int) -> list[Row]:
         if not self._drives:
-            return [[(line, '')] for line in self._source.advice.splitlines()]
+            advice = self._source.advice.split('\n')
+            return [row for line in advice for row in wrapped([(line, '')], width)]
         drive = self._drives[self._at]
         figures = '' if drive.line is None else f'line: {_figures(drive.line)}'
         line = wrapped([(figures, 'dim')], width)
