@@ -7,8 +7,7 @@ from can_bus_bench import Bus
 import pytest
 
 ERROR_CODE, CONTROL, STATUS, TARGET, DEMAND, ACTUAL = range(0x603F, 0x6045)
-SHUTDOWN_OPTION, MODES, DISPLAY, TORQUE, TORQUE_ACTUAL = 0x605B, 0x6060, 0x6061, 0x6071, 0x6077
-MODE, SCMD, ST_MODE, CONTROL_MODE, RETARD = 0x2022, 0x2023, 0x2021, 0x2024, 0x201D
+MODES, MODE, SCMD = 0x6060, 0x2022, 0x2023
 #: By hand: the whole message of a client, and that of the node. Target velocity 600 rpm; shutdown,
 #: switch on, enable operation, with the ramp generator in use; disable voltage.
 STARTS = (
@@ -80,15 +79,6 @@ def test_what_it_shows_while_it_ramps_to_a_stop(shown: str, ramp: int) -> None:
     assert number(bus, STATUS) & 0x6F == 0x21 and not bus.drive.motor.driven
 
 
-@pytest.mark.parametrize('option', [0, 1])
-def test_the_shutdown_option_is_st_mode(option: int) -> None:
-    bus = running()
-    assert bus.write(SHUTDOWN_OPTION, 0, word(option)) == ''
-    assert number(bus, ST_MODE) == number(bus, SHUTDOWN_OPTION) == option
-    bus.write(CONTROL, 0, word(0x76))
-    assert bus.drive.motor.driven is bool(option)
-
-
 def test_a_fault_waits_for_an_edge_of_bit_7_and_nothing_turns_then() -> None:
     bus = running()
     bus.drive.trip(8)
@@ -124,18 +114,10 @@ def test_the_last_command_has_the_reference() -> None:
     assert bus.drive.motor.frequency == pytest.approx(0.0, abs=0.1)
 
 
-def test_torque_by_the_mode_that_the_drive_is_in() -> None:
+def test_no_other_mode_than_that_of_the_drive_is_taken() -> None:
     bus = running(settings={'control.mode': 'Speed'})
     assert bus.drive.motor.frequency == pytest.approx(20.0, abs=1.5)
     assert bus.write(MODES, 0, b'\x02') == '' and bus.write(MODES, 0, b'\x04') == '06090030'
-    bus = Bus(settings={'control.mode': 'Torque'})
-    assert bus.read(DISPLAY) == b'\x04'
-    bus.write(TORQUE, 0, word(300))
-    for value in (0x76, 0x77, 0x7F):
-        bus.write(CONTROL, 0, word(value))
-    bus.wait(2.0)
-    assert bus.drive.motor.torque == pytest.approx(0.3, abs=0.05)
-    assert number(bus, TORQUE_ACTUAL) == pytest.approx(300, abs=50)
 
 
 def test_the_scale_of_the_target_is_the_dimension_factor() -> None:
