@@ -10,14 +10,18 @@ by a drive that is kinder.
 """
 
 from collections.abc import Mapping
+import contextlib
 from dataclasses import dataclass, field
 from typing import Any
 
+from hypothesis import given, settings, strategies as st
 import pytest
+from support.examples import examples
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.simulator.drive import SimulatedDrive
+from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
 from nfo_sinus_driver.simulator.family import load, simulated, simulated_drive
+from nfo_sinus_driver.simulator.memory import Refused
 
 SIO_FAIL, BUS_FAIL = 14, 15
 
@@ -202,3 +206,87 @@ def test_a_change_at_the_keypad_is_no_write_of_the_bus(model: str) -> None:
     run(drive)
     counted = {**drive.writes, **drive.command_writes}
     assert {key: counted[key] for key in commands} == dict.fromkeys(commands, 1)
+
+
+# ---- in any order ----
+
+#: What a master writes, by key; of telegram 1 the control word and the set-point.
+WORDS = (0x0000, 0x0400, 0x0408, 0x0409, 0x0476, 0x0477, 0x047F, 0x04F6, 0x4006, 0xC07F, 0xFFFF)
+_SINUS: Any = {'fieldbus.mode': (1, 2, 3), 'fieldbus.drive_control': WORDS}
+WRITES: Mapping[str, Mapping[str, tuple[int, ...]]] = {
+    'sinus_g2': {
+        **_SINUS, 'fieldbus.scmd': (0, 0x101, 0x081, 0x005, 0x201),
+        'status.frq_set': (0, 200, -300), 'telegram1': WORDS,
+    },
+    'sinus_optimal': {
+        **_SINUS, 'fieldbus.smode': (0, 0x101, 0x081),
+        'fieldbus.input_freq_setpoint': (0, 200, -300), 'telegram1': WORDS,
+    },
+    'movitrac31': {
+        'serial.control_mode': (0, 100, 200, 300), 'fieldbus.remote_setpoint': (0, 2500, 40000),
+        'fieldbus.function_bits': (0, 1, 2, 5, 6, 7, 0x40, 0x105, 0x1005),
+        'terminal.input_42': (0, 100, 1100, 1200), 'control.dc_braking_1': (0, 100),
+        'special.auto_reset': (0, 100),
+    },
+    'sinus_h': {'telegram1': WORDS},
+}  # fmt: skip
+KEYS = {
+    'movitrac31': ('manual', 'automatic', 'cw', 'ccw', 'stop', 'reset'),
+    'sinus_h': ('start', 'stop', 'reset'),
+}
+
+
+def happens(model: str) -> st.SearchStrategy[tuple[Any, ...]]:
+    return st.one_of(
+        *(
+            st.tuples(st.just('write'), st.just(key), st.sampled_from(values))
+            for key, values in WRITES[model].items()
+        ),
+        st.tuples(st.just('trip'), st.booleans()),
+        st.tuples(st.just('cause gone')),
+        st.tuples(st.just('power')),
+        st.tuples(st.just('run input'), st.booleans()),
+        st.tuples(st.just('press'), st.sampled_from(KEYS.get(model, ('stop', 'ext', 'start')))),
+    )
+
+
+def happen(drive: SimulatedDrive, what: str, *values: Any) -> None:
+    with contextlib.suppress(Refused):
+        if what == 'write' and values[0] == 'telegram1':
+            drive.servers['telegram1'].exchange(values[1], 200)  # type: ignore[attr-defined]
+        elif what == 'write':
+            drive.write_raw(*values)
+        elif what == 'trip':
+            fault = {'movitrac31': 101, 'sinus_h': 11}.get(drive.model.name, 5)
+            drive.trip(fault, cause_present=values[0])
+        elif what == 'cause gone':
+            drive.faults.end_causes()
+        elif what == 'power':
+            drive.power_cycle(0.0)
+        elif what == 'run input':
+            drive.set_run_input(*values)
+        else:
+            drive.control_unit.press(*values)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize('model', simulated())
+@settings(max_examples=examples(60))
+@given(data=st.data())
+def test_in_any_order_no_fault_turns_the_motor_and_only_a_command_does(
+    model: str, data: st.DataObject
+) -> None:
+    drive = simulated_drive(model)
+    motor, unit = drive.motor, drive.control_unit
+    events = st.tuples(happens(model), st.sampled_from([0.0, 0.02, 0.4, 3.0]))
+    for event, pause in data.draw(st.lists(events, max_size=25)):
+        driven = motor.driven
+        happen(drive, *event)
+        if event[0] in ('trip', 'cause gone', 'power') and not driven:
+            assert not motor.driven, 'nothing of these starts it'
+        if model == 'sinus_h' and motor.driven and not driven and event[0] == 'write':
+            assert unit.report()['state'] == 'S4'
+        for seconds in (0.0, pause):
+            drive.advance(seconds)
+            assert not (drive.faults and motor.driven)
+            assert abs(motor.frequency) <= 160.0 and (motor.driven or not motor.frequency)
+        assert describe(drive)['driven'] is motor.driven

@@ -3,9 +3,7 @@
 
 """The simulated Sinus H by the tables of its manual, typed in here by hand [M3]."""
 
-from hypothesis import given, settings, strategies as st
 import pytest
-from support.examples import examples
 from telegram_bench import TelegramBench
 
 S1, S2, S3, S4 = 'S1', 'S2', 'S3', 'S4'
@@ -240,62 +238,3 @@ def test_lost_command_runs_on_or_stops_by_its_mode_and_its_time():
         assert bench.motor.trend < 0 or mode == 'Free-Run'
         bench.wait(3.0, telegrams=False)
         assert (bench.motor.driven, bench.drive.faults.codes) == (False, [35]), mode
-
-
-# --- in any order ---
-
-STEPS = st.lists(
-    st.tuples(
-        st.sampled_from(
-            ['word', 'word', 'word', 'fault', 'stop', 'power', 'silence', 'gone', 'start']
-        ),
-        st.integers(0, 15),
-        st.sampled_from([0x0400, 0x0480, 0x0470, 0x0470, 0x0470, 0x04F0, 0x0070]),
-        st.integers(-0x8000, 0x7FFF),
-        st.sampled_from([0.0, 0.02, 0.1, 1.0, 3.0]),
-    ),
-    max_size=25,
-)
-OPTIONS = st.fixed_dictionaries(
-    {
-        'unlisted_exits': st.sampled_from(['none', 'profidrive']),
-        'echo_bits': st.sampled_from(['state', 'word']),
-    }
-)
-LOST = st.sampled_from(['None', 'Free-Run', 'Dec', 'Hold Input', 'Hold Output', 'Lost Preset'])
-
-
-@settings(max_examples=examples(100))
-@given(STEPS, OPTIONS, LOST)
-def test_in_any_order_it_runs_forward_in_operation_alone(steps, options, mode):
-    bench = Bench({'prt.lost_cmd_mode': mode}, **options)
-    driven = False
-    for what, low, high, setpoint, seconds in steps:
-        if what == 'fault':
-            bench.drive.trip(11, cause_present=bool(low & 1))
-        elif what == 'gone':
-            bench.drive.faults.end_causes()
-        elif what in ('stop', 'start'):
-            bench.unit.press(what)
-        elif what == 'power':
-            bench.drive.power_cycle(0.0)
-        elif what == 'word':
-            before = bench.state
-            faulted = bool(bench.drive.faults)
-            bench.send(high | low, setpoint)
-            expected = table(before, low) if high & BY_PLC else before
-            if options['unlisted_exits'] == 'none' and not faulted:
-                assert bench.state == expected
-        bench.wait(seconds, telegrams=what != 'silence')
-        motor = bench.motor
-        assert -0.01 <= motor.frequency <= 62.0
-        if motor.driven and not driven:
-            assert bench.state == S4, 'nothing else starts it'
-        if bench.drive.faults:
-            assert not motor.driven
-            assert bench.state == S1
-        shown = bench.unit.status_word & 0x47
-        if options['echo_bits'] == 'state':
-            assert shown == PATTERN[bench.state]
-        assert bool(shown & 0x40) == (bench.state == S1)
-        driven = motor.driven

@@ -3,9 +3,7 @@
 
 """The simulated Optimal and G2 on a fieldbus: telegram 1 by their manuals ([M1], [M0 §7])."""
 
-from hypothesis import given, settings as examples_of, strategies as st
 import pytest
-from support.examples import examples
 from telegram_bench import TelegramBench as Bench
 
 # Optimal: bits of STW1 and ZSW1, copied from [M1]
@@ -173,42 +171,3 @@ def test_commands_count_by_level_where_that_is_chosen():
         bench.step(word, 1000)
         bench.wait(2.0)
         assert bench.motor.driven, model
-
-
-# --- in any order ---
-
-OPTIMALS = (0, PLC, PLC | ENABLE, PLC | ENABLE | SWITCH_ON, PLC | ACK)
-WORDS = (*OPTIMALS, G2_STANDBY, G2_ON, G2_FORWARD, G2_REVERSE, G2_STANDBY | 0x80, 0xFFFF)
-
-
-@examples_of(max_examples=examples(100))
-@given(
-    st.sampled_from(['sinus_optimal', 'sinus_g2']),
-    st.lists(
-        st.tuples(
-            st.sampled_from(['word', 'word', 'word', 'fault', 'stop', 'power', 'silence', 'run']),
-            st.sampled_from(WORDS),
-            st.integers(-0x8000, 0x7FFF),
-            st.sampled_from([0.0, 0.02, 0.1, 1.0]),
-        ),
-        max_size=20,
-    ),
-)
-def test_in_any_order_a_word_alone_starts_the_motor(model, steps):
-    bench = Bench(model)
-    for what, word, setpoint, seconds in steps:
-        if what == 'word':
-            bench.send(word, setpoint)
-        elif what == 'fault':
-            bench.drive.trip(3)
-        elif what == 'stop':
-            bench.drive.control_unit.press('stop')
-        elif what == 'power':
-            bench.drive.power_cycle(0.0)
-        elif what == 'run':
-            bench.drive.set_run_input(bool(setpoint & 1))
-        bench.wait(seconds, telegrams=what != 'silence')
-        if what in ('fault', 'stop', 'power') or bench.drive.faults:
-            assert not bench.motor.driven
-        assert -0x8000 <= bench.actual <= 0x7FFF
-        assert 0 <= bench.zsw1 <= 0xFFFF
