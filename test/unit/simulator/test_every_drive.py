@@ -23,7 +23,7 @@ from nfo_sinus_driver.simulator.drive import SimulatedDrive, describe
 from nfo_sinus_driver.simulator.family import load, simulated, simulated_drive
 from nfo_sinus_driver.simulator.memory import Refused
 
-SIO_FAIL, BUS_FAIL = 14, 15
+SIO_FAIL = 14
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,11 @@ class Way:
 
     :ivar run: what runs the motor, the set-point and the run command last; key and raw number.
     :ivar setting: one that can be written, and a raw number for it.
-    :ivar fault: one that needs an acknowledgement; :ivar lost: that of a silent line.
-    :ivar drops: options with which a fault takes the run command; :ivar keeps: it stands.
-    :ivar watch: settings with which a silent line is a fault after 1 s.
+    :ivar fault: one that needs an acknowledgement.
+    :ivar lost: that of a silent line.
+    :ivar watch: settings with which a silent line is one, after 1 s.
+    :ivar keeps: options with which the run command stands through a fault.
+    :ivar drops: options with which a fault takes it.
     :ivar revived: options with which power-on leaves the set-point.
     """
 
@@ -179,7 +181,7 @@ def test_a_silent_line_is_a_fault_where_all_that_it_takes_is_set(model: str) -> 
         drive.advance(0.9)
     assert drive.motor.driven
     # it hears nothing either
-    drive.silence(0.05)
+    drive.silence(5.0)
     drive.advance(0.2)
     assert drive.faults.codes == [way.lost] and not drive.motor.driven
     for left_out in way.watch:

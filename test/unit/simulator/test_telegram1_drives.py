@@ -16,7 +16,7 @@ FULL = 8192
 G2_CONTROLLED = 0xC000 | 0x70
 G2_STANDBY = G2_CONTROLLED | 0x06
 G2_ON = G2_STANDBY | 0x01
-G2_FORWARD, G2_REVERSE = G2_ON | 0x08, G2_ON | 0x2000
+G2_FORWARD = G2_ON | 0x08
 
 
 def running_optimal(setpoint=FULL // 2, seconds=6.0, **settings):
