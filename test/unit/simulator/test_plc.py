@@ -115,6 +115,28 @@ def test_parameters_of_a_g2_are_read_and_written_by_pnu():
     assert asked(bench, 7, 1, 1028, 9) == (7, 2, 0, 3), 'it has no such sub-index'
 
 
+def test_pnus_of_faults_have_the_active_ones_and_the_last_and_acknowledge_nothing():
+    for model, fault, past in (('sinus_g2', 3, 1), ('sinus_h', 11, 8)):
+        bench = Bench(model, settings=LAYOUT_2)
+        drive = bench.drives[1]
+        before = asked(bench, 1, 1, 944)[3]
+        drive.trip(fault)
+        assert asked(bench, 2, 1, 947, 0)[1:] == (0, 0, fault)
+        assert asked(bench, 3, 1, 944)[3] == before + 1
+        assert asked(bench, 4, 1, 947, past)[1:] == (0, 0, 0)
+        assert drive.faults
+        drive.faults.acknowledge()
+        assert asked(bench, 5, 1, 947, 0)[1:] == (0, 0, 0)
+        assert asked(bench, 6, 1, 947, past)[1:] == (0, 0, fault)
+
+
+def test_an_access_takes_its_time_and_is_busy_meanwhile():
+    bench = Bench('sinus_g2', settings=PlcSetting(layout=2, access_time=0.2))
+    assert asked(bench, 1, 1, 922, wait=0.3)[:2] == (0, 3)
+    bench.wait(0.2)
+    assert bench.read(24, 4) == (1, 0, 0, 1)
+
+
 def test_without_the_fieldbus_and_of_a_drive_without_pnus_there_is_no_access():
     bench = Bench('sinus_g2', 'sinus_optimal', settings=LAYOUT_2)
     bench.plc.channels[1].cut_until = bench.now + 1.0
@@ -146,11 +168,11 @@ def test_registers_of_the_plc_are_not_the_drivers_in_either_layout():
 
 def test_drive_runs_by_the_words_in_its_block_and_stops_by_the_ramp_without_a_driver():
     for model in STARTS:
-        bench = Bench(model)
+        bench = Bench(model, settings=PlcSetting(ros_time=1.5))
         word, setpoint = bench.start(model)
         assert bench.motor.frequency == pytest.approx(20.0, abs=0.05)
         assert bench.read()[3:] == (3, 1)
-        bench.wait(0.9)
+        bench.wait(1.4)
         assert bench.motor.frequency == pytest.approx(20.0, abs=0.05)
         bench.wait(0.3)
         assert bench.motor.driven and bench.motor.trend < 0, model
