@@ -100,8 +100,9 @@ def test_local_control_is_not_remote_and_the_control_word_is_not_processed() -> 
     bus = Bus(canopen_bus_mode='free')
     assert number(bus, STATUS) & 0x200 == 0
     # without remote the control word is not processed
-    said(bus, (('2b4060007f000000', '6040600000000000'),))
-    bus.wait(1.0)
+    for value in (0x76, 0x77, 0x7F):
+        bus.write(CONTROL, 0, word(value))
+        bus.wait(1.0)
     assert not bus.drive.motor.driven and number(bus, CONTROL) == 0x7F
     bus.write(MODE, 0, word(3))
     assert number(bus, STATUS) & 0x200
