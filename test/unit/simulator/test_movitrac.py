@@ -190,8 +190,14 @@ def test_a_rising_bit_resets_in_remote_control_alone(running):
     trip(running, OVERCURRENT)
     running.bits(RESET)
     assert running.fault == OVERCURRENT, 'in another control mode it is not read'
+
+
+def test_it_remembers_five_faults_through_power_off(running):
+    for fault in (1, 2, 3, 4, 5, 6):
+        trip(running, fault)
+        running.unit.press('reset')
     running.drive.power_cycle(0.0)
-    assert (running.read(m.FAULT_T0), running.fault) == (OVERCURRENT, 0), 'that is the memory'
+    assert [running.read(index) for index in range(8, 13)] == [6, 5, 4, 3, 2]
 
 
 def test_terminal_and_keypad_reset_where_they_may(running):
