@@ -29,6 +29,9 @@ import threading
 import time
 import traceback
 
+from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.simulator.family import every_option
+
 _MODULES = (
     'nfo_sinus_driver.link.rtu',
     'nfo_sinus_driver.node.main',
@@ -106,6 +109,9 @@ def _server() -> subprocess.Popen[str]:
 def _serve() -> None:
     for module in _MODULES:
         importlib.import_module(module)
+    # both are kept
+    load_family('sinus_g2')
+    every_option()
     for line in sys.stdin:
         reading, writing = os.pipe()
         if os.fork() == 0:
