@@ -41,7 +41,7 @@ from nfo_sinus_driver.cli.parameter_file import (
 )
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, Identity
-from nfo_sinus_driver.drive.parameter_writer import Change, ParameterError, shown_raw
+from nfo_sinus_driver.drive.parameter_writer import ParameterChange, ParameterError, shown_raw
 
 _NOTHING = ', nothing was written'
 
@@ -107,7 +107,7 @@ class Load(Verb):
                 # as bytes where they mean nothing
                 old = values.get(key, shown_raw(drive.parameters.data[key]))
                 new = drive.params.value(key, data[key])
-                put(str(Change(key, old, new, drive.model[key].unit)))
+                put(str(ParameterChange(key, old, new, drive.model[key].unit)))
             count = 'one parameter' if len(data) == 1 else f'{len(data)} parameters'
             if not data:
                 remark(f'nothing to write: {drive} has all of it already')
@@ -213,7 +213,7 @@ class Loading:
         self._options = options
         #: What the drive had, to be put back.
         self._before = {key: drive.parameters.data[key] for key in data}
-        self._written: dict[str, Change] = {}
+        self._written: dict[str, ParameterChange] = {}
 
     def run(self) -> None:
         """Write all of it; if that fails, say what was written and what not, or put it back."""
@@ -225,11 +225,13 @@ class Loading:
             stained = list(dict.fromkeys((*self._written, *doubtful)))
             raise CliError(self._clean_up(stained)) from error
 
-    def _write(self, what: str, data: Mapping[str, bytes], written: dict[str, Change]) -> None:
+    def _write(
+        self, what: str, data: Mapping[str, bytes], written: dict[str, ParameterChange]
+    ) -> None:
         """Write, and keep account of it; a signal ends it after the parameter on its way."""
         with _signals_noted() as came, progress(f'{what} {self._drive}', len(data)) as step:
 
-            def wrote(change: Change) -> None:
+            def wrote(change: ParameterChange) -> None:
                 written[change.key] = change
                 step()
                 if came() and len(written) < len(data):
@@ -259,7 +261,7 @@ class Loading:
             if self._written:
                 remark(f'to put it back:\n  {self._how_to_put_back()}')
             return f'not loaded: {len(self._written)} of {len(self._data)} were written'
-        back: dict[str, Change] = {}
+        back: dict[str, ParameterChange] = {}
         try:
             self._write('putting back', {key: self._before[key] for key in stained}, back)
         except (DriveError, Interrupted) as error:

@@ -73,7 +73,7 @@ def main() -> int:
     if bag:
         print(f'Its bag: {bag}; {replay_warning("/nfo_sinus")}')
     if not missing:
-        from nfo_sinus_driver.demo.picture import draw
+        from nfo_sinus_driver.demo.plot import draw
 
         picture = folder / 'ride.png'
         draw(bag, picture, '/nfo_sinus')

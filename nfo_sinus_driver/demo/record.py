@@ -105,7 +105,7 @@ def why_no_picture() -> str:
 def _draw(command: str, bag: Path, drives: Sequence[str], picture: Path) -> int:
     """Draw some drives, or all: one picture for each line."""
     # here and not above: a recorder has no use for it before
-    from nfo_sinus_driver.demo.picture import draw
+    from nfo_sinus_driver.demo.plot import draw
     from nfo_sinus_driver.demo.recorded import drives_in
 
     try:
@@ -131,12 +131,12 @@ def _by_line(drives: Sequence[str]) -> dict[str, list[str]]:
 
 def _explain(bag: Path, drives: Sequence[str]) -> int:
     """Say what happened to some drives, or all."""
+    from nfo_sinus_driver.demo.explanation import explanation
     from nfo_sinus_driver.demo.recorded import drives_in, read
-    from nfo_sinus_driver.demo.story import story
 
     try:
         for run in read(bag, drives or drives_in(bag)):
-            print('\n'.join(story(run)), end='\n\n')
+            print('\n'.join(explanation(run)), end='\n\n')
     except (OSError, ValueError) as error:
         print(f'plot: cannot read {bag}: {error}', file=sys.stderr)
         return 1

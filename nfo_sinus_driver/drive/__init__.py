@@ -7,7 +7,7 @@ from nfo_sinus_driver.catalog import InverterStatus, Procedure
 from nfo_sinus_driver.drive.drive import Drive
 from nfo_sinus_driver.drive.events import Cause, DriveError, Event, Report, Severity
 from nfo_sinus_driver.drive.identity import Identity
-from nfo_sinus_driver.drive.parameter_writer import Change
+from nfo_sinus_driver.drive.parameter_writer import ParameterChange
 from nfo_sinus_driver.drive.settings import CONTROL_METHODS, DriveSettings
 from nfo_sinus_driver.drive.snapshot import Listener, LogEntry, Snapshot, Telemetry
 from nfo_sinus_driver.drive.stop_reason import StopReason
@@ -16,7 +16,6 @@ from nfo_sinus_driver.drive.tuning import Tuned
 __all__ = [
     'CONTROL_METHODS',
     'Cause',
-    'Change',
     'Drive',
     'DriveError',
     'DriveSettings',
@@ -25,6 +24,7 @@ __all__ = [
     'InverterStatus',
     'Listener',
     'LogEntry',
+    'ParameterChange',
     'Procedure',
     'Report',
     'Severity',

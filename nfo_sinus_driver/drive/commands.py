@@ -180,7 +180,7 @@ async def _store(
     notify(Severity.INFO, Report(Cause.STORED, key=step.key, name=name, old=old, new=new))
 
 
-class Commands:
+class ProfileRunner:
     """
     The commands of one drive, by the control method of its settings; on the bus alone.
 

@@ -17,7 +17,7 @@ from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.memory import Borrowed, Memory
-from nfo_sinus_driver.drive.parameter_writer import Change, not_changed
+from nfo_sinus_driver.drive.parameter_writer import ParameterChange, not_changed
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN, DRIVE_TIMEOUT_MARGIN
 from nfo_sinus_driver.link import LinkError
@@ -137,7 +137,7 @@ class CommunicationWatchdog:
         self._report_once(Severity.WARNING, Report(Cause.NOT_REMEMBERED, why=why, keys=keys))
         return otherwise
 
-    async def require_set(self) -> None:
+    async def ensure_set(self) -> None:
         """
         Set it, if that was not done yet.
 
@@ -163,7 +163,7 @@ class CommunicationWatchdog:
         settled = seconds, self._state.timeout.stops_motor
         return self._settled == settled and self._parameters.values.get(key, ours) == ours
 
-    async def set_now(self, seconds: float) -> Sequence[Change]:
+    async def set_now(self, seconds: float) -> Sequence[ParameterChange]:
         """
         Set and verify it, and have it stop the motor; return what was changed.
 
@@ -235,7 +235,7 @@ class CommunicationWatchdog:
         await self._set_to({self._state.model.key(Role.COMMUNICATION_TIMEOUT): seconds})
         await self._state.timeout.read()
 
-    async def _set_to(self, wanted: Mapping[str, Value]) -> Sequence[Change]:
+    async def _set_to(self, wanted: Mapping[str, Value]) -> Sequence[ParameterChange]:
         """
         Write and verify values; return what was changed.
 
@@ -319,7 +319,7 @@ class CommunicationWatchdog:
             why = explain_failure(error, state)
             state.notify(Severity.WARNING, Cause.WATCH_LEFT, why=why, by=by, seconds=seconds)
 
-    async def _change(self, wanted: Mapping[str, Value]) -> Sequence[Change]:
+    async def _change(self, wanted: Mapping[str, Value]) -> Sequence[ParameterChange]:
         return await self._parameters.change_now(
             wanted, guarded=False, report_as=Cause.CHANGED_FOR_TIMEOUT
         )

@@ -81,7 +81,7 @@ TRANSITIONS = _read(_TABLE)
 COMMANDED = frozenset((ControlState.ENABLING, ControlState.ENABLED, ControlState.PROCEDURE))
 
 
-class Control:
+class ControlTable:
     """
     The state of control of one drive.
 

@@ -17,8 +17,8 @@ import math
 
 from nfo_sinus_driver.bus import Cancelled, Priority, Task
 from nfo_sinus_driver.catalog import InverterStatus, Kind, Limits, Meaning, State
-from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.control_state import Control, ControlEvent, ControlState
+from nfo_sinus_driver.drive.commands import ProfileRunner
+from nfo_sinus_driver.drive.control_state import ControlEvent, ControlState, ControlTable
 from nfo_sinus_driver.drive.diagnosis import (
     explain_fall,
     explain_fault,
@@ -29,7 +29,7 @@ from nfo_sinus_driver.drive.diagnosis import (
 from nfo_sinus_driver.drive.drive_state import LOOK_PERIOD, TIMEOUT, DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
-from nfo_sinus_driver.drive.following import Following
+from nfo_sinus_driver.drive.following import FollowingCheck
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.starting import Prepare, StartSequence
 from nfo_sinus_driver.drive.stop_reason import StopReason, reason_of
@@ -53,7 +53,7 @@ class Controller:
     def __init__(
         self,
         state: DriveState,
-        method: Commands,
+        method: ProfileRunner,
         setpoint: Setpoint,
         look: Callable[[], Awaitable[None]],
     ) -> None:
@@ -65,7 +65,7 @@ class Controller:
         #: Called on the bus after a stop was begun, with the reason.
         self._on_stop: Callable[[Report], None] = lambda _: None
         self._show_stop: Callable[[], None] = lambda: None
-        self._control = Control(self._bus.now, self._changed, self._notify_stop)
+        self._control = ControlTable(self._bus.now, self._changed, self._notify_stop)
         #: Since when nothing can start the motor any more, for the driver ends, s.
         self._closed_at = math.inf
         #: The task that enables, to be cancelled; the procedure that excludes others and an enable.
@@ -73,7 +73,7 @@ class Controller:
         self._access: ExclusiveAccess | None = None
         self._starting = StartSequence(state, method)
         self._sequence = StopSequence(state, method, self._control, look)
-        self._following = Following(state, setpoint)
+        self._following = FollowingCheck(state, setpoint)
         #: A set-point that the drive refused: when, and why.
         self._refusal: tuple[float, Report] | None = None
         #: The last status that was checked.

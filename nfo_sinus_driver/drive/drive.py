@@ -14,7 +14,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Statistics, Task
 from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
-from nfo_sinus_driver.drive.commands import Commands, carry_out
+from nfo_sinus_driver.drive.commands import ProfileRunner, carry_out
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import explain
@@ -24,7 +24,7 @@ from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.fault_name import FaultNamer
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.memory import Memory, ProcessMemory
-from nfo_sinus_driver.drive.parameter_writer import Change
+from nfo_sinus_driver.drive.parameter_writer import ParameterChange
 from nfo_sinus_driver.drive.parameters import Parameters, on_bus
 from nfo_sinus_driver.drive.poller import Poller, take_snapshot
 from nfo_sinus_driver.drive.procedure import Procedures
@@ -102,13 +102,13 @@ class Drive:
             lambda reply: self._poller.take_status(reply),
         )
         self._controller: Controller | None = None
-        commands: Commands | None = None
+        runner: ProfileRunner | None = None
         if settings.method != 'monitor':
-            commands = Commands(self.state)
-        self._recogniser = Recogniser(self.state, commands)
-        if commands is not None:
+            runner = ProfileRunner(self.state)
+        self._recogniser = Recogniser(self.state, runner)
+        if runner is not None:
             look = self._recogniser.look
-            self._controller = Controller(self.state, commands, self.setpoint, look)
+            self._controller = Controller(self.state, runner, self.setpoint, look)
         self._poller = Poller(
             self.state,
             self.setpoint,
@@ -127,7 +127,7 @@ class Drive:
         self._error_log_monitor = ErrorLogMonitor(self.state, self.log)
         self._fault_namer = FaultNamer(self.state)
         self._tuning = Tuning(
-            self.state, self.parameters, procedures, self._watchdog.require_set
+            self.state, self.parameters, procedures, self._watchdog.ensure_set
         )
         bus.on_restart(self._unit, self._poller.restarted)
         bus.require_sign_of_life(self._unit, settings.lost_after)
@@ -361,7 +361,7 @@ class Drive:
         self._require_active()
         controller = self._procedures.controller
         self._require_connected()
-        answer = await controller.enable(self._watchdog.require_set, requested_at)
+        answer = await controller.enable(self._watchdog.ensure_set, requested_at)
         self._poller.wake()
         return answer
 
@@ -458,7 +458,7 @@ class Drive:
         return await self._procedures.abort()
 
     @on_bus
-    async def set_drive_timeout(self, seconds: float) -> Sequence[Change]:
+    async def set_drive_timeout(self, seconds: float) -> Sequence[ParameterChange]:
         """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
         return await self._watchdog.set_now(seconds)
 
@@ -536,7 +536,7 @@ class Drive:
             self._poller.read_mode_soon()
         self.state.listener.on_parameters(keys)
 
-    def _take_scale(self, change: Change) -> None:
+    def _take_scale(self, change: ParameterChange) -> None:
         """Stop a motor whose set-points would mean another speed from now on."""
         controller = self._controller
         is_used = self.state.nameplate.scales.found.get(change.key) == change.new

@@ -62,7 +62,7 @@ _FIXED = (
 _UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
 
 
-class Turning(NamedTuple):
+class SpeedSource(NamedTuple):
     """
     How the speed of a motor is measured.
 
@@ -77,11 +77,11 @@ class Turning(NamedTuple):
     hertz: float
 
 
-def _turning(model: Family) -> Turning:
+def _speed_source(model: Family) -> SpeedSource:
     """Return how: by the frequency, or by the speed where there is only that."""
     if Role.ACTUAL_FREQUENCY not in model.roles and Role.ACTUAL_SPEED in model.roles:
-        return Turning(Role.ACTUAL_SPEED, 'rpm', 'Speed', 1 / 60)
-    return Turning(Role.ACTUAL_FREQUENCY, 'Hz', 'Freque', 1.0)
+        return SpeedSource(Role.ACTUAL_SPEED, 'rpm', 'Speed', 1 / 60)
+    return SpeedSource(Role.ACTUAL_FREQUENCY, 'Hz', 'Freque', 1.0)
 
 
 class DriveState:
@@ -98,7 +98,7 @@ class DriveState:
             settings.telegram_speed,
             settings.own_parameters,
         )
-        self.turning = _turning(self.model)
+        self.turning = _speed_source(self.model)
         #: Which way the motor turns, where the drive does not report that.
         self.direction = Direction()
         method = settings.method_class
@@ -146,7 +146,7 @@ class DriveState:
         #: It is changing its parameters itself.
         self.tuning = False
         #: The code of a fault or alarm that the status word does not name, and the one that does.
-        self._named: tuple[int, int] | None = None
+        self._resolved: tuple[int, int] | None = None
         self.control_mode = ''
         self.unit = ''
         #: Its communication time-outs.
@@ -216,8 +216,8 @@ class DriveState:
         if code_of is None:
             return InverterStatus(at, word, NO_CODE, self.model)
         code = code_of(word)
-        if self._named is not None and self._named[0] == code:
-            code = self._named[1]
+        if self._resolved is not None and self._resolved[0] == code:
+            code = self._resolved[1]
         status = InverterStatus(at, word, code, self.model, code_at=at)
         return self._with_control_as_before(status)
 
@@ -233,7 +233,7 @@ class DriveState:
             # that takes several transactions, and a stop does not wait for them
             return status
         try:
-            self.name(status.code, await self.read_fault_code(priority))
+            self.resolve_fault(status.code, await self.read_fault_code(priority))
         except (Refused, NoAnswer):
             return status
         assert status.word is not None
@@ -246,7 +246,7 @@ class DriveState:
         return self.model.profile.fault_code(int(number))
 
     @property
-    def unnamed(self) -> int:
+    def unresolved_code(self) -> int:
         """The code of the fault or alarm that the status word does not name; 0: there is none."""
         code_of, status = self.model.profile.status_word.code, self.status
         if code_of is None or status is None or status.word is None:
@@ -254,17 +254,17 @@ class DriveState:
         code = code_of(status.word)
         return code if Meaning.UNNAMED in self.model.status_code(code).meanings else 0
 
-    def name(self, unnamed: int, code: int) -> None:
+    def resolve_fault(self, unresolved: int, code: int) -> None:
         """Take the name of a fault or alarm that the status word does not name; 0: it has none."""
         is_one = self.model.status_code(code).kind is not Kind.STATUS
         # where all codes are the drive's own numbers, one that is not listed names it, too
         names = code in self.model.status_codes or (code and self.model.unlisted is not None)
-        self._named = (unnamed, code) if is_one and names else None
+        self._resolved = (unresolved, code) if is_one and names else None
 
     @property
-    def named(self) -> bool:
+    def fault_resolved(self) -> bool:
         """The fault or alarm that the status word does not name has a name."""
-        return self._named is not None
+        return self._resolved is not None
 
     def require_fresh(self, status: InverterStatus) -> None:
         """
@@ -394,8 +394,8 @@ class DriveState:
         before = self.status
         if before is None or status.at >= before.at:
             self.status = status
-            if not self.unnamed:
-                self._named = None
+            if not self.unresolved_code:
+                self._resolved = None
             self._intervals.append(status.at - before.at if before else 0.0)
             self._alone = self.bus.silences.take_longest(self.settings.address)
             self._asked_in_vain, self._in_vain = self._in_vain, False

@@ -43,14 +43,14 @@ class FaultNamer:
         state, read_at = self._state, -math.inf
         while True:
             now = state.bus.now()
-            if not state.unnamed:
+            if not state.unresolved_code:
                 read_at = -math.inf
-            elif now - read_at > (_PERIOD if state.named else _RETRY_PERIOD):
+            elif now - read_at > (_PERIOD if state.fault_resolved else _RETRY_PERIOD):
                 read_at = now
-                await self._name(state.unnamed)
+                await self._name(state.unresolved_code)
             await state.bus.sleep(_WAIT)
 
-    async def _name(self, unnamed: int) -> None:
+    async def _name(self, unresolved: int) -> None:
         state = self._state
         if not state.params.reaches(state.model.key(Role.FAULT_CODE)):
             return
@@ -59,5 +59,5 @@ class FaultNamer:
         except LinkError:
             # the poll reports it if the drive is lost
             return
-        if state.unnamed == unnamed:
-            state.name(unnamed, code)
+        if state.unresolved_code == unresolved:
+            state.resolve_fault(unresolved, code)

@@ -34,7 +34,7 @@ _SHORT, _FALLEN = 1.0, 0.4
 _COMPARED = {'Freque': (Role.ACTUAL_FREQUENCY, 1.0), 'Speed': (Role.ACTUAL_SPEED, 30.0)}
 
 
-class _Fall:
+class _DecelerationCheck:
     """A frequency or speed that ought to fall."""
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class _Fall:
         return at - self._fell_at > _FALLS_WITHIN
 
 
-class Following:
+class FollowingCheck:
     """Compares the speed of one motor with its set-points while it is enabled."""
 
     def __init__(self, state: DriveState, setpoint: Setpoint) -> None:
@@ -60,8 +60,10 @@ class Following:
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew."""
-        self._after_expiry, self._backwards, self._beyond = _Fall(), _Fall(), _Fall()
+        """Begin again."""
+        self._after_expiry = _DecelerationCheck()
+        self._backwards = _DecelerationCheck()
+        self._beyond = _DecelerationCheck()
         #: The direction of all recent set-points; 0: none, or both.
         self._direction = 0
         self._wrong_polls = 0
@@ -100,7 +102,7 @@ class Following:
     def _goes_on(self, frequency: float, at: float) -> bool:
         """Return whether it does not slow down, although set-points have ceased."""
         if not self._setpoint.expired or not abs(frequency) > _STANDSTILL:
-            self._after_expiry = _Fall()
+            self._after_expiry = _DecelerationCheck()
             return False
         return self._after_expiry.take(abs(frequency), at)
 
@@ -134,7 +136,7 @@ class Following:
             direction = -1
         if direction != self._direction:
             # a motor that ramps down from the other direction has not begun at standstill
-            self._direction, self._backwards, self._wrong_polls = direction, _Fall(), 0
+            self._direction, self._backwards, self._wrong_polls = direction, _DecelerationCheck(), 0
         if not direction:
             return False
         back = -direction * frequency
@@ -167,7 +169,7 @@ class Following:
         """Report a motor that turns faster than its set-point, and write that again."""
         size, margin = abs(value), _BEYOND_BY * unit
         if not size > most * (1 + _BEYOND) + margin:
-            self._beyond, self._reported = _Fall(), False
+            self._beyond, self._reported = _DecelerationCheck(), False
             return
         endless = self._beyond.take(size, at, _FALL * unit)
         if self._reported or not (endless or size > self._beyond.least + margin):

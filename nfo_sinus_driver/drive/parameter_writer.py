@@ -50,7 +50,7 @@ class _BadValue(ParameterError):
 
 
 @dataclass(frozen=True)
-class Change:
+class ParameterChange:
     """A parameter that was written; bytes that mean nothing are shown as text."""
 
     key: str
@@ -99,7 +99,7 @@ class ParameterWriter:
 
     async def write(
         self, wanted: Mapping[str, bytes], pace: Priority = Priority.POLL
-    ) -> tuple[Change, ...]:
+    ) -> tuple[ParameterChange, ...]:
         """
         Write what differs, all of it or nothing: after an error what was written is put back.
 
@@ -172,11 +172,11 @@ class ParameterWriter:
         if depends and self._procedures.enabled:
             raise not_changed(key, Report(Cause.NOT_WHILE_ENABLED))
 
-    def describe(self, entry: Written) -> Change:
+    def describe(self, entry: Written) -> ParameterChange:
         """Return what was written, as values."""
         model = self._params.model[entry.key]
         before, after = self.value(entry.key, entry.before), self.value(entry.key, entry.after)
-        return Change(entry.key, before, after, model.unit)
+        return ParameterChange(entry.key, before, after, model.unit)
 
     def _order(self, key: str) -> tuple[bool, bool]:
         """Sort what a running motor forbids to the front, what may cut the line to the end."""

@@ -26,7 +26,7 @@ from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, Report, Severity
 from nfo_sinus_driver.drive.parameter_writer import (
-    Change,
+    ParameterChange,
     ParameterError,
     ParameterWriter,
     Written,
@@ -100,7 +100,7 @@ class Parameters:
         procedures: Procedures,
         run: Callable[[Callable[[], Coroutine[Any, Any, Any]]], Future[Any]],
         on_change: Callable[[Collection[str]], None],
-        on_scale: Callable[[Change], None],
+        on_scale: Callable[[ParameterChange], None],
     ) -> None:
         self._bus = state.bus
         self._state = state
@@ -140,14 +140,14 @@ class Parameters:
         return f'{len(self._keys)} read' if self._keys else 'not read'
 
     @property
-    def drift(self) -> tuple[Change, ...]:
+    def drift(self) -> tuple[ParameterChange, ...]:
         """What differs from the wanted settings, as wanted -> what the drive has."""
         return self._desired.drift
 
-    def describe(self, key: str, before: Value, data: bytes) -> Change:
+    def describe(self, key: str, before: Value, data: bytes) -> ParameterChange:
         """Return the difference between a value and what bytes mean."""
         unit = self._state.model[key].unit
-        return Change(key, before, self._writer.value(key, data), unit)
+        return ParameterChange(key, before, self._writer.value(key, data), unit)
 
     def coerce(self, key: str, value: Value) -> Value:
         """Return a value as the drive would show it."""
@@ -286,7 +286,7 @@ class Parameters:
 
     async def change_now(
         self, wanted: Mapping[str, Value], *, guarded: bool = True, report_as: Cause = Cause.CHANGED
-    ) -> tuple[Change, ...]:
+    ) -> tuple[ParameterChange, ...]:
         """
         Write what differs, all of it or nothing, and read it back; return what was changed.
 
@@ -326,7 +326,7 @@ class Parameters:
         return changes
 
     async def write_each_now(
-        self, wanted: Mapping[str, bytes], wrote: Callable[[Change], None]
+        self, wanted: Mapping[str, bytes], wrote: Callable[[ParameterChange], None]
     ) -> None:
         """
         Write what differs, one after the other; what was written before a refusal stays.
@@ -349,12 +349,12 @@ class Parameters:
     @contextlib.asynccontextmanager
     async def left_to_the_drive(
         self, keys: Collection[str]
-    ) -> AsyncIterator[Callable[[], Awaitable[tuple[Change, ...]]]]:
+    ) -> AsyncIterator[Callable[[], Awaitable[tuple[ParameterChange, ...]]]]:
         """Let the drive change parameters itself; yield what reads which of them it changed."""
         before = {key: await self._params.read_data(key, Priority.SERVICE) for key in keys}
 
-        async def changes() -> tuple[Change, ...]:
-            found: list[Change] = []
+        async def changes() -> tuple[ParameterChange, ...]:
+            found: list[ParameterChange] = []
             for key, old in before.items():
                 data = await self._params.read_data(key, Priority.SERVICE)
                 if key in self._data:
@@ -434,13 +434,14 @@ class Parameters:
             return
         self._values = values
         if not (quiet or same) and before is not None and key in values:
-            self._report_change(Change(key, before, values[key], self._state.model[key].unit), own)
+            change = ParameterChange(key, before, values[key], self._state.model[key].unit)
+            self._report_change(change, own)
         try:
             self._on_change((key,))
         except Exception:
             _log.exception('a new value of %s could not be reported', key)
 
-    def _report_change(self, change: Change, own: bool) -> None:
+    def _report_change(self, change: ParameterChange, own: bool) -> None:
         if not self._desired.report_drift(change.key) and not own:
             self._state.notify(Severity.INFO, Cause.CHANGED_AT_DRIVE, change=change)
         if change.key in self._state.model.scaling and not own:
@@ -456,7 +457,7 @@ class DesiredConfig:
         self._values: dict[str, Value] = {}
 
     @property
-    def drift(self) -> tuple[Change, ...]:
+    def drift(self) -> tuple[ParameterChange, ...]:
         """What differs from the wanted settings, as wanted -> what the drive has."""
         data, values = self._parameters.data, self._parameters.values
         return tuple(
@@ -510,7 +511,7 @@ class DesiredConfig:
             drifts = self.drift if write and len(refused) < len(drifts) else ()
 
 
-def _not_as_wanted(drift: Change) -> Report:
+def _not_as_wanted(drift: ParameterChange) -> Report:
     has = f'{show(drift.new)} {drift.unit}'.rstrip()
     return Report(Cause.NOT_AS_WANTED, key=drift.key, has=has, wanted=show(drift.old))
 

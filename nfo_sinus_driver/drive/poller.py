@@ -18,7 +18,7 @@ from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import Conditions, explain_failure, explain_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
-from nfo_sinus_driver.drive.parameter_writer import Change
+from nfo_sinus_driver.drive.parameter_writer import ParameterChange
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.snapshot import NAN, NOT_MEASURED, Measured, Snapshot
@@ -505,7 +505,7 @@ class Poller:
             controller = self._controller
             # a start that is under way reads them itself
             if before not in (None, now) and controller is not None and controller.enabled:
-                change = Change(key, before, now, state.model[key].unit)
+                change = ParameterChange(key, before, now, state.model[key].unit)
                 controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
         return True
 

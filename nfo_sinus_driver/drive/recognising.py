@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import InverterStatus, Role, Value
-from nfo_sinus_driver.drive.commands import Commands, carry_out, read_scales
+from nfo_sinus_driver.drive.commands import ProfileRunner, carry_out, read_scales
 from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report
@@ -25,14 +25,14 @@ class Recogniser:
     """
     Recognises one drive.
 
-    :param commands: what it is commanded by; ``None`` if this driver only reads.
+    :param runner: what it is commanded by; ``None`` if this driver only reads.
     """
 
-    def __init__(self, state: DriveState, commands: Commands | None) -> None:
+    def __init__(self, state: DriveState, runner: ProfileRunner | None) -> None:
         self._state = state
         self._params = state.params
         self._profile = state.model.profile
-        self._commands = commands
+        self._runner = runner
         self._params.recognise_by(self.require)
 
     async def recognise(self, *, retry: bool = True) -> bool:
@@ -51,8 +51,8 @@ class Recogniser:
         named = bool(tells) and not known
         try:
             await state.nameplate.identify(retry=retry)
-            if self._commands is not None:
-                self._commands.require_fitted()
+            if self._runner is not None:
+                self._runner.require_fitted()
             if named:
                 await self.read_nameplate()
             await read_scales(state)

@@ -12,7 +12,7 @@ import math
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact, InverterStatus, Limits, Meaning, Role
 from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.drive.commands import Commands, read_limits, read_scales
+from nfo_sinus_driver.drive.commands import ProfileRunner, read_limits, read_scales
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError
@@ -63,7 +63,7 @@ class _StepTime:
 class StartSequence:
     """Starts the motor of one drive, or says in a :class:`DriveError` why not; on the bus alone."""
 
-    def __init__(self, state: DriveState, method: Commands) -> None:
+    def __init__(self, state: DriveState, method: ProfileRunner) -> None:
         self._state = state
         self._method = method
         #: When the start has to be over, s of the clock of the bus.

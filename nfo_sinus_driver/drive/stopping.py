@@ -13,8 +13,8 @@ import math
 from nfo_sinus_driver.bus import Priority, Task
 from nfo_sinus_driver.catalog import InverterStatus, Removal, State
 from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.drive.commands import Commands
-from nfo_sinus_driver.drive.control_state import Control, ControlEvent
+from nfo_sinus_driver.drive.commands import ProfileRunner
+from nfo_sinus_driver.drive.control_state import ControlEvent, ControlTable
 from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
@@ -77,8 +77,8 @@ class StopSequence:
     def __init__(
         self,
         state: DriveState,
-        method: Commands,
-        control: Control,
+        method: ProfileRunner,
+        control: ControlTable,
         look: Callable[[], Awaitable[None]],
     ) -> None:
         self._bus = state.bus

@@ -14,7 +14,7 @@ from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
-from nfo_sinus_driver.drive.parameter_writer import Change
+from nfo_sinus_driver.drive.parameter_writer import ParameterChange
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.starting import Prepare
@@ -55,7 +55,7 @@ class Tuned:
 
     success: bool
     how: Report
-    changes: tuple[Change, ...]
+    changes: tuple[ParameterChange, ...]
 
     @property
     def report(self) -> Report:

@@ -12,7 +12,6 @@ import re
 import time
 
 from nfo_sinus_driver.link import sdo
-from nfo_sinus_driver.link.another_master import Sightings
 from nfo_sinus_driver.link.can import FUNCTION_CODE, CanPort, Frame, SocketCan
 from nfo_sinus_driver.link.canopen_supervision import (
     HEARTBEATS,
@@ -20,6 +19,7 @@ from nfo_sinus_driver.link.canopen_supervision import (
     CanopenSupervision,
     start,
 )
+from nfo_sinus_driver.link.foreign_traffic import Sightings
 from nfo_sinus_driver.link.interface import (
     Address,
     Clock,
@@ -67,7 +67,7 @@ def _remark(unit: int) -> str:
     )
 
 
-class AnotherClient:
+class ForeignSdo:
     """
     Finds the requests of another client to the nodes of this one.
 
@@ -216,7 +216,7 @@ class CanopenLink:
     the next one is lost is not distinguished.
 
     Another client may use the same nodes: an answer that may be to it is not believed, and a read
-    is repeated (:class:`AnotherClient`).
+    is repeated (:class:`ForeignSdo`).
 
     How long a number is, and where the sub-indices of an array begin, is up to the node [C102];
     above this link a number has the length of the catalog (:class:`ObjectShapes`).
@@ -241,7 +241,7 @@ class CanopenLink:
         self._late: LateReplies[Transfer, Kind] = LateReplies(
             settings.response_timeout, lambda transfer: transfer.kinds
         )
-        self._another = AnotherClient(self.remarks)
+        self._another = ForeignSdo(self.remarks)
         #: The nodes that were made operational.
         self._started: set[int] = set()
         self._shapes = ObjectShapes()

@@ -19,7 +19,7 @@ import struct
 import time
 from typing import Any
 
-from nfo_sinus_driver.link.another_master import Codec
+from nfo_sinus_driver.link.foreign_traffic import Codec
 from nfo_sinus_driver.link.interface import (
     Address,
     Clock,

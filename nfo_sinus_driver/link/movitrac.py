@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
-from nfo_sinus_driver.link.another_master import Codec
+from nfo_sinus_driver.link.foreign_traffic import Codec
 from nfo_sinus_driver.link.interface import Address, DamagedAnswer, Refused, Reply
 from nfo_sinus_driver.link.late_replies import STOP_WAITS
 from nfo_sinus_driver.link.protocols import MOVITRAC

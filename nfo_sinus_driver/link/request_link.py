@@ -16,7 +16,7 @@ import contextlib
 import time
 from typing import Any, Generic, Protocol, TypeVar
 
-from nfo_sinus_driver.link.another_master import DOUBTFUL, TRIES, Codec, OtherRequests
+from nfo_sinus_driver.link.foreign_traffic import DOUBTFUL, TRIES, Codec, ForeignPairs
 from nfo_sinus_driver.link.interface import (
     Address,
     Clock,
@@ -102,7 +102,7 @@ class Echo:
         return held
 
 
-class AnyMaster(Protocol):
+class ForeignTraffic(Protocol):
     """Finds another master on the line."""
 
     def is_there(self, now: float) -> bool:
@@ -134,7 +134,7 @@ class RequestLink(ABC, Generic[_Request]):
 
     supervision = None
     protocol: LineProtocol
-    _another: AnyMaster
+    _another: ForeignTraffic
     _late: LateReplies[Any, Any]
 
     def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
@@ -412,7 +412,7 @@ class CodecLink(RequestLink[Any]):
     If the answer to a write is in quarantine it is not believed: the line is cleared by reading
     something, and :class:`DamagedAnswer` says that the outcome is unknown.
 
-    The requests of another master are found (:class:`OtherRequests`). An answer that may be to one
+    The requests of another master are found (:class:`ForeignPairs`). An answer that may be to one
     of them, or may have collided with another, is not believed; a read is repeated.
     """
 
@@ -428,7 +428,7 @@ class CodecLink(RequestLink[Any]):
         codec = self._codec
         longest = settings.response_timeout + self._longest_response
         self._late = LateReplies(settings.response_timeout, codec.kinds, longest)
-        self._another: OtherRequests = OtherRequests(self.remarks, longest, codec)
+        self._another: ForeignPairs = ForeignPairs(self.remarks, longest, codec)
         #: The last answer is the one before, and came before the request can have been answered.
         self._again = False
         #: The last request, its answer and when it came; ``None``: it had none.

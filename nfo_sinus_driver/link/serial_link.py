@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import time
 from typing import Any, TypeVar
 
-from nfo_sinus_driver.link.another_master import DOUBTFUL, AnotherMaster
+from nfo_sinus_driver.link.foreign_traffic import DOUBTFUL, ForeignModbus
 from nfo_sinus_driver.link.interface import (
     Address,
     Clock,
@@ -67,14 +67,14 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
     next request of its shape waits for that.
     """
 
-    _another: AnotherMaster
+    _another: ForeignModbus
 
     def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
         super().__init__(port, settings, now)
         self._late: LateReplies[Request[Any], bytes] = LateReplies(
             settings.response_timeout, answer_kinds
         )
-        self._another = AnotherMaster(self.remarks, settings.response_timeout, self._messages)
+        self._another = ForeignModbus(self.remarks, settings.response_timeout, self._messages)
         self._resync_addresses: dict[int, tuple[Address, ...]] = {}
         #: How long a pause within an answer may be on this line, s, by the answers so far.
         self._pause = 0.0

@@ -63,7 +63,7 @@ _T = TypeVar('_T')
 _Command = Callable[[Drive, Call], Future[Report]]
 
 
-class Commands:
+class CommandServices:
     """Takes commands for the drive of a node, each kind in a callback group of its own."""
 
     def __init__(self, node: Node, managed: ManagedDrive) -> None:
@@ -204,7 +204,11 @@ class ErrorLogServices:
     """Offers ``~/get_error_log``, ``~/erase_error_log`` and ``~/reset_energy``."""
 
     def __init__(
-        self, node: Node, managed: ManagedDrive, commands: Commands, stamp: Callable[[float], Time]
+        self,
+        node: Node,
+        managed: ManagedDrive,
+        commands: CommandServices,
+        stamp: Callable[[float], Time],
     ) -> None:
         self._managed = managed
         self._commands = commands

@@ -18,10 +18,10 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from nfo_sinus_driver.drive import Cause, Change, DriveError, DriveSettings, Report
+from nfo_sinus_driver.drive import Cause, DriveError, DriveSettings, ParameterChange, Report
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.callers import Call
-from nfo_sinus_driver.node.commands import Commands, ErrorLogServices, TuningServices
+from nfo_sinus_driver.node.commands import CommandServices, ErrorLogServices, TuningServices
 from nfo_sinus_driver.node.declaring import coerce, declare
 from nfo_sinus_driver.node.drive_parameters import DriveParameters, desired_config
 from nfo_sinus_driver.node.factory_settings import with_factory_address
@@ -117,7 +117,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         self.add_on_set_parameters_callback(self._check_settings)
         self.add_post_set_parameters_callback(self._take_settings)
         self._setpoints = Setpoints(self, context, self.managed, joint)
-        commands = Commands(self, self.managed)
+        commands = CommandServices(self, self.managed)
         ErrorLogServices(self, self.managed, commands, reporter.stamp)
         TuningServices(self, self.managed, reporter.stamp)
         context.add(self.managed)
@@ -339,7 +339,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             if changed.get(name, now) != now and self.managed.drive.following:
                 raise ValueError(f'{name} can only be changed while the drive is not enabled')
 
-    def _try_drive_timeout(self, seconds: float, changes: Sequence[Change]) -> None:
+    def _try_drive_timeout(self, seconds: float, changes: Sequence[ParameterChange]) -> None:
         """Set the drive's own time-out, or undo changes; without a drive configure does it."""
         managed = self.managed
         if managed.state in ('inactive', 'active') and seconds != managed.settings.drive_timeout:

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import Family, Parameter as CatalogParameter, Value
-from nfo_sinus_driver.drive import Change, Drive
+from nfo_sinus_driver.drive import Drive, ParameterChange
 from nfo_sinus_driver.node.parameter_names import require_parameter
 from nfo_sinus_driver.node.rclpy_internals import overrides_of, writable
 from nfo_sinus_driver.node.wording import NodeError
@@ -128,7 +128,7 @@ class DriveParameters:
         finally:
             self._outside = None
 
-    def write(self, parameters: Iterable[Parameter]) -> tuple[Change, ...]:
+    def write(self, parameters: Iterable[Parameter]) -> tuple[ParameterChange, ...]:
         """
         Write parameters to the drive that a client sets, all or none; return what was changed.
 
@@ -141,13 +141,13 @@ class DriveParameters:
         wanted = {one.name: one.value for one in parameters if one.name in self._declared}
         return self._change(drive, wanted) if wanted else ()
 
-    def put_back(self, changes: Sequence[Change]) -> None:
+    def put_back(self, changes: Sequence[ParameterChange]) -> None:
         """Undo changes, or raise why not."""
         if changes and self._drive is not None:
             self._change(self._drive, {change.key: change.old for change in changes})
 
     @staticmethod
-    def _change(drive: Drive, wanted: Mapping[str, Value]) -> tuple[Change, ...]:
+    def _change(drive: Drive, wanted: Mapping[str, Value]) -> tuple[ParameterChange, ...]:
         try:
             return drive.parameters.change(wanted).result(_LONGEST_CHANGE)
         except FutureTimeoutError:

@@ -415,7 +415,7 @@ LAWS = (
         'the time-out of the drive is set by looking',
         DRIVE,
         '            self._watchdog.connected()',
-        '            self._watchdog.connected()\n            await self._watchdog.require_set()',
+        '            self._watchdog.connected()\n            await self._watchdog.ensure_set()',
         ('test/unit/drive/test_laws.py', '-k', 'test_1_'),
     ),
     Mutant(
@@ -601,7 +601,7 @@ LAWS = (
     Mutant(
         8,
         'an answer to the last of several requests of another master answers all of them',
-        'nfo_sinus_driver/link/another_master.py',
+        'nfo_sinus_driver/link/foreign_traffic.py',
         '                del requests[:number]',
         '                requests.clear()',
         ('test/unit/link/test_another_master_on_a_line.py',),

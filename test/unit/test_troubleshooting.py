@@ -28,7 +28,7 @@ nodes, texts = _TOOL['nodes'], _TOOL['texts']
 #: node asks before.
 NEVER_SHOWN = {
     *(f'catalog/{name}.py' for name in ('codec', 'family', 'table')),
-    *(f'catalog/declared/{name}.py' for name in ('places', 'yaml_file')),
+    *(f'catalog/declared/{name}.py' for name in ('register_map', 'yaml_file')),
     *(f'link/{name}.py' for name in ('classic', 'lawicel', 'movitrac', 'sdo')),
     *('drive/drive_state.py', 'drive/setpoint.py', 'node/messages.py'),
 }

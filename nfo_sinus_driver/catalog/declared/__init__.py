@@ -6,19 +6,19 @@
 from nfo_sinus_driver.catalog.declared.description import (
     Assign,
     Await,
-    Change,
     Condition,
     Description,
     Direction,
     Pause,
     Put,
+    SetBits,
     SetpointPlace,
     Step,
     Steps,
     drive_number,
 )
-from nfo_sinus_driver.catalog.declared.places import FAULT_KEY, STATUS_KEY
 from nfo_sinus_driver.catalog.declared.reader import SUFFIX, read
+from nfo_sinus_driver.catalog.declared.register_map import FAULT_KEY, STATUS_KEY
 from nfo_sinus_driver.catalog.declared.tables import Code, status_codes
 from nfo_sinus_driver.catalog.declared.yaml_file import DescriptionError
 
@@ -28,7 +28,6 @@ __all__ = [
     'SUFFIX',
     'Assign',
     'Await',
-    'Change',
     'Code',
     'Condition',
     'Description',
@@ -36,6 +35,7 @@ __all__ = [
     'Direction',
     'Pause',
     'Put',
+    'SetBits',
     'SetpointPlace',
     'Step',
     'Steps',

@@ -11,15 +11,15 @@ from typing import Any, NamedTuple
 from nfo_sinus_driver.catalog.declared.description import (
     Assign,
     Await,
-    Change,
     Direction,
     Pause,
     Put,
+    SetBits,
     StatusPlace,
     Step,
     Steps,
 )
-from nfo_sinus_driver.catalog.declared.places import WORD, PlacedCondition, Places
+from nfo_sinus_driver.catalog.declared.register_map import WORD, PlacedCondition, RegisterMap
 from nfo_sinus_driver.catalog.declared.settings import Settings
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
 from nfo_sinus_driver.catalog.parameter import Parameter
@@ -46,10 +46,10 @@ class StepReader:
     """Reads steps; :meth:`use` says where the status stands, for those that wait for it."""
 
     def __init__(
-        self, root: Node, places: Places, settings: Settings, problems: Problems
+        self, root: Node, register_map: RegisterMap, settings: Settings, problems: Problems
     ) -> None:
         self._root = root
-        self._places = places
+        self._map = register_map
         self._settings = settings
         self._problems = problems
         self._awaited: dict[int, PlacedCondition] = {}
@@ -60,7 +60,7 @@ class StepReader:
         for name in NAMES:
             for node in self._root['control'].get(name).items:
                 if 'until' in node:
-                    condition = self._places.condition(node['until'], f'until of {name}')
+                    condition = self._map.condition(node['until'], f'until of {name}')
                     if condition is not None:
                         self._awaited[id(node)] = condition
                         yield condition
@@ -106,26 +106,26 @@ class StepReader:
         if place is None:
             return None
         word = node.integer('value') & WORD
-        return Put(self._places.word(name, place, word), word)
+        return Put(self._map.word(name, place, word), word)
 
     def _put_several(self, node: Node, name: str) -> Step | None:
         place = self._place(node, name)
         if place is None:
             return None
         words = [int(one.scalar or 0) & WORD for one in node['values'].items]
-        if len(words) > 1 and 16 not in self._places.functions:
+        if len(words) > 1 and 16 not in self._map.functions:
             self._problems.add(
                 node.line, f'{name} writes several registers, and the line has no function 16'
             )
-        if len(words) > self._places.most_registers:
+        if len(words) > self._map.most_registers:
             self._problems.add(node.line, f'{name} writes more than most_registers in a message')
-        if self._places.register(place) + len(words) > WORD + 1:
+        if self._map.register(place) + len(words) > WORD + 1:
             self._problems.add(node.line, f'{name} writes beyond the last register')
             return None
         raw = 0
         for word in words:
             raw = raw << 16 | word
-        return Put(self._places.word(name, place, *words), raw)
+        return Put(self._map.word(name, place, *words), raw)
 
     def _change(self, node: Node, name: str) -> Step | None:
         place = self._place(node, name)
@@ -134,13 +134,13 @@ class StepReader:
         bits, cleared = node.integer('set') & WORD, node.integer('clear') & WORD
         if bits & cleared or not bits | cleared:
             self._problems.add(node.line, f'{name} sets and clears the same bits, or none')
-        return Change(self._places.word(name, place, bits | cleared), bits, cleared)
+        return SetBits(self._map.word(name, place, bits | cleared), bits, cleared)
 
     def _switch(self, node: Node, name: str) -> Step | None:
         if 'coil' not in node:
             self._problems.add(node.line, f'a step of {name} needs the coil that is on or off')
             return None
-        return Put(self._places.coil_key(name, node['coil']), int(node.flag('on')))
+        return Put(self._map.coil_key(name, node['coil']), int(node.flag('on')))
 
     def _assign(self, node: Node, name: str) -> Step | None:
         key = self._settings.known(node.get('parameter'))
@@ -182,7 +182,7 @@ class _RunWord(NamedTuple):
     bits: int
 
 
-class Commands:
+class CommandLists:
     """
     The commands of one file, checked beside each other.
 
@@ -236,10 +236,10 @@ class Commands:
         """Yield what a step writes: where, the word, and which bits of it are known then."""
         if isinstance(step, Assign):
             yield step.key, hash(step.value), -1
-        elif isinstance(step, (Put, Change)):
+        elif isinstance(step, (Put, SetBits)):
             address = self._made[step.key].at('modbus')
             coil = address.space == 'coil'
-            if isinstance(step, Change):
+            if isinstance(step, SetBits):
                 yield (address.index, coil), step.set, step.set | step.clear
                 return
             count = 1 if coil else address.codec.size // 2

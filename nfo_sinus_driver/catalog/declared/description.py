@@ -63,7 +63,7 @@ class Put:
 
 
 @dataclass(frozen=True)
-class Change:
+class SetBits:
     """Set some bits of a register, clear others, and keep the rest."""
 
     key: str
@@ -94,7 +94,7 @@ class Await:
     seconds: float
 
 
-Step = Put | Change | Assign | Pause | Await
+Step = Put | SetBits | Assign | Pause | Await
 Steps = Sequence[Step]
 
 

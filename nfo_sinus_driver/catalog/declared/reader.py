@@ -11,7 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from nfo_sinus_driver.catalog.declared import schema
-from nfo_sinus_driver.catalog.declared.commands import Commands, StepReader
+from nfo_sinus_driver.catalog.declared.commands import CommandLists, StepReader
 from nfo_sinus_driver.catalog.declared.description import (
     Condition,
     Description,
@@ -28,12 +28,12 @@ from nfo_sinus_driver.catalog.declared.description import (
     status_code,
 )
 from nfo_sinus_driver.catalog.declared.parameter_table import with_parameters
-from nfo_sinus_driver.catalog.declared.places import (
+from nfo_sinus_driver.catalog.declared.register_map import (
     FAULT_KEY,
     STATUS_KEY,
     WORD,
     PlacedCondition,
-    Places,
+    RegisterMap,
     internal,
     place_of,
 )
@@ -82,34 +82,34 @@ class _Reader:
         self._problems = problems
         self._line = self._line_defaults(root.get('line'))
         self._require_format()
-        self._places = Places(root, self._line, problems)
+        self._map = RegisterMap(root, self._line, problems)
         self._conditions: dict[str, PlacedCondition] = {}
 
     def description(self) -> Description:
         """Return what the file says; what is wrong goes to the problems."""
         root, control = self._root, self._root['control']
-        settings = Settings(root, self._places, self._problems)
+        settings = Settings(root, self._map, self._problems)
         faults = dict(self._faults(root.get('faults')))
         flags = list(self._flags(faults))
         self._conditions = dict(self._facts())
-        steps = StepReader(root, self._places, settings, self._problems)
+        steps = StepReader(root, self._map, settings, self._problems)
         running = [one for name, one in self._conditions.items() if name == 'running']
         of_flags = (one for one, _ in flags)
         conditions = [*running, *self._conditions.values(), *of_flags, *steps.awaited()]
-        status = self._places.status(conditions, root['status'].get('block'))
+        status = self._map.status(conditions, root['status'].get('block'))
         facts = {name: one.in_place(status) for name, one in self._conditions.items()}
         self._require_apart(facts)
         steps.use(status)
         codes = self._codes(root.get('faults'), status)
         setpoint = self._setpoint(settings)
-        commands = Commands(
-            control, steps, setpoint.direction, self._places.made, self._problems
+        commands = CommandLists(
+            control, steps, setpoint.direction, self._map.made, self._problems
         )
         measured, roles = self._measured(settings)
         self._require_one_holder(control, settings)
         after_write = tuple(self._after_write(steps, commands))
         identify = dict(self._identify())
-        parameters = {**settings.parameters, **measured, **self._places.made}
+        parameters = {**settings.parameters, **measured, **self._map.made}
         return Description(
             name=self._path.name.removesuffix(SUFFIX),
             path=str(self._path),
@@ -169,7 +169,7 @@ class _Reader:
     def _facts(self) -> Iterator[tuple[str, PlacedCondition]]:
         for name, node in self._root['status'].mapping.items():
             if name not in _OF_STATUS:
-                condition = self._places.condition(node, f'status {name}')
+                condition = self._map.condition(node, f'status {name}')
                 if condition is not None:
                     yield name, condition
 
@@ -206,8 +206,8 @@ class _Reader:
             if 'codes' in node:
                 self._problems.add(node.line, 'faults has codes, but no register that tells them')
             return None
-        none, places = node.integer('none') & WORD, self._places
-        address = places.address(node, 'the fault', use=Use.FAULT)
+        none, register_map = node.integer('none') & WORD, self._map
+        address = register_map.address(node, 'the fault', use=Use.FAULT)
         if status.holds(address):
             low, high = 0, 15
             if 'bits' in node:
@@ -215,7 +215,7 @@ class _Reader:
             shift = status.shift(address.index) + low
             bits = max(high - low + 1, 0)
             return FaultCodes(((1 << bits) - 1) << shift, shift, none, in_status=True)
-        places.made[FAULT_KEY] = internal(
+        register_map.made[FAULT_KEY] = internal(
             FAULT_KEY, place_of(node, 'fault'), address, Access.READ
         )
         return FaultCodes(address.number.maximum, 0, none, in_status=False)
@@ -253,7 +253,7 @@ class _Reader:
         taken = dict(faults)
         for number, node in enumerate(flags.items):
             text, code = node.text('text'), node.integer('code', _FLAGS_FROM + number)
-            condition = self._places.condition(node, f'fault flag {text!r}')
+            condition = self._map.condition(node, f'fault flag {text!r}')
             fault = _fault(node, status_code(code))
             other = taken.setdefault(fault.code, fault)
             if other is not fault:
@@ -275,11 +275,11 @@ class _Reader:
     def _setpoint(self, settings: Settings) -> SetpointPlace:
         node = self._root['setpoint']
         what = 'the set-point'
-        address = self._places.address(node, what, writable=True, use=Use.SETPOINT)
+        address = self._map.address(node, what, writable=True, use=Use.SETPOINT)
         write_only = node.text('access') == 'w'
         access = Access.WRITE if write_only or 'read_register' in node else Access.READ_WRITE
         unit, most = node.text('unit'), node.number('most') or Fraction(1)
-        made = self._places.made
+        made = self._map.made
         name = place_of(node, 'set-point')
         made[SETPOINT_KEY] = settings.scaled(
             node, internal(SETPOINT_KEY, name, address, access, unit)
@@ -287,9 +287,9 @@ class _Reader:
         read_key = '' if write_only else SETPOINT_KEY
         if 'read_register' in node:
             read_key = SETPOINT_READ_KEY
-            index, line = self._places.register(node['read_register']), node['read_register'].line
+            index, line = self._map.register(node['read_register']), node['read_register'].line
             count = address.codec.size // 2
-            self._places.registers.take(Use.VALUE, what, line, 'register', index, count)
+            self._map.registers.take(Use.VALUE, what, line, 'register', index, count)
             shifted = replace(address, index=index)
             name = f'set-point (register {node["read_register"].written})'
             made[read_key] = settings.scaled(
@@ -337,8 +337,8 @@ class _Reader:
                 node.line, 'forward and reverse have to differ; of a coil they are 0 and 1'
             )
         if coil:
-            return Direction(self._places.coil_key('direction', node['coil']), forward, reverse)
-        key = self._places.word('direction', node['register'], forward | reverse)
+            return Direction(self._map.coil_key('direction', node['coil']), forward, reverse)
+        key = self._map.word('direction', node['register'], forward | reverse)
         return Direction(key, forward, reverse)
 
     # --- the rest ---
@@ -346,9 +346,9 @@ class _Reader:
     def _identify(self) -> Iterator[tuple[str, tuple[int, ...]]]:
         for number, node in enumerate(self._root.get('identify').items, 1):
             key = f'{IDENTITY_KEY}_{number}'
-            address = self._places.address(node, key)
+            address = self._map.address(node, key)
             name = f'register {node["register"].written}'
-            self._places.made[key] = internal(key, name, address, Access.READ)
+            self._map.made[key] = internal(key, name, address, Access.READ)
             given = [node['value']] if 'value' in node else list(node.get('values').items)
             values = tuple(one.scalar for one in given if isinstance(one.scalar, int))
             if ('value' in node) is ('values' in node):
@@ -363,11 +363,11 @@ class _Reader:
     def _measured(self, settings: Settings) -> tuple[dict[str, Parameter], dict[Role, str]]:
         made: dict[str, Parameter] = {}
         roles: dict[Role, str] = {Role.STATUS_WORD: STATUS_KEY}
-        if FAULT_KEY in self._places.made:
+        if FAULT_KEY in self._map.made:
             roles[Role.FAULT_CODE] = FAULT_KEY
         for name, node in self._root.get('measured').mapping.items():
             role, key = Role(name), f'measured.{name}'
-            address = self._places.address(node, name)
+            address = self._map.address(node, name)
             unit = _UNITS.get(name, '')
             parameter = internal(key, place_of(node, name), address, Access.READ, unit)
             made[key] = settings.scaled(node, parameter)
@@ -382,7 +382,7 @@ class _Reader:
                 if value is not None:
                     yield Requirement(key, value, node.flag('write'), _sentence(node, 'text'))
 
-    def _after_write(self, steps: StepReader, commands: Commands) -> Iterator[Put | Pause]:
+    def _after_write(self, steps: StepReader, commands: CommandLists) -> Iterator[Put | Pause]:
         node = self._root.get('after_write')
         listed = steps.read(node, 'after_write')
         commands.require_no_run('after_write', listed, node.line)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from nfo_sinus_driver.catalog.declared.places import Places
+from nfo_sinus_driver.catalog.declared.register_map import RegisterMap
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, number_of
 from nfo_sinus_driver.catalog.parameter import NO_SETTINGS, Access, Parameter, Value
 from nfo_sinus_driver.catalog.status import Role
@@ -26,9 +26,9 @@ class Settings:
     :ivar defaults: with what value they leave the factory.
     """
 
-    def __init__(self, root: Node, places: Places, problems: Problems) -> None:
+    def __init__(self, root: Node, register_map: RegisterMap, problems: Problems) -> None:
         self._root = root
-        self._places = places
+        self._map = register_map
         self._problems = problems
         self.parameters: dict[str, Parameter] = {}
         self.roles: dict[Role, str] = {}
@@ -45,7 +45,7 @@ class Settings:
             return
         access = Access(node.text('access', 'rw'))
         writable = access is not Access.READ
-        address = self._places.address(node, key, writable=writable)
+        address = self._map.address(node, key, writable=writable)
         parameter = self._parameter(key, node, access)
         self.parameters[key] = self.scaled(node, replace(parameter, addresses={'modbus': address}))
         self._check(key, node)

@@ -18,10 +18,10 @@ from nfo_sinus_driver.catalog.declared import (
     STATUS_KEY,
     Assign,
     Await,
-    Change,
     Description,
     Pause,
     Put,
+    SetBits,
     Steps as Listed,
 )
 from nfo_sinus_driver.catalog.parameter import Value
@@ -209,7 +209,7 @@ def _each(steps: Listed, *, retry: bool = False) -> Steps[None]:
         raise refusal
 
 
-def _changed(step: Change, retry: bool) -> Steps[int]:
+def _changed(step: SetBits, retry: bool) -> Steps[int]:
     """Return a register with bits changed; what is only cleared is 0 where it cannot be read."""
     try:
         before = int((yield Read(step.key, retry=retry)))

@@ -10,10 +10,10 @@ from collections.abc import Iterator, Mapping
 from nfo_sinus_driver.catalog.declared import (
     Assign,
     Await,
-    Change,
     Condition,
     Description,
     Put,
+    SetBits,
     Step,
 )
 
@@ -50,7 +50,7 @@ class Order:
                 for place, word in words_of(drive, step):
                     if place != (setpoint, False):
                         self._row.append((place, 0xFFFF, word))
-            elif isinstance(step, Change):
+            elif isinstance(step, SetBits):
                 index = drive.parameters[step.key].at('modbus').index
                 self._row.append(((index, False), step.set | step.clear, step.set))
             elif isinstance(step, Assign):

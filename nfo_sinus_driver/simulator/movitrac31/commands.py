@@ -54,7 +54,7 @@ class Command:
     parameters: ParameterSet
 
 
-class Commands:
+class SerialCommands:
     """
     Joins what the terminals, the line and the keypad want.
 

@@ -22,8 +22,8 @@ from nfo_sinus_driver.simulator.movitrac31.commands import (
     KEYS,
     MANUAL,
     SETPOINT,
-    Commands,
     Sequence,
+    SerialCommands,
 )
 from nfo_sinus_driver.simulator.movitrac31.parameters import (
     AMBIENT,
@@ -95,7 +95,7 @@ class MovitracControlUnit(ControlUnit):
         self.eeprom = Eeprom(memory)
         self.ambient = AMBIENT
         self.factory_left = 0.0
-        self._commands = Commands(memory, self.terminals, variant.enable_bit)
+        self._commands = SerialCommands(memory, self.terminals, variant.enable_bit)
         self._parameters = self._commands.now.parameters
         super().__init__(memory, address, variant, MovitracFaults(memory.model))
         self._fault_memory = FaultMemory()

@@ -19,7 +19,7 @@ from nfo_sinus_driver.catalog import families, load_family
 from nfo_sinus_driver.cli import console as cli
 from nfo_sinus_driver.drive import Cause, Report
 from nfo_sinus_driver.drive.events import sentence
-from nfo_sinus_driver.drive.parameter_writer import Change
+from nfo_sinus_driver.drive.parameter_writer import ParameterChange
 from nfo_sinus_driver.link import PROTOCOLS
 
 PACKAGE = Path(__file__).resolve().parents[3] / 'nfo_sinus_driver'
@@ -214,7 +214,7 @@ def test_several_reports_and_several_values() -> None:
     keeps = Report(Cause.DRIVE_KEEPS, value='7 s')
     text = sentence(Report(Cause.SEVERAL, reports=(keeps, back)), CALLS)
     assert text == 'the drive keeps 7 s; put back: a, b'
-    changes = tuple(itertools.repeat(Change('a', 1, 2, 's'), 2))
+    changes = tuple(itertools.repeat(ParameterChange('a', 1, 2, 's'), 2))
     report = Report(Cause.TUNING_CHANGED, how=keeps, changes=changes)
     assert sentence(report, CALLS).endswith('; changed: a: 1 -> 2 s, a: 1 -> 2 s')
 

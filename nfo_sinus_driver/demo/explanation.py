@@ -17,8 +17,8 @@ _DONE = ('stopped (', 'stopping (')
 _TIME_OUT = 'setpoint timeout'
 
 
-def story(run: Recording) -> Iterator[str]:
-    """Yield the lines of the story of a drive, with times in s."""
+def explanation(run: Recording) -> Iterator[str]:
+    """Yield the lines of the explanation of a drive, with times in s."""
     yield f'{run.drive}, times in s from {run.began:%d %B %Y, %H:%M:%S} on:'
     moments = [*_answers(run), *_calls(run), *_enabled(run), *_faults(run), *_stops(run)]
     # what was done comes before what came of it in the same moment

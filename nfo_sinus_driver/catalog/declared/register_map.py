@@ -49,7 +49,7 @@ class PlacedCondition:
         return Condition(self.mask << shift, values, self.inverted)
 
 
-class Places:
+class RegisterMap:
     """
     Makes parameters of what a file says of registers and coils.
 

@@ -161,7 +161,7 @@ class Codec(NamedTuple):
     inter_byte_timeout: float
 
 
-class OtherRequests:
+class ForeignPairs:
     """
     Finds the requests of another master in all that comes, and the answers to them.
 
@@ -246,7 +246,7 @@ class OtherRequests:
         return found
 
 
-class AnotherMaster:
+class ForeignModbus:
     """
     Finds the requests of another master, and the answers to them, in what is no answer to us.
 
