@@ -249,7 +249,7 @@ class Loading:
         if self._written:
             remark(listed('written:', map(str, self._written.values())))
         if failed:
-            remark(listed('tried in vain:', failed))
+            remark(listed('tried without success:', failed))
         if left:
             remark(listed('not written:', left))
 

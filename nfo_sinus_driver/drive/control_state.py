@@ -37,7 +37,7 @@ class ControlEvent(enum.Enum):
     LOST = 'the drive is lost, or disconnected'
     ENABLE = 'a client enables the motor'
     REFUSED = 'an enable is refused before anything was written'
-    RUNNING = 'the status says that the motor runs, at set-point 0'
+    RUNNING = 'the status shows that the motor runs, at set-point 0'
     STOP = 'a reason to stop: a service, a fault, a refusal, control lost, a failed enable …'
     STOPPED = 'the status confirms that the drive stops'
     FAULT_BLOCKS = 'the drive has a fault, stands, and refuses the stop'

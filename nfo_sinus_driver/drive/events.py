@@ -70,7 +70,7 @@ class Cause(enum.Enum):
     ANOTHER_DRIVE = 'this is no {title}: {why}; {call.set_model}'
     IS_NOT = 'its {name} is {value}, and should be {values}'
     CANNOT_BE = 'its {name} is {value}, which cannot be'
-    MADE_BY = 'it says that {vendor} has made it'
+    MADE_BY = 'it reports {vendor} as its maker'
     """Another drive answers than `model` or `family` says: nothing is written to it. Set the right
     one, or connect the right drive. `should be` is what `identify` in [the file of the
     drive](your_own_drive.md) says"""
@@ -246,7 +246,7 @@ class Cause(enum.Enum):
         'check that it is right'
     )
     """The same set-point would be another speed. Put the parameter back, or check what sends
-    set-points; enable reads it anew"""
+    set-points; enable reads it again"""
     CONTROL_MODE_CHANGED = (
         'the control mode was changed to {mode} at the drive, and set-points are in {unit} now: '
         'check what sends them'
@@ -316,11 +316,11 @@ class Cause(enum.Enum):
     """Such a status confirms neither a start, a stop nor standstill. Of a [described
     drive](your_own_drive.md#what-a-file-can-say) add it to the file"""
     RUN_COMMAND_STANDS = (
-        'the run command stands in the drive ({status}), and the next set-point would turn the '
+        'the run command is still active ({status}), and the next set-point would turn the '
         'motor'
     )
-    """The drive answered the stop and did not carry it out, or its status says that it runs for
-    another reason. The driver releases the motor if it can"""
+    """The drive answered the stop and did not carry it out, or its status shows a run for another
+    reason. The driver releases the motor if it can"""
     STILL_TURNS = (
         'the status is {status}, yet the motor turns at {now:.4g} {unit} and does not slow down'
     )

@@ -183,7 +183,7 @@ class DriveSettings:
     lost_after: float = setting(
         1.0,
         'a drive that is asked and sends no valid frame for this long is lost and stopped; any '
-        'valid answer, a refusal too, begins it anew',
+        'valid answer, a refusal too, begins it again',
         0.2, 60, unit='s',
     )
     setpoint_timeout: float = setting(

@@ -49,7 +49,7 @@ _STATE = Refused.DEVICE_FAILURE
 #: The meaning of an abort code: the code of :class:`Refused` that means the same, and a text.
 ABORT_CODES: Mapping[int, tuple[int, str]] = {
     0x0503_0000: (_STATE, 'the toggle bit did not alternate'),
-    TIMED_OUT: (_STATE, 'the drive waited in vain for the next segment'),
+    TIMED_OUT: (_STATE, 'the next segment did not arrive in time'),
     0x0504_0001: (_FUNCTION, 'the drive does not know this command'),
     0x0504_0002: (_FUNCTION, 'invalid block size'),
     0x0504_0003: (_FUNCTION, 'invalid sequence number'),

@@ -165,7 +165,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             self.lifecycle.complain(self.managed.wording.say(error), known=port_lost)
             return TransitionCallbackReturn.FAILURE
         if not is_wanted:
-            self.get_logger().info('the settings were changed meanwhile: beginning anew')
+            self.get_logger().info('the settings were changed meanwhile: beginning again')
             self._stop_for('let go', self.managed.disconnect)
             return TransitionCallbackReturn.FAILURE
         self._drive_parameters.declare(self.managed.drive)

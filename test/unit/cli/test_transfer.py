@@ -326,7 +326,7 @@ def test_half_way_it_says_what_was_written(nfo: Nfo, bench: Bench, some: Path) -
         'written:',
         '  motor.p_nom: 1.5 -> 2.2 kW',
         '  control.accel: 5 -> 7.5 s',
-        'tried in vain:',
+        'tried without success:',
         '  control.retard',
         'not written:',
         '  freque.f_fix1',
