@@ -363,7 +363,7 @@ class DriveSettings:
         found = find(self.family)
         if self.model not in (usual_family(), found):
             raise ValueError(
-                f'family is {self.family} and model is {self.model}: leave one of both away'
+                f'family is {self.family} and model is {self.model}: omit one of them'
             )
         try:
             load_family(found)

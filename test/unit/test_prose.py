@@ -22,7 +22,7 @@ BETTER = {
     r'\bwho asks\b|\bwhom was here': 'the caller, an earlier session',
     r'\b[Ll]ets no one\b': 'cannot be',
     r'\b[Ll]est\b|\bon whose command\b': 'so that it does not',
-    r'\b(leave|leaves|left|leaving)( it)? away\b': 'omit',
+    r'\b(leave|leaves|left|leaving)( \w+){0,4} away\b': 'omit',
     r'\b([Tt]ake|takes|taken|taking|took)( [\w-]+){0,3} back\b': 'remove, restore',
     r'\bstart(s|ed)? anew|\bopen(s|ed)? anew': 'restart, open again',
     r'\b(does|do) alike\b': 'share',

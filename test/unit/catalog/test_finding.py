@@ -146,7 +146,7 @@ def test_a_family_with_code_is_an_entry_point(
 def test_a_drive_has_the_family_that_is_given(tmp_path: Path) -> None:
     settings = DriveSettings(family='siemens_v20')
     assert settings.model == str(SHIPPED['siemens_v20']) and settings.method == 'custom'
-    with pytest.raises(ValueError, match='leave one of both away'):
+    with pytest.raises(ValueError, match='omit one of them'):
         DriveSettings(family='siemens_v20', model='sinus_optimal')
     bad = tmp_path / 'bad.vfd.yaml'
     bad.write_text('vfd: 1\n')

@@ -63,7 +63,7 @@ def test_a_drive_of_another_type_is_not_connected_and_nothing_is_written(
 ) -> None:
     remote = {TYPE: type_, 'serial.control_mode': 'Remote control'}
     with Rig('movitrac', parameters=remote, control_method=method, drive_timeout=0.0) as rig:
-        with pytest.raises(DriveError, match=f'says that it is a {type_}'):
+        with pytest.raises(DriveError, match=f'identifies itself as a {type_}'):
             rig.connect()
         assert not any(data for _, _, data in rig.asked)
 
