@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a G2 and an Optimal do alike: who commands, and what their status says of it."""
+"""What a G2 and an Optimal share: who commands, and what their status says of it."""
 
 import pytest
 
