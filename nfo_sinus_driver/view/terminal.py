@@ -65,6 +65,7 @@ def _run(window: curses.window, layout: Layout, ended: threading.Event) -> None:
         if time.monotonic() >= due:
             due = time.monotonic() + PERIOD
             layout.look()
+        _fit(window)
         _draw(window, layout, styles)
         window.timeout(max(0, round(1000 * (due - time.monotonic()))))
         key = window.getch()
@@ -75,6 +76,15 @@ def _run(window: curses.window, layout: Layout, ended: threading.Event) -> None:
             curses.flushinp()
         elif key >= 0:
             layout.press(_KEYS.get(key, chr(key)))
+
+
+def _fit(window: curses.window) -> None:
+    """Have the window of the size of the terminal: the signal of another one may be lost."""
+    with contextlib.suppress(OSError):
+        columns, lines = os.get_terminal_size(sys.stdin.fileno())
+        # a serial console does not tell
+        if columns and lines and (lines, columns) != window.getmaxyx():
+            curses.resizeterm(lines, columns)
 
 
 def _draw(window: curses.window, layout: Layout, styles: Mapping[str, int]) -> None:
