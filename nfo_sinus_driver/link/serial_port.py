@@ -24,6 +24,12 @@ _PTY_MAJORS = range(136, 144)
 #: The device that a process with the other end of one has open.
 _PTMX = os.makedev(5, 2)
 
+#: What pyserial sets of how characters are sent and received.
+_FORMAT_AND_RATE = (
+    termios.CBAUD | termios.CSIZE | termios.CSTOPB | termios.PARENB | termios.PARODD
+    | termios.CREAD | termios.CLOCAL
+)
+
 _READ_SIZE = 512
 
 
@@ -56,17 +62,13 @@ class SerialPort:
         self._discard()
         self.close()
         settings = self._settings
-        pty = _is_pty(self._path)
-        port = _Serial(
-            baudrate=settings.baud_rate,
-            # the C library compares what it set with the result
-            bytesize=8 if pty else settings.data_bits,
-            parity='N' if pty else settings.parity,
-            stopbits=settings.stop_bits,
-            exclusive=True,
-        )
+        port = _Serial(baudrate=settings.baud_rate, stopbits=settings.stop_bits, exclusive=True)
         port.port = self._path
         try:
+            pty = _is_pty(self._path)
+            # the C library compares what it set with the result
+            port.bytesize = 8 if pty else settings.data_bits
+            port.parity = 'N' if pty else settings.parity
             port.open()
             if not pty:
                 # the lock of pyserial stops those alone that look for it. A pseudo-terminal would
@@ -147,13 +149,17 @@ class SerialPort:
             # best effort: most adapters switch by themselves and do not support it
             with contextlib.suppress(ValueError):
                 port.rs485_mode = RS485Settings()
-        modes = termios.tcgetattr(port.fileno())
+        # pyserial leaves what it does not know as an earlier program set it, such as a rate of its
+        # own to receive at
+        _, _, cflag, _, *rates_and_characters = termios.tcgetattr(port.fileno())
         # a byte with wrong parity is dropped, so that the frame is too short to count; pyserial
         # passes it on. A break empties no queue
-        modes[0] = termios.INPCK | termios.IGNPAR if self._settings.parity != 'N' else 0
-        # closing it would have the modem lines fall
-        modes[2] &= ~termios.HUPCL
+        iflag = termios.INPCK | termios.IGNPAR if self._settings.parity != 'N' else 0
+        # without HUPCL, for closing it would have the modem lines fall
+        modes = [iflag, 0, cflag & _FORMAT_AND_RATE, 0, *rates_and_characters]
         termios.tcsetattr(port.fileno(), termios.TCSANOW, modes)
+        # what an earlier program has written must not leave now
+        termios.tcflush(port.fileno(), termios.TCIOFLUSH)
 
     def _not_opened(self, error: OSError | ValueError | termios.error) -> PortError:
         """Return why the port was not opened, and what to do."""
@@ -198,10 +204,7 @@ def _ports() -> list[str]:
 
 
 def _is_pty(path: str) -> bool:
-    try:
-        return os.major(os.stat(path).st_rdev) in _PTY_MAJORS
-    except OSError:
-        return False
+    return os.major(os.stat(path).st_rdev) in _PTY_MAJORS
 
 
 def holders(path: str) -> list[str]:

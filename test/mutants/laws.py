@@ -538,8 +538,8 @@ LAWS = (
         8,
         'a byte with wrong parity counts as it came',
         SERIAL_PORT,
-        'modes[0] = termios.INPCK | termios.IGNPAR if',
-        'modes[0] = 0 if',
+        'iflag = termios.INPCK | termios.IGNPAR if',
+        'iflag = 0 if',
         (PORTS, '-k', 'nothing_of_an_earlier_program'),
     ),
     Mutant(
@@ -549,6 +549,14 @@ LAWS = (
         '        self._discard()\n        self.close()',
         '        self.close()',
         (PORTS, '-k', 'an_open_port_is_opened_again'),
+    ),
+    Mutant(
+        2,
+        'what an earlier program has written leaves after the port was opened',
+        SERIAL_PORT,
+        'termios.TCIOFLUSH',
+        'termios.TCIFLUSH',
+        (PORTS, '-k', 'earlier_program_wrote'),
     ),
     Mutant(
         8,

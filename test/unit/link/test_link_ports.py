@@ -39,7 +39,7 @@ EVERY_BYTE = bytes(range(256))
 #: Whether a terminal is open for root alone (asm-generic/ioctls.h), its settings with the rates as
 #: numbers, and its RS-485 mode.
 _TIOCGEXCL = 0x80045440
-_TCGETS2 = 0x802C542A
+_TCGETS2, _TCSETS2 = 0x802C542A, 0x402C542B
 _TIOCGRS485, _TIOCSRS485 = 0x542E, 0x542F
 
 
@@ -165,26 +165,51 @@ def test_every_format_is_set(
 def test_every_baud_rate_is_set(pty: Pty, baud: int) -> None:
     port = SerialPort(pty.path, LineSettings(baud_rate=baud, char_format='8N1'))
     port.open()
-    # four words of flags, 20 bytes of characters, and the rates of both directions
+    assert list(_settings(pty)[9:]) == [baud, baud]
+    port.close()
+
+
+def _settings(pty: Pty) -> array.array[int]:
+    """Return four words of flags, 20 bytes of characters, and the rates of both directions."""
     settings = array.array('I', [0] * 11)
     fcntl.ioctl(pty.far, _TCGETS2, settings)
-    assert list(settings[9:]) == [baud, baud]
-    port.close()
+    return settings
 
 
 @pytest.mark.parametrize('baud', [19_200, 250_000])
 def test_nothing_of_an_earlier_program_is_left(pty: Pty, baud: int) -> None:
-    modes = termios.tcgetattr(pty.far)
-    modes[0] |= termios.BRKINT | termios.PARMRK | termios.IXOFF
-    modes[2] |= termios.HUPCL | termios.CRTSCTS
-    termios.tcsetattr(pty.far, termios.TCSANOW, modes)
+    settings = _settings(pty)
+    settings[0] |= termios.BRKINT | termios.PARMRK | termios.IXOFF
+    # all there are, and a rate of its own for what is received
+    settings[2] |= 0xFFFFFFFF & ~termios.CIBAUD | termios.CBAUDEX << 16
+    settings[3] |= termios.NOFLSH | termios.TOSTOP
+    settings[9:] = array.array('I', [4800, 4800])
+    fcntl.ioctl(pty.far, _TCSETS2, settings)
     port = SerialPort(pty.path, LineSettings(baud_rate=baud))
     port.open()
-    flags, _, control, *_ = termios.tcgetattr(pty.far)
+    now = _settings(pty)
     # a byte with wrong parity never comes, and a break is none
-    assert flags == termios.INPCK | termios.IGNPAR
+    assert list(now[:2]) == [termios.INPCK | termios.IGNPAR, 0]
     # a modem line that falls when the port is closed resets some adapters
-    assert not control & (termios.HUPCL | termios.CRTSCTS)
+    assert now[2] & ~termios.CBAUD == termios.CS8 | termios.CREAD | termios.CLOCAL
+    assert [now[3], *now[9:]] == [0, baud, baud]
+    port.close()
+
+
+def test_what_an_earlier_program_wrote_does_not_leave(pty: Pty) -> None:
+    written = 0
+    os.set_blocking(pty._near, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            written += os.write(pty._near, EVERY_BYTE)
+    port = SerialPort(pty.path, LineSettings())
+    port.open()
+    port.write(b'new')
+    came = b''
+    while not came.endswith(b'new'):
+        came += pty.receive(1)
+    # the far end of a terminal has some of it already
+    assert len(came) < written
     port.close()
 
 
@@ -292,6 +317,29 @@ def test_rs485_is_switched_by_rts_and_keeps_the_delays_of_the_board(
     # SER_RS485_ENABLED and SER_RS485_RTS_ON_SEND (linux/serial.h)
     assert written == [[3, 2, 3, 0, 0, 0, 0, 0]]
     port.close()
+
+
+def test_a_port_that_appears_while_it_is_opened(
+    pty: Pty, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ioctls: list[int]
+) -> None:
+    name = tmp_path / 'simulated'
+    stat = os.stat
+
+    def before(path: object, *rest: object, **kwargs: object) -> object:
+        try:
+            return stat(path, *rest, **kwargs)  # type: ignore[call-overload]
+        finally:
+            if path == str(name) and not name.is_symlink():
+                name.symlink_to(pty.path)
+
+    monkeypatch.setattr(os, 'stat', before)
+    port = SerialPort(str(name), LineSettings(char_format='8N1'))
+    with pytest.raises(PortError, match='does not exist'):
+        port.open()
+    port.open()
+    port.close()
+    # else it would stay open to root alone
+    assert ioctls and termios.TIOCEXCL not in ioctls
 
 
 def test_absent_port_names_those_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -476,7 +524,7 @@ def test_adapter_that_cannot_do_the_settings(
 
 @pytest.mark.parametrize(
     ('call', 'works'),
-    [('tcgetattr', 0), ('tcgetattr', 1), ('tcflush', 0), ('tcsetattr', 0), ('tcsetattr', 1)],
+    [(call, works) for call in ('tcgetattr', 'tcsetattr', 'tcflush') for works in (0, 1)],
 )
 def test_adapter_that_goes_away_while_it_is_opened(
     pty: Pty, monkeypatch: pytest.MonkeyPatch, no_pty: None, call: str, works: int
