@@ -170,7 +170,7 @@ def test_a_drive_that_restarted_is_no_longer_enabled_at_once() -> None:
         rig.turn()
         rig.far.power_cycle()
         rig.pass_time(0.5)
-        assert rig.notes.said('as its boot-up message says') and not rig.drive.following
+        assert rig.notes.said('its boot-up message was received') and not rig.drive.following
         rig.wait_until(lambda: rig.drive.snapshot.connected)
         rig.assert_only_enable_helps()
 

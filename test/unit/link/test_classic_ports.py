@@ -218,15 +218,19 @@ def test_no_unit_there(hasty: ClassicLink) -> None:
 
 @pytest.mark.parametrize('late', [1.5, 3.0])
 def test_late_answer(drive: PtyDrive, hasty: ClassicLink, late: float) -> None:
+    given_up = threading.Event()
+
     def hold_back(data: bytes) -> None:
         # whatever it is asked meanwhile is answered behind this
         drive.answer = drive.send
-        time.sleep(late * SHORT)
+        given_up.wait(PATIENT)
+        time.sleep((late - 1) * SHORT)
         drive.send(data)
 
     drive.answer = hold_back
     with pytest.raises(NoAnswer):
         hasty.read(1, SPEED)
+    given_up.set()
     drive.values[0x94] = 7
     deadline = time.monotonic() + PATIENT
     reply = b''
