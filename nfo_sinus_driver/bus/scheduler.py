@@ -15,7 +15,7 @@ import itertools
 import math
 from typing import Literal, NamedTuple
 
-from nfo_sinus_driver.bus.tasks import LatestValue, Priority, Task, Transfer
+from nfo_sinus_driver.bus.tasks import Exchange, LatestValue, Priority, Task
 from nfo_sinus_driver.link import LinkError, NotSent, PortError, Refused
 
 __all__ = ['BACKGROUND_SHARE', 'EXCHANGE', 'Scheduler', 'Waiting']
@@ -53,7 +53,7 @@ class Waiting(NamedTuple):
     """A transaction, and the task that awaits it."""
 
     task: Task
-    transfer: Transfer
+    exchange: Exchange
 
 
 class Scheduler:
@@ -96,7 +96,7 @@ class Scheduler:
         self._given: _Rank = _SLOT
         self._slot_went = False
         #: The stop, or its read, that was given out just now, and the unit that did not answer one.
-        self._given_stop: Transfer | None = None
+        self._given_stop: Exchange | None = None
         self._unanswered: int | None = None
         #: What units have not answered since they last answered anything: a stop (true), its read.
         self._unanswered_stops: set[tuple[int, bool]] = set()
@@ -130,8 +130,8 @@ class Scheduler:
             if entry is not None:
                 del self._queues[rank][entry]
                 self._given = rank
-                transfer = None if isinstance(entry, LatestValue) else entry.transfer
-                self._given_stop = transfer if rank in _STOPS else None
+                exchange = None if isinstance(entry, LatestValue) else entry.exchange
+                self._given_stop = exchange if rank in _STOPS else None
                 return entry
         if self._unanswered is None:
             return None
@@ -163,7 +163,7 @@ class Scheduler:
 
     def _is_unanswered(self, entry: LatestValue | Waiting) -> bool:
         """Return whether it is for the unit that has just not answered a stop."""
-        return isinstance(entry, Waiting) and entry.transfer.unit == self._unanswered
+        return isinstance(entry, Waiting) and entry.exchange.unit == self._unanswered
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
@@ -172,7 +172,7 @@ class Scheduler:
         self._unanswered = stop.unit if stop is not None and self._is_silent(stop.unit) else None
         if self._unanswered is not None and stop is not None:
             # each by itself: the stop behind a read that was not answered goes out at once
-            self._unanswered_stops.add((stop.unit, stop.data is not None))
+            self._unanswered_stops.add((stop.unit, stop.writes))
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
                 continue
@@ -224,23 +224,22 @@ class Scheduler:
 
     def _rank(self, entry: LatestValue | Waiting) -> _Rank:
         if isinstance(entry, LatestValue):
-            unit = entry.unit
-            if unit is None or not self._is_silent(unit) or entry.urgent():
+            if not self._is_silent(entry.unit) or entry.urgent():
                 return _SLOT
-            return _MISSING if self._is_missing(unit) else _RETRY
-        transfer = entry.transfer
-        if not self._is_silent(transfer.unit):
+            return _MISSING if self._is_missing(entry.unit) else _RETRY
+        exchange = entry.exchange
+        if not self._is_silent(exchange.unit):
             if self._unanswered_stops:
-                self._unanswered_stops -= {(transfer.unit, False), (transfer.unit, True)}
-        elif transfer.priority in _READS:
-            return _MISSING if self._is_missing(transfer.unit) else _RETRY
-        elif self._is_repeated(transfer) and self._is_missing(transfer.unit):
+                self._unanswered_stops -= {(exchange.unit, False), (exchange.unit, True)}
+        elif exchange.priority in _READS:
+            return _MISSING if self._is_missing(exchange.unit) else _RETRY
+        elif self._is_repeated(exchange) and self._is_missing(exchange.unit):
             return _MISSING
-        return transfer.priority
+        return exchange.priority
 
-    def _is_repeated(self, transfer: Transfer) -> bool:
-        before = (transfer.unit, transfer.data is not None)
-        return transfer.priority <= Priority.LOOK and before in self._unanswered_stops
+    def _is_repeated(self, exchange: Exchange) -> bool:
+        before = (exchange.unit, exchange.writes)
+        return exchange.priority <= Priority.LOOK and before in self._unanswered_stops
 
 
 #: A unit that has been silent for so long counts as missing, s: short enough to spare the others,

@@ -14,23 +14,28 @@ import heapq
 import itertools
 import logging
 import math
-from typing import Any
+from typing import Any, TypeVar
 
 from nfo_sinus_driver.link import (
     Address,
+    Ask,
     DamagedAnswer,
     Identification,
     InProgress,
-    Inquiry,
     LinkError,
+    Operation,
+    Plan,
     PortError,
+    Read,
+    Refused,
     Reply,
-    Watch,
+    WriteAndRead,
+    Written,
 )
 
 _log = logging.getLogger(__name__)
+_Found = TypeVar('_Found')
 
-_NOWHERE = Address('', 0, None, 0)
 #: How often the parts of a value that changes meanwhile are read again.
 _TRIES = 5
 
@@ -57,34 +62,28 @@ class Cancelled(BaseException):
 
 
 @dataclass(eq=False, slots=True)
-class Transfer:
+class Exchange:
     """
-    One transaction that a coroutine awaits.
-
-    A read, or a write if ``data`` is given, or whatever ``send`` does.
+    What is wanted of a unit; a coroutine awaits its answer.
 
     :ivar require_wanted: called by the worker at the moment of sending; what it raises goes to the
         coroutine, and nothing is sent.
-    :ivar source: what is read in the same transaction as the write, or ``None``.
-    :ivar once: it is not read again if the answer may be old.
     """
 
     unit: int
-    address: Address
+    operation: Operation
     priority: Priority
-    data: bytes | None = None
-    send: Callable[[], Reply] | None = None
     require_wanted: Callable[[], None] = lambda: None
-    source: Address | None = None
-    once: bool = False
 
     @property
-    def _only_reads(self) -> bool:
-        return self.data is None and self.send is None
+    def writes(self) -> bool:
+        """It writes a parameter."""
+        return not isinstance(self.operation, (Read, Ask))
 
     def reads(self, unit: int, address: Address) -> bool:
         """Return whether it only reads a parameter."""
-        return self._only_reads and self.unit == unit and self.address == address
+        operation = self.operation
+        return isinstance(operation, Read) and (self.unit, operation.address) == (unit, address)
 
     def without_old(self, reply: Reply) -> Reply:
         """
@@ -92,14 +91,15 @@ class Transfer:
 
         :raises InProgress: it is to be read again.
         """
-        if self.source is not None:
+        operation = self.operation
+        if isinstance(operation, WriteAndRead):
             return reply._replace(data=b'')
-        if self._only_reads and not self.once:
-            self.once = True
+        if isinstance(operation, Read) and not operation.once:
+            self.operation = operation._replace(once=True)
             raise InProgress(reply.arrived)
         return reply
 
-    def __await__(self) -> Generator[Transfer, Reply, Reply]:
+    def __await__(self) -> Generator[Exchange, Reply, Reply]:
         return (yield self)
 
 
@@ -115,10 +115,10 @@ async def consistent_read(unit: int, parts: Sequence[Address], priority: Priorit
     :raises LinkError: as the link does.
     """
     low_part, high_part = parts
-    high = await Transfer(unit, high_part, priority)
+    high = await Exchange(unit, Read(high_part), priority)
     for _ in range(_TRIES):
-        low = await Transfer(unit, low_part, priority)
-        again = await Transfer(unit, high_part, priority)
+        low = await Exchange(unit, Read(low_part), priority)
+        again = await Exchange(unit, Read(high_part), priority)
         if again.data == high.data:
             # the drive had both at the moment in between; the last answer may be from after a write
             return Reply(low.data + high.data, low.arrived)
@@ -126,42 +126,60 @@ async def consistent_read(unit: int, parts: Sequence[Address], priority: Priorit
     raise DamagedAnswer(f'unit {unit}: {high_part.space} {high_part.index:04X}h never stood still')
 
 
-async def inquire(unit: int, inquiry: Inquiry, priority: Priority) -> Identification:
-    """Ask a unit all questions about itself, each a transaction; return its answers."""
-    while not inquiry.done:
+async def inquire(unit: int, questions: Plan[Identification], priority: Priority) -> Identification:
+    """Ask a unit who it is, each question once and by itself; return what was found."""
+
+    async def ask(question: Operation) -> Reply | None:
         try:
-            await Transfer(unit, _NOWHERE, priority, send=inquiry.ask)
+            return await Exchange(unit, question, priority)
         except PortError:
             raise
         except LinkError as error:
             _log.debug('unit %d does not identify itself: %s', unit, error)
-    return inquiry.found
+            return None
+
+    return await _follow(questions, ask)
 
 
 async def set_up(
-    unit: int, watch: Watch, priority: Priority, tries: int, require_wanted: Callable[[], None]
+    unit: int,
+    steps: Plan[str],
+    priority: Priority,
+    tries: int,
+    require_wanted: Callable[[], None],
 ) -> str:
     """
-    Have a unit watch this end of the line, each step a transaction; return by which means.
+    Have a unit watch this end of the line, each step by itself; return by which means.
 
     :param tries: how often a step without an answer is tried: each may be done again.
-    :param require_wanted: as for :class:`Transfer`.
+    :param require_wanted: as for :class:`Exchange`.
     """
-    left = tries
-    while not watch.done:
+
+    async def take(step: Operation) -> Reply | None:
+        for left in reversed(range(tries)):
+            try:
+                return await Exchange(unit, step, priority, require_wanted)
+            except LinkError as error:
+                if isinstance(error, Refused) and error.code != Refused.BUSY:
+                    return None
+                if isinstance(error, PortError) or not left:
+                    raise
+        raise AssertionError
+
+    return await _follow(steps, take)
+
+
+async def _follow(
+    plan: Plan[_Found], take: Callable[[Operation], Coroutine[Any, Any, Reply | None]]
+) -> _Found:
+    reply = None
+    while True:
         try:
-            await Transfer(
-                unit, _NOWHERE, priority, send=watch.step, require_wanted=require_wanted
-            )
-        except PortError:
-            raise
-        except LinkError:
-            left -= 1
-            if left <= 0:
-                raise
-        else:
-            left = tries
-    return watch.means
+            step = plan.send(reply)
+        except StopIteration as end:
+            found: _Found = end.value
+            return found
+        reply = await take(step)
 
 
 @dataclass(eq=False, slots=True)
@@ -185,7 +203,7 @@ class Task:
         self.running = False
         self.cancel_due = False
         #: What it waits for.
-        self.awaited: Transfer | Pause | None = None
+        self.awaited: Exchange | Pause | None = None
         #: Distinguishes the timers of earlier pauses from that of the present one.
         self.pause = 0
         self.asleep = False
@@ -228,7 +246,7 @@ class Task:
         self.asleep = False
         self.pause += 1
 
-    def step(self, value: Any, error: BaseException | None) -> Transfer | Pause | None:
+    def step(self, value: Any, error: BaseException | None) -> Exchange | Pause | None:
         """Run it up to what it awaits next; ``None`` when it has ended."""
         self.running = True
         self.awaited = None
@@ -240,7 +258,7 @@ class Task:
         except BaseException as failure:
             self.future.set_exception(failure)
         else:
-            assert isinstance(awaited, (Transfer, Pause))
+            assert isinstance(awaited, (Exchange, Pause))
             self.awaited = awaited
             return awaited
         finally:
@@ -286,18 +304,18 @@ class LatestValue:
     """
     A place for one pending write of which only the latest counts, such as a set-point.
 
+    :ivar unit: whose it is; one that does not answer has a share of the time only.
     :ivar make: called by the worker at the moment of sending; returns what to write now, or
         ``None`` if there is nothing to write any more.
     :ivar done: called by the worker with the error, or ``None`` when the unit took it.
     :ivar answered: called after that with the answer of a unit that took it.
-    :ivar unit: whose it is; one that does not answer has a share of the time only.
     :ivar urgent: returns whether it goes ahead all the same; called by any thread.
     """
 
-    make: Callable[[], Transfer | None]
-    done: Callable[[Transfer, LinkError | None], None]
+    unit: int
+    make: Callable[[], Written | None]
+    done: Callable[[Written, LinkError | None], None]
     answered: Callable[[Reply], None] = lambda reply: None
-    unit: int | None = None
     pending: bool = False
     urgent: Callable[[], bool] = lambda: False
 
@@ -309,7 +327,7 @@ class LatestValue:
         self.pending = True
         return True
 
-    def take(self) -> Transfer | None:
+    def take(self) -> Written | None:
         """Return what is to be written now; ``None`` if there is nothing any more."""
         self.pending = False
         return self.make()

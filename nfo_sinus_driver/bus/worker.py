@@ -5,10 +5,10 @@
 The worker of one line.
 
 One worker thread owns the link. What takes several transactions is a coroutine
-(``async def``) that awaits :meth:`Bus.read`, :meth:`Bus.write` and :meth:`Bus.sleep`; the worker
-steps all of them and sends one transaction at a time, the most urgent first. So the state that
-coroutines share is only ever touched by the worker, a stop waits for one transaction at most,
-and nothing that a coroutine raises can end the worker.
+(``async def``) that awaits :meth:`Bus.carry_out` and :meth:`Bus.sleep`; the worker steps all of
+them and sends one transaction at a time, the most urgent first. So the state that coroutines share
+is only ever touched by the worker, a stop waits for one transaction at most, and nothing that a
+coroutine raises can end the worker.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from nfo_sinus_driver.bus.scheduler import Scheduler, Silences, Waiting
 from nfo_sinus_driver.bus.statistics import Recorder, Statistics
 from nfo_sinus_driver.bus.tasks import (
     Cancelled,
+    Exchange,
     LatestValue,
     Pause,
     Priority,
     Sleepers,
     Task,
-    Transfer,
     consistent_read,
     inquire,
     log_unexpected,
@@ -50,9 +50,12 @@ from nfo_sinus_driver.link import (
     Link,
     LinkError,
     NotReady,
+    Operation,
     PortError,
+    Read,
     Reconnect,
     Reply,
+    carry_out,
 )
 
 _log = logging.getLogger(__name__)
@@ -211,42 +214,22 @@ class Bus:
 
     # --- for coroutines on the worker ---------------------------------------------------------
 
-    def read(
+    def carry_out(
         self,
         unit: int,
-        address: Address,
+        operation: Operation,
         priority: Priority,
         require_wanted: Callable[[], None] = lambda: None,
-        *,
-        once: bool = False,
     ) -> Awaitable[Reply]:
         """
-        Read one parameter, one transaction at a time.
+        Have an operation carried out (to be awaited), a parameter of two parts read as one.
 
-        :param require_wanted: for a read that has an effect, in one transaction; as for a write.
-        :param once: not again where the answer may be old, for reading it has an effect.
+        :param require_wanted: called when its turn has come; if it raises, nothing is sent.
         """
-        parts = self._link.parts(address)
+        parts = self._link.parts(operation.address) if isinstance(operation, Read) else ()
         if len(parts) > 1:
             return consistent_read(unit, parts, priority)
-        return Transfer(unit, address, priority, require_wanted=require_wanted, once=once)
-
-    def write(
-        self,
-        unit: int,
-        address: Address,
-        data: bytes,
-        priority: Priority,
-        require_wanted: Callable[[], None] = lambda: None,
-    ) -> Transfer:
-        """Write one parameter, unless ``require_wanted`` raises when its turn has come."""
-        return Transfer(unit, address, priority, data, require_wanted=require_wanted)
-
-    def write_and_read(
-        self, unit: int, address: Address, data: bytes, source: Address, priority: Priority
-    ) -> Transfer:
-        """Write one parameter and read another at once; see :meth:`Link.write_and_read`."""
-        return Transfer(unit, address, priority, data, source=source)
+        return Exchange(unit, operation, priority, require_wanted)
 
     def last_tries(self, unit: int, seconds: float) -> None:
         """Open a port that is mute within ``seconds``, however often that was in vain."""
@@ -256,29 +239,11 @@ class Bus:
     def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
         """Give a task a reading that came with another answer; false if it waits for no such."""
         awaited = task.awaited
-        if not isinstance(awaited, Transfer) or not awaited.reads(unit, address):
+        if not isinstance(awaited, Exchange) or not awaited.reads(unit, address):
             return False
         self._scheduler.remove(Waiting(task, awaited))
         self._advance(task, reply, None)
         return True
-
-    def read_then_write(
-        self,
-        unit: int,
-        source: Address,
-        address: Address,
-        data: bytes,
-        priority: Priority,
-        require_wanted: Callable[[], None] = lambda: None,
-    ) -> Transfer:
-        """
-        Read a parameter whose value is not needed, then write another: one turn, whatever was read.
-
-        :param source: what is read in one transaction.
-        :raises LinkError: as for a write; ``maybe_done`` once the read was sent.
-        """
-        send = functools.partial(self._link.read_then_write, unit, source, address, data)
-        return Transfer(unit, address, priority, data, send, require_wanted)
 
     def identify(self, unit: int, priority: Priority) -> Coroutine[Any, Any, Identification]:
         """Read the identity of a unit, each part once; what it does not give stays empty."""
@@ -490,7 +455,7 @@ class Bus:
                 self.wake(joiner)
             return
         self._tasks.add(task)
-        if isinstance(awaited, Transfer):
+        if isinstance(awaited, Exchange):
             self._scheduler.add(Waiting(task, awaited))
         else:
             self._sleepers.add(task, awaited.until)
@@ -507,34 +472,34 @@ class Bus:
         return entry is not None
 
     def _write_slot(self, slot: LatestValue) -> None:
-        transfer = slot.take()
-        if transfer is None:
+        written = slot.take()
+        if written is None:
             return
         try:
-            reply = self._transact(transfer)
+            reply = self._transact(Exchange(slot.unit, written, Priority.SETPOINT))
         except NotReady as error:
             self._later(error.until, functools.partial(self.request, slot))
         except LinkError as error:
-            slot.done(transfer, error)
+            slot.done(written, error)
         else:
-            slot.done(transfer, None)
+            slot.done(written, None)
             slot.answered(reply)
 
-    def _exchange(self, task: Task, transfer: Transfer) -> None:
+    def _exchange(self, task: Task, exchange: Exchange) -> None:
         try:
-            transfer.require_wanted()
-            reply = self._transact(transfer)
+            exchange.require_wanted()
+            reply = self._transact(exchange)
         except NotReady as error:
-            self._later(error.until, functools.partial(self._resume, task, transfer))
+            self._later(error.until, functools.partial(self._resume, task, exchange))
         except Exception as error:
             # the line failed, or it is not wanted any more
             self._advance(task, None, error)
         else:
             self._advance(task, reply, None)
 
-    def _resume(self, task: Task, transfer: Transfer) -> None:
-        if task.awaited is transfer:
-            self._scheduler.add(Waiting(task, transfer))
+    def _resume(self, task: Task, exchange: Exchange) -> None:
+        if task.awaited is exchange:
+            self._scheduler.add(Waiting(task, exchange))
 
     def _later(self, until: float, function: Callable[[], None]) -> None:
         async def wait() -> None:
@@ -543,7 +508,7 @@ class Bus:
 
         self.spawn(wait())
 
-    def _transact(self, transfer: Transfer) -> Reply:
+    def _transact(self, exchange: Exchange) -> Reply:
         """
         Carry out a transaction.
 
@@ -553,26 +518,17 @@ class Bus:
         paced_until = self._paced_until
         self._paced_until = started + self._request_period
         try:
-            if transfer.send is not None:
-                reply = transfer.send()
-            elif transfer.data is None:
-                reply = self._link.read(transfer.unit, transfer.address)
-            elif transfer.source is None:
-                reply = self._link.write(transfer.unit, transfer.address, transfer.data)
-            else:
-                reply = self._link.write_and_read(
-                    transfer.unit, transfer.address, transfer.data, transfer.source
-                )
+            reply = carry_out(self._link, exchange.unit, exchange.operation)
             if self._clock.resumed_at > started:
-                reply = transfer.without_old(reply)
+                reply = exchange.without_old(reply)
         except InProgress:
-            self._account(transfer.unit, started, None)
+            self._account(exchange.unit, started, None)
             raise
         except NotReady:
             self._paced_until = paced_until
             raise
         except LinkError as error:
-            self._account(transfer.unit, started, error)
+            self._account(exchange.unit, started, error)
             raise
         except BaseException as error:
             # an error in the link must reach the caller, not leave it waiting
@@ -580,7 +536,7 @@ class Bus:
             raise LinkError(f'error in the link: {error!r}') from error
         if not reply.requests:
             self._paced_until = paced_until
-        self._account(transfer.unit, started, None)
+        self._account(exchange.unit, started, None)
         return reply
 
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
@@ -628,15 +584,15 @@ class Bus:
         for entry in self._scheduler.clear():
             if isinstance(entry, LatestValue):
                 self._fail_slot(entry, error)
-            elif entry.task.awaited is entry.transfer:
+            elif entry.task.awaited is entry.exchange:
                 # else an earlier callback has ended it
                 self._advance(entry.task, None, error)
 
     def _fail_slot(self, slot: LatestValue, error: PortError) -> None:
         try:
-            transfer = slot.take()
-            if transfer is not None:
-                slot.done(transfer, error)
+            written = slot.take()
+            if written is not None:
+                slot.done(written, error)
         except BaseException:
             # the others have to be notified all the same
             _log.exception('error in a slot; the bus worker goes on')

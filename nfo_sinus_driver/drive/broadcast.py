@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.drive.drive import Drive
 from nfo_sinus_driver.drive.events import Cause, DriveError
-from nfo_sinus_driver.link import Address
+from nfo_sinus_driver.link import Address, Write
 
 
 async def broadcast_stop(bus: Bus, drives: Iterable[Drive]) -> None:
@@ -33,4 +33,4 @@ async def broadcast_stop(bus: Bus, drives: Iterable[Drive]) -> None:
             parameter = model[stop.key]
             address = Address(*parameter.at(addressing).place)
             data = parameter.encode(stop.value, addressing)
-            await bus.write(everyone, address, data, Priority.STOP)
+            await bus.carry_out(everyone, Write(address, data), Priority.STOP)

@@ -9,7 +9,7 @@ from nfo_sinus_driver.bus import Bus, Cancelled, Priority
 from nfo_sinus_driver.catalog import Family, families, load_family
 from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.events import Cause, DriveError
-from nfo_sinus_driver.link import Address, Identification, LinkError, Refused
+from nfo_sinus_driver.link import Address, Identification, LinkError, Read, Refused
 
 
 async def detect_model(bus: Bus, unit: int) -> str:
@@ -49,7 +49,7 @@ def _speaks(model: Family, protocol: str) -> bool:
 async def _has(bus: Bus, unit: int, model: Family, key: str) -> bool:
     address = Address(*model[key].at(bus.protocol.addressing).place)
     try:
-        await bus.read(unit, address, Priority.SERVICE)
+        await bus.carry_out(unit, Read(address), Priority.SERVICE)
     except Refused:
         return False
     return True

@@ -9,8 +9,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from fractions import Fraction
 
 from nfo_sinus_driver.bus import Bus, Priority
-from nfo_sinus_driver.catalog import Access, Family, Parameter, Role, Value
-from nfo_sinus_driver.catalog.profile import Write
+from nfo_sinus_driver.catalog import Access, Family, Parameter, Role, Value, profile
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.recognition import Recognition
 from nfo_sinus_driver.link import (
@@ -20,8 +19,11 @@ from nfo_sinus_driver.link import (
     Identification,
     LinkError,
     NoAnswer,
+    Read,
+    ReadThenWrite,
     Refused,
     Reply,
+    Write,
 )
 
 #: How often a request to a busy drive is repeated, s, and how many times.
@@ -129,7 +131,7 @@ class ParameterAccess:
             raise ValueError(f'{key}: {value:g} is out of range, at most {highest} on this bus')
         return parameter.encode(value, self.protocol)
 
-    def target(self, step: Write) -> tuple[Address, bytes]:
+    def target(self, step: profile.Write) -> tuple[Address, bytes]:
         """Return where a step of a profile is written, and what: a float as the nearest step."""
         address = self.address(step.at if self.reaches(step.at) else step.key)
         if isinstance(step.value, float):
@@ -242,32 +244,31 @@ class ParameterAccess:
     async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges, once: an operator has requested it."""
         assert self.model[key].access is Access.ACKNOWLEDGE, key
-        address = self.address(key)
-        reply = await self._ask(address, priority, None, retry=False, has_effect=True)
+        reply = await self._ask(Read(self.address(key), once=True), priority, retry=False)
         return self.value(key, reply.data)
 
-    async def acknowledge_and_write(self, key: str, step: Write) -> None:
+    async def acknowledge_and_write(self, key: str, step: profile.Write) -> None:
         """
         Read a parameter whose reading acknowledges, and write another as the very next frame.
 
         :raises LinkError: the write was not answered, or refused, whether or not the reading was.
         """
         assert self.model[key].access is Access.ACKNOWLEDGE, key
-        await self.require_recognised()
-        place, require = self.address(key), self.recognition.require
-        await self._bus.read_then_write(
-            self._unit, place, *self.target(step), Priority.STOP, require
-        )
+        both = ReadThenWrite(self.address(key), *self.target(step))
+        await self._ask(both, Priority.STOP, retry=False)
 
     async def write(
-        self, step: Write, priority: Priority, require_wanted: Callable[[], None] = lambda: None
+        self,
+        step: profile.Write,
+        priority: Priority,
+        require_wanted: Callable[[], None] = lambda: None,
     ) -> None:
         """Write as a profile says, unless ``require_wanted`` raises when its turn has come."""
         address, data = self.target(step)
         priority = Priority.STOP if step.head else priority
         self._own[step.key] = data
         try:
-            await self._ask(address, priority, data, step.retry, require_wanted)
+            await self._ask(Write(address, data), priority, step.retry, require_wanted)
         except Refused as error:
             self._own.pop(step.key, None)
             raise self._named(error, step.key) from None
@@ -283,12 +284,12 @@ class ParameterAccess:
         self, key: str, data: bytes, priority: Priority, *, retry: bool = True
     ) -> None:
         """Write the bytes of a parameter, whatever its range."""
-        await self._ask(self.address(key), priority, data, retry)
+        await self._ask(Write(self.address(key), data), priority, retry)
 
     async def read_from(self, address: Address, priority: Priority, *, retry: bool = True) -> bytes:
         """Read the bytes at an address."""
-        address = address._replace(block=self._block)
-        return (await self._ask(address, priority, None, retry)).data
+        there = Read(address._replace(block=self._block))
+        return (await self._ask(there, priority, retry)).data
 
     def is_odd(self, key: str) -> bool:
         """Return whether the last value of a parameter is impossible, read more than once."""
@@ -303,9 +304,9 @@ class ParameterAccess:
 
     async def read_reply(self, key: str, priority: Priority, *, retry: bool = True) -> Reply:
         """Read the bytes of a parameter; an impossible value counts when it comes again."""
-        address = self.address(key)
+        there = Read(self.address(key))
         try:
-            reply = await self._ask(address, priority, None, retry)
+            reply = await self._ask(there, priority, retry)
         except Refused as error:
             if error.code in NONE_SUCH and self.model[key].option:
                 self._denials[key] = [*self._denials.get(key, ()), error][-_DENIALS:]
@@ -318,7 +319,7 @@ class ParameterAccess:
                 self._odd[key] = reply.data
                 break
             before = reply.data
-            reply = await self._ask(address, priority, None, retry)
+            reply = await self._ask(there, priority, retry)
             readings += 1
         return reply
 
@@ -340,17 +341,14 @@ class ParameterAccess:
 
     async def _ask(
         self,
-        address: Address,
+        operation: Read | Write | ReadThenWrite,
         priority: Priority,
-        data: bytes | None,
         retry: bool,
         require_wanted: Callable[[], None] = lambda: None,
-        *,
-        has_effect: bool = False,
     ) -> Reply:
-        has_effect = has_effect or data is not None
+        has_effect = not isinstance(operation, Read) or operation.once
         # a mailbox is asked by a write to the registers of the PLC
-        if has_effect or (self.in_block and address.space in BY_MAILBOX):
+        if has_effect or (self.in_block and operation.address.space in BY_MAILBOX):
             await self.require_recognised()
 
             def require() -> None:
@@ -363,11 +361,7 @@ class ParameterAccess:
         busy = 0 if not retry and priority <= Priority.LOOK else _BUSY_TRIES
         while True:
             try:
-                if data is None:
-                    return await self._bus.read(
-                        self._unit, address, priority, require, once=has_effect
-                    )
-                return await self._bus.write(self._unit, address, data, priority, require)
+                return await self._bus.carry_out(self._unit, operation, priority, require)
             except (NoAnswer, DamagedAnswer) as error:
                 self.count(error)
                 tries -= 1

@@ -12,12 +12,22 @@ import functools
 import math
 from typing import NamedTuple
 
-from nfo_sinus_driver.bus import LatestValue, Priority, Task, Transfer
+from nfo_sinus_driver.bus import LatestValue, Priority, Task
 from nfo_sinus_driver.catalog import Limits, SetpointTarget
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.snapshot import NAN
-from nfo_sinus_driver.link import Address, Interrupted, LinkError, NoAnswer, Refused, Reply
+from nfo_sinus_driver.link import (
+    Address,
+    Interrupted,
+    LinkError,
+    NoAnswer,
+    Refused,
+    Reply,
+    Write,
+    WriteAndRead,
+    Written,
+)
 
 #: An unchanged set-point is written again when the last write is this old, s: another master
 #: may have changed it meanwhile.
@@ -74,15 +84,14 @@ class Setpoint:
         on_status: Callable[[Reply], None],
     ) -> None:
         self._bus = state.bus
-        self._unit = state.settings.address
         self._params = state.params
         self._state = state
         self._refused = refused
         self._slot = LatestValue(
+            state.settings.address,
             self._make,
             self._done,
             on_status,
-            self._unit,
             # a motor is to stand still, whether the drive answers or not
             urgent=lambda: self._request.value == 0,
         )
@@ -304,7 +313,7 @@ class Setpoint:
             self.timed_out = None
             self._state.notify(Severity.INFO, Cause.SETPOINTS_AGAIN)
 
-    def _make(self) -> Transfer | None:
+    def _make(self) -> Written | None:
         request = self._request
         if self._target is None or not self._counts(request):
             return None
@@ -326,9 +335,8 @@ class Setpoint:
         self._may_have(self._decoded({**self._in_drive, address: data}))
         by_itself = len(due) > 1 or self._is_once(address)
         if by_itself or self._combining is _Combining.GIVEN_UP:
-            return self._bus.write(self._unit, address, data, Priority.SETPOINT)
-        status = self._params.address(self._state.word_key)
-        return self._bus.write_and_read(self._unit, address, data, status, Priority.SETPOINT)
+            return Write(address, data)
+        return WriteAndRead(address, data, self._params.address(self._state.word_key))
 
     def _report_limited(self, value: float, limited: float) -> None:
         chosen = self._state.settings.setpoint_max
@@ -341,28 +349,27 @@ class Setpoint:
             unit=self._state.unit,
         )
 
-    def _done(self, transfer: Transfer, error: LinkError | None) -> None:
+    def _done(self, written: Written, error: LinkError | None) -> None:
         if not self.following:
             return
+        combined = isinstance(written, WriteAndRead)
         if error is None:
-            assert transfer.data is not None
-            if transfer.source is not None:
+            if combined:
                 self._combining = _Combining.TAKEN
-            self._take_note(transfer.address, transfer.data)
+            self._take_note(written.address, written.data)
             if len(self._keys) > 1:
                 self._bus.request(self._slot)
-        elif transfer.source is not None and self._gives_up_combining(error):
+        elif combined and self._gives_up_combining(error):
             # if the set-point itself is wrong, the drive refuses this, too
             self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
-            assert transfer.data is not None
-            asked = self._decoded({**self._in_drive, transfer.address: transfer.data})
+            asked = self._decoded({**self._in_drive, written.address: written.data})
             self._refused(Report(Cause.SETPOINT_REFUSED, value=asked, error=str(error)))
         elif isinstance(error, Interrupted):
             # no status is needed: the PLC has stopped the drive, and does not let it go on
             self._refused(Report(Cause.LINE_FAILED, error=str(error)))
         else:
-            self._missed(error, transfer.address)
+            self._missed(error, written.address)
 
     def _take_note(self, address: Address, data: bytes) -> None:
         self._busy_since = math.inf

@@ -29,8 +29,9 @@ from nfo_sinus_driver.link.interface import (
     LineSettings,
     LinkError,
     NoAnswer,
-    NotReady,
+    Plan,
     PortError,
+    Read,
     Refused,
     Remarks,
     Reply,
@@ -152,45 +153,6 @@ _QUESTIONS: tuple[tuple[int, int, int, str, Callable[[bytes], str]], ...] = (
 )
 
 
-class CanopenInquiry:
-    """
-    Questions to a node about itself, one by one.
-
-    :param read: reads an object of a node.
-    """
-
-    def __init__(self, unit: int, read: Callable[[int, Address], Reply]) -> None:
-        self._unit = unit
-        self._read = read
-        self._left = list(_QUESTIONS)
-        self.found = Identification()
-
-    @property
-    def done(self) -> bool:
-        """There is nothing left to ask."""
-        return not self._left
-
-    def ask(self) -> Reply:
-        """
-        Ask the next question: one transaction.
-
-        A question that failed is not asked again, unless by :class:`NotReady`.
-
-        :raises LinkError: as its subclasses say.
-        """
-        index, sub_index, size, field, value_of = self._left[0]
-        try:
-            reply = self._read(self._unit, Address(_SPACE, index, sub_index, size))
-        except NotReady:
-            raise
-        except LinkError:
-            del self._left[0]
-            raise
-        del self._left[0]
-        self.found = replace(self.found, **{field: value_of(reply.data)})
-        return reply
-
-
 class _Ambiguous(DamagedAnswer):
     """An answer came that may belong to an earlier request, or to another client."""
 
@@ -245,7 +207,7 @@ class CanopenLink:
         #: The nodes that were made operational.
         self._started: set[int] = set()
         self._shapes = ObjectShapes()
-        self.supervision = CanopenSupervision(port, now, self._take, self.read, self.write)
+        self.supervision = CanopenSupervision(port, now, self._take)
 
     def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
         """Wait for no more than the answer to the request that was sent, where a stop waits."""
@@ -389,9 +351,14 @@ class CanopenLink:
             error.maybe_done = True
             raise
 
-    def identify(self, unit: int) -> CanopenInquiry:
-        """Return the questions by which a node identifies itself; nothing is sent yet."""
-        return CanopenInquiry(unit, self.read)
+    def identify(self, unit: int) -> Plan[Identification]:
+        """Have a node identify itself; what it does not give stays empty."""
+        found: dict[str, str] = {}
+        for index, sub_index, size, field, value_of in _QUESTIONS:
+            reply = yield Read(Address(_SPACE, index, sub_index, size))
+            if reply is not None:
+                found[field] = value_of(reply.data)
+        return Identification(**found)
 
     # --- belief -----------------------------------------------------------------------------------
 

@@ -12,12 +12,12 @@ them, so they end with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence, Set as AbstractSet
+from collections.abc import Callable, Sequence, Set as AbstractSet
 import math
 from typing import NamedTuple
 
 from nfo_sinus_driver.link.can import CanPort, Frame
-from nfo_sinus_driver.link.interface import Address, Clock, Refused, Reply
+from nfo_sinus_driver.link.interface import Address, Clock, Plan, Read, Write
 
 #: Added to the address of a node, the identifier of its boot-up and of its heartbeat.
 HEARTBEATS = 0x700
@@ -79,7 +79,6 @@ class CanopenSupervision:
     The heartbeat and guarding of this client on one line, and the boot-ups of nodes.
 
     :param take: takes what has come until a moment, and hands it to :meth:`take_frames`.
-    :param read: reads an object of a node; ``write`` writes one.
     """
 
     def __init__(
@@ -87,14 +86,10 @@ class CanopenSupervision:
         port: CanPort,
         now: Clock,
         take: Callable[[float], Sequence[Frame]],
-        read: Callable[[int, Address], Reply],
-        write: Callable[[int, Address, bytes], Reply],
     ) -> None:
         self._port = port
         self.now = now
         self._take = take
-        self._read = read
-        self._write = write
         #: The nodes that got a request.
         self._addressed: set[int] = set()
         self._restarted: set[int] = set()
@@ -172,11 +167,15 @@ class CanopenSupervision:
         restarted, self._restarted = self._restarted, set()
         return restarted
 
-    def watch(self, unit: int, seconds: float) -> CanopenWatch:
-        """Return how a node is made to watch this client, with a time-out, s; 0: no longer."""
-        return CanopenWatch(self, unit, seconds, self._read, self._write)
+    def watch(self, unit: int, seconds: float) -> Plan[str]:
+        """
+        Have a node watch this client, with a time-out, s; 0: no longer.
 
-    # --- for what sets it up ----------------------------------------------------------------------
+        :returns: the first means that reads back; ``''``: it does not watch.
+        """
+        if not seconds:
+            return self._end(unit)
+        return self._begin(unit, min(round(seconds * 1000), _LONGEST))
 
     @property
     def client(self) -> int:
@@ -186,148 +185,76 @@ class CanopenSupervision:
         free = [unit for unit in reversed(NODES) if unit not in self._addressed]
         return free[0] if free else NODES[-1]
 
-    def show_heartbeat(self, unit: int, seconds: float, entry: int) -> None:
+    def _show_heartbeat(self, unit: int, seconds: float, entry: int) -> None:
         """Send the heartbeat for a node with a time-out, s, in an entry of object 1016h."""
         self._client = self.client
         self._watching[unit] = seconds, entry
         self._beat_due = 0.0
 
-    def guard(self, unit: int, period: float) -> None:
-        """Request the state of a node once in each period, s."""
-        self._guarded[unit] = _Guarding(period, 0.0)
+    def _begin(self, unit: int, milliseconds: int) -> Plan[str]:
+        if (yield from self._begin_heartbeat(unit, milliseconds)):
+            return HEARTBEAT_MEANS
+        return GUARDING_MEANS if (yield from self._begin_guarding(unit, milliseconds)) else ''
 
-    def entry_of(self, unit: int) -> int:
-        """Return the entry of object 1016h by which a node watches; 0: it does not."""
-        return self._watching.get(unit, (0.0, 0))[1]
-
-    def is_guarded(self, unit: int) -> bool:
-        """Return whether the state of a node is requested."""
-        return unit in self._guarded
-
-    def end(self, unit: int) -> None:
-        """End heartbeat and guarding for a node."""
-        self._watching.pop(unit, None)
-        self._guarded.pop(unit, None)
-
-
-class _Request(NamedTuple):
-    """A read, or a write if there are data."""
-
-    address: Address
-    data: bytes | None = None
-
-
-#: Yields requests; receives what was read, empty for a write, or ``None`` if that is refused.
-_Plan = Generator[_Request, bytes | None, None]
-
-
-def _object(index: int, sub_index: int, size: int) -> Address:
-    return Address('object', index, sub_index, size)
-
-
-class CanopenWatch:
-    """
-    Has a node watch this client by the first means that reads back, or ends that.
-
-    :ivar means: the means; ``''``: it does not watch.
-    """
-
-    def __init__(
-        self,
-        supervision: CanopenSupervision,
-        unit: int,
-        seconds: float,
-        read: Callable[[int, Address], Reply],
-        write: Callable[[int, Address, bytes], Reply],
-    ) -> None:
-        self._supervision = supervision
-        self._unit = unit
-        self._read = read
-        self._write = write
-        self.means = ''
-        self._plan = self._begin(seconds) if seconds else self._end()
-        self._request = next(self._plan, None)
-
-    @property
-    def done(self) -> bool:
-        """There is nothing left to do."""
-        return self._request is None
-
-    def step(self) -> Reply:
-        """
-        Do the next step: one transaction, which is done again after an error.
-
-        :raises LinkError: as its subclasses say; a refusal is none.
-        """
-        request = self._request
-        assert request is not None
-        value: bytes | None = None
-        reply = Reply(b'', self._supervision.now())
-        try:
-            if request.data is None:
-                reply = self._read(self._unit, request.address)
-            else:
-                reply = self._write(self._unit, request.address, request.data)
-            value = reply.data
-        except Refused as refusal:
-            if refusal.code == Refused.BUSY:
-                raise
-        try:
-            self._request = self._plan.send(value)
-        except StopIteration:
-            self._request = None
-        return reply
-
-    def _begin(self, seconds: float) -> _Plan:
-        milliseconds = min(round(seconds * 1000), _LONGEST)
-        yield from self._begin_heartbeat(milliseconds)
-        if not self.means:
-            yield from self._begin_guarding(milliseconds)
-
-    def _begin_heartbeat(self, milliseconds: int) -> _Plan:
-        supervision, unit = self._supervision, self._unit
-        client = supervision.client
+    def _begin_heartbeat(self, unit: int, milliseconds: int) -> Plan[bool]:
+        client = self.client
         wanted = (client << 16 | milliseconds).to_bytes(4, 'little')
         for entry in range(1, _ENTRIES + 1):
             place = _object(0x1016, entry, 4)
-            value = yield _Request(place)
-            if value is None or len(value) != len(wanted):
-                return
-            number = int.from_bytes(value, 'little')
+            reply = yield Read(place)
+            if reply is None or len(reply.data) != len(wanted):
+                return False
+            number = int.from_bytes(reply.data, 'little')
             if number & _LONGEST and number >> 16 & 0x7F not in (0, client):
                 # it watches another node by this one
                 continue
-            supervision.show_heartbeat(unit, milliseconds / 1000, entry)
-            if (yield _Request(place, wanted)) is not None and (yield _Request(place)) == wanted:
+            self._show_heartbeat(unit, milliseconds / 1000, entry)
+            if (yield from _write_and_check(place, wanted)):
                 # it watches from the first heartbeat on: send one before any motor runs
-                supervision.show_heartbeat(unit, milliseconds / 1000, entry)
-                self.means = HEARTBEAT_MEANS
-            else:
-                supervision.end(unit)
-            return
+                self._show_heartbeat(unit, milliseconds / 1000, entry)
+                return True
+            self._forget(unit)
+            return False
+        return False
 
-    def _begin_guarding(self, milliseconds: int) -> _Plan:
-        supervision, unit = self._supervision, self._unit
+    def _begin_guarding(self, unit: int, milliseconds: int) -> Plan[bool]:
         time_place, factor_place = _object(0x100C, 0, 2), _object(0x100D, 0, 1)
         period = milliseconds // _LIFE_FACTOR
         values = {
             time_place: period.to_bytes(2, 'little'), factor_place: bytes((_LIFE_FACTOR,)),
         }
         for place, value in values.items():
-            if (yield _Request(place, value)) is None or (yield _Request(place)) != value:
+            if not (yield from _write_and_check(place, value)):
                 # one of both alone is of no use
-                yield _Request(time_place, bytes(2))
-                return
+                yield Write(time_place, bytes(2))
+                return False
         # it watches from the first request on, which is now
-        supervision.guard(unit, period / 1000)
-        self.means = GUARDING_MEANS
+        self._guarded[unit] = _Guarding(period / 1000, 0.0)
+        return True
 
-    def _end(self) -> _Plan:
-        supervision, unit = self._supervision, self._unit
-        entry = supervision.entry_of(unit)
+    def _end(self, unit: int) -> Plan[str]:
+        _, entry = self._watching.get(unit, (0.0, 0))
         if entry:
-            yield _Request(_object(0x1016, entry, 4), bytes(4))
-        if supervision.is_guarded(unit):
-            yield _Request(_object(0x100C, 0, 2), bytes(2))
-            yield _Request(_object(0x100D, 0, 1), bytes(1))
-        supervision.end(unit)
+            yield Write(_object(0x1016, entry, 4), bytes(4))
+        if unit in self._guarded:
+            yield Write(_object(0x100C, 0, 2), bytes(2))
+            yield Write(_object(0x100D, 0, 1), bytes(1))
+        self._forget(unit)
+        return ''
+
+    def _forget(self, unit: int) -> None:
+        """End heartbeat and guarding for a node."""
+        self._watching.pop(unit, None)
+        self._guarded.pop(unit, None)
+
+
+def _write_and_check(place: Address, data: bytes) -> Plan[bool]:
+    """Write an object and read it back; return whether it was taken."""
+    if (yield Write(place, data)) is None:
+        return False
+    reply = yield Read(place)
+    return reply is not None and reply.data == data
+
+
+def _object(index: int, sub_index: int, size: int) -> Address:
+    return Address('object', index, sub_index, size)

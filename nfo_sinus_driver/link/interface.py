@@ -5,16 +5,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set as AbstractSet
+from collections.abc import Callable, Generator, Sequence, Set as AbstractSet
 from dataclasses import dataclass
 import functools
 import re
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeVar
 
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 #: The baud rates of serial lines to drives, bit/s.
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600)
+_Found = TypeVar('_Found')
 _FORMAT = re.compile(r'([78])([EON])([12])')
 #: Most protocols are not the factory setting of their drives [C93].
 _CHECK = (
@@ -92,46 +93,48 @@ class Identification:
     serial: str = ''
 
 
-class Inquiry(Protocol):
-    """Questions to a unit about itself, asked one by one, so that other requests go between."""
+class Read(NamedTuple):
+    """Read a parameter; ``once``: not again where the answer may be old, for it has an effect."""
 
-    @property
-    def done(self) -> bool:
-        """There is nothing left to ask."""
-
-    @property
-    def found(self) -> Identification:
-        """What it has answered so far."""
-
-    def ask(self) -> Reply:
-        """
-        Ask the next question: one transaction.
-
-        A question that failed is not asked again, unless by :class:`NotReady`.
-
-        :raises LinkError: as its subclasses say.
-        """
+    address: Address
+    once: bool = False
 
 
-class Watch(Protocol):
-    """
-    How a unit is made to watch this end of the line; step by step, as an inquiry.
+class Write(NamedTuple):
+    """Write a parameter."""
 
-    :ivar means: by which means; ``''``: it has none, or it is turned off.
-    """
+    address: Address
+    data: bytes
 
-    means: str
 
-    @property
-    def done(self) -> bool:
-        """There is nothing left to do."""
+class WriteAndRead(NamedTuple):
+    """Write a parameter and read another in the same transaction."""
 
-    def step(self) -> Reply:
-        """
-        Do the next step: one transaction, which is done again after an error.
+    address: Address
+    data: bytes
+    source: Address
 
-        :raises LinkError: as its subclasses say.
-        """
+
+class ReadThenWrite(NamedTuple):
+    """Read a parameter whose value is not needed, then write another; nothing goes between."""
+
+    source: Address
+    address: Address
+    data: bytes
+
+
+class Ask(NamedTuple):
+    """Ask a unit what is no parameter."""
+
+    question: Callable[[], Reply]
+
+
+Written = Write | WriteAndRead
+#: What may be wanted of a unit; each takes a turn on the line.
+Operation = Read | Written | ReadThenWrite | Ask
+#: Several of them, one by one, so that other requests go between; each brings its reply, or
+#: ``None`` where it failed.
+Plan = Generator[Operation, Reply | None, _Found]
 
 
 class Supervision(Protocol):
@@ -151,8 +154,8 @@ class Supervision(Protocol):
     def take_restarted(self) -> AbstractSet[int]:
         """Return the units that have restarted since the last call."""
 
-    def watch(self, unit: int, seconds: float) -> Watch:
-        """Return how a unit is made to watch this end, with a time-out, s; 0: no longer."""
+    def watch(self, unit: int, seconds: float) -> Plan[str]:
+        """Have a unit watch this end, with a time-out, s; return by which means (``''``: none)."""
 
 
 class Remarks:
@@ -174,17 +177,6 @@ class Remarks:
     def texts(self) -> tuple[str, ...]:
         """All sentences, in the order in which they came."""
         return tuple(self._texts)
-
-
-class NothingToAsk:
-    """The inquiry of a protocol that has only parameters: it has no questions."""
-
-    done = True
-    found = Identification()
-
-    def ask(self) -> Reply:
-        """Ask nothing: there is no question."""
-        raise IndexError('there is no question left')
 
 
 @dataclass(frozen=True)
@@ -341,8 +333,8 @@ class Link(Protocol):
         :raises LinkError: as for a write; :attr:`LinkError.maybe_done` once the read was sent.
         """
 
-    def identify(self, unit: int) -> Inquiry:
-        """Return the questions by which a unit identifies itself; nothing is sent yet."""
+    def identify(self, unit: int) -> Plan[Identification]:
+        """Have a unit identify itself; what it does not give stays empty."""
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """
@@ -350,6 +342,19 @@ class Link(Protocol):
 
         After a doubtful answer, reading one of them shows whether the line can be believed again.
         """
+
+
+def carry_out(link: Link, unit: int, operation: Operation) -> Reply:
+    """Have a link carry out what is wanted of a unit (LinkError: as its subclasses say)."""
+    if isinstance(operation, Read):
+        return link.read(unit, operation.address)
+    if isinstance(operation, Write):
+        return link.write(unit, *operation)
+    if isinstance(operation, WriteAndRead):
+        return link.write_and_read(unit, *operation)
+    if isinstance(operation, ReadThenWrite):
+        return link.read_then_write(unit, *operation)
+    return operation.question()
 
 
 class LinkError(Exception):

@@ -13,9 +13,10 @@ from typing import TypeVar
 
 from nfo_sinus_driver.link.interface import (
     Address,
+    Ask,
     Identification,
     LineProtocol,
-    NotReady,
+    Plan,
     Remarks,
     Reply,
 )
@@ -50,9 +51,9 @@ class ModbusLink(ABC):
         """Write one parameter and read another, in one transaction (function 23)."""
         return Reply(*self._ask(write_and_read_of(unit, address, data, source)))
 
-    def identify(self, unit: int) -> ModbusInquiry:
-        """Return the questions by which a unit identifies itself (functions 43/14 and 17)."""
-        return ModbusInquiry(unit, self._ask)
+    def identify(self, unit: int) -> Plan[Identification]:
+        """Have a unit identify itself (functions 43/14 and 17)."""
+        return questions(unit, self._ask)
 
     @abstractmethod
     def _ask(self, request: Request[_T]) -> tuple[_T, float]:
@@ -178,53 +179,40 @@ def serial_number(report: bytes) -> str:
     return max((part.strip() for part in _TEXT.findall(report)), key=len, default=b'').decode()
 
 
-class ModbusInquiry:
+def questions(
+    unit: int, ask: Callable[[Request[object]], tuple[object, float]]
+) -> Plan[Identification]:
     """
-    The questions by which a unit identifies itself.
+    Have a unit identify itself.
 
     All objects that fit into one answer are read at once, then the serial number. A question that
     is refused or not answered is never repeated: many devices do not know it [C57].
 
     :param ask: sends a request; returns its answer and when that came.
     """
+    found: dict[str, str] = {}
+    answer: object = None
 
-    def __init__(self, unit: int, ask: Callable[[Request[object]], tuple[object, float]]):
-        self._unit = unit
-        self._ask = ask
-        self._questions: list[Request[object]] = [ReadDevice(unit), ReportSlaveId(unit)]
-        self._answers: dict[str, str] = {}
+    def question(request: Request[object]) -> Ask:
+        def answered() -> Reply:
+            nonlocal answer
+            answer, arrived = ask(request)
+            return Reply(b'', arrived)
 
-    @property
-    def done(self) -> bool:
-        """There is nothing left to ask."""
-        return not self._questions
+        return Ask(answered)
 
-    @property
-    def found(self) -> Identification:
-        """What it has answered so far."""
-        return Identification(**self._answers)
-
-    def ask(self) -> Reply:
-        """Ask the next question: one transaction (LinkError: as its subclasses say)."""
-        question = self._questions.pop(0)
-        try:
-            answer, arrived = self._ask(question)
-        except NotReady:
-            self._questions.insert(0, question)
-            raise
-        if isinstance(answer, DeviceObjects):
-            assert isinstance(question, ReadDevice)
-            self._take(answer)
-            following = answer.next_object
-            # only forward: a unit that always has more must not keep this going
-            if following is not None and question.first < following < len(_FIELDS):
-                self._questions.insert(0, ReadDevice(self._unit, REGULAR, following))
-        elif isinstance(answer, bytes):
-            self._answers['serial'] = serial_number(answer)
-        return Reply(b'', arrived)
-
-    def _take(self, answer: DeviceObjects) -> None:
+    request: ReadDevice | None = ReadDevice(unit)
+    while request is not None and (yield question(request)):
+        assert isinstance(answer, DeviceObjects)
         for number, content in answer.objects:
             if number < len(_FIELDS):
                 name = _FIELDS[number]
-                self._answers[name] = revision(content) if name == 'revision' else text(content)
+                found[name] = revision(content) if name == 'revision' else text(content)
+        # only forward: a unit that always has more must not keep this going
+        following, least = answer.next_object or 0, request.first + 1
+        forward = following in range(least, len(_FIELDS))
+        request = ReadDevice(unit, REGULAR, following) if forward else None
+    if (yield question(ReportSlaveId(unit))):
+        assert isinstance(answer, bytes)
+        found['serial'] = serial_number(answer)
+    return Identification(**found)

@@ -21,14 +21,15 @@ from nfo_sinus_driver.link.interface import (
     Address,
     Clock,
     DamagedAnswer,
+    Identification,
     InProgress,
     LineProtocol,
     LineSettings,
     LinkError,
     NeverSilent,
     NoAnswer,
-    NothingToAsk,
     NotReady,
+    Plan,
     PortError,
     Refused,
     Remarks,
@@ -455,9 +456,10 @@ class CodecLink(RequestLink[Any]):
     def read(self, unit: int, address: Address) -> Reply:
         """Read one parameter (LinkError: as its subclasses say)."""
 
-    def identify(self, unit: int) -> NothingToAsk:
-        """Return no questions: the protocol has only parameters."""
-        return NothingToAsk()
+    def identify(self, unit: int) -> Plan[Identification]:
+        """Ask nothing: the protocol has only parameters."""
+        yield from ()
+        return Identification()
 
     def _read_request(self, unit: int, address: Address) -> Any:
         return self._codec.enquiry(unit, address.index)

@@ -12,13 +12,13 @@ whatever the decoder let out.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-import contextlib
 from random import Random
 import re
 import struct
 from typing import Any
 
 from support.addresses import packed
+from support.plans import followed
 
 from fuzz import judges
 from fuzz.judges import Asked, Meaning, Objects, Refusal
@@ -32,7 +32,7 @@ from nfo_sinus_driver.link import (
     movitrac,
     rtu,
 )
-from nfo_sinus_driver.link.interface import LinkError, NoAnswer, Refused
+from nfo_sinus_driver.link.interface import NoAnswer, Refused
 from nfo_sinus_driver.link.modbus_pdu import AnswerReader
 
 #: Most bytes that a reader of a whole connection keeps, beside those just handed over.
@@ -269,6 +269,7 @@ def _identify(random: Random, frames: int) -> None:
         def ask(request: modbus_pdu.Request[Any]) -> tuple[object, float]:
             nonlocal questions
             questions += 1
+            assert questions <= _MOST_QUESTIONS, 'it asks for ever'
             asked = Asked(request.unit, request.function)
             if isinstance(request, modbus_link.ReadDevice):
                 asked = asked._replace(place=request.first, count=request.code)
@@ -280,12 +281,7 @@ def _identify(random: Random, frames: int) -> None:
                 raise NoAnswer
             return answer, 0.0
 
-        inquiry = modbus_link.ModbusInquiry(unit, ask)
-        while not inquiry.done:
-            with contextlib.suppress(LinkError):
-                inquiry.ask()
-            assert questions <= _MOST_QUESTIONS, 'it asks for ever'
-        for text in vars(inquiry.found).values():
+        for text in vars(followed(modbus_link.questions(unit, ask))).values():
             assert text.isprintable(), f'{text!r} would come into a log'
         frames -= questions
 

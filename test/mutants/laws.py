@@ -948,7 +948,7 @@ LAWS = (
         8,
         'what was read before a pause of the driver counts after it',
         'nfo_sinus_driver/bus/worker.py',
-        '                reply = transfer.without_old(reply)',
+        '                reply = exchange.without_old(reply)',
         '                pass',
         (STANDS_STILL, '-k', 'nothing_old'),
         also=((WATCH, 'if self._bus.paused == paused:', 'if True:'),),

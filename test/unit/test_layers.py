@@ -31,9 +31,9 @@ CHANGES = {
     *('add', 'append', 'appendleft', 'clear', 'discard', 'extend', 'insert', 'pop', 'popitem'),
     *('popleft', 'remove', 'setdefault', 'sort', 'update'),
 }
-#: What has a bus send a write, or what has an effect; and who may: they ask before whether the
-#: drive was recognised.
-SENDS = {'write', 'write_and_read', 'read_then_write', 'watch'}
+#: What has a bus write something, or what has an effect; and who may use it: they ask before
+#: whether the drive was recognised.
+SENDS = {'Ask', 'ReadThenWrite', 'Write', 'WriteAndRead', 'Written'}
 GATES = ['drive/broadcast.py', 'drive/parameter_access.py', 'drive/setpoint.py']
 
 LICENCE = re.compile(
@@ -74,14 +74,16 @@ def violations(path: str, source: str) -> Iterator[str]:
 
 
 def sends(path: str, source: str) -> bool:
-    """Whether a module has a bus write something."""
-    calls = [node.func for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
-    return not path.startswith(('bus/', 'link/', 'simulator/')) and any(
-        isinstance(call, ast.Attribute)
-        and call.attr in SENDS
-        and ast.unparse(call.value).rpartition('.')[2].lstrip('_') == 'bus'
-        for call in calls
-    )
+    """Whether a module has a bus write something, or set up its watch."""
+    found = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom)]
+    names = {
+        one.name
+        for node in found
+        if (node.module or '').startswith('nfo_sinus_driver.link')
+        for one in node.names
+    }
+    sending = SENDS & names or 'bus.watch(' in source
+    return bool(sending) and not path.startswith(('bus/', 'link/', 'simulator/'))
 
 
 def foreign_writes(source: str) -> Iterator[str]:

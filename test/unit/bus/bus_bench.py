@@ -13,8 +13,8 @@ from fake_link import PATIENCE, Done, FakeLink, wait_until
 import pytest
 from support.addresses import packed, register
 
-from nfo_sinus_driver.bus import Bus, Cancelled, LatestValue, Priority, Task, Transfer
-from nfo_sinus_driver.link import LinkError
+from nfo_sinus_driver.bus import Bus, Cancelled, LatestValue, Priority, Task
+from nfo_sinus_driver.link import LinkError, Read, Write, Written
 
 UNIT = 1
 OTHER = 2
@@ -30,8 +30,8 @@ def ask(
 
     async def job() -> bytes:
         if data is None:
-            return (await bus.read(unit, register(number), priority)).data
-        return (await bus.write(unit, register(number), data, priority)).data
+            return (await bus.carry_out(unit, Read(register(number)), priority)).data
+        return (await bus.carry_out(unit, Write(register(number), data), priority)).data
 
     return bus.run(job())
 
@@ -58,7 +58,7 @@ class Writer:
         self.bus = bus
         self.wanted: int | None = None
         self.outcomes: list[tuple[bytes | None, LinkError | None]] = []
-        self.slot = LatestValue(self.make, self.done)
+        self.slot = LatestValue(unit, self.make, self.done)
         self.address = register(number)
         self.unit = unit
 
@@ -66,13 +66,13 @@ class Writer:
         self.wanted = value
         self.bus.request(self.slot)
 
-    def make(self) -> Transfer | None:
+    def make(self) -> Write | None:
         if self.wanted is None:
             return None
-        return Transfer(self.unit, self.address, Priority.SETPOINT, packed(self.wanted))
+        return Write(self.address, packed(self.wanted))
 
-    def done(self, transfer: Transfer, error: LinkError | None) -> None:
-        self.outcomes.append((transfer.data, error))
+    def done(self, written: Written, error: LinkError | None) -> None:
+        self.outcomes.append((written.data, error))
 
 
 def spawned(bus: Bus, coroutine: Any) -> Task:

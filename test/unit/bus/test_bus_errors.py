@@ -15,7 +15,7 @@ import pytest
 from support.addresses import packed, register
 
 from nfo_sinus_driver.bus import Bus, Cancelled, Priority, worker as bus_module
-from nfo_sinus_driver.link import InProgress, LinkError, NotReady, PortError
+from nfo_sinus_driver.link import InProgress, LinkError, NotReady, PortError, Read
 
 
 @RAISED
@@ -175,7 +175,7 @@ def test_cancelled_while_its_unit_is_in_doubt(bus: Bus, link: FakeLink) -> None:
         return packed(done.number)
 
     async def job() -> None:
-        await bus.read(UNIT, register(66), Priority.POLL)
+        await bus.carry_out(UNIT, Read(register(66)), Priority.POLL)
 
     async def past_it() -> None:
         await bus.sleep(0.05)

@@ -12,48 +12,33 @@ import pytest
 from support.addresses import packed, register
 
 from nfo_sinus_driver.bus import Bus, Priority
+from nfo_sinus_driver.bus.tasks import set_up
 from nfo_sinus_driver.link import (
     DamagedAnswer,
     Identification,
     LinkError,
     NoAnswer,
     NotReady,
+    Plan,
     PortError,
+    Read,
     Refused,
-    Reply,
+    Write,
 )
 
 _UNIT = 1
 _FIRST, _SECOND, _STOP = 43, 17, 99
 
 
-class _Inquiry:
-    """Two questions, each of which is a read as far as the fake link knows."""
-
-    def __init__(self, link: FakeLink, unit: int) -> None:
-        self._link = link
-        self._unit = unit
-        self._left = [_FIRST, _SECOND]
-        self.found = Identification()
-
-    @property
-    def done(self) -> bool:
-        return not self._left
-
-    def ask(self) -> Reply:
-        number = self._left.pop(0)
-        try:
-            reply = self._link.read(self._unit, register(number))
-        except NotReady:
-            self._left.insert(0, number)
-            raise
-        self.found = Identification(vendor=f'{self.found.vendor}{number}')
-        return reply
-
-
 class _Link(FakeLink):
-    def identify(self, unit: int) -> _Inquiry:
-        return _Inquiry(self, unit)
+    """It has two questions, each of which is a read."""
+
+    def identify(self, unit: int) -> Plan[Identification]:
+        answered = ''
+        for number in (_FIRST, _SECOND):
+            if (yield Read(register(number))) is not None:
+                answered += str(number)
+        return Identification(vendor=answered)
 
 
 @pytest.fixture
@@ -87,7 +72,7 @@ def test_each_question_is_asked_once(link: _Link, bus: Bus) -> None:
 
 def test_a_stop_goes_between_two_questions(link: _Link, bus: Bus) -> None:
     async def stop() -> None:
-        await bus.write(_UNIT, register(_STOP), packed(0), Priority.STOP)
+        await bus.carry_out(_UNIT, Write(register(_STOP), packed(0)), Priority.STOP)
 
     with link.held():
         inquiry = bus.run(bus.identify(_UNIT, Priority.SERVICE))
@@ -132,3 +117,41 @@ def test_a_lost_port_ends_it(link: _Link, bus: Bus) -> None:
     future = bus.run(bus.identify(_UNIT, Priority.SERVICE))
     assert isinstance(future.exception(PATIENCE), PortError)
     assert link.numbers == [_FIRST]
+
+
+def _steps() -> Plan[str]:
+    for number in (_FIRST, _SECOND):
+        if (yield Write(register(number), packed(0))) is None:
+            return f'refused {number}'
+    return 'all'
+
+
+def _set_up(bus: Bus, tries: int) -> str:
+    future = bus.run(set_up(_UNIT, _steps(), Priority.SERVICE, tries, lambda: None))
+    return future.result(PATIENCE)
+
+
+@pytest.mark.parametrize('error', [NoAnswer('no unit'), DamagedAnswer('noise'), Refused(6)])
+def test_a_step_that_was_not_carried_out_is_tried_again(
+    link: _Link, bus: Bus, error: LinkError
+) -> None:
+    failures = iter([error, None, error, None])
+
+    def answer(done: Done) -> bytes:
+        if (failure := next(failures)) is not None:
+            raise failure
+        return b''
+
+    link.answer = answer
+    assert _set_up(bus, 2) == 'all'
+    assert link.numbers == [_FIRST, _FIRST, _SECOND, _SECOND]
+    link.answer = _failing(error, _SECOND)
+    with pytest.raises(type(error)):
+        _set_up(bus, 3)
+    assert link.numbers[4:] == [_FIRST, *3 * [_SECOND]]
+
+
+def test_a_step_that_is_refused_is_not_tried_again(link: _Link, bus: Bus) -> None:
+    link.answer = _failing(Refused(2), _SECOND)
+    assert _set_up(bus, 3) == 'refused 17'
+    assert link.numbers == [_FIRST, _SECOND]

@@ -14,7 +14,15 @@ import pytest
 from support.addresses import packed, register
 
 from nfo_sinus_driver.bus import Bus, Cancelled, LatestValue, Priority, Task, worker as bus_module
-from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, NotReady, PortError, Refused
+from nfo_sinus_driver.link import (
+    DamagedAnswer,
+    LinkError,
+    NoAnswer,
+    NotReady,
+    PortError,
+    Read,
+    Refused,
+)
 
 
 def test_port_that_is_lost_and_comes_back(bus: Bus, link: FakeLink) -> None:
@@ -54,14 +62,14 @@ def test_lost_port_is_reported_to_all_though_one_of_them_ends_another(
 
     async def end_the_other() -> None:
         try:
-            await bus.read(UNIT, register(1), Priority.POLL)
+            await bus.carry_out(UNIT, Read(register(1)), Priority.POLL)
         except PortError:
             bus.cancel(tasks[0])
             raise
 
     async def wait_behind() -> None:
         tasks.append(bus.current)
-        await bus.read(UNIT, register(2), Priority.POLL)
+        await bus.carry_out(UNIT, Read(register(2)), Priority.POLL)
 
     with link.held():
         lost = hold(bus, link)
@@ -92,7 +100,7 @@ def test_slot_that_raises_while_the_port_is_lost(bus: Bus, link: FakeLink) -> No
     link.opening = raiser(PortError('gone'))
     link.answer = raiser(PortError('gone'))
     failure(ask(bus, 1, Priority.POLL))
-    broken = LatestValue(raiser(ValueError('oops')), lambda transfer, error: None)
+    broken = LatestValue(UNIT, raiser(ValueError('oops')), lambda written, error: None)
     writer = Writer(bus)
 
     def want_both() -> None:
@@ -169,7 +177,7 @@ def test_close_ends_everything(link: FakeLink) -> None:
 
     async def for_ever() -> None:
         while True:
-            await bus.read(UNIT, register(1), Priority.POLL)
+            await bus.carry_out(UNIT, Read(register(1)), Priority.POLL)
 
     futures = [bus.run(sleeper()), bus.run(for_ever())]
     wait_until(lambda: len(link.done) > 3)

@@ -13,7 +13,7 @@ from fake_link import Done, FakeLink, wait_until
 from support.addresses import packed, register
 
 from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Task
-from nfo_sinus_driver.link import NotReady
+from nfo_sinus_driver.link import NotReady, Read
 
 
 def test_sleep_takes_its_time_and_keeps_no_other_waiting(bus: Bus, link: FakeLink) -> None:
@@ -87,7 +87,7 @@ def test_waking_does_not_shorten_the_next_sleep(bus: Bus) -> None:
 
 def test_waking_a_task_that_waits_for_an_answer_does_nothing(bus: Bus, link: FakeLink) -> None:
     async def job() -> bytes:
-        return (await bus.read(UNIT, register(9), Priority.REFRESH)).data
+        return (await bus.carry_out(UNIT, Read(register(9)), Priority.REFRESH)).data
 
     with link.held():
         hold(bus, link, Priority.POLL)
@@ -123,7 +123,7 @@ def test_cancelled_task_sends_nothing_more(bus: Bus, link: FakeLink) -> None:
 
     async def job() -> None:
         try:
-            await bus.read(UNIT, register(66), Priority.REFRESH)
+            await bus.carry_out(UNIT, Read(register(66)), Priority.REFRESH)
         except Cancelled:
             seen.append('cancelled')
             raise
@@ -156,7 +156,7 @@ def test_cancelled_sleeper(bus: Bus) -> None:
 
 def test_cancelling_one_leaves_the_others(bus: Bus, link: FakeLink) -> None:
     async def job(number: int) -> bytes:
-        return (await bus.read(UNIT, register(number), Priority.REFRESH)).data
+        return (await bus.carry_out(UNIT, Read(register(number)), Priority.REFRESH)).data
 
     tasks: list[Task] = []
     with link.held():
@@ -170,8 +170,8 @@ def test_cancelling_one_leaves_the_others(bus: Bus, link: FakeLink) -> None:
 def test_cancelled_while_its_answer_is_on_the_way(bus: Bus, link: FakeLink) -> None:
     # the transaction on the line ends first; what comes after it is not sent
     async def job() -> None:
-        await bus.read(UNIT, register(1), Priority.POLL)
-        await bus.read(UNIT, register(2), Priority.POLL)
+        await bus.carry_out(UNIT, Read(register(1)), Priority.POLL)
+        await bus.carry_out(UNIT, Read(register(2)), Priority.POLL)
 
     tasks: list[Task] = []
     with link.held():
@@ -211,7 +211,7 @@ def test_cancelled_task_may_still_talk_while_it_cleans_up(bus: Bus, link: FakeLi
         try:
             await bus.sleep(3600)
         except Cancelled:
-            return (await bus.read(UNIT, register(8), Priority.STOP)).data
+            return (await bus.carry_out(UNIT, Read(register(8)), Priority.STOP)).data
         return b''
 
     def answer(done: Done) -> bytes:

@@ -11,7 +11,8 @@ from bus_bench import ask, result
 from fake_link import Done, FakeLink, wait_until
 from support.addresses import packed, register
 
-from nfo_sinus_driver.bus import Bus, LatestValue, Priority, Transfer
+from nfo_sinus_driver.bus import Bus, LatestValue, Priority
+from nfo_sinus_driver.link import Read, Write
 
 _SETPOINT = 50
 _POLL = 7
@@ -23,17 +24,17 @@ def test_set_points_that_never_end_leave_every_other_turn_to_the_polls() -> None
     link = FakeLink()
     bus = Bus(link, now=link.now)
 
-    def write() -> Transfer:
+    def write() -> Write:
         # wanted again before it is written: set-points come faster than the line can carry
         for slot in slots:
             bus.request(slot)
-        return Transfer(1, register(_SETPOINT), Priority.SETPOINT, packed(1))
+        return Write(register(_SETPOINT), packed(1))
 
-    slots = [LatestValue(write, lambda transfer, error: None) for _ in range(8)]
+    slots = [LatestValue(1, write, lambda written, error: None) for _ in range(8)]
 
     async def poll() -> None:
         while True:
-            await bus.read(1, register(_POLL), Priority.POLL)
+            await bus.carry_out(1, Read(register(_POLL)), Priority.POLL)
 
     bus.start()
     polling = bus.run(poll())

@@ -13,7 +13,8 @@ import pytest
 from support.addresses import packed, register
 
 from nfo_sinus_driver.bus.scheduler import BACKGROUND_SHARE, Scheduler, Waiting
-from nfo_sinus_driver.bus.tasks import LatestValue, Priority, Task, Transfer
+from nfo_sinus_driver.bus.tasks import Exchange, LatestValue, Priority, Task
+from nfo_sinus_driver.link import Read, Write
 
 _SLOT = 'slot'
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
@@ -25,15 +26,15 @@ _TURNS = 4000
 def entry(kind: object, name: str = '') -> LatestValue | Waiting:
     """Something that waits; a name stands for its task."""
     if kind == _SLOT:
-        return LatestValue(lambda: None, lambda transfer, error: None)
-    transfer = Transfer(1, register(1), cast(Priority, kind))
-    return Waiting(cast(Task, name), transfer)
+        return LatestValue(1, lambda: None, lambda written, error: None)
+    exchange = Exchange(1, Read(register(1)), cast(Priority, kind))
+    return Waiting(cast(Task, name), exchange)
 
 
 def kind_of(taken: LatestValue | Waiting | None) -> object:
     """What was taken out: ``slot``, a priority, or ``None``."""
     if isinstance(taken, Waiting):
-        return taken.transfer.priority
+        return taken.exchange.priority
     return None if taken is None else _SLOT
 
 
@@ -91,9 +92,9 @@ def test_equals_go_in_the_order_they_came(kind: object) -> None:
 def test_a_stop_goes_before_a_look_whether_a_motor_stops() -> None:
     scheduler = Scheduler()
     look = entry(Priority.LOOK, 'look')
-    address = register(1)
+    write = Write(register(1), packed(0))
     stops = [
-        Waiting(cast(Task, name), Transfer(1, address, Priority.STOP, packed(0)))
+        Waiting(cast(Task, name), Exchange(1, write, Priority.STOP))
         for name in ('1', '2')
     ]
     for waiting in (look, *stops):
@@ -134,15 +135,15 @@ def test_set_points_without_end_halve_the_turns_of_polls_and_background_alike(
 def test_polls_of_units_that_do_not_answer_have_half_the_time() -> None:
     silent, timeout = {7, 8}, 0.2
     scheduler = Scheduler(silent.__contains__)
-    polls = {unit: Transfer(unit, register(1), Priority.POLL) for unit in (1, 2, 7, 8)}
-    for transfer in polls.values():
-        scheduler.add(Waiting(cast(Task, ''), transfer))
+    polls = {unit: Exchange(unit, Read(register(1)), Priority.POLL) for unit in (1, 2, 7, 8)}
+    for exchange in polls.values():
+        scheduler.add(Waiting(cast(Task, ''), exchange))
     took: Counter[int] = Counter()
     gaps, gap = [], 0.0
     while sum(took.values()) < 60.0:
         taken = scheduler.take()
         assert isinstance(taken, Waiting)
-        unit = taken.transfer.unit
+        unit = taken.exchange.unit
         seconds = timeout if unit in silent else _READ
         scheduler.took(seconds)
         took[unit] += seconds
@@ -266,8 +267,8 @@ def test_set_point_that_was_not_sent_had_no_turn() -> None:
 
 def stop_of(unit: int) -> Waiting:
     """A stop that waits."""
-    transfer = Transfer(unit, register(1), Priority.STOP, packed(0))
-    return Waiting(cast(Task, f'stop {unit}'), transfer)
+    exchange = Exchange(unit, Write(register(1), packed(0)), Priority.STOP)
+    return Waiting(cast(Task, f'stop {unit}'), exchange)
 
 
 def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
@@ -298,7 +299,7 @@ def test_between_two_stops_without_an_answer_the_most_urgent_has_its_turn(
 ) -> None:
     scheduler = Scheduler({2, 4}.__contains__)
     urgent, silent = entry(kind), stop_of(2)
-    retry = Waiting(cast(Task, 'retry'), Transfer(4, register(1), Priority.POLL))
+    retry = Waiting(cast(Task, 'retry'), Exchange(4, Read(register(1)), Priority.POLL))
     for waiting in (retry, *map(entry, _BACKGROUND)):
         scheduler.add(waiting)
     # it costs so much that every other request has a claim on the line
@@ -326,7 +327,7 @@ def test_a_stop_that_is_answered_gives_way_to_none() -> None:
 
 def poll_of(unit: int) -> Waiting:
     """A poll of one unit."""
-    return Waiting(cast(Task, 'poll'), Transfer(unit, register(1), Priority.POLL))
+    return Waiting(cast(Task, 'poll'), Exchange(unit, Read(register(1)), Priority.POLL))
 
 
 def test_what_is_for_a_missing_unit_waits_until_it_may_go_and_goes_first_then() -> None:
@@ -349,7 +350,7 @@ def test_what_waits_for_a_unit_that_goes_missing_waits_with_the_others_then(
 ) -> None:
     missing: set[int] = set()
     scheduler = Scheduler(missing.__contains__, missing.__contains__)
-    waiting = Waiting(cast(Task, 'asks'), Transfer(7, register(1), kind))
+    waiting = Waiting(cast(Task, 'asks'), Exchange(7, Read(register(1)), kind))
     scheduler.add(waiting)
     missing.add(7)
     assert scheduler.take(missing=False) is None

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import struct
-from types import SimpleNamespace
 from typing import Any
 
 from support.rig import Rig
@@ -18,6 +17,7 @@ from nfo_sinus_driver.link import (
     Address,
     Identification,
     LinkError,
+    Plan,
     Refused,
     Remarks,
     Reply,
@@ -70,9 +70,10 @@ class FarEnd:
     def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
         """Nothing is ever in doubt."""
 
-    def identify(self, unit: int) -> SimpleNamespace:
+    def identify(self, unit: int) -> Plan[Identification]:
         """It does not tell who it is."""
-        return SimpleNamespace(done=True, found=Identification())
+        yield from ()
+        return Identification()
 
     def parts(self, address: Address) -> Sequence[Address]:
         """Whatever it has is read at once."""

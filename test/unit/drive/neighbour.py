@@ -8,11 +8,11 @@ from __future__ import annotations
 import contextlib
 
 from nfo_sinus_driver.bus import Bus, Priority
-from nfo_sinus_driver.link import Address, LinkError
+from nfo_sinus_driver.link import Address, LinkError, Read
 
 
 async def neighbour(bus: Bus, address: Address, priority: Priority = Priority.POLL) -> None:
     """Read something again and again, with this urgency; never ends by itself."""
     while True:
         with contextlib.suppress(LinkError):
-            await bus.read(1, address, priority)
+            await bus.carry_out(1, Read(address), priority)

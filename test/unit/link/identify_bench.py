@@ -6,21 +6,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import contextlib
 
 import pymodbus_opinion as opinion
 from support.addresses import register, words_of
+from support.plans import followed
 from virtual_wire import Wire
 
 from nfo_sinus_driver.link.interface import (
     Address,
-    DamagedAnswer,
     Identification,
     LineSettings,
-    NoAnswer,
-    Refused,
 )
-from nfo_sinus_driver.link.modbus_link import ModbusInquiry
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.rtu import RtuLink
 
@@ -148,7 +144,7 @@ class Unit:
         self._free = self.wire.arrive(start, answer)
 
     def identify(self) -> Identification:
-        return asked_all(self.link.identify(1))
+        return followed(self.link.identify(1))
 
     def read(self, address: Address = ONE) -> bytes:
         return self.link.read(1, address).data
@@ -160,10 +156,3 @@ def silent(frame: bytes) -> bytes:
 
 def refuses(frame: bytes) -> bytes:
     return opinion.exception(1, frame[1], 1)
-
-
-def asked_all(inquiry: ModbusInquiry) -> Identification:
-    while not inquiry.done:
-        with contextlib.suppress(Refused, NoAnswer, DamagedAnswer):
-            inquiry.ask()
-    return inquiry.found

@@ -11,6 +11,7 @@ from link_bench import TIMEOUT, UNIT, A, B, Bench, C
 import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
+from support.plans import followed
 
 # what holds for RTU holds for ASCII, unless it is about the silence between frames
 from test_rtu_link import (
@@ -152,9 +153,7 @@ def test_a_unit_identifies_itself() -> None:
         bench.wire.arrive(end, opinion.ascii_frame(texts.get(request[1], objects)))
 
     bench.wire.far_end = far_end
-    inquiry = bench.link.identify(UNIT)
-    while not inquiry.done:
-        inquiry.ask()
-    assert inquiry.found.product == 'NFO Sinus'
-    assert inquiry.found.model == '1.50/400'
-    assert inquiry.found.serial == '0123456789ABCDEF'
+    found = followed(bench.link.identify(UNIT))
+    assert found.product == 'NFO Sinus'
+    assert found.model == '1.50/400'
+    assert found.serial == '0123456789ABCDEF'

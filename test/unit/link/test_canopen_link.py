@@ -23,6 +23,7 @@ from canopen_bench import (
 )
 from hypothesis import example, given, settings as hypothesis_settings, strategies as st
 import pytest
+from support.plans import followed
 
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
@@ -78,15 +79,10 @@ def test_a_refusal_says_why() -> None:
 def test_identity_of_a_node() -> None:
     bench = Bench()
     bench.bus.servers[UNIT].objects |= {(0x1018, 2): bytes(4), (0x1018, 4): bytes(4)}
-    inquiry = bench.link.identify(UNIT)
-    while not inquiry.done:
-        try:
-            inquiry.ask()
-        except Refused as error:
-            assert 'no such object' in str(error)
+    found = followed(bench.link.identify(UNIT), bench.link, UNIT)
     assert bench.asked == [0x1018, 0x1018, 0x1018, 0x1008, 0x100A]
     number = [str(int.from_bytes(bench.answer_of(each), 'little')) for each in range(3)]
-    assert inquiry.found == Identification(
+    assert found == Identification(
         vendor=number[0],
         product_code=number[1],
         serial=number[2],

@@ -11,8 +11,9 @@ import math
 from canopen_bench import DROP, TIMEOUT, UNIT, A, Bench, Fate
 from canopen_far_end import Server
 import pytest
+from support.plans import followed
 
-from nfo_sinus_driver.link import DamagedAnswer, NoAnswer, Watch
+from nfo_sinus_driver.link import DamagedAnswer, NoAnswer, carry_out
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_supervision import GUARDING_MEANS, HEARTBEAT_MEANS
 
@@ -33,11 +34,9 @@ class _Objects:
         self.server.objects.update(objects)
         self.bench.bus.kept |= objects.keys()
 
-    def carry_out(self, seconds: float) -> Watch:
-        watch = self.bench.link.supervision.watch(UNIT, seconds)
-        while not watch.done:
-            watch.step()
-        return watch
+    def carry_out(self, seconds: float) -> str:
+        link = self.bench.link
+        return followed(link.supervision.watch(UNIT, seconds), link, UNIT)
 
 
 def elapse(bench: Bench, seconds: float) -> list[tuple[float, Frame]]:
@@ -91,7 +90,7 @@ def test_a_client_that_waits_for_a_silent_node_sends_its_heartbeat() -> None:
 
 def test_a_node_watches_over_the_heartbeat() -> None:
     far = _Objects(HEARTBEAT_OBJECTS | GUARDING_OBJECTS)
-    assert far.carry_out(1.5).means == HEARTBEAT_MEANS
+    assert far.carry_out(1.5) == HEARTBEAT_MEANS
     assert far.server.objects[0x1016, 1] == WATCHES
     # half of it at most is silent
     beats = [when for when, frame in elapse(far.bench, 3.0) if frame == BEAT]
@@ -109,7 +108,7 @@ def test_a_short_time_has_a_quick_heartbeat() -> None:
 def test_it_ends() -> None:
     far = _Objects(HEARTBEAT_OBJECTS)
     far.carry_out(1.5)
-    assert far.carry_out(0.0).means == ''
+    assert far.carry_out(0.0) == ''
     assert far.server.objects[0x1016, 1] == bytes(4)
     # who has watched nothing is left alone
     before = len(far.bench.bus.begun)
@@ -119,16 +118,16 @@ def test_it_ends() -> None:
 
 def test_what_stands_there_already_is_not_written_again() -> None:
     far = _Objects({(0x1016, 0): b'\1', (0x1016, 1): WATCHES})
-    assert far.carry_out(1.5).means == HEARTBEAT_MEANS
+    assert far.carry_out(1.5) == HEARTBEAT_MEANS
 
 
 def test_no_watch_of_another_client_is_taken_away() -> None:
     other = bytes.fromhex('E8030300')
     far = _Objects({(0x1016, 0): b'\2', (0x1016, 1): other, (0x1016, 2): bytes(4)})
-    assert far.carry_out(1.5).means == HEARTBEAT_MEANS
+    assert far.carry_out(1.5) == HEARTBEAT_MEANS
     assert (far.server.objects[0x1016, 1], far.server.objects[0x1016, 2]) == (other, WATCHES)
     full = _Objects({(0x1016, 0): b'\1', (0x1016, 1): other} | GUARDING_OBJECTS)
-    assert full.carry_out(1.5).means == GUARDING_MEANS
+    assert full.carry_out(1.5) == GUARDING_MEANS
     assert full.server.objects[0x1016, 1] == other
 
 
@@ -139,7 +138,7 @@ def test_else_a_node_is_guarded(how: str) -> None:
         far.server.refuses[0x1016, 1] = 0x06010002
     elif how == 'kept':
         far.server.constant.add((0x1016, 1))
-    assert far.carry_out(2.0).means == GUARDING_MEANS
+    assert far.carry_out(2.0) == GUARDING_MEANS
     period = int.from_bytes(far.server.objects[0x100C, 0], 'little') / 1000
     factor = far.server.objects[0x100D, 0][0]
     assert period * factor == pytest.approx(2.0)
@@ -153,30 +152,31 @@ def test_else_a_node_is_guarded(how: str) -> None:
 def test_half_of_guarding_is_nothing() -> None:
     far = _Objects(GUARDING_OBJECTS)
     far.server.constant.add((0x100D, 0))
-    assert far.carry_out(2.0).means == ''
+    assert far.carry_out(2.0) == ''
     assert far.server.objects[0x100C, 0] == bytes(2)
     assert GUARD not in [frame for _, frame in elapse(far.bench, 5.0)]
 
 
 def test_a_node_that_has_nothing_for_it() -> None:
     far = _Objects({})
-    assert far.carry_out(2.0).means == ''
+    assert far.carry_out(2.0) == ''
 
 
 def test_a_step_without_an_answer_is_done_again() -> None:
     far = _Objects(HEARTBEAT_OBJECTS)
-    watch = far.bench.link.supervision.watch(UNIT, 1.5)
-    watch.step()
+    link = far.bench.link
+    plan = link.supervision.watch(UNIT, 1.5)
+    step = plan.send(carry_out(link, UNIT, next(plan)))
     far.bench.bus.heal(DROP)
     with pytest.raises(NoAnswer):
-        watch.step()
-    while not watch.done:
-        try:
-            watch.step()
-        except (NoAnswer, DamagedAnswer):
-            far.bench.bus.now += TIMEOUT
-    assert watch.means == HEARTBEAT_MEANS
-
+        carry_out(link, UNIT, step)
+    with pytest.raises(StopIteration) as end:
+        while True:
+            try:
+                step = plan.send(carry_out(link, UNIT, step))
+            except (NoAnswer, DamagedAnswer):
+                far.bench.bus.now += TIMEOUT
+    assert end.value.value == HEARTBEAT_MEANS
 
 def test_the_heartbeat_goes_on_when_the_adapter_is_back() -> None:
     far = _Objects(HEARTBEAT_OBJECTS)

@@ -16,7 +16,6 @@ from identify_bench import (
     TIMEOUT,
     TWO,
     Unit,
-    asked_all,
     device_answer,
     g2_answer,
     refuses,
@@ -25,22 +24,26 @@ from identify_bench import (
 )
 import pytest
 from support.addresses import packed
+from support.plans import followed
 
 from nfo_sinus_driver.link.interface import (
+    Ask,
     DamagedAnswer,
     Identification,
     LineSettings,
     LinkError,
     NoAnswer,
     NotReady,
+    Operation,
     Refused,
+    Reply,
 )
 from nfo_sinus_driver.link.modbus_link import (
     REGULAR,
     DeviceObjects,
-    ModbusInquiry,
     ReadDevice,
     ReportSlaveId,
+    questions,
     revision,
     serial_number,
     text,
@@ -127,16 +130,21 @@ class Script:
         return reply, float(len(self.asked))
 
 
+def answered(question: Operation) -> Reply:
+    assert isinstance(question, Ask)
+    return question.question()
+
+
 def test_two_questions_are_enough() -> None:
     script = Script(DeviceObjects(tuple(G2.items())), SERIAL)
-    assert asked_all(ModbusInquiry(1, script)) == KNOWN
+    assert followed(questions(1, script)) == KNOWN
     assert script.asked == [ReadDevice(1, REGULAR, 0), ReportSlaveId(1)]
 
 
 def test_reply_says_when_its_last_byte_came() -> None:
-    inquiry = ModbusInquiry(1, Script(DeviceObjects(()), b''))
-    assert [inquiry.ask().arrived, inquiry.ask().arrived] == [1.0, 2.0]
-    assert inquiry.done
+    plan = questions(1, Script(DeviceObjects(()), b''))
+    first = answered(next(plan))
+    assert [first.arrived, answered(plan.send(first)).arrived] == [1.0, 2.0]
 
 
 def test_reading_goes_on_where_more_follows() -> None:
@@ -146,7 +154,7 @@ def test_reading_goes_on_where_more_follows() -> None:
         DeviceObjects(((4, b'NFO Sinus'), (5, b'1.50/400'))),
         SERIAL,
     )
-    found = asked_all(ModbusInquiry(1, script))
+    found = followed(questions(1, script))
     assert (found.vendor, found.revision, found.model) == ('NFO', '4.30 / 4018', '1.50/400')
     assert script.asked[1:3] == [ReadDevice(1, REGULAR, 2), ReadDevice(1, REGULAR, 4)]
 
@@ -154,37 +162,38 @@ def test_reading_goes_on_where_more_follows() -> None:
 @pytest.mark.parametrize('following', [0, 1, 2, 7, 0x80, 255])
 def test_only_what_is_ahead_and_known_is_read_on(following: int) -> None:
     script = Script(DeviceObjects((), 2), DeviceObjects((), following), b'')
-    asked_all(ModbusInquiry(1, script))
+    followed(questions(1, script))
     assert [type(question) for question in script.asked] == [ReadDevice, ReadDevice, ReportSlaveId]
 
 
 def test_unknown_objects_are_passed_over() -> None:
     script = Script(DeviceObjects(((0, b'NFO'), (7, b'x'), (0x80, b'y'))), b'')
-    assert asked_all(ModbusInquiry(1, script)) == Identification(vendor='NFO')
+    assert followed(questions(1, script)) == Identification(vendor='NFO')
 
 
 @pytest.mark.parametrize('error', [Refused(1), Refused(2), Refused(3), NoAnswer(), DamagedAnswer()])
 def test_a_question_without_answer_is_not_asked_again(error: LinkError) -> None:
     script = Script(error, SERIAL)
-    assert asked_all(ModbusInquiry(1, script)) == Identification(serial='0123456789ABCDEF')
+    assert followed(questions(1, script)) == Identification(serial='0123456789ABCDEF')
     script = Script(DeviceObjects(((0, b'NFO'),)), error)
-    assert asked_all(ModbusInquiry(1, script)) == Identification(vendor='NFO')
+    assert followed(questions(1, script)) == Identification(vendor='NFO')
     script = Script(DeviceObjects(((0, b'NFO'),), 1), error, error)
-    assert asked_all(ModbusInquiry(1, script)) == Identification(vendor='NFO')
+    assert followed(questions(1, script)) == Identification(vendor='NFO')
     script = Script(error, error)
-    assert asked_all(ModbusInquiry(1, script)) == Identification()
+    assert followed(questions(1, script)) == Identification()
 
 
 def test_a_question_that_could_not_be_sent_is_asked_later() -> None:
     script = Script(NotReady(1.0), DeviceObjects(((0, b'NFO'),)), NotReady(2.0), SERIAL)
-    inquiry = ModbusInquiry(1, script)
+    plan, reply = questions(1, script), None
     for _ in range(2):
+        question = plan.send(reply)
         with pytest.raises(NotReady):
-            inquiry.ask()
-        assert not inquiry.done
-        inquiry.ask()
-    assert inquiry.done
-    assert inquiry.found == Identification(vendor='NFO', serial='0123456789ABCDEF')
+            answered(question)
+        reply = answered(question)
+    with pytest.raises(StopIteration) as end:
+        plan.send(reply)
+    assert end.value.value == Identification(vendor='NFO', serial='0123456789ABCDEF')
 
 
 # --- on a line in virtual time --------------------------------------------------------------------
@@ -200,8 +209,7 @@ def test_a_g2_identifies_itself(baud: int) -> None:
 
 def test_nothing_is_sent_before_the_first_question() -> None:
     unit = Unit()
-    inquiry = unit.link.identify(1)
-    assert not inquiry.done
+    unit.link.identify(1)
     assert unit.functions == []
 
 

@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import contextlib
 
 from pymodbus_server import REGISTERS, serial_server
 import pytest
 from support.addresses import packed, register
+from support.plans import followed
 
-from nfo_sinus_driver.link import BusSettings, Link, LinkError, Refused
+from nfo_sinus_driver.link import BusSettings, Link, Refused
 
 ONE = register(0x2A5)
 TWO = register(0x258, 2)
@@ -56,11 +56,8 @@ def test_refusal(link: Link) -> None:
 
 
 def test_identification(link: Link) -> None:
-    inquiry = link.identify(1)
-    while not inquiry.done:
-        # not every version has function 17
-        with contextlib.suppress(LinkError):
-            inquiry.ask()
-    assert inquiry.found.product == 'NFO Sinus'
-    assert inquiry.found.model == '1.50/400'
-    assert inquiry.found.revision == '4.30 / 4018'
+    # not every version has function 17
+    found = followed(link.identify(1))
+    assert found.product == 'NFO Sinus'
+    assert found.model == '1.50/400'
+    assert found.revision == '4.30 / 4018'

@@ -14,13 +14,13 @@ import time
 from pymodbus_server import PATIENCE, REGISTERS, tcp_server
 import pytest
 from support.addresses import packed, register, words_of
+from support.plans import followed
 
 from nfo_sinus_driver.link import (
     Address,
     DamagedAnswer,
     GatewaySilent,
     LineSettings,
-    LinkError,
     NoAnswer,
     NoPath,
     PortError,
@@ -67,13 +67,10 @@ def test_refusal(link: TcpLink) -> None:
 
 
 def test_identification(link: TcpLink) -> None:
-    inquiry = link.identify(1)
-    while not inquiry.done:
-        # not every version has function 17
-        with contextlib.suppress(LinkError):
-            inquiry.ask()
-    assert inquiry.found.product == 'NFO Sinus'
-    assert inquiry.found.revision == '4.30 / 4018'
+    # not every version has function 17
+    found = followed(link.identify(1))
+    assert found.product == 'NFO Sinus'
+    assert found.revision == '4.30 / 4018'
 
 
 def test_reply_says_when_it_came(link: TcpLink) -> None:
