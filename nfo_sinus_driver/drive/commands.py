@@ -341,7 +341,7 @@ class ProfileRunner:
         Have the drive begin a procedure, once: the state before a second try would be unknown.
 
         It queues with the stops, so that no later one overtakes it; if ``require_wanted`` raises
-        at its turn, nothing is written.
+        at its turn, nothing is written. A busy drive has done nothing, and gets it again.
         """
         write = self._method.procedures[procedure]
         await self._params.write(write, Priority.STOP, require_wanted)

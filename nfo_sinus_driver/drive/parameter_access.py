@@ -268,7 +268,9 @@ class ParameterAccess:
         priority = Priority.STOP if step.head else priority
         self._own[step.key] = data
         try:
-            await self._ask(Write(address, data), priority, step.retry, require_wanted)
+            await self._ask(
+                Write(address, data), priority, step.retry, require_wanted, patient=step.head
+            )
         except Refused as error:
             self._own.pop(step.key, None)
             raise self._named(error, step.key) from None
@@ -345,6 +347,8 @@ class ParameterAccess:
         priority: Priority,
         retry: bool,
         require_wanted: Callable[[], None] = lambda: None,
+        *,
+        patient: bool = False,
     ) -> Reply:
         has_effect = not isinstance(operation, Read) or operation.once
         # a mailbox is asked by a write to the registers of the PLC
@@ -358,7 +362,7 @@ class ParameterAccess:
             require = require_wanted
         tries = 1 + self._retries if retry else 1
         # a busy drive has done nothing; a stop that is sent once is repeated by its caller
-        busy = 0 if not retry and priority <= Priority.LOOK else _BUSY_TRIES
+        busy = _BUSY_TRIES if patient or retry or priority > Priority.LOOK else 0
         while True:
             try:
                 return await self._bus.carry_out(self._unit, operation, priority, require)

@@ -17,11 +17,7 @@ from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report
 from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
-from nfo_sinus_driver.link import LinkError, Refused
-
-#: How often a command is repeated to a busy drive, and for how long, s.
-_BUSY_PERIOD = 0.05
-_LONGEST_BUSY = 0.5
+from nfo_sinus_driver.link import LinkError
 
 
 def require_known(procedure: Procedure | Reset, model: Family) -> None:
@@ -111,21 +107,8 @@ class Procedures:
         return await controller.stop(Report(Cause.PROCEDURE_CANCELLED, what=what))
 
     async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
-        """
-        Have the drive begin, once: the state before a second try would be unknown.
-
-        It queues with the stops, so that no later one overtakes it. Only to a busy drive, which
-        has done nothing, the command is repeated for a while.
-        """
-        deadline = self._bus.now() + _LONGEST_BUSY
-        while True:
-            try:
-                await self.controller.method.begin(procedure, access.require_wanted)
-                return
-            except Refused as error:
-                if error.code != Refused.BUSY or self._bus.now() >= deadline:
-                    raise
-            await self._bus.sleep(_BUSY_PERIOD)
+        """Have the drive begin; see :meth:`.Commands.begin`."""
+        await self.controller.method.begin(procedure, access.require_wanted)
 
     async def _take(self, access: ExclusiveAccess) -> Holder:
         controller, state, what = self.controller, self._state, access.what
