@@ -382,6 +382,6 @@ HISTORIES = (
         TABLE,
         'LOST          .         OFFLINE   STOPPING STOPPING',
         'LOST          .         OFFLINE   STOPPING OFFLINE ',
-        ('test/unit/drive/test_control_state.py',),
+        ('test/unit/drive/test_control_table.py',),
     ),
 )
