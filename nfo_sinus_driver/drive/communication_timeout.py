@@ -36,6 +36,8 @@ class CommunicationTimeout:
         #: 0: it does not.
         self.watched_for = 0.0
         self.watched_by = ''
+        #: The longest that it may have taken since it last confirmed one, or that it has none, s.
+        self.may_watch_for = 0.0
 
     @property
     def shortest(self) -> float:
@@ -74,8 +76,9 @@ class CommunicationTimeout:
 
         After an error the drive may go on as before, and so does what is known of it.
         """
+        self.may_watch_for = max(seconds, self.may_watch_for)
         self.watched_by = await self._params.watch(seconds, Priority.SERVICE)
-        self.watched_for = seconds if self.watched_by else 0.0
+        self.watched_for = self.may_watch_for = seconds if self.watched_by else 0.0
 
     async def read(self) -> None:
         """Read SioTot, and on what it depends that the motor stops, where the drive has them."""

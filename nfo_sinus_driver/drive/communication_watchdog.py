@@ -310,13 +310,13 @@ class CommunicationWatchdog:
 
     async def _end_watch(self) -> None:
         state = self._state
-        by, seconds = state.timeout.watched_by, state.timeout.watched_for
-        if not by:
+        by, seconds = state.timeout.watched_by, state.timeout.may_watch_for
+        if not seconds:
             return
         try:
             await state.timeout.watch(0.0)
-        except LinkError as error:
-            why = explain_failure(error, state)
+        except (LinkError, DriveError) as error:
+            why, by = explain_failure(error, state), by or 'heartbeat or guarding'
             state.notify(Severity.WARNING, Cause.WATCH_LEFT, why=why, by=by, seconds=seconds)
 
     async def _change(self, wanted: Mapping[str, Value]) -> Sequence[ParameterChange]:

@@ -213,6 +213,8 @@ class CanopenSupervision:
                 # it watches from the first heartbeat on: send one before any motor runs
                 self._show_heartbeat(unit, milliseconds / 1000, entry)
                 return True
+            # another time than this is of no use
+            yield Write(place, bytes(4))
             self._forget(unit)
             return False
         return False

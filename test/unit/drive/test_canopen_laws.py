@@ -143,6 +143,29 @@ def test_a_watch_that_could_not_be_changed_is_ended_all_the_same() -> None:
         assert server_of(rig).read(0x1016, 1) == bytes(4)
 
 
+@pytest.mark.parametrize('why', ['no answer', 'stop'])
+def test_a_watch_that_was_begun_only_is_ended_all_the_same(why: str) -> None:
+    with Rig('canopen', drive_timeout=5.0, retries=0) as rig:
+        rig.connect()
+
+        def plan(request: bytes) -> str | None:
+            if b'23161001' not in request:
+                return None
+            if why == 'stop':
+                rig.drive.stop()
+            return 'drop' if why == 'no answer' else None
+
+        rig.line.plan = plan
+        rig.answer(rig.drive.enable())
+        rig.line.plan = lambda request: None
+        assert not rig.drive.following
+        assert server_of(rig).read(0x1016, 1)[:2] == (5000).to_bytes(2, 'little')
+        rig.answer(rig.drive.disconnect(4.0))
+        assert server_of(rig).read(0x1016, 1) == bytes(4)
+        be_gone(rig, 6.0)
+        assert not rig.far.faults.codes
+
+
 def test_a_lost_answer_to_the_end_of_the_watch_is_no_failed_clean_up() -> None:
     with Rig('canopen', drive_timeout=5.0, retries=0) as rig:
         rig.connect()

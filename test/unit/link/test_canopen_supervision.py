@@ -13,7 +13,7 @@ from canopen_far_end import Server
 import pytest
 from support.plans import followed
 
-from nfo_sinus_driver.link import DamagedAnswer, NoAnswer, carry_out
+from nfo_sinus_driver.link import Address, DamagedAnswer, NoAnswer, Reply, carry_out
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_supervision import GUARDING_MEANS, HEARTBEAT_MEANS
 
@@ -147,6 +147,18 @@ def test_else_a_node_is_guarded(how: str) -> None:
     far.carry_out(0.0)
     assert far.server.objects[0x100C, 0] == bytes(2) and far.server.objects[0x100D, 0] == b'\0'
     assert GUARD not in [frame for _, frame in elapse(far.bench, 5.0)]
+
+
+def test_a_node_that_takes_another_time_is_left_with_none() -> None:
+    far = _Objects(HEARTBEAT_OBJECTS)
+    write = far.bench.link.write
+
+    def rounded(unit: int, address: Address, data: bytes) -> Reply:
+        return write(unit, address, bytes.fromhex('E8037F00') if data == WATCHES else data)
+
+    far.bench.link.write = rounded  # type: ignore[method-assign]
+    assert far.carry_out(1.5) == ''
+    assert far.server.objects[0x1016, 1] == bytes(4)
 
 
 def test_half_of_guarding_is_nothing() -> None:
