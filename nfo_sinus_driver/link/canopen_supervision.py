@@ -225,10 +225,13 @@ class CanopenSupervision:
         values = {
             time_place: period.to_bytes(2, 'little'), factor_place: bytes((_LIFE_FACTOR,)),
         }
+        # to be ended from now on, and requested only when it is set up
+        self._guarded.setdefault(unit, _Guarding(period / 1000, math.inf))
         for place, value in values.items():
             if not (yield from _write_and_check(place, value)):
                 # one of both alone is of no use
                 yield Write(time_place, bytes(2))
+                self._guarded.pop(unit, None)
                 return False
         # it watches from the first request on, which is now
         self._guarded[unit] = _Guarding(period / 1000, 0.0)
