@@ -142,7 +142,7 @@ def test_rubbish_on_the_line_is_survived(link, open_master):
             until(lambda: simulator.line.due == float('inf'))
             master.receive(timeout=0.01)
         # what was sent last may not have been read yet: then the first question goes with it
-        until(lambda: len(master.ask(1, READ_MODE, 7)) == 7)
+        until(lambda: len(master.ask(1, READ_MODE, 7, timeout=2.0)) == 7)
         assert simulator.failure is None
 
 
