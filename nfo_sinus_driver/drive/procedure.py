@@ -107,7 +107,7 @@ class Procedures:
         return await controller.stop(Report(Cause.PROCEDURE_CANCELLED, what=what))
 
     async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
-        """Have the drive begin; see :meth:`.Commands.begin`."""
+        """Have the drive begin; see :meth:`.ProfileRunner.begin`."""
         await self.controller.method.begin(procedure, access.require_wanted)
 
     async def _take(self, access: ExclusiveAccess) -> Holder:
