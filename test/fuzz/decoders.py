@@ -269,7 +269,7 @@ def _identify(random: Random, frames: int) -> None:
         def ask(request: modbus_pdu.Request[Any]) -> tuple[object, float]:
             nonlocal questions
             questions += 1
-            assert questions <= _MOST_QUESTIONS, 'it asks for ever'
+            assert questions <= _MOST_QUESTIONS, 'it never ends'
             asked = Asked(request.unit, request.function)
             if isinstance(request, modbus_link.ReadDevice):
                 asked = asked._replace(place=request.first, count=request.code)

@@ -55,7 +55,7 @@ def test_however_it_is_ended_the_terminal_is_as_it_was(bench: Bench, end: int | 
 
 def test_it_fits_any_window_and_no_key_of_the_terminal_stops_it(bench: Bench) -> None:
     # the signal of another size may be lost
-    command = ['env', '--ignore-signal=WINCH', *COMMAND, *bench.options, 'monitor']
+    command = ['env', '--block-signal=WINCH', *COMMAND, *bench.options, 'monitor']
     with Terminal([*command, '--addresses', '1,2', '--period', '0.05']) as terminal:
         terminal.wait_for('2 standing', 'q quit')
         # it would stop all that is drawn, and suspend the program

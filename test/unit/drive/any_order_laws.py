@@ -141,7 +141,7 @@ class Laws(History):
             raise Broken(f'an acknowledgement turns the motor for {POWERED} transactions')
 
     def _judge_standing(self) -> None:
-        """A run command of a past run is removed; one of another master when it is seen."""
+        """A run command of a past run is removed; one of another master when it is noticed."""
         if self._foreign:
             since = self.now if self._running_since is None else self._running_since
             # a drive that is not connected is not watched

@@ -364,7 +364,7 @@ class MovitracOrder(AnyOrder):
 
     @property
     def _is_seen(self) -> bool:
-        """Whether a motor that starts again is seen to, though the drive is not lost before."""
+        """Whether a motor that starts again is stopped, though the drive is not lost before."""
         far, line, laws = self.rig.far, self.rig.line, self.laws
         since, value = laws.setpoint_since
         steady = line.whole and laws.now - since > 0.5 and abs(value) > _SEEN_FROM
