@@ -21,8 +21,8 @@ from nfo_sinus_driver.cli.control_session import (
 from nfo_sinus_driver.cli.options import SETTINGS, Verb, add_setting, duration, period, setpoint
 from nfo_sinus_driver.cli.screen import as_facts, as_line
 from nfo_sinus_driver.drive import Cause, DriveError
-from nfo_sinus_driver.drive.commands import read_limits
 from nfo_sinus_driver.drive.settings import REFERENCES
+from nfo_sinus_driver.drive.starting import read_limits
 
 #: How often the set-point is sent anew, s; it is given up as old after 2.5 s.
 _PERIOD = 0.1

@@ -68,7 +68,7 @@ class CommunicationWatchdog:
     @property
     def _goes_on(self) -> bool:
         """The bus keeps control after the end, or gets it back: the drive goes on watching."""
-        return self._controller is not None and bool(self._controller.method.control_retained)
+        return self._controller is not None and bool(self._controller.control_retained)
 
     def connected(self) -> None:
         """Have it set with the next enable (DriveError: a setting wants it; there is none)."""

@@ -17,7 +17,6 @@ import math
 
 from nfo_sinus_driver.bus import Cancelled, Priority, Task
 from nfo_sinus_driver.catalog import InverterStatus, Kind, Limits, Meaning, State
-from nfo_sinus_driver.drive.commands import ProfileRunner
 from nfo_sinus_driver.drive.control_state import ControlEvent, ControlState, ControlTable
 from nfo_sinus_driver.drive.diagnosis import (
     explain_fall,
@@ -32,6 +31,7 @@ from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.drive.following import FollowingCheck
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.starting import Prepare, StartSequence
+from nfo_sinus_driver.drive.steps import carry_out
 from nfo_sinus_driver.drive.stop_reason import StopReason, reason_of
 from nfo_sinus_driver.drive.stopping import StopSequence
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
@@ -53,14 +53,14 @@ class Controller:
     def __init__(
         self,
         state: DriveState,
-        method: ProfileRunner,
         setpoint: Setpoint,
         look: Callable[[], Awaitable[None]],
     ) -> None:
         self._bus = state.bus
         self._state = state
-        #: The commands of the drive, for a procedure too.
-        self.method = method
+        chosen = state.model.profile.methods[state.settings.method]
+        #: What is written for each command, for a procedure too.
+        self.method = method = chosen(state.settings.reference, state.params.reaches)
         self._setpoint = setpoint
         #: Called on the bus after a stop was begun, with the reason.
         self._on_stop: Callable[[Report], None] = lambda _: None
@@ -120,6 +120,11 @@ class Controller:
     def closed(self) -> bool:
         """The driver ends: the motor is stopped, and nothing can start it any more."""
         return self._closed_at < math.inf
+
+    @property
+    def control_retained(self) -> str:
+        """Why control may stay with the bus when it is released; ``''`` where it does not."""
+        return self.method.control_retained or self._state.held_by_line
 
     @property
     def commanded(self) -> bool:
@@ -290,7 +295,10 @@ class Controller:
             self._control.dispatch(ControlEvent.RUNNING)
             if not self.enabled:
                 raise Cancelled
-            target = self.method.setpoint_target(control_mode)
+            target = None
+            if self._state.settings.follows_setpoints:
+                targets = self._state.model.profile.setpoints
+                target = self.method.setpoint_target(targets[control_mode])
             self._setpoint.follow(control_mode, limits, target)
             self._following.begin()
         except Exception as error:
@@ -336,6 +344,26 @@ class Controller:
         """Put the drive under bus control for a procedure, with no run command active."""
         await self._starting.take_control(control_mode)
 
+    async def in_control(self, priority: Priority) -> bool:
+        """Return whether the bus has control, taken by this session or an earlier one."""
+        return await carry_out(self._state, self.method.in_control(), priority)
+
+    async def give_back(self) -> None:
+        """Give control back; again from the beginning where a step that is sent once is lost."""
+        try:
+            await carry_out(self._state, self.method.release(), Priority.SERVICE)
+        except (NoAnswer, DamagedAnswer):
+            await carry_out(self._state, self.method.release(), Priority.SERVICE)
+
+    async def _has_retained_control(self) -> bool:
+        """Return whether control has stayed with the bus; true if the drive does not answer."""
+        if not self._state.held_by_line:
+            return bool(self.control_retained)
+        try:
+            return await self.in_control(Priority.SERVICE)
+        except LinkError:
+            return True
+
     async def withdraw_run_command(self, ended: Report | None) -> None:
         """Remove what a procedure has commanded, and note that it has ended; control is kept."""
         self._sequence.start(ended)
@@ -353,10 +381,11 @@ class Controller:
         may_run = self.may_run
         with self._sequence.external_stop(why):
             try:
-                may_run = may_run or await self.method.in_control(Priority.STOP)
+                may_run = may_run or await self.in_control(Priority.STOP)
                 may_run = may_run or (await self._state.read_status(Priority.LOOK)).tuning
                 if may_run:
-                    await self.method.quick_stop(self._state.control_mode)
+                    steps = self.method.quick_stop(self._state.control_mode)
+                    await carry_out(self._state, steps, Priority.STOP)
                     await self._await_quick_stop(self._bus.now())
             except Exception as error:
                 # even after an error in the driver the motor is stopped
@@ -387,7 +416,8 @@ class Controller:
         await self._require_recognised()
         with self._sequence.external_stop(why):
             with contextlib.suppress(LinkError, DriveError):
-                await self.method.rapid_stop(self._state.control_mode)
+                steps = self.method.rapid_stop(self._state.control_mode)
+                await carry_out(self._state, steps, Priority.STOP)
             stopped = await self.stop(why)
         status = self._state.status
         if status is None or not status.driven or status.faulted:
@@ -411,7 +441,7 @@ class Controller:
         fault = status.listed
         if not status.faulted and fault.kind is Kind.STATUS:
             return state.report(Cause.NOTHING_TO_ACKNOWLEDGE)
-        may_run = self.may_run or await self.method.in_control(Priority.SERVICE)
+        may_run = self.may_run or await self.in_control(Priority.SERVICE)
         with self._sequence.external_stop(why):
             return await self._acknowledge(status, may_run=may_run)
 
@@ -425,7 +455,10 @@ class Controller:
                     lambda now: now.state is not State.FAULT_REACTION_ACTIVE, Priority.SERVICE
                 )
         try:
-            details = await self.method.acknowledge(status.code, state.control_mode)
+            shown = state.model.status_code(status.code)
+            # it is no stop, and does not have the priority of one: the motor might start
+            steps = self.method.acknowledge(shown, state.control_mode)
+            details = await carry_out(state, steps, Priority.SERVICE)
         finally:
             # even if no answer came, the drive may be free to run now
             if may_run:
@@ -473,7 +506,7 @@ class Controller:
         with self._sequence.external_stop(why):
             stop = self._stopped if ended else self.stop
             stopped = await stop() if may_run else None
-            if not await self.method.in_control(Priority.SERVICE):
+            if not await self.in_control(Priority.SERVICE):
                 return stopped or Report(Cause.NOT_IN_CONTROL)
             return await self._release(timeout, prepare, stopped or await stop())
 
@@ -486,12 +519,12 @@ class Controller:
             # not every drive shows whether it ramps or runs again, by a command that came late
             await self.stop(patience=_LEAST_PATIENCE)
             await self._state.timeout.read()
-            if not self._state.timeout.shortest or self.method.control_retained:
+            if not self._state.timeout.shortest or self.control_retained:
                 return Report(Cause.LEFT_TO_RAMP, stop=stopped)
             stopped = Report(Cause.COASTED_FOR_TIMEOUT)
-        await self.method.release()
-        if await self.method.retains_control():
-            return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.method.control_retained)
+        await self.give_back()
+        if await self._has_retained_control():
+            return Report(Cause.CONTROL_KEPT, stop=stopped, why=self.control_retained)
         return Report(Cause.CONTROL_RELEASED, stop=stopped)
 
     async def _await_standstill(self, timeout: float) -> bool:
@@ -535,7 +568,7 @@ class Controller:
             return
         with contextlib.suppress(DriveError, LinkError):
             await self._state.wait_until(lambda status: not status.driven, Priority.LOOK, timeout)
-            await self.method.release()
+            await self.give_back()
 
     def close(self, why: Report) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
@@ -572,7 +605,7 @@ class Controller:
         Where the bus has no control, remove what would run the motor once it has.
         """
         state, status = self._state, self._state.status
-        if await self.method.in_control(Priority.SERVICE):
+        if await self.in_control(Priority.SERVICE):
             turns = status is not None and (status.runs_by_bus or abs(status.frequency) > 0)
             found = None
             if turns and not self.stopping:
@@ -580,7 +613,7 @@ class Controller:
                 state.notify(Severity.WARNING, found)
             self._sequence.restart(found)
         else:
-            await self.method.remove_leftover()
+            await carry_out(self._state, self.method.remove_leftover(), Priority.STOP)
             if self._lost_in_use and status is not None and not status.faulted:
                 why = state.report(Cause.CONTROL_LOST_WHILE_AWAY)
                 state.notify(Severity.WARNING, why)

@@ -14,7 +14,6 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Statistics, Task
 from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
-from nfo_sinus_driver.drive.commands import ProfileRunner, carry_out
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import explain
@@ -32,6 +31,7 @@ from nfo_sinus_driver.drive.recognising import Recogniser
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import Listener, LogEntry, Snapshot
+from nfo_sinus_driver.drive.steps import carry_out
 from nfo_sinus_driver.drive.telemetry import watch_telemetry
 from nfo_sinus_driver.drive.tuning import Tuned, Tuning
 from nfo_sinus_driver.link import LinkError
@@ -102,13 +102,9 @@ class Drive:
             lambda reply: self._poller.take_status(reply),
         )
         self._controller: Controller | None = None
-        runner: ProfileRunner | None = None
+        self._recogniser = Recogniser(self.state)
         if settings.method != 'monitor':
-            runner = ProfileRunner(self.state)
-        self._recogniser = Recogniser(self.state, runner)
-        if runner is not None:
-            look = self._recogniser.look
-            self._controller = Controller(self.state, runner, self.setpoint, look)
+            self._controller = Controller(self.state, self.setpoint, self._recogniser.look)
         self._poller = Poller(
             self.state,
             self.setpoint,
@@ -408,7 +404,7 @@ class Drive:
     async def active_control_method(self) -> str:
         """Return the control method by which the bus runs the drive, or could stop it."""
         steps = self.model.profile.in_charge(self.state.status)
-        return await carry_out(steps, self.params, Priority.SERVICE)
+        return await carry_out(self.state, steps, Priority.SERVICE)
 
     @on_bus
     async def error_log(self, most: int = 0) -> tuple[LogEntry, ...]:
@@ -481,7 +477,7 @@ class Drive:
     async def _connect(self, retry: bool) -> None:
         state = self.state
         self.params.connected()
-        takes_control = state.model.profile.holds_control.get(self.params.protocol)
+        takes_control = state.held_by_line
         if takes_control and not self.statistics.transactions:
             state.notify(Severity.WARNING, Cause.TAKES_CONTROL, why=takes_control)
         named = await self._recogniser.recognise(retry=retry)

@@ -341,6 +341,11 @@ class DriveState:
         return int(self.params.number(key, reply.data)), reply.arrived
 
     @property
+    def held_by_line(self) -> str:
+        """Why control stays with the bus on this line, once taken; ``''``: it does not."""
+        return self.model.profile.holds_control.get(self.params.protocol, '')
+
+    @property
     def word_key(self) -> str:
         """The parameter that a status begins with; ``''`` if the model has none."""
         return self.model.key(Role.STATUS_WORD)

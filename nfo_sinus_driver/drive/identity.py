@@ -178,6 +178,11 @@ class Nameplate:
         source = await self._params.read(key, Priority.SERVICE)
         return self._model.profile.holders.get(source) in dialect.harmless
 
+    async def read_scales(self) -> None:
+        """Read the scale of speeds, and report one that is not the one before."""
+        if await self.scales.read():
+            self._report(Severity.INFO, Report(Cause.SPEED_SCALE, scale=str(self.scales.speed)))
+
     async def read_more(self) -> Identity:
         """Read vendor, product and serial number; nothing needs them, many lack them [C57]."""
         assert self.identity is not None

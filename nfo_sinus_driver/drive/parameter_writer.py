@@ -355,7 +355,7 @@ class WriteAccess:
                 nonlocal access
                 if not self._state.nameplate.is_older:
                     return
-                if await self._procedures.controller.method.in_control(Priority.SERVICE):
+                if await self._procedures.controller.in_control(Priority.SERVICE):
                     return
                 # control was lost: to a client that stopped the drive, or by a serial fault that a
                 # refused write has caused

@@ -17,6 +17,7 @@ from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report
 from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
+from nfo_sinus_driver.drive.steps import carry_out
 from nfo_sinus_driver.link import LinkError
 
 
@@ -107,14 +108,20 @@ class Procedures:
         return await controller.stop(Report(Cause.PROCEDURE_CANCELLED, what=what))
 
     async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
-        """Have the drive begin; see :meth:`.ProfileRunner.begin`."""
-        await self.controller.method.begin(procedure, access.require_wanted)
+        """
+        Have the drive begin, once: the state before a second try would be unknown.
+
+        It queues with the stops, so that no later one overtakes it; if it is not wanted any more at
+        its turn, nothing is written. A busy drive has done nothing, and gets it again.
+        """
+        write = self.controller.method.procedures[procedure]
+        await self._state.params.write(write, Priority.STOP, access.require_wanted)
 
     async def _take(self, access: ExclusiveAccess) -> Holder:
         controller, state, what = self.controller, self._state, access.what
         status = await state.read_status(Priority.SERVICE)
         require_no_fault(state, status)
-        found = await controller.method.holder(Priority.SERVICE)
+        found = await carry_out(state, controller.method.holder(), Priority.SERVICE)
         if found is Holder.INHIBITED:
             name = state.model[state.model.key(Role.CONTROL_SOURCE)].name
             raise DriveError(state.report(Cause.CONTROL_INHIBITED, what=what, name=name))
@@ -132,7 +139,7 @@ class Procedures:
                     await self._give_back(found)
                 raise DriveError(state.report(Cause.NO_STANDBY, what=what))
             # no manual says that a drive forgets an earlier command
-            await controller.method.stop(control_mode)
+            await carry_out(state, controller.method.stop(control_mode), Priority.STOP)
             await self._bus.sleep(drive_state.LOOK_PERIOD)
         return found
 
@@ -141,4 +148,4 @@ class Procedures:
         controller = self.controller
         await controller.withdraw_run_command(ended)
         if found is Holder.NOBODY and not controller.blocked_by_fault:
-            await controller.method.release()
+            await controller.give_back()

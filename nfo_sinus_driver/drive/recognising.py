@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import InverterStatus, Role, Value
-from nfo_sinus_driver.drive.commands import ProfileRunner, carry_out, read_scales
 from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.parameter_access import NONE_SUCH
+from nfo_sinus_driver.drive.steps import carry_out
 from nfo_sinus_driver.link import LinkError, Refused
 
 #: An inverter status has one byte; firmware that is newer than the manual may have more of them.
@@ -22,17 +22,12 @@ _NO_FIRMWARE = (0.0, 100.0)
 
 
 class Recogniser:
-    """
-    Recognises one drive.
+    """Recognises one drive."""
 
-    :param runner: what it is commanded by; ``None`` if this driver only reads.
-    """
-
-    def __init__(self, state: DriveState, runner: ProfileRunner | None) -> None:
+    def __init__(self, state: DriveState) -> None:
         self._state = state
         self._params = state.params
         self._profile = state.model.profile
-        self._runner = runner
         self._params.recognise_by(self.require)
 
     async def recognise(self, *, retry: bool = True) -> bool:
@@ -51,11 +46,10 @@ class Recogniser:
         named = bool(tells) and not known
         try:
             await state.nameplate.identify(retry=retry)
-            if self._runner is not None:
-                self._runner.require_fitted()
+            self._require_fitted()
             if named:
                 await self.read_nameplate()
-            await read_scales(state)
+            await state.nameplate.read_scales()
             await state.read_control_mode()
             await state.timeout.read()
             status = await state.read_status(Priority.SERVICE)
@@ -103,10 +97,22 @@ class Recogniser:
                 raise self._another(Report(Cause.MADE_BY, vendor=identity.vendor))
             return identity
         try:
-            return nameplate.take(await carry_out(product(), self._params, Priority.SERVICE))
+            return nameplate.take(await carry_out(self._state, product(), Priority.SERVICE))
         except DriveError:
             self._params.recognition.end()
             raise
+
+    def _require_fitted(self) -> None:
+        """Make sure that the drive has what its control method needs (DriveError: it lacks it)."""
+        settings, params = self._state.settings, self._params
+        method = self._profile.methods.get(settings.method)
+        lacking = [key for key in method.needs if not params.reaches(key)] if method else ()
+        if lacking:
+            names = ' and '.join(params.model[key].name for key in lacking)
+            others = settings.other_methods(self._state.bus.protocol)
+            raise DriveError(
+                Cause.METHOD_NEEDS, names=names, method=settings.method, others=others
+            )
 
     def _require_identity(self, key: str, value: Value) -> None:
         values = self._profile.identify.get(key, (value,))

@@ -7,15 +7,23 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 import contextlib
+from dataclasses import replace
 import math
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Fact, InverterStatus, Limits, Meaning, Role
+from nfo_sinus_driver.catalog import (
+    ControlMethod,
+    Fact,
+    InverterStatus,
+    Limits,
+    Meaning,
+    Role,
+)
 from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.drive.commands import ProfileRunner, read_limits, read_scales
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError
+from nfo_sinus_driver.drive.steps import carry_out
 from nfo_sinus_driver.link import Refused
 
 #: How long the steps of a start may take together, s, delays of the drive itself aside.
@@ -23,6 +31,25 @@ _START_TIMEOUT = 4.0
 
 #: Runs before the motor is energised.
 Prepare = Callable[[], Awaitable[None]]
+
+
+async def read_limits(state: DriveState, control_mode: str) -> Limits:
+    """
+    Read what a set-point may be, in the unit of a control mode.
+
+    :returns: no limits where the drive takes no set-points in that mode.
+    """
+    target = state.model.profile.setpoints.get(control_mode)
+    if target is None:
+        return Limits()
+    steps = target.read_limits(state.nameplate.has, older=state.nameplate.is_older)
+    limits = await carry_out(state, steps, Priority.SERVICE)
+    if not state.params.is_rescaled(target.key):
+        return limits
+    # with another scale a word may not hold all that the drive takes
+    least, most, _ = state.params.limits(target.key)
+    least = least if target.has_sign else -most
+    return replace(limits, least=max(limits.least, least), most=min(limits.most, most))
 
 
 class _StepTime:
@@ -63,7 +90,7 @@ class _StepTime:
 class StartSequence:
     """Starts the motor of one drive, or says in a :class:`DriveError` why not; on the bus alone."""
 
-    def __init__(self, state: DriveState, method: ProfileRunner) -> None:
+    def __init__(self, state: DriveState, method: ControlMethod) -> None:
         self._state = state
         self._method = method
         #: When the start has to be over, s of the clock of the bus.
@@ -87,9 +114,9 @@ class StartSequence:
             raise DriveError(
                 Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
             )
-        await self._method.require_startable()
+        await carry_out(state, self._method.require_startable(), Priority.SERVICE)
         # the keypad may have changed it since the drive was connected
-        await read_scales(state)
+        await state.nameplate.read_scales()
         scales = state.nameplate.scales
         if key := scales.impossible:
             raise DriveError(Cause.SCALE_IMPOSSIBLE, key=key, value=scales.found[key])
@@ -123,11 +150,12 @@ class StartSequence:
         await self.take_control(control_mode)
         await self._await_status(lambda now: now.from_bus)
         if self._state.settings.follows_setpoints:
-            await self._method.zero_setpoint(control_mode, Priority.SERVICE)
+            await self._zero_setpoint(control_mode)
         begun = self._state.bus.now()
         await prepare()
         self._deadline += self._state.bus.now() - begun
-        await self._method.run(self._await_start)
+        run = self._method.run()
+        await carry_out(self._state, run, Priority.SERVICE, self._await_start)
         run_at = self._state.bus.now()
         # behind a PLC a status from before the run command is shown for a while
         await self._await_start(lambda now: now.may_run and now.at > run_at)
@@ -168,5 +196,10 @@ class StartSequence:
         self._deadline = self._state.bus.now() + _START_TIMEOUT
         if not self._state.nameplate.is_older:
             with contextlib.suppress(DriveError, Refused):
-                await self._method.zero_setpoint(control_mode, Priority.SERVICE)
-        await self._method.take_control(self._await_status)
+                await self._zero_setpoint(control_mode)
+        steps = self._method.take_control()
+        await carry_out(self._state, steps, Priority.SERVICE, self._await_status)
+
+    async def _zero_setpoint(self, control_mode: str) -> None:
+        steps = self._method.zero_setpoint(control_mode)
+        await carry_out(self._state, steps, Priority.SERVICE)

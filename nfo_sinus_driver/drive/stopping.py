@@ -11,13 +11,13 @@ import enum
 import math
 
 from nfo_sinus_driver.bus import Priority, Task
-from nfo_sinus_driver.catalog import InverterStatus, Removal, State
+from nfo_sinus_driver.catalog import ControlMethod, InverterStatus, Removal, State
 from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.drive.commands import ProfileRunner
 from nfo_sinus_driver.drive.control_state import ControlEvent, ControlTable
 from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.drive.steps import carry_out
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
 
 #: How often a stop that was answered and is not confirmed is written again, s.
@@ -77,7 +77,7 @@ class StopSequence:
     def __init__(
         self,
         state: DriveState,
-        method: ProfileRunner,
+        method: ControlMethod,
         control: ControlTable,
         look: Callable[[], Awaitable[None]],
     ) -> None:
@@ -324,7 +324,7 @@ class StopSequence:
         if not self._state.connected:
             await self._find()
         try:
-            await self._method.stop(control_mode)
+            await carry_out(self._state, self._method.stop(control_mode), Priority.STOP)
             self._sent_at = min(self._sent_at, self._bus.now())
             self._refusals = self._unanswered = self._ignored = 0
         except Refused as error:
@@ -349,7 +349,9 @@ class StopSequence:
         if failure is None:
             status = await self._newer(status, reasons, self._sent_at)
         if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
-            removed = await self._method.remove(control_mode) is Removal.COMMAND
+            # ahead of all else, too: the fault may end by itself, and the motor run on
+            steps = self._method.remove(control_mode)
+            removed = await carry_out(self._state, steps, Priority.STOP) is Removal.COMMAND
             removed_at = self._bus.now()
             # some faults end as control is released
             status = await self._state.read_status(Priority.LOOK, retry=False)
@@ -409,7 +411,8 @@ class StopSequence:
 
     async def _force(self, control_mode: str, reasons: int, why: Report) -> Report | None:
         """Stop by every means left [C126]; return why that is not confirmed."""
-        obeyed = await self._method.force_stop(control_mode)
+        steps = self._method.force_stop(control_mode)
+        obeyed = await carry_out(self._state, steps, Priority.STOP, onward=True)
         sent_at = self._bus.now()
         status = await self._state.read_status(Priority.LOOK, retry=False)
         if not obeyed:
@@ -480,7 +483,7 @@ class StopSequence:
     async def _has_run_command(self, status: InverterStatus) -> bool:
         """Return whether a drive that shows a run has a run command, as far as that shows yet."""
         if self._method.reads_run_command:
-            return await self._method.has_run_command()
+            return await carry_out(self._state, self._method.has_run_command(), Priority.LOOK)
         # on its ramp it shows a run, too
         braking = await self._state.read_stop_braking()
         self.shown_for = _SHOWN_FOR + braking

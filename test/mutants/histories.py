@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from mutant import (
     ANY_ORDER,
-    COMMANDS,
     CONTROL_TAKEN,
     CONTROLLER,
     DRIVE,
@@ -67,7 +66,7 @@ HISTORIES = (
         2,
         'in any order: a driver that begins lets run what runs',
         CONTROLLER,
-        '        if await self.method.in_control(Priority.SERVICE):\n            turns',
+        '        if await self.in_control(Priority.SERVICE):\n            turns',
         '        self._control.since = float("inf")\n        if False:\n            turns',
         G2_CONTROL,
         # a poll would find it, too
@@ -126,11 +125,9 @@ HISTORIES = (
     Mutant(
         3,
         'in any order: a stop that a fault has refused waits for measured values',
-        COMMANDS,
-        'self._method.remove(control_mode)\n'
-        '        return await carry_out(steps, self._params, Priority.STOP)',
-        'self._method.remove(control_mode)\n'
-        '        return await carry_out(steps, self._params, Priority.SERVICE)',
+        SEQUENCE,
+        'carry_out(self._state, steps, Priority.STOP) is Removal.COMMAND',
+        'carry_out(self._state, steps, Priority.SERVICE) is Removal.COMMAND',
         ('test/unit/drive/test_any_order_found.py',),
     ),
     Mutant(
@@ -297,9 +294,9 @@ HISTORIES = (
     Mutant(
         2,
         'a tuning that waits for the line is sent after a stop',
-        COMMANDS,
-        'await self._params.write(write, Priority.STOP, require_wanted)',
-        'await self._params.write(write, Priority.STOP)',
+        'nfo_sinus_driver/drive/procedure.py',
+        '.params.write(write, Priority.STOP, access.require_wanted)',
+        '.params.write(write, Priority.STOP)',
         TUNING_BEGINS,
     ),
     Mutant(

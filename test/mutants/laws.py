@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from mutant import (
     ADVICE,
-    COMMANDS,
     CONTROLLER,
     DRIVE,
     ECHO,
@@ -163,7 +162,7 @@ LAWS = (
         2,
         'a restarted driver lets run what runs',
         CONTROLLER,
-        '        if await self.method.in_control(Priority.SERVICE):\n            turns',
+        '        if await self.in_control(Priority.SERVICE):\n            turns',
         '        self._control.since = float("inf")\n        if False:\n            turns',
         (NO_RESTART, '-k', 'restarted_driver'),
         # a poll would find it, too
@@ -350,9 +349,9 @@ LAWS = (
     Mutant(
         3,
         'a stop waits behind everything else',
-        COMMANDS,
-        'carry_out(self._method.stop(control_mode), self._params, Priority.STOP)',
-        'carry_out(self._method.stop(control_mode), self._params, Priority.REFRESH)',
+        SEQUENCE,
+        'self._method.stop(control_mode), Priority.STOP)',
+        'self._method.stop(control_mode), Priority.REFRESH)',
         ('test/unit/drive/test_drive_commands.py', '-k', 'ahead_of_all'),
     ),
     Mutant(
@@ -722,7 +721,7 @@ LAWS = (
         9,
         'a clean exit leaves the time-out of the drive to strike',
         CONTROLLER,
-        '\n        await self.method.release()\n',
+        '\n        await self.give_back()\n',
         '\n',
         (WAYS_OUT, '-k', 'leaves_no_fault'),
     ),
@@ -738,7 +737,7 @@ LAWS = (
         9,
         'a time-out goes on where control is kept',
         WATCHDOG,
-        'return self._controller is not None and bool(self._controller.method.control_retained)',
+        'return self._controller is not None and bool(self._controller.control_retained)',
         'return False',
         ('test/unit/drive/test_movitrac_commands.py', '-k', 'clean_end'),
     ),
@@ -924,7 +923,7 @@ LAWS = (
         2,
         'a run command of an earlier session waits for the control of the line',
         CONTROLLER,
-        '            await self.method.remove_leftover()\n',
+        '            await carry_out(self._state, self.method.remove_leftover(), Priority.STOP)\n',
         '',
         (LEFTOVER, '-k', 'delta_vfd_el or movitrac'),
     ),

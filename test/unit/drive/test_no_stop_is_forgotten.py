@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from support.rig import Rig
 
+from nfo_sinus_driver.catalog.profile import Steps
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.events import Cause, Report
 
@@ -59,11 +60,11 @@ def test_an_attempt_that_fails_at_once_confirms_nothing() -> None:
         controller = rig.drive._controller
         stop, left = controller.method.stop, [7]
 
-        async def fail(control_mode: str) -> None:
+        def fail(control_mode: str) -> Steps[None]:
             if left[0]:
                 left[0] -= 1
                 raise ValueError('a mistake')
-            await stop(control_mode)
+            yield from stop(control_mode)
 
         controller.method.stop = fail  # type: ignore[method-assign]
         answer = rig.drive.stop()
@@ -83,7 +84,7 @@ def test_a_mistake_in_a_quick_stop_ends_in_a_stop() -> None:
         rig.turn()
         controller = rig.drive._controller
 
-        async def fail(control_mode: str) -> None:
+        def fail(control_mode: str) -> Steps[None]:
             raise ValueError('a mistake')
 
         controller.method.quick_stop = fail  # type: ignore[method-assign]

@@ -20,8 +20,8 @@ from nfo_sinus_driver.catalog.profile import (
     Until,
     Write,
 )
-from nfo_sinus_driver.drive.commands import carry_out
-from nfo_sinus_driver.drive.parameter_access import ParameterAccess
+from nfo_sinus_driver.drive.drive_state import DriveState
+from nfo_sinus_driver.drive.steps import carry_out
 
 
 class Noted:
@@ -67,7 +67,8 @@ def test_each_step_brings_what_the_next_one_is_given() -> None:
         return int(first + flags)
 
     noted = Noted(3, None, 4, None, None)
-    done = carry_out(steps(), cast(ParameterAccess, noted), Priority.STOP, noted.reached)
+    state = cast(DriveState, SimpleNamespace(params=noted, wait_until=noted.reached))
+    done = carry_out(state, steps(), Priority.STOP)
     assert asyncio.run(done) == 7
     assert noted.asked == [
         ('read', 'a', Priority.STOP, False),
