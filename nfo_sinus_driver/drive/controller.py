@@ -62,9 +62,6 @@ class Controller:
         #: What is written for each command, for a procedure too.
         self.method = method = chosen(state.settings.reference, state.params.reaches)
         self._setpoint = setpoint
-        #: Called on the bus after a stop was begun, with the reason.
-        self._on_stop: Callable[[Report], None] = lambda _: None
-        self._show_stop: Callable[[], None] = lambda: None
         self._control = ControlTable(self._bus.now, self._changed, self._notify_stop)
         #: Since when nothing can start the motor any more, for the driver ends, s.
         self._closed_at = math.inf
@@ -172,18 +169,9 @@ class Controller:
         if self.state is ControlState.IDLE and not self._state.connected:
             self._control.dispatch(ControlEvent.LOST)
 
-    def on_stop(self, call: Callable[[Report], None]) -> None:
-        """Call a function on the bus whenever the motor is stopped, with the reason."""
-        self._on_stop = call
-
-    def show_stop_by(self, show: Callable[[], None]) -> None:
-        """Have a stop of the motor shown while it keeps polls from their turns."""
-        self._show_stop = show
-
     def _notify_stop(self, why: Report) -> None:
         # after the stop of this motor is on its way
-        self._bus.call(lambda: self._on_stop(why))
-        self._bus.call(self._show_stop)
+        self._bus.call(lambda: self._state.hooks.motor_stopped(why))
 
     def stop_because(self, why: Report) -> None:
         """Stop the motor, if this driver may run it, for a reason that its status does not show."""

@@ -96,21 +96,13 @@ class Drive:
         self._unit = settings.address
         self.state = DriveState(bus, settings, listener)
         self.model, self.params = self.state.model, self.state.params
-        self.setpoint = Setpoint(
-            self.state,
-            lambda reason: self._controller.refused(reason) if self._controller else None,
-            lambda reply: self._poller.take_status(reply),
-        )
+        self.setpoint = Setpoint(self.state)
         self._controller: Controller | None = None
         self._recogniser = Recogniser(self.state)
         if settings.method != 'monitor':
             self._controller = Controller(self.state, self.setpoint, self._recogniser.look)
         self._poller = Poller(
-            self.state,
-            self.setpoint,
-            self._controller,
-            lambda: self._connect(retry=False),
-            lambda: self._recogniser.recognise(retry=False),
+            self.state, self.setpoint, self._controller, self._recogniser, self._connect
         )
         self._procedures = procedures = Procedures(self.state, self._controller)
         self.parameters = Parameters(
@@ -125,6 +117,17 @@ class Drive:
         self._tuning = Tuning(
             self.state, self.parameters, procedures, self._watchdog.ensure_set
         )
+        #: Stops the drives that stop with this one.
+        self._on_stop: Callable[[Report], None] = lambda why: None
+        # what follows in one part of it from what happens in another
+        hooks = self.state.hooks
+        hooks.status_arrived = self._poller.take_status
+        hooks.request_missed = self._poller.poll_soon
+        hooks.fault_came = self._error_log_monitor.expect
+        hooks.motor_stopped = self._motor_stopped
+        if self._controller is not None:
+            hooks.setpoint_refused = self._controller.refused
+        self.params.recognise_by(self._recogniser.require)
         bus.on_restart(self._unit, self._poller.restarted)
         bus.require_sign_of_life(self._unit, settings.lost_after)
         #: The tasks that run while it is connected, and while it is active.
@@ -231,15 +234,7 @@ class Drive:
 
     def on_stop(self, call: Callable[[Report], None]) -> None:
         """Call a function on the bus whenever the motor is stopped, with the reason."""
-
-        def safely(why: Report) -> None:
-            try:
-                call(why)
-            except Exception:
-                _log.exception('other drives were not stopped: %s', why)
-
-        if self._controller is not None:
-            self._controller.on_stop(safely)
+        self._on_stop = call
 
     def stop_beside(self, why: Report) -> None:
         """Stop the motor, if this driver may run it, because another one stops; on the bus."""
@@ -474,7 +469,14 @@ class Drive:
         if self._controller is not None and self._controller.closed:
             raise DriveError(Cause.ENDING)
 
-    async def _connect(self, retry: bool) -> None:
+    def _motor_stopped(self, why: Report) -> None:
+        try:
+            self._on_stop(why)
+        except Exception:
+            _log.exception('other drives were not stopped: %s', why)
+        self._poller.show_stop()
+
+    async def _connect(self, retry: bool = False) -> None:
         state = self.state
         self.params.connected()
         takes_control = state.held_by_line

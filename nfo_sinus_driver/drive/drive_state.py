@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import logging
 import math
 from typing import NamedTuple
@@ -84,12 +84,36 @@ def _speed_source(model: Family) -> SpeedSource:
     return SpeedSource(Role.ACTUAL_FREQUENCY, 'Hz', 'Freque', 1.0)
 
 
+def _nothing(*_: object) -> None:
+    """Do nothing: no other part of the drive is concerned."""
+
+
+@dataclass
+class Hooks:
+    """
+    What follows in other parts of a drive; the list of them is in :class:`~.drive.Drive`.
+
+    :ivar status_arrived: a status word came with the answer to a set-point.
+    :ivar request_missed: a request other than that of a poll was not answered.
+    :ivar fault_came: a fault that was not active before.
+    :ivar setpoint_refused: the drive takes no set-points any more, for this reason.
+    :ivar motor_stopped: a stop of the motor was begun, for this reason.
+    """
+
+    status_arrived: Callable[[Reply], None] = _nothing
+    request_missed: Callable[[], None] = _nothing
+    fault_came: Callable[[], None] = _nothing
+    setpoint_refused: Callable[[Report], None] = _nothing
+    motor_stopped: Callable[[Report], None] = _nothing
+
+
 class DriveState:
     """What the driver knows of one drive; used on the bus alone, readable from anywhere."""
 
     def __init__(self, bus: Bus, settings: DriveSettings, listener: Listener) -> None:
         self.bus = bus
         self.settings = settings
+        self.hooks = Hooks()
         #: What the catalog knows of its family.
         self.model = load_family(
             settings.model,
@@ -120,8 +144,6 @@ class DriveState:
         self.connected = False
         #: The last poll was answered; while it was not, no other request should wait for it.
         self.responsive = False
-        #: Called when any request to it failed.
-        self._on_missed: Callable[[], None] = lambda: None
         #: It did not answer a request just before the last status.
         self.missed_reply = False
         #: How many requests had got no answer when the status was last read.
@@ -133,8 +155,6 @@ class DriveState:
         self._intervals: deque[float] = deque((0.0,), maxlen=4)
         #: The longest time without a valid frame before the newest one, s.
         self._alone = 0.0
-        #: Called when a fault comes that was not active before.
-        self._on_fault: Callable[[], None] = lambda: None
         #: The status that first showed the active fault, and whether that had just come.
         self.fault: InverterStatus | None = None
         self.fault_is_fresh = False
@@ -442,12 +462,12 @@ class DriveState:
         elif self.fault is None or self.fault.code != status.code:
             self.fault = status
             self.fault_is_fresh = before is not None and status.at - before.at < _SOON
-            self._on_fault()
+            self.hooks.fault_came()
 
     def missed(self) -> None:
         """Note that a request failed; until it is known why, none should wait for it."""
         self.unanswered()
-        self._on_missed()
+        self.hooks.request_missed()
 
     def answered(self) -> None:
         """Note that a poll was answered."""
@@ -476,14 +496,6 @@ class DriveState:
         """Note whether it did not answer a request just before the status read now."""
         self.missed_reply = self.missed_since_status
         self._unanswered = self.params.unanswered
-
-    def on_missed(self, call: Callable[[], None]) -> None:
-        """Call a function when any request to it failed."""
-        self._on_missed = call
-
-    def on_fault(self, call: Callable[[], None] | None) -> None:
-        """Call a function when a fault comes that was not active before; ``None``: call none."""
-        self._on_fault = call or (lambda: None)
 
     def use(self, settings: DriveSettings) -> None:
         """

@@ -288,16 +288,15 @@ class ErrorLogMonitor:
             return
         self._known = None
         self._looked_at = self._reported_at = -math.inf
-        self._state.on_fault(self._expect)
-        self._expect()
+        self.expect()
         self._task = self._bus.spawn(self._watch_repeatedly())
 
     def end(self) -> None:
         """Stop watching."""
-        self._state.on_fault(None)
         self._bus.cancel(self._task)
 
-    def _expect(self) -> None:
+    def expect(self) -> None:
+        """Look for the entry of the active fault."""
         self._fault, self._tries = self._state.fault, _TRIES
         self._bus.wake(self._task)
 

@@ -5,12 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable
 import contextlib
 import functools
 import logging
 import math
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from nfo_sinus_driver.bus import Priority, Task
 from nfo_sinus_driver.catalog import InverterStatus, Role
@@ -19,6 +19,7 @@ from nfo_sinus_driver.drive.diagnosis import Conditions, explain_failure, explai
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.parameter_writer import ParameterChange
+from nfo_sinus_driver.drive.recognising import Recogniser
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.drive.snapshot import NAN, NOT_MEASURED, Measured, Snapshot
@@ -124,7 +125,6 @@ class Poller:
 
     :param controller: how it is commanded; ``None`` if this driver only reads.
     :param connect: connects to the drive again after it was lost.
-    :param recognise: reads what tells whether it is still the same, while it is connected.
     """
 
     def __init__(
@@ -132,8 +132,8 @@ class Poller:
         state: DriveState,
         setpoint: Setpoint,
         controller: Controller | None,
-        connect: Callable[[], Coroutine[Any, Any, None]],
-        recognise: Callable[[], Coroutine[Any, Any, object]],
+        recogniser: Recogniser,
+        connect: Callable[[], Awaitable[None]],
     ) -> None:
         self._bus = state.bus
         self._unit = state.settings.address
@@ -141,8 +141,8 @@ class Poller:
         self._params = state.params
         self._setpoint = setpoint
         self._controller = controller
+        self._recogniser = recogniser
         self._connect = connect
-        self._recognise = recognise
         self._task: Task | None = None
         self._keep_alive_task: Task | None = None
         self._show_task: Task | None = None
@@ -166,9 +166,6 @@ class Poller:
         self._received: Reply | None = None
         self._reported_fault = 0
         self._conditions = Conditions(state)
-        state.on_missed(self._poll_soon)
-        if controller is not None:
-            controller.show_stop_by(self._show_stop)
 
     @property
     def begun(self) -> bool:
@@ -245,7 +242,7 @@ class Poller:
         if self._task is not None:
             self._bus.wake(self._task)
 
-    def _poll_soon(self) -> None:
+    def poll_soon(self) -> None:
         """Find out at once whether a drive responds that did not answer another request."""
         if not self._state.connected:
             return
@@ -282,7 +279,7 @@ class Poller:
                     await self._read_status()
                 if not self._params.recognition.holds:
                     # it was silent for long, or this driver stood still: is it still the same?
-                    await self._recognise()
+                    await self._recogniser.recognise(retry=False)
                 self._failures.end(_POLL)
             except (LinkError, DriveError) as error:
                 self._on_poll_failed(error)
@@ -644,7 +641,8 @@ class Poller:
             # an error of the listener must not end the polling
             _log.exception('the loss of the drive could not be reported')
 
-    def _show_stop(self) -> None:
+    def show_stop(self) -> None:
+        """Have what is known published until the motor is stopped."""
         self._bus.cancel(self._show_task)
         self._show_task = self._bus.spawn(self._show_while_stopping())
 

@@ -28,7 +28,6 @@ class Recogniser:
         self._state = state
         self._params = state.params
         self._profile = state.model.profile
-        self._params.recognise_by(self.require)
 
     async def recognise(self, *, retry: bool = True) -> bool:
         """

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 import enum
 import functools
@@ -23,7 +23,6 @@ from nfo_sinus_driver.link import (
     LinkError,
     NoAnswer,
     Refused,
-    Reply,
     Write,
     WriteAndRead,
     Written,
@@ -70,28 +69,18 @@ class _Combining(enum.Enum):
 
 
 class Setpoint:
-    """
-    The set-point that the motor follows while the drive is enabled.
+    """The set-point that the motor follows while the drive is enabled."""
 
-    :param refused: called when the drive refuses a set-point, with the reason.
-    :param on_status: called with the status word that came with a set-point.
-    """
-
-    def __init__(
-        self,
-        state: DriveState,
-        refused: Callable[[Report], None],
-        on_status: Callable[[Reply], None],
-    ) -> None:
+    def __init__(self, state: DriveState) -> None:
         self._bus = state.bus
         self._params = state.params
         self._state = state
-        self._refused = refused
+        self._hooks = state.hooks
         self._slot = LatestValue(
             state.settings.address,
             self._make,
             self._done,
-            on_status,
+            lambda reply: self._hooks.status_arrived(reply),
             # a motor is to stand still, whether the drive answers or not
             urgent=lambda: self._request.value == 0,
         )
@@ -364,10 +353,11 @@ class Setpoint:
             self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
             asked = self._decoded({**self._in_drive, written.address: written.data})
-            self._refused(Report(Cause.SETPOINT_REFUSED, value=asked, error=str(error)))
+            why = Report(Cause.SETPOINT_REFUSED, value=asked, error=str(error))
+            self._hooks.setpoint_refused(why)
         elif isinstance(error, Interrupted):
             # no status is needed: the PLC has stopped the drive, and does not let it go on
-            self._refused(Report(Cause.LINE_FAILED, error=str(error)))
+            self._hooks.setpoint_refused(Report(Cause.LINE_FAILED, error=str(error)))
         else:
             self._missed(error, written.address)
 
@@ -450,7 +440,7 @@ class Setpoint:
                     await self._expire(timeout)
         except Exception as error:
             # a set-point without a time-out must not be followed
-            self._refused(Report(Cause.DRIVER_ERROR, error=repr(error)))
+            self._hooks.setpoint_refused(Report(Cause.DRIVER_ERROR, error=repr(error)))
 
     async def _expire(self, timeout: float) -> None:
         assert self._target is not None
@@ -473,7 +463,7 @@ class Setpoint:
                 except (LinkError, DriveError) as error:
                     if isinstance(error, Refused) and not self._may_be_busy(error):
                         why = Report(Cause.SETPOINT_REFUSED, value=0.0, error=str(error))
-                        self._refused(why)
+                        self._hooks.setpoint_refused(why)
                         return
                     # the poll finds out whether the drive is lost; until then this is tried again
                     await self._bus.sleep(_WATCH_PERIOD)

@@ -988,7 +988,7 @@ LAWS = (
         3,
         'a drive goes on although the one that it stops with has stopped',
         CONTROLLER,
-        '        self._bus.call(lambda: self._on_stop(why))',
+        '        self._bus.call(lambda: self._state.hooks.motor_stopped(why))',
         '        pass',
         ('test/unit/drive/test_stop_with.py',),
     ),
