@@ -15,6 +15,7 @@ import enum
 import math
 
 from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.drive.stop_reason import StopReason, reason_of
 
 
@@ -79,6 +80,8 @@ TRANSITIONS = _read(_TABLE)
 
 #: Something that the driver has begun may drive the motor.
 COMMANDED = frozenset((ControlState.ENABLING, ControlState.ENABLED, ControlState.PROCEDURE))
+#: What leads there; refused whatever the state while the driver ends, or a procedure goes on.
+_BEGINNINGS = frozenset((ControlEvent.ENABLE, ControlEvent.BEGIN))
 
 
 class ControlTable:
@@ -91,6 +94,8 @@ class ControlTable:
     :ivar state: what the driver is doing with the drive.
     :ivar since: when the last event came, s: an earlier status says nothing of it.
     :ivar stopped_at: when a stop was confirmed last, s.
+    :ivar closed_at: since when the driver ends, and nothing begins any more, s.
+    :ivar access: of the procedure beside which nothing begins, also while it is ending.
     :ivar stopped_for: why the motor was stopped last; ``None`` before the first time.
     """
 
@@ -103,6 +108,8 @@ class ControlTable:
         self.state = ControlState.OFFLINE
         self.since = 0.0
         self.stopped_at = -math.inf
+        self.closed_at = math.inf
+        self.access: ExclusiveAccess | None = None
         self.stopped_for: Report | None = None
         self._now = now
         self._on_change = on_change
@@ -111,7 +118,8 @@ class ControlTable:
     def dispatch(self, event: ControlEvent, why: Report | None = None) -> None:
         """Go where an event leads; where that ends what may drive the motor, note why."""
         before = self.state
-        self.state = TRANSITIONS.get((before, event), before)
+        if not self._forbids(event):
+            self.state = TRANSITIONS.get((before, event), before)
         self.since = self._now()
         if event is ControlEvent.STOPPED:
             self.stopped_at = self.since
@@ -132,7 +140,15 @@ class ControlTable:
 
     def accepts(self, event: ControlEvent) -> bool:
         """Whether an event leads to another state."""
-        return (self.state, event) in TRANSITIONS
+        return (self.state, event) in TRANSITIONS and not self._forbids(event)
+
+    def _forbids(self, event: ControlEvent) -> bool:
+        return event in _BEGINNINGS and (self.closed or self.access is not None)
+
+    @property
+    def closed(self) -> bool:
+        """The driver ends: the motor is stopped, and nothing can start it any more."""
+        return self.closed_at < math.inf
 
     @property
     def commanded(self) -> bool:

@@ -63,11 +63,8 @@ class Controller:
         self.method = method = chosen(state.settings.reference, state.params.reaches)
         self._setpoint = setpoint
         self._control = ControlTable(self._bus.now, self._changed, self._notify_stop)
-        #: Since when nothing can start the motor any more, for the driver ends, s.
-        self._closed_at = math.inf
-        #: The task that enables, to be cancelled; the procedure that excludes others and an enable.
+        #: The task of the newest enable.
         self._enabling: Task | None = None
-        self._access: ExclusiveAccess | None = None
         self._starting = StartSequence(state, method)
         self._sequence = StopSequence(state, method, self._control, look)
         self._following = FollowingCheck(state, setpoint)
@@ -116,7 +113,7 @@ class Controller:
     @property
     def closed(self) -> bool:
         """The driver ends: the motor is stopped, and nothing can start it any more."""
-        return self._closed_at < math.inf
+        return self._control.closed
 
     @property
     def control_retained(self) -> str:
@@ -136,7 +133,7 @@ class Controller:
     @property
     def procedure(self) -> str:
         """The procedure that has exclusive access, also while it is ending; ``''``: none."""
-        return '' if self._access is None else self._access.what
+        return '' if self._control.access is None else self._control.access.what
 
     @property
     def stopped_for(self) -> Report | None:
@@ -162,10 +159,10 @@ class Controller:
         if before is ControlState.ENABLED:
             self._setpoint.stop_following()
         elif before is ControlState.ENABLING:
-            if not self.enabled and self._enabling not in (None, self._bus.current):
+            if not self.enabled and self._enabling is not self._bus.current:
                 self._bus.cancel(self._enabling)
-        elif before is ControlState.PROCEDURE and self._access is not None:
-            self._access.abort()
+        elif before is ControlState.PROCEDURE and self._control.access is not None:
+            self._control.access.abort()
         if self.state is ControlState.IDLE and not self._state.connected:
             self._control.dispatch(ControlEvent.LOST)
 
@@ -183,23 +180,22 @@ class Controller:
     def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
         """Give a procedure exclusive access; a stop ends it, during its preparations too."""
         self.require_idle(what)
-        self._access = access = ExclusiveAccess(what)
         self._control.dispatch(ControlEvent.BEGIN)
+        self._control.access = access = ExclusiveAccess(what)
         try:
             yield access
         finally:
-            self._access = None
+            self._control.access = None
             self._control.dispatch(ControlEvent.END)
 
     def require_idle(self, what: str) -> None:
         """Make sure that a procedure may begin."""
-        if self.closed:
-            raise DriveError(Cause.ENDING)
-        if self._access is not None:
-            other = self._access.what
-            raise DriveError(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=other)
         if self._control.accepts(ControlEvent.BEGIN):
             return
+        if self.closed:
+            raise DriveError(Cause.ENDING)
+        if self.procedure:
+            raise DriveError(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=self.procedure)
         if self.commanded:
             raise DriveError(Cause.MOTOR_ENABLED, what=what)
         if self.blocked_by_fault and self._state.status is not None:
@@ -221,12 +217,12 @@ class Controller:
 
         A stop that is not confirmed forbids it: the client may not know of it.
         """
-        if self.closed:
-            raise DriveError(Cause.NOT_ACTIVE)
-        if self._access is not None:
-            raise DriveError(Cause.PROCEDURE_GOES_ON, what=self._access.what)
         if self._control.accepts(ControlEvent.ENABLE):
             return
+        if self.closed:
+            raise DriveError(Cause.NOT_ACTIVE)
+        if self.procedure:
+            raise DriveError(Cause.PROCEDURE_GOES_ON, what=self.procedure)
         if self.state is ControlState.ENABLING:
             raise DriveError(Cause.ENABLING_ALREADY)
         if self.blocked_by_fault:
@@ -255,8 +251,6 @@ class Controller:
             await self._start(control_mode, limits, prepare)
         except Cancelled:
             raise DriveError(Cause.STOPPED_WHILE_ENABLING) from None
-        finally:
-            self._enabling = None
         if self._state.settings.follows_setpoints:
             return Report(Cause.ENABLED)
         reference = self._state.settings.reference
@@ -483,7 +477,7 @@ class Controller:
         may_run = self.commanded or self.stopping or (status is not None and status.from_bus)
         # at an end that has stopped it, one more would go ahead of the stops of other drives
         owed = self.stop_owed or self.stop_overdue
-        ended = self._control.stopped_at >= self._closed_at and not owed
+        ended = self._control.stopped_at >= self._control.closed_at and not owed
         if ended:
             # the last poll shows nothing of what has come since
             status = await self._state.read_status(Priority.SERVICE)
@@ -560,7 +554,7 @@ class Controller:
 
     def close(self, why: Report) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
-        self._closed_at = self._bus.now()
+        self._control.closed_at = self._bus.now()
         if self.stop_owed or (self.may_run and self._state.params.recognition.holds):
             self._sequence.start(why)
 

@@ -38,6 +38,7 @@ STOP_CONFIRMED = ('test/unit/drive/test_stop_is_confirmed.py',)
 RECOGNITION = 'test/unit/drive/test_recognition.py'
 LEFTOVER = 'test/unit/drive/test_leftover_run_command.py'
 CONTROL_TAKEN = ('test/unit/drive/test_control_is_taken.py',)
+GUARDS = ('test/unit/drive/test_control_table.py', '-k', 'nothing_begins')
 TUNING_BEGINS = (TUNING, '-k', 'any_moment')
 TERMINALS_KEEP = ('test/unit/drive/test_drive_commands.py', '-k', 'terminals_keep')
 NO_STOP_FORGOTTEN = ('test/unit/drive/test_no_stop_is_forgotten.py',)

@@ -24,7 +24,9 @@ from nfo_sinus_driver.drive.control_state import (
     TRANSITIONS,
     ControlEvent as Event,
     ControlState as State,
+    ControlTable,
 )
+from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 
 _Table = Mapping[tuple[State, Event], State]
 
@@ -320,6 +322,24 @@ def changes() -> Iterator[tuple[str, _Table]]:
             if other is not to:
                 changed = {**TRANSITIONS, (state, event): other}
                 yield f'{state.name} {event.name} -> {other.name}, not {to.name}', changed
+
+
+@pytest.mark.parametrize('guard', ['the driver ends', 'a procedure goes on'])
+def test_nothing_begins_while_that_is_so(guard: str) -> None:
+    for state in State:
+        for event in (Event.ENABLE, Event.BEGIN):
+            table = ControlTable(lambda: 1.0, lambda before: None, lambda why: None)
+            table.state = state
+            if guard == 'the driver ends':
+                table.closed_at = 0.0
+            else:
+                table.access = ExclusiveAccess('tuning')
+            assert not table.accepts(event)
+            table.dispatch(event)
+            assert table.state is state
+            # and it is stopped as ever
+            table.dispatch(Event.STOP)
+            assert table.stopping
 
 
 def test_no_law_is_broken_in_any_state() -> None:
