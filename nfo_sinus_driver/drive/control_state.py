@@ -89,8 +89,8 @@ class ControlTable:
     The state of control of one drive.
 
     :param now: the clock of the bus.
-    :param on_change: called with the state before, after each transition to another one.
-    :param on_stop: called with the reason when what may drive the motor is stopped.
+    :ivar on_change: called with the state before, after each transition to another one.
+    :ivar on_stop: called with the reason when what may drive the motor is stopped.
     :ivar state: what the driver is doing with the drive.
     :ivar since: when the last event came, s: an earlier status says nothing of it.
     :ivar stopped_at: when a stop was confirmed last, s.
@@ -99,12 +99,9 @@ class ControlTable:
     :ivar stopped_for: why the motor was stopped last; ``None`` before the first time.
     """
 
-    def __init__(
-        self,
-        now: Callable[[], float],
-        on_change: Callable[[ControlState], None],
-        on_stop: Callable[[Report], None],
-    ) -> None:
+    def __init__(self, now: Callable[[], float]) -> None:
+        self.on_change: Callable[[ControlState], None] = lambda before: None
+        self.on_stop: Callable[[Report], None] = lambda why: None
         self.state = ControlState.OFFLINE
         self.since = 0.0
         self.stopped_at = -math.inf
@@ -112,8 +109,6 @@ class ControlTable:
         self.access: ExclusiveAccess | None = None
         self.stopped_for: Report | None = None
         self._now = now
-        self._on_change = on_change
-        self._on_stop = on_stop
 
     def dispatch(self, event: ControlEvent, why: Report | None = None) -> None:
         """Go where an event leads; where that ends what may drive the motor, note why."""
@@ -125,7 +120,7 @@ class ControlTable:
             self.stopped_at = self.since
         if self.state is not before:
             self._note(before, why)
-            self._on_change(before)
+            self.on_change(before)
 
     def explain(self, why: Report) -> None:
         """Note a better reason for the stop in progress."""
@@ -136,7 +131,7 @@ class ControlTable:
         commanded = before in COMMANDED or reason_of(why) is StopReason.NOT_ENABLED
         if why is not None and commanded and self.state is ControlState.STOPPING:
             self.stopped_for = why
-            self._on_stop(why)
+            self.on_stop(why)
 
     def accepts(self, event: ControlEvent) -> bool:
         """Whether an event leads to another state."""
@@ -151,9 +146,24 @@ class ControlTable:
         return self.closed_at < math.inf
 
     @property
+    def procedure(self) -> str:
+        """The procedure that goes on, also while it is ending; ``''``: none."""
+        return '' if self.access is None else self.access.what
+
+    @property
+    def enabled(self) -> bool:
+        """The motor follows set-points, or the reference of the drive."""
+        return self.state is ControlState.ENABLED
+
+    @property
     def commanded(self) -> bool:
         """Something that the driver has begun may drive the motor."""
         return self.state in COMMANDED
+
+    @property
+    def stop_owed(self) -> bool:
+        """This driver may have run the motor, and has no confirmation that it stops."""
+        return self.commanded or self.stopping
 
     @property
     def stopping(self) -> bool:

@@ -17,7 +17,7 @@ import math
 
 from nfo_sinus_driver.bus import Cancelled, Priority, Task
 from nfo_sinus_driver.catalog import InverterStatus, Kind, Limits, Meaning, State
-from nfo_sinus_driver.drive.control_state import ControlEvent, ControlState, ControlTable
+from nfo_sinus_driver.drive.control_state import ControlEvent, ControlState
 from nfo_sinus_driver.drive.diagnosis import (
     explain_fall,
     explain_fault,
@@ -62,11 +62,12 @@ class Controller:
         #: What is written for each command, for a procedure too.
         self.method = method = chosen(state.settings.reference, state.params.reaches)
         self._setpoint = setpoint
-        self._control = ControlTable(self._bus.now, self._changed, self._notify_stop)
+        self._control = control = state.control
+        control.on_change, control.on_stop = self._changed, self._notify_stop
         #: The task of the newest enable.
         self._enabling: Task | None = None
         self._starting = StartSequence(state, method)
-        self._sequence = StopSequence(state, method, self._control, look)
+        self._sequence = StopSequence(state, method, look)
         self._following = FollowingCheck(state, setpoint)
         #: A set-point that the drive refused: when, and why.
         self._refusal: tuple[float, Report] | None = None
@@ -80,26 +81,6 @@ class Controller:
     # --- the state ----------------------------------------------------------------------------
 
     @property
-    def state(self) -> ControlState:
-        """What the driver is doing with the drive."""
-        return self._control.state
-
-    @property
-    def enabled(self) -> bool:
-        """The motor follows set-points, or the reference of the drive."""
-        return self.state is ControlState.ENABLED
-
-    @property
-    def stopping(self) -> bool:
-        """A stop is not confirmed yet."""
-        return self._control.stopping
-
-    @property
-    def blocked_by_fault(self) -> bool:
-        """A fault keeps the motor still, and the drive refuses the stop until it is over."""
-        return self._control.blocked
-
-    @property
     def stop_waits(self) -> bool:
         """A stop is written until it is confirmed, or it is not clear whether the motor stops."""
         return self._sequence.waits
@@ -107,13 +88,8 @@ class Controller:
     @property
     def stop_overdue(self) -> bool:
         """A stop was not confirmed in time, or not at all, and no fault keeps the motor still."""
-        unclear = self._sequence.unclear is not None and not self.commanded
+        unclear = self._sequence.unclear is not None and not self._control.commanded
         return unclear or self._sequence.overdue
-
-    @property
-    def closed(self) -> bool:
-        """The driver ends: the motor is stopped, and nothing can start it any more."""
-        return self._control.closed
 
     @property
     def control_retained(self) -> str:
@@ -121,36 +97,15 @@ class Controller:
         return self.method.control_retained or self._state.held_by_line
 
     @property
-    def commanded(self) -> bool:
-        """Something that the driver has begun may drive the motor."""
-        return self._control.commanded
-
-    @property
-    def stop_owed(self) -> bool:
-        """This driver may have run the motor, and has no confirmation that it stops."""
-        return self.commanded or self.stopping
-
-    @property
-    def procedure(self) -> str:
-        """The procedure that has exclusive access, also while it is ending; ``''``: none."""
-        return '' if self._control.access is None else self._control.access.what
-
-    @property
     def stopped_for(self) -> Report | None:
         """Why the motor was stopped last; ``None`` while it follows set-points that arrive."""
-        return self._setpoint.timed_out if self.enabled else self._control.stopped_for
-
-    @property
-    def changing(self) -> bool:
-        """The driver waits for the status to change."""
-        return self.stopping or (self.commanded and not self.enabled)
+        return self._setpoint.timed_out if self._control.enabled else self._control.stopped_for
 
     @property
     def may_run(self) -> bool:
         """The motor runs by the bus, or may do so, or at least the bus has control."""
         status = self._state.status
-        commanded = self.commanded or self.stopping
-        return commanded or status is None or status.from_bus or status.tuning
+        return self._control.stop_owed or status is None or status.from_bus or status.tuning
 
     # --- transitions --------------------------------------------------------------------------
 
@@ -159,11 +114,11 @@ class Controller:
         if before is ControlState.ENABLED:
             self._setpoint.stop_following()
         elif before is ControlState.ENABLING:
-            if not self.enabled and self._enabling is not self._bus.current:
+            if not self._control.enabled and self._enabling is not self._bus.current:
                 self._bus.cancel(self._enabling)
         elif before is ControlState.PROCEDURE and self._control.access is not None:
             self._control.access.abort()
-        if self.state is ControlState.IDLE and not self._state.connected:
+        if self._control.state is ControlState.IDLE and not self._state.connected:
             self._control.dispatch(ControlEvent.LOST)
 
     def _notify_stop(self, why: Report) -> None:
@@ -172,7 +127,7 @@ class Controller:
 
     def stop_because(self, why: Report) -> None:
         """Stop the motor, if this driver may run it, for a reason that its status does not show."""
-        if self.commanded:
+        if self._control.commanded:
             self._sequence.start(why)
             self._report_stop(why)
 
@@ -192,13 +147,13 @@ class Controller:
         """Make sure that a procedure may begin."""
         if self._control.accepts(ControlEvent.BEGIN):
             return
-        if self.closed:
+        if self._control.closed:
             raise DriveError(Cause.ENDING)
-        if self.procedure:
-            raise DriveError(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=self.procedure)
-        if self.commanded:
+        if other := self._control.procedure:
+            raise DriveError(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=other)
+        if self._control.commanded:
             raise DriveError(Cause.MOTOR_ENABLED, what=what)
-        if self.blocked_by_fault and self._state.status is not None:
+        if self._control.blocked and self._state.status is not None:
             require_no_fault(self._state, self._state.status)
         raise DriveError(Cause.STOP_NOT_CONFIRMED_YET, what=what)
 
@@ -219,13 +174,13 @@ class Controller:
         """
         if self._control.accepts(ControlEvent.ENABLE):
             return
-        if self.closed:
+        if self._control.closed:
             raise DriveError(Cause.NOT_ACTIVE)
-        if self.procedure:
-            raise DriveError(Cause.PROCEDURE_GOES_ON, what=self.procedure)
-        if self.state is ControlState.ENABLING:
+        if self._control.procedure:
+            raise DriveError(Cause.PROCEDURE_GOES_ON, what=self._control.procedure)
+        if self._control.state is ControlState.ENABLING:
             raise DriveError(Cause.ENABLING_ALREADY)
-        if self.blocked_by_fault:
+        if self._control.blocked:
             status = await self._state.read_status(Priority.SERVICE)
             self._explain_refusal(status)
             require_no_fault(self._state, status)
@@ -241,7 +196,7 @@ class Controller:
         :param requested_at: when the client requested it, s, monotonic.
         """
         self.require_newer(requested_at)
-        if self.enabled:
+        if self._control.enabled:
             return Report(Cause.ENABLED_ALREADY)
         await self._require_enable()
         self._enabling = self._bus.current
@@ -275,7 +230,7 @@ class Controller:
         try:
             await self._starting.start(control_mode, prepare)
             self._control.dispatch(ControlEvent.RUNNING)
-            if not self.enabled:
+            if not self._control.enabled:
                 raise Cancelled
             target = None
             if self._state.settings.follows_setpoints:
@@ -304,7 +259,7 @@ class Controller:
     async def _stopped(self) -> Report:
         """Return how a motor stops, or what else the drive shows, once its stop is confirmed."""
         status = self._state.status
-        if self.blocked_by_fault:
+        if self._control.blocked:
             return self._state.report(Cause.STOP_BLOCKED)
         if status is not None and status.faulted and not status.driven:
             return self._state.report(Cause.STOPPED_BY_FAULT)
@@ -474,9 +429,9 @@ class Controller:
         # a run command may be on its way, whatever has control now; and where the bus has it, one
         # may be active that an acknowledgement has not removed yet
         status = self._state.status
-        may_run = self.commanded or self.stopping or (status is not None and status.from_bus)
+        may_run = self._control.stop_owed or (status is not None and status.from_bus)
         # at an end that has stopped it, one more would go ahead of the stops of other drives
-        owed = self.stop_owed or self.stop_overdue
+        owed = self._control.stop_owed or self.stop_overdue
         ended = self._control.stopped_at >= self._control.closed_at and not owed
         if ended:
             # the last poll shows nothing of what has come since
@@ -493,7 +448,7 @@ class Controller:
             return await self._release(timeout, prepare, stopped or await stop())
 
     async def _release(self, timeout: float, prepare: Prepare, stopped: Report) -> Report:
-        if self.blocked_by_fault:
+        if self._control.blocked:
             raise DriveError(self._state.report(Cause.RELEASE_BLOCKED))
         stands = await self._await_standstill(timeout)
         await prepare()
@@ -546,7 +501,7 @@ class Controller:
 
         :param timeout: how long the motor may take to stand still, s.
         """
-        if not self.method.plc_time or self.blocked_by_fault:
+        if not self.method.plc_time or self._control.blocked:
             return
         with contextlib.suppress(DriveError, LinkError):
             await self._state.wait_until(lambda status: not status.driven, Priority.LOOK, timeout)
@@ -555,7 +510,7 @@ class Controller:
     def close(self, why: Report) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
         self._control.closed_at = self._bus.now()
-        if self.stop_owed or (self.may_run and self._state.params.recognition.holds):
+        if self._control.stop_owed or (self.may_run and self._state.params.recognition.holds):
             self._sequence.start(why)
 
     async def _require_recognised(self, patience: float = 0.0) -> None:
@@ -568,7 +523,7 @@ class Controller:
         :raises DriveError: nothing is written to it.
         """
         until = self._bus.now() + patience
-        while not self.stop_owed:
+        while not self._control.stop_owed:
             try:
                 await self._state.params.require_recognised()
                 return
@@ -590,7 +545,7 @@ class Controller:
         if await self.in_control(Priority.SERVICE):
             turns = status is not None and (status.runs_by_bus or abs(status.frequency) > 0)
             found = None
-            if turns and not self.stopping:
+            if turns and not self._control.stopping:
                 found = state.report(Cause.FOUND_RUNNING)
                 state.notify(Severity.WARNING, found)
             self._sequence.restart(found)
@@ -609,12 +564,12 @@ class Controller:
     def disconnected(self, why: Report) -> None:
         """Note that the drive is disconnected; stop the motor if it may still run."""
         self._control.dispatch(ControlEvent.LOST, why)
-        if self.stopping:
+        if self._control.stopping:
             self._sequence.start()
 
     def lost(self, why: Report) -> bool:
         """Note that the drive is lost; return whether this driver may have run its motor."""
-        self._lost_in_use = self.commanded or self._refusal is not None
+        self._lost_in_use = self._control.commanded or self._refusal is not None
         if self._refusal is not None:
             # no status will come to show a better reason
             (_, reason), self._refusal = self._refusal, None
@@ -627,30 +582,30 @@ class Controller:
 
     def silent(self, seconds: float) -> None:
         """Stop a motor whose drive has not answered for so long, s, that it may run anew."""
-        if self.enabled and self._state.may_have_restarted(seconds):
+        if self._control.enabled and self._state.may_have_restarted(seconds):
             self.stop_because(Report(Cause.MAY_HAVE_RESTARTED))
 
     def alarmed_by(self, status: InverterStatus) -> bool:
         """Return whether a status is a reason to stop."""
-        follows = self.enabled and status.at >= self._control.since
+        follows = self._control.enabled and status.at >= self._control.since
         return follows and self._why_stopped(status) is not None
 
     def on_status(self, status: InverterStatus) -> bool:
         """Check a status, and stop the motor if it says so; return whether that was reported."""
         self._setpoint.answered()
         before, self._checked = self._checked, status
-        if self.blocked_by_fault and not status.faulted:
+        if self._control.blocked and not status.faulted:
             self._sequence.restart()
         if self._explain_refusal(status):
             return True
         if status.at < self._control.since:
             return False
         reason = None
-        if self.enabled:
+        if self._control.enabled:
             reason = self._why_stopped(status) or self._why_slower(status, before)
             if reason is None and self._state.settings.follows_setpoints:
                 reason = self._following.check()
-        elif not (self.commanded or self.stopping):
+        elif not self._control.stop_owed:
             reason = self._why_stopped_again(status)
         if reason is not None:
             self._sequence.start(reason)

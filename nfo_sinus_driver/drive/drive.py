@@ -174,7 +174,7 @@ class Drive:
     @property
     def stop_unconfirmed(self) -> bool:
         """A stop was requested that the drive has not confirmed yet."""
-        return self._controller is not None and self._controller.stopping
+        return self.state.control.stopping
 
     @property
     def recognised(self) -> bool:
@@ -184,7 +184,7 @@ class Drive:
     @property
     def stop_owed(self) -> bool:
         """This driver may have run the motor, and has no confirmation that it stops."""
-        return self._controller is not None and self._controller.stop_owed
+        return self.state.control.stop_owed
 
     @property
     def stop_waits(self) -> bool:
@@ -194,7 +194,7 @@ class Drive:
     @property
     def blocked_by_fault(self) -> bool:
         """A fault keeps the motor still, and the drive refuses a stop until it is over."""
-        return self._controller is not None and self._controller.blocked_by_fault
+        return self.state.control.blocked
 
     @property
     def stop_overdue(self) -> bool:
@@ -466,7 +466,7 @@ class Drive:
 
     def _require_open(self) -> None:
         # a procedure would take control and could not give it back
-        if self._controller is not None and self._controller.closed:
+        if self.state.control.closed:
             raise DriveError(Cause.ENDING)
 
     def _motor_stopped(self, why: Report) -> None:
@@ -538,7 +538,7 @@ class Drive:
         """Stop a motor whose set-points would mean another speed from now on."""
         controller = self._controller
         is_used = self.state.nameplate.scales.found.get(change.key) == change.new
-        if controller is not None and controller.enabled and not is_used:
+        if controller is not None and self.state.control.enabled and not is_used:
             controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
 
     def _set_active(self, active: bool) -> None:

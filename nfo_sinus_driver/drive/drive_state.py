@@ -26,6 +26,7 @@ from nfo_sinus_driver.catalog import (
 )
 from nfo_sinus_driver.catalog.inverter_status import NO_CODE
 from nfo_sinus_driver.drive.communication_timeout import CommunicationTimeout
+from nfo_sinus_driver.drive.control_state import ControlTable
 from nfo_sinus_driver.drive.direction import Direction
 from nfo_sinus_driver.drive.events import Cause, DriveError, Event, Report, Severity
 from nfo_sinus_driver.drive.identity import Nameplate
@@ -114,6 +115,8 @@ class DriveState:
         self.bus = bus
         self.settings = settings
         self.hooks = Hooks()
+        #: What the driver is doing with it; nothing, where it only reads.
+        self.control = ControlTable(bus.now)
         #: What the catalog knows of its family.
         self.model = load_family(
             settings.model,

@@ -329,10 +329,9 @@ class Poller:
         pause = polled_at + self._period - self._bus.now()
         # however low the poll rate, a motor that runs is watched, and so is one whose run
         # command may still be active, for it would start when its fault ends
-        controller = self._controller
         if self._may_restart:
             return min(pause, _RESTART_WATCH_PERIOD)
-        watched = controller is not None and (controller.stopping or self._setpoint.following)
+        watched = state.control.stopping or self._setpoint.following
         return min(pause, _WATCH_PERIOD) if watched else pause
 
     @property
@@ -371,9 +370,8 @@ class Poller:
     @property
     def _is_idle(self) -> bool:
         """The motor is at standstill, and nothing was begun that may change that."""
-        controller, status = self._controller, self._state.status
-        commanded = controller is not None and (controller.commanded or controller.stopping)
-        if commanded or status is None or status.driven:
+        status = self._state.status
+        if self._state.control.stop_owed or status is None or status.driven:
             return False
         # a motor that coasts is not driven; what is not measured is NaN, and no greater than 0
         return not any(abs(value) > 0 for value in (self._state.frequency, self._state.speed))
@@ -408,8 +406,9 @@ class Poller:
     @property
     def _code_holds(self) -> float:
         """How long an inverter status counts while the status word stays the same, s."""
-        controller = self._controller
-        if controller is not None and controller.changing:
+        control = self._state.control
+        if control.stop_owed and not control.enabled:
+            # the driver waits for the status to change
             return 0.0
         if self._state.missed_since_status:
             # it may have been switched off and on
@@ -501,7 +500,7 @@ class Poller:
                 return False
             controller = self._controller
             # a start that is under way reads them itself
-            if before not in (None, now) and controller is not None and controller.enabled:
+            if before not in (None, now) and controller is not None and state.control.enabled:
                 change = ParameterChange(key, before, now, state.model[key].unit)
                 controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
         return True
@@ -648,11 +647,11 @@ class Poller:
 
     async def _show_while_stopping(self) -> None:
         """Publish what is known while the stop of a drive that answers in part delays its polls."""
-        assert self._controller is not None
-        while self._controller.stopping:
+        control = self._state.control
+        while control.stopping:
             before = self.snapshot, self._bus.paused
             await self._bus.sleep(_SHOW_PERIOD)
-            waits = before == (self.snapshot, self._bus.paused) and self._controller.stopping
+            waits = before == (self.snapshot, self._bus.paused) and control.stopping
             # one that was lost has shown nothing since that could be shown again
             known = self._state.connected and self.snapshot.connected
             if waits and known and self._task is not None:

@@ -52,7 +52,7 @@ class Procedures:
     def enabled(self) -> bool:
         """The motor is enabled, or about to be; not by the control that a write has taken."""
         states = ControlState.ENABLING, ControlState.ENABLED
-        return self._controller is not None and self._controller.state in states
+        return self._state.control.state in states
 
     def require(self, procedure: Procedure | Reset) -> None:
         """Make sure that a procedure may begin."""
@@ -101,11 +101,9 @@ class Procedures:
 
     async def abort(self) -> Report | None:
         """End the procedure that has exclusive access; stop nothing else."""
-        controller = self._controller
-        if controller is None or not controller.procedure:
+        if not (what := self._state.control.procedure):
             return None
-        what = controller.procedure
-        return await controller.stop(Report(Cause.PROCEDURE_CANCELLED, what=what))
+        return await self.controller.stop(Report(Cause.PROCEDURE_CANCELLED, what=what))
 
     async def command(self, access: ExclusiveAccess, procedure: Procedure | Reset) -> None:
         """
@@ -147,5 +145,5 @@ class Procedures:
         """Remove the command, and release control where it was free; not while faulted."""
         controller = self.controller
         await controller.withdraw_run_command(ended)
-        if found is Holder.NOBODY and not controller.blocked_by_fault:
+        if found is Holder.NOBODY and not self._state.control.blocked:
             await controller.give_back()

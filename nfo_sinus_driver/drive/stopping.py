@@ -13,7 +13,7 @@ import math
 from nfo_sinus_driver.bus import Priority, Task
 from nfo_sinus_driver.catalog import ControlMethod, InverterStatus, Removal, State
 from nfo_sinus_driver.drive import drive_state
-from nfo_sinus_driver.drive.control_state import ControlEvent, ControlTable
+from nfo_sinus_driver.drive.control_state import ControlEvent
 from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
@@ -78,13 +78,12 @@ class StopSequence:
         self,
         state: DriveState,
         method: ControlMethod,
-        control: ControlTable,
         look: Callable[[], Awaitable[None]],
     ) -> None:
         self._bus = state.bus
         self._state = state
         self._method = method
-        self._control = control
+        self._control = state.control
         self._look = look
         #: The task that removes the run command, until that is confirmed.
         self._task: Task | None = None

@@ -351,7 +351,7 @@ HISTORIES = (
         3,
         'a drive that is left alone while it runs is not stopped',
         CONTROLLER,
-        '        if self.stopping:\n            self._sequence.start()\n',
+        '        if self._control.stopping:\n            self._sequence.start()\n',
         '',
         NO_STOP_FORGOTTEN,
     ),

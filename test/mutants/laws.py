@@ -147,7 +147,7 @@ LAWS = (
         2,
         'the motor is enabled while it is being tuned',
         CONTROLLER,
-        '            raise DriveError(Cause.PROCEDURE_GOES_ON, what=self.procedure)\n',
+        '            raise DriveError(Cause.PROCEDURE_GOES_ON, what=self._control.procedure)\n',
         '            self._control.state, self._control.access = ControlState.IDLE, None\n'
         '            return\n',
         (TUNING, '-k', 'two_at_a_time'),
@@ -811,7 +811,7 @@ LAWS = (
         2,
         'a drive that keeps its run command runs again after a moment without power',
         CONTROLLER,
-        '        if self.enabled and self._state.may_have_restarted(seconds):',
+        '        if self._control.enabled and self._state.may_have_restarted(seconds):',
         '        if False:',
         ('test/unit/drive/test_described_oddities.py', '-k', 'survives_starts'),
     ),
@@ -1014,8 +1014,8 @@ LAWS = (
         7,
         'why a motor stopped is not kept',
         TABLE,
-        '            self.stopped_for = why\n            self._on_stop(why)',
-        '            self._on_stop(why)',
+        '            self.stopped_for = why\n            self.on_stop(why)',
+        '            self.on_stop(why)',
         (WHY_STOPPED,),
     ),
     Mutant(

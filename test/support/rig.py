@@ -31,7 +31,6 @@ from nfo_sinus_driver.drive import (
     Snapshot,
     Telemetry,
 )
-from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.memory import Memory, ProcessMemory
 from nfo_sinus_driver.link import Address, LinkError, Refused, Reply
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
@@ -429,11 +428,11 @@ class Rig:
             controller = drive._controller
             if controller is None:
                 continue
-            state, sequence = controller.state, controller._sequence
+            control, sequence = drive.state.control, controller._sequence
             active = sequence._task is not None or sequence._external > 0
-            said = f'{state.name}, and a stop is {"" if active else "not "}on its way'
-            assert controller.stopping == active, said
-            assert drive.following == (state is ControlState.ENABLED)
+            said = f'{control.state.name}, and a stop is {"" if active else "not "}on its way'
+            assert control.stopping == active, said
+            assert drive.following == control.enabled
 
     # --- usual steps ---
 

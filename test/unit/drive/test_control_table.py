@@ -328,7 +328,7 @@ def changes() -> Iterator[tuple[str, _Table]]:
 def test_nothing_begins_while_that_is_so(guard: str) -> None:
     for state in State:
         for event in (Event.ENABLE, Event.BEGIN):
-            table = ControlTable(lambda: 1.0, lambda before: None, lambda why: None)
+            table = ControlTable(lambda: 1.0)
             table.state = state
             if guard == 'the driver ends':
                 table.closed_at = 0.0

@@ -69,7 +69,7 @@ def test_an_attempt_that_fails_at_once_confirms_nothing() -> None:
         controller.method.stop = fail  # type: ignore[method-assign]
         answer = rig.drive.stop()
         rig.pass_time(0.05)
-        assert controller.state is ControlState.STOPPING
+        assert rig.drive.state.control.state is ControlState.STOPPING
         enabled = rig.drive.enable()
         rig.answer(enabled)
         assert enabled.exception() is not None
@@ -92,7 +92,7 @@ def test_a_mistake_in_a_quick_stop_ends_in_a_stop() -> None:
         rig.answer(answer)
         assert answer.exception() is not None
         rig.pass_time(3.0)
-        assert not rig.far.motor.driven and controller.state is ControlState.IDLE
+        assert not rig.far.motor.driven and rig.drive.state.control.state is ControlState.IDLE
         # not only because a poll has found it running
         assert not rig.notes.said(Cause.STOPPED_BECAUSE)
         rig.notes.events.clear()
@@ -105,8 +105,8 @@ def test_a_refused_set_point_and_a_loss_leave_no_stop_that_is_not_shown() -> Non
         controller.on_status = lambda status: False  # type: ignore[method-assign]
         controller.refused(Report(Cause.NO_ANSWER_YET))
         rig.pass_time(0.3)
-        assert controller.state is ControlState.IDLE
+        assert rig.drive.state.control.state is ControlState.IDLE
         rig.line.state = 'silent'
         rig.pass_time(4.0)
-        assert controller.stopping
-        assert controller.state is ControlState.STOPPING
+        assert rig.drive.state.control.stopping
+        assert rig.drive.state.control.state is ControlState.STOPPING
