@@ -677,3 +677,10 @@ class Controller:
         if status is not None and status.driven:
             raise DriveError(self._state.report(Cause.RUN_BY_OTHERS))
         return self._state.report(Cause.NO_CONTROL)
+
+
+def required(controller: Controller | None) -> Controller:
+    """Return what commands a drive; a :class:`DriveError` if this driver only reads."""
+    if controller is None:
+        raise DriveError(Cause.MONITOR_ONLY)
+    return controller

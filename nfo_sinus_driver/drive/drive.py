@@ -15,7 +15,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Statistics, Task
 from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
-from nfo_sinus_driver.drive.controller import Controller
+from nfo_sinus_driver.drive.controller import Controller, required
 from nfo_sinus_driver.drive.diagnosis import explain
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.error_log import ErrorLog, ErrorLogMonitor
@@ -350,7 +350,7 @@ class Drive:
             is refused if a stop was confirmed since.
         """
         self._require_active()
-        controller = self._procedures.controller
+        controller = required(self._controller)
         self._require_connected()
         answer = await controller.enable(self._watchdog.ensure_set, requested_at)
         self._poller.wake()
@@ -359,22 +359,22 @@ class Drive:
     @_stops
     async def stop(self, why: Report = _STOP) -> Report:
         """Stop as the drive's StMode says; control is kept."""
-        return await self._procedures.controller.stop(why)
+        return await required(self._controller).stop(why)
 
     @_stops
     async def rapid_stop(self, why: Report = _STOP) -> Report:
         """Stop along the stop ramp of the drive, where it has one; control is kept."""
-        return await self._procedures.controller.rapid_stop(why)
+        return await required(self._controller).rapid_stop(why)
 
     @_stops
     async def quick_stop(self, why: Report = _QUICK_STOP) -> Report:
         """Release the motor at once: it coasts."""
-        return await self._procedures.controller.quick_stop(why)
+        return await required(self._controller).quick_stop(why)
 
     @on_bus
     async def acknowledge(self, why: Report = _ACKNOWLEDGE) -> Report:
         """Acknowledge a fault."""
-        controller = self._procedures.controller
+        controller = required(self._controller)
         self._require_connected()
         return await controller.acknowledge(why)
 
@@ -435,7 +435,7 @@ class Drive:
         """
         # as with enable, the motor may turn
         self._require_active()
-        self._procedures.controller.require_newer(requested_at)
+        required(self._controller).require_newer(requested_at)
 
         def report(status: InverterStatus, elapsed: float) -> None:
             if progress is not None:

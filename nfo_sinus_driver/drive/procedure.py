@@ -12,7 +12,7 @@ from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family, Holder, Procedure, Reset, Role
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.control_state import ControlState
-from nfo_sinus_driver.drive.controller import Controller
+from nfo_sinus_driver.drive.controller import Controller, required
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report
@@ -44,9 +44,7 @@ class Procedures:
     @property
     def controller(self) -> Controller:
         """What commands the drive otherwise; a :class:`DriveError` if this driver only reads."""
-        if self._controller is None:
-            raise DriveError(Cause.MONITOR_ONLY)
-        return self._controller
+        return required(self._controller)
 
     @property
     def enabled(self) -> bool:
