@@ -10,7 +10,8 @@ This alone knows whether the motor may turn, and whether it is being stopped: :m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+import contextlib
 import enum
 import math
 
@@ -89,8 +90,6 @@ class ControlTable:
     The state of control of one drive.
 
     :param now: the clock of the bus.
-    :ivar on_change: called with the state before, after each transition to another one.
-    :ivar on_stop: called with the reason when what may drive the motor is stopped.
     :ivar state: what the driver is doing with the drive.
     :ivar since: when the last event came, s: an earlier status says nothing of it.
     :ivar stopped_at: when a stop was confirmed last, s.
@@ -100,8 +99,8 @@ class ControlTable:
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
-        self.on_change: Callable[[ControlState], None] = lambda before: None
-        self.on_stop: Callable[[Report], None] = lambda why: None
+        self._on_change: Callable[[ControlState], None] = lambda before: None
+        self._on_stop: Callable[[Report], None] = lambda why: None
         self.state = ControlState.OFFLINE
         self.since = 0.0
         self.stopped_at = -math.inf
@@ -109,6 +108,32 @@ class ControlTable:
         self.access: ExclusiveAccess | None = None
         self.stopped_for: Report | None = None
         self._now = now
+
+    def listen(
+        self, on_change: Callable[[ControlState], None], on_stop: Callable[[Report], None]
+    ) -> None:
+        """
+        Take what is called when the state changes.
+
+        :param on_change: with the state before, after each transition to another one.
+        :param on_stop: with the reason, when what may drive the motor is stopped.
+        """
+        self._on_change, self._on_stop = on_change, on_stop
+
+    def close(self) -> None:
+        """Let nothing begin any more: the driver ends."""
+        self.closed_at = self._now()
+
+    @contextlib.contextmanager
+    def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
+        """Give a procedure exclusive access; a stop ends it."""
+        self.dispatch(ControlEvent.BEGIN)
+        self.access = access = ExclusiveAccess(what)
+        try:
+            yield access
+        finally:
+            self.access = None
+            self.dispatch(ControlEvent.END)
 
     def dispatch(self, event: ControlEvent, why: Report | None = None) -> None:
         """Go where an event leads; where that ends what may drive the motor, note why."""
@@ -120,7 +145,7 @@ class ControlTable:
             self.stopped_at = self.since
         if self.state is not before:
             self._note(before, why)
-            self.on_change(before)
+            self._on_change(before)
 
     def explain(self, why: Report) -> None:
         """Note a better reason for the stop in progress."""
@@ -131,7 +156,7 @@ class ControlTable:
         commanded = before in COMMANDED or reason_of(why) is StopReason.NOT_ENABLED
         if why is not None and commanded and self.state is ControlState.STOPPING:
             self.stopped_for = why
-            self.on_stop(why)
+            self._on_stop(why)
 
     def accepts(self, event: ControlEvent) -> bool:
         """Whether an event leads to another state."""

@@ -11,7 +11,7 @@ leads. All of this runs on the bus.
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable
 import contextlib
 import math
 
@@ -62,8 +62,8 @@ class Controller:
         #: What is written for each command, for a procedure too.
         self.method = method = chosen(state.settings.reference, state.params.reaches)
         self._setpoint = setpoint
-        self._control = control = state.control
-        control.on_change, control.on_stop = self._changed, self._notify_stop
+        self._control = state.control
+        self._control.listen(self._changed, self._notify_stop)
         #: The task of the newest enable.
         self._enabling: Task | None = None
         self._starting = StartSequence(state, method)
@@ -131,17 +131,10 @@ class Controller:
             self._sequence.start(why)
             self._report_stop(why)
 
-    @contextlib.contextmanager
-    def exclusive(self, what: str) -> Iterator[ExclusiveAccess]:
+    def exclusive(self, what: str) -> contextlib.AbstractContextManager[ExclusiveAccess]:
         """Give a procedure exclusive access; a stop ends it, during its preparations too."""
         self.require_idle(what)
-        self._control.dispatch(ControlEvent.BEGIN)
-        self._control.access = access = ExclusiveAccess(what)
-        try:
-            yield access
-        finally:
-            self._control.access = None
-            self._control.dispatch(ControlEvent.END)
+        return self._control.exclusive(what)
 
     def require_idle(self, what: str) -> None:
         """Make sure that a procedure may begin."""
@@ -509,7 +502,7 @@ class Controller:
 
     def close(self, why: Report) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
-        self._control.closed_at = self._bus.now()
+        self._control.close()
         if self._control.stop_owed or (self.may_run and self._state.params.recognition.holds):
             self._sequence.start(why)
 

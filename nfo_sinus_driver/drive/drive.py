@@ -17,7 +17,7 @@ from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
 from nfo_sinus_driver.drive.controller import Controller, required
 from nfo_sinus_driver.drive.diagnosis import explain
-from nfo_sinus_driver.drive.drive_state import DriveState
+from nfo_sinus_driver.drive.drive_state import DriveState, Hooks
 from nfo_sinus_driver.drive.error_log import ErrorLog, ErrorLogMonitor
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.fault_name import FaultNamer
@@ -120,13 +120,15 @@ class Drive:
         #: Stops the drives that stop with this one.
         self._on_stop: Callable[[Report], None] = lambda why: None
         # what follows in one part of it from what happens in another
-        hooks = self.state.hooks
-        hooks.status_arrived = self._poller.take_status
-        hooks.request_missed = self._poller.poll_soon
-        hooks.fault_came = self._error_log_monitor.expect
-        hooks.motor_stopped = self._motor_stopped
+        hooks = Hooks(
+            status_arrived=self._poller.take_status,
+            request_missed=self._poller.poll_soon,
+            fault_came=self._error_log_monitor.expect,
+            motor_stopped=self._motor_stopped,
+        )
         if self._controller is not None:
-            hooks.setpoint_refused = self._controller.refused
+            hooks = hooks._replace(setpoint_refused=self._controller.refused)
+        self.state.use_hooks(hooks)
         self.params.recognise_by(self._recogniser.require)
         bus.on_restart(self._unit, self._poller.restarted)
         bus.require_sign_of_life(self._unit, settings.lost_after)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import logging
 import math
 from typing import NamedTuple
@@ -89,8 +89,7 @@ def _nothing(*_: object) -> None:
     """Do nothing: no other part of the drive is concerned."""
 
 
-@dataclass
-class Hooks:
+class Hooks(NamedTuple):
     """
     What follows in other parts of a drive; the list of them is in :class:`~.drive.Drive`.
 
@@ -499,6 +498,10 @@ class DriveState:
         """Note whether it did not answer a request just before the status read now."""
         self.missed_reply = self.missed_since_status
         self._unanswered = self.params.unanswered
+
+    def use_hooks(self, hooks: Hooks) -> None:
+        """Take what follows in other parts of the drive."""
+        self.hooks = hooks
 
     def use(self, settings: DriveSettings) -> None:
         """

@@ -75,12 +75,11 @@ class Setpoint:
         self._bus = state.bus
         self._params = state.params
         self._state = state
-        self._hooks = state.hooks
         self._slot = LatestValue(
             state.settings.address,
             self._make,
             self._done,
-            lambda reply: self._hooks.status_arrived(reply),
+            lambda reply: state.hooks.status_arrived(reply),
             # a motor is to stand still, whether the drive answers or not
             urgent=lambda: self._request.value == 0,
         )
@@ -354,10 +353,10 @@ class Setpoint:
         elif isinstance(error, Refused) and not self._may_be_busy(error):
             asked = self._decoded({**self._in_drive, written.address: written.data})
             why = Report(Cause.SETPOINT_REFUSED, value=asked, error=str(error))
-            self._hooks.setpoint_refused(why)
+            self._state.hooks.setpoint_refused(why)
         elif isinstance(error, Interrupted):
             # no status is needed: the PLC has stopped the drive, and does not let it go on
-            self._hooks.setpoint_refused(Report(Cause.LINE_FAILED, error=str(error)))
+            self._state.hooks.setpoint_refused(Report(Cause.LINE_FAILED, error=str(error)))
         else:
             self._missed(error, written.address)
 
@@ -440,7 +439,7 @@ class Setpoint:
                     await self._expire(timeout)
         except Exception as error:
             # a set-point without a time-out must not be followed
-            self._hooks.setpoint_refused(Report(Cause.DRIVER_ERROR, error=repr(error)))
+            self._state.hooks.setpoint_refused(Report(Cause.DRIVER_ERROR, error=repr(error)))
 
     async def _expire(self, timeout: float) -> None:
         assert self._target is not None
@@ -463,7 +462,7 @@ class Setpoint:
                 except (LinkError, DriveError) as error:
                     if isinstance(error, Refused) and not self._may_be_busy(error):
                         why = Report(Cause.SETPOINT_REFUSED, value=0.0, error=str(error))
-                        self._hooks.setpoint_refused(why)
+                        self._state.hooks.setpoint_refused(why)
                         return
                     # the poll finds out whether the drive is lost; until then this is tried again
                     await self._bus.sleep(_WATCH_PERIOD)

@@ -1014,8 +1014,8 @@ LAWS = (
         7,
         'why a motor stopped is not kept',
         TABLE,
-        '            self.stopped_for = why\n            self.on_stop(why)',
-        '            self.on_stop(why)',
+        '            self.stopped_for = why\n            self._on_stop(why)',
+        '            self._on_stop(why)',
         (WHY_STOPPED,),
     ),
     Mutant(

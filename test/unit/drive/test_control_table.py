@@ -331,7 +331,7 @@ def test_nothing_begins_while_that_is_so(guard: str) -> None:
             table = ControlTable(lambda: 1.0)
             table.state = state
             if guard == 'the driver ends':
-                table.closed_at = 0.0
+                table.close()
             else:
                 table.access = ExclusiveAccess('tuning')
             assert not table.accepts(event)
