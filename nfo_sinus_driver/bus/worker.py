@@ -55,6 +55,7 @@ from nfo_sinus_driver.link import (
     Read,
     Reconnect,
     Reply,
+    Why,
     carry_out,
 )
 
@@ -187,9 +188,9 @@ class Bus:
         """Why the port is not open, or ``None`` when it is."""
         return None if self._port.is_open else self._port.error
 
-    def use_resync_reads(self, unit: int, addresses: tuple[Address, ...]) -> None:
-        """Give the link the parameters of a unit that it may read to resynchronise."""
-        self.call(lambda: self._link.use_resync_reads(unit, addresses))
+    def use_resync_reads(self, unit: int, addresses: tuple[Address, ...], why: Why = None) -> None:
+        """Give the link the parameters of a unit that it may read; see its method of this name."""
+        self.call(lambda: self._link.use_resync_reads(unit, addresses, why))
 
     @property
     def remarks(self) -> tuple[str, ...]:

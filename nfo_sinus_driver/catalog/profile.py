@@ -594,6 +594,11 @@ class Profile:
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
     :ivar spelled: by parameter, what a tool shows beside a number that the display of the drive
         shows otherwise; ``''``: nothing.
+    :ivar resync_reads: parameters that every drive of it has and that are safe to read at any time,
+        by the protocol; a protocol that is not there reads others.
+    :ivar why_refused: finds out why it refused a write over a protocol that does not say it; by a
+        call that reads a parameter, and the status code just before (``None``: not known). Returns
+        the exception code of Modbus that means the same, and the text.
     :ivar keeps_run: it keeps its run command without power, and runs again when it is back;
         ``None``: no manual says.
     """
@@ -634,6 +639,8 @@ class Profile:
     after_write: Sequence[Write | Wait] = ()
     pole_pairs: int = 0
     spelled: Mapping[str, Callable[[int], str]] = field(default_factory=dict)
+    resync_reads: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    why_refused: Callable[[Callable[[str], int], int | None], tuple[int, str]] | None = None
     keeps_run: bool | None = None
 
     def seen_by(self, method: str) -> Profile:

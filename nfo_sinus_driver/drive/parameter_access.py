@@ -91,8 +91,15 @@ class ParameterAccess:
         self._block = block_address if self.in_block else None
         #: The PLC has a mailbox by which parameters of the drive are reached.
         self._has_mailbox = False
-        reads = (model.key(role) for role in _RESYNC_READS if role in model.roles)
-        bus.use_resync_reads(unit, tuple(self.address(key) for key in reads))
+        usual = (model.key(role) for role in _RESYNC_READS if role in model.roles)
+        reads = model.profile.resync_reads.get(self.protocol, usual)
+        ask = model.profile.why_refused
+
+        def why(read: Callable[[Address], int], before: int | None) -> tuple[int, str]:
+            assert ask is not None
+            return ask(lambda key: read(self.address(key)), before)
+
+        bus.use_resync_reads(unit, tuple(map(self.address, reads)), ask and why)
 
     def address(self, key: str) -> Address:
         """Return the address of a parameter."""

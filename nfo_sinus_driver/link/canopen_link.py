@@ -35,6 +35,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Remarks,
     Reply,
+    Why,
 )
 from nfo_sinus_driver.link.late_replies import LISTENING_STEP, STOP_WAITS, LateReplies
 from nfo_sinus_driver.link.lawicel import LawicelPort
@@ -242,7 +243,7 @@ class CanopenLink:
         self._shapes.clear()
         self.supervision.closed()
 
-    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
         """Take parameters that are safe to read; here those are read that every node has."""
 
     def parts(self, address: Address) -> tuple[Address]:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The Classic protocol of NFO: messages without I/O, reasons of a NAK, the link [M0 §6.1], [M2 §5].
+The Classic protocol: messages without I/O, and the link [M0 §6.1], [M2 §5].
 
 :func:`encode` makes a message; a :class:`Reader` finds messages in the bytes that come in, in any
 pieces, among noise and the remains of others. Hexadecimal digits are sent in upper case and read
@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, reduce
+import math
 from operator import xor
 import struct
 import time
@@ -28,6 +29,7 @@ from nfo_sinus_driver.link.interface import (
     PortError,
     Refused,
     Reply,
+    Why,
 )
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.protocols import BROADCAST, CLASSIC, POINT_TO_POINT
@@ -228,71 +230,6 @@ def _decode(frame: bytearray) -> Message | None:
     return Select(unit, number, word) if is_request else Value(unit, number, word)
 
 
-#: The parameters that the protocol itself needs; both firmwares have them.
-INV_ST = 0x00E9  #: inverter status, without acknowledging
-SIO_ERR = 0x00AC  #: serial fault flags; reading clears them and the serial fault
-MODE = 0x0029  #: who controls the drive
-
-#: The inverter status of a serial fault [M0 table 19].
-SIO_FAIL = 14
-#: The inverter status codes that are faults.
-_FAULTS = range(1, 24)
-
-_VALUE_BIT = 10
-#: Prefix, unknown, unreadable, not to be written.
-_ADDRESS_BITS = (5, 7, 8, 9)
-#: SioErr, bit by bit [M2 table 4].
-FLAGS = {
-    0: 'the inverter is blocked by an alarm',
-    1: 'wrong parity',
-    2: 'wrong check sum',
-    3: 'wrong message structure',
-    4: 'time-out of the serial communication',
-    5: 'wrong parameter prefix',
-    6: 'not permitted in the current mode',
-    7: 'unknown parameter',
-    8: 'the parameter cannot be read',
-    9: 'the parameter cannot be written',
-    10: 'the value is out of range',
-    14: 'receive buffer overrun',
-}
-
-
-def flag_names(word: int) -> list[str]:
-    """Return the serial fault flags in words."""
-    bits = (bit for bit in range(16) if word >> bit & 1)
-    return [FLAGS.get(bit, f'flag {bit}') for bit in bits]
-
-
-def refused_by_status(inv_st: int) -> Refused:
-    """Return the refusal for a NAK by the inverter status, where the flags are not read."""
-    if inv_st == SIO_FAIL:
-        text = 'a serial fault (Sio Fail) is active: until it is acknowledged nothing can be done'
-        return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)')
-    if inv_st in _FAULTS:
-        text = f'a fault is active (InvSt {inv_st}): until it is acknowledged nothing can be done'
-        return Refused(Refused.DEVICE_FAILURE, f'{text} (NAK)')
-    text = 'the drive does not accept this value, or not in its present state'
-    return Refused(Refused.ILLEGAL_VALUE, f'{text} (NAK, InvSt {inv_st})')
-
-
-def refused_by_flags(word: int) -> Refused:
-    """Return the refusal for a NAK by the serial fault flags, which are clear now."""
-    code = Refused.DEVICE_FAILURE
-    if word >> _VALUE_BIT & 1:
-        code = Refused.ILLEGAL_VALUE
-    elif any(word >> bit & 1 for bit in _ADDRESS_BITS):
-        code = Refused.ILLEGAL_ADDRESS
-    why = ', '.join(flag_names(word)) or 'it does not say why'
-    text = f'the drive refused: {why}; its serial fault (Sio Fail) by this is cleared (NAK)'
-    return Refused(code, text)
-
-
-def refused_unknown(error: LinkError) -> Refused:
-    """Return the refusal for a NAK whose reason could not be read."""
-    return Refused(Refused.DEVICE_FAILURE, f'the drive refused (NAK); why is not known: {error}')
-
-
 #: The value in a message.
 _WORD = struct.Struct('>H')
 #: Pauses within an answer may last this long, s: no manual limits them [C86], and an adapter may
@@ -308,11 +245,7 @@ _WRITE_WAIT = 0.05
 _TURNAROUND = 0.1
 _TURNAROUND_MARGIN = 2.0
 _KEPT_OF_SLOWEST = 0.98
-#: Parameters that every firmware has and that are safe to read [M0 tables 2, 3], [M2 tables 1, 2]:
-#: InvSt without acknowledging, MODE, Control/Mode and f-Nom. With four of them one is always
-#: certain, see LateReplies.
-_EVERYWHERE = (INV_ST, MODE, 0x0030, 0x000F)
-#: How old the inverter status may be to show that a serial fault is new, s.
+#: How old a status may be to show that a fault is new, s.
 _FRESH = 1.0
 CODEC = Codec(
     Enquiry, Select, kind, kinds, answers, encode, Reader, LONGEST_ANSWER, _INTER_BYTE_TIMEOUT
@@ -340,19 +273,25 @@ class ClassicLink(CodecLink):
     #: [M0 §6.1.2], [C10].
     protocol = CLASSIC
     _codec = CODEC
-    _everywhere = _EVERYWHERE
 
     def __init__(self, port: Port, settings: LineSettings, now: Clock = time.monotonic) -> None:
         super().__init__(port, settings, now)
-        #: The inverter status that each unit reported last, and when.
-        self._inv_st: dict[int, tuple[int, float]] = {}
+        #: What finds out why each unit refused.
+        self._why: dict[int, Why] = {}
+        #: The status that each unit reported last, and when.
+        self._status: dict[int, tuple[int, float]] = {}
         #: What the slowest unit took recently until its answer began, s.
         self._slowest = _TURNAROUND
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
         super().close()
-        self._inv_st.clear()
+        self._status.clear()
+
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
+        """Name parameters that are safe to read at any time, and what tells why a unit refused."""
+        super().use_resync_reads(unit, addresses)
+        self._why[unit] = why
 
     def parts(self, address: Address) -> tuple[Address, ...]:
         """Return the words: a message carries one."""
@@ -392,8 +331,8 @@ class ClassicLink(CodecLink):
         if isinstance(answer, Nak):
             text = f'the drive has no parameter E{number:04X} that can be read (NAK)'
             raise Refused(Refused.ILLEGAL_ADDRESS, text)
-        if number == INV_ST:
-            self._inv_st[unit] = answer.word, arrived
+        if number in self._resync_numbers.get(unit, ())[:1]:
+            self._status[unit] = answer.word, arrived
         return answer.word, arrived
 
     def _broadcast(self, request: Select) -> float:
@@ -410,22 +349,23 @@ class ClassicLink(CodecLink):
 
     def _refusal(self, unit: int, began: float) -> Refused:
         """
-        Find out why a SELECT was answered by NAK [M0 §6.1.5]; clear nothing but our own error.
+        Find out why a SELECT was answered by NAK [M0 §6.1.5].
 
         :param began: when the SELECT was sent.
         """
-        before, read_at = self._inv_st.get(unit, (SIO_FAIL, 0.0))
-        # a serial fault that was not active just before: this SELECT is its cause
-        ours = before != SIO_FAIL and began - read_at < _FRESH
+        why = self._why.get(unit)
+        if why is None:
+            return Refused(Refused.DEVICE_FAILURE, 'the drive refused (NAK)')
+        before, read_at = self._status.get(unit, (None, -math.inf))
+        if began - read_at >= _FRESH:
+            before = None
         try:
-            inv_st, _ = self._enquire(unit, INV_ST)
-            if inv_st != SIO_FAIL or not ours:
-                return refused_by_status(inv_st)
-            return refused_by_flags(self._enquire(unit, SIO_ERR)[0])
+            return Refused(*why(lambda at: self._enquire(unit, at.index)[0], before))
         except PortError:
             raise
         except LinkError as error:
-            return refused_unknown(error)
+            text = f'the drive refused (NAK); why is not known: {error}'
+            return Refused(Refused.DEVICE_FAILURE, text)
 
     # --- belief -----------------------------------------------------------------------------------
 

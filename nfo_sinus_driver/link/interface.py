@@ -132,6 +132,9 @@ class Ask(NamedTuple):
 Written = Write | WriteAndRead
 #: What may be wanted of a unit; each takes a turn on the line.
 Operation = Read | Written | ReadThenWrite | Ask
+#: Finds out why a unit refused a write whose answer does not say it: by a call that reads a
+#: parameter, and its status just before, if that is known. Returns code and text of the refusal.
+Why = Callable[[Callable[[Address], int], int | None], tuple[int, str]] | None
 #: Several of them, one by one, so that other requests go between; each brings its reply, or
 #: ``None`` where it failed.
 Plan = Generator[Operation, Reply | None, _Found]
@@ -336,11 +339,13 @@ class Link(Protocol):
     def identify(self, unit: int) -> Plan[Identification]:
         """Have a unit identify itself; what it does not give stays empty."""
 
-    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
         """
-        Name parameters of different sizes that are safe to read at any time.
+        Name parameters whose answers differ and that are safe to read at any time.
 
         After a doubtful answer, reading one of them shows whether the line can be believed again.
+
+        :param why: finds out why the unit refused, where that needs its status, the first of them.
         """
 
 

@@ -37,6 +37,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Remarks,
     Reply,
+    Why,
 )
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, read_of, understand
@@ -213,7 +214,7 @@ class TcpLink(ModbusLink):
             error.maybe_done = True
             raise
 
-    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
         """Take parameters that are safe to read; here nothing has to be resynchronised."""
 
     # --- the connection ---------------------------------------------------------------------------

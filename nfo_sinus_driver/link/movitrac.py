@@ -369,10 +369,6 @@ _INTER_BYTE_TIMEOUT = 0.03
 _GAP = 2
 #: The least time of an answer, s; less is a line without speed.
 _AT_ONCE = 0.001
-#: Parameters that every drive has and that are safe to read: its address (P842), its response time
-#: (P843), frequency and heat sink temperature. With four of them one is always certain, see
-#: LateReplies.
-_EVERYWHERE = (206, 207, 0, 4)
 CODEC = Codec(
     Enquiry, Select, kind, kinds, answers, encode, Reader, LONGEST_ANSWER, _INTER_BYTE_TIMEOUT
 )
@@ -401,7 +397,6 @@ class MovitracLink(CodecLink):
     #: [M4 §2.3.1], [M4 §2.3.3]; 31 drives on a line at most, with addresses of 64 [C75].
     protocol = MOVITRAC
     _codec = CODEC
-    _everywhere = _EVERYWHERE
     _longest_response = LONGEST_RESPONSE_TIME
 
     def parts(self, address: Address) -> tuple[Address]:

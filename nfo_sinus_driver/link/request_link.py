@@ -34,6 +34,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Remarks,
     Reply,
+    Why,
 )
 from nfo_sinus_driver.link.late_replies import LISTENING_STEP, LateReplies
 from nfo_sinus_driver.link.port import Port, port_of
@@ -418,9 +419,6 @@ class CodecLink(RequestLink[Any]):
     """
 
     _codec: Codec
-    #: Parameters that every drive has and that are safe to read: with four of them one is always
-    #: certain, see :class:`LateReplies`.
-    _everywhere: tuple[int, ...]
     #: How late a drive may answer, s.
     _longest_response = 0.0
 
@@ -434,18 +432,17 @@ class CodecLink(RequestLink[Any]):
         self._again = False
         #: The last request, its answer and when it came; ``None``: it had none.
         self._last: tuple[Any, Any, float] | None = None
+        #: What is safe to read, by unit: of four one is always certain, see :class:`LateReplies`.
+        self._resync_numbers: dict[int, tuple[int, ...]] = {}
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
         super().close()
         self._last = None
 
-    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
-        """
-        Take parameters that are safe to read; here those are read that every drive has.
-
-        A read of a parameter that a drive lacks may be a fault, for which it stops [M2 table 4].
-        """
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
+        """Name parameters that are safe to read at any time."""
+        self._resync_numbers[unit] = tuple(address.index for address in addresses)
 
     def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
         """Write one parameter, then read another; in as many transactions as that takes."""
@@ -469,7 +466,8 @@ class CodecLink(RequestLink[Any]):
         return max(WRITE_WAIT, self._codec.longest_answer * self._settings.char_time)
 
     def _resync_reads(self, unit: int) -> Iterable[Any]:
-        return (self._codec.enquiry(unit, number) for number in self._everywhere)
+        numbers = self._resync_numbers.get(unit, ())
+        return (self._codec.enquiry(unit, number) for number in numbers)
 
     def _distinct_kinds(self, request: Any) -> Sequence[Any]:
         return self._codec.kinds(request)[:1]
@@ -502,10 +500,11 @@ class CodecLink(RequestLink[Any]):
 
     def _settle(self, unit: int) -> None:
         """Try to read something, so that the next answer is believed again."""
-        if self.stop_waits():
+        first = next(iter(self._resync_reads(unit)), None)
+        if first is None or self.stop_waits():
             return
         try:
-            self._await_gap(self._codec.enquiry(unit, self._everywhere[0]))
+            self._await_gap(first)
             self._resync_read(self._first_certain(unit))
         except PortError:
             raise

@@ -22,6 +22,7 @@ from nfo_sinus_driver.link.interface import (
     NotReady,
     Refused,
     Reply,
+    Why,
 )
 from nfo_sinus_driver.link.late_replies import STOP_WAITS, Doubt, LateReplies
 from nfo_sinus_driver.link.modbus_link import SPECIFIC, ModbusLink, ReadDevice, ReportSlaveId
@@ -85,7 +86,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         #: The last answer may be to another master.
         self._doubtful = False
 
-    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
         parts = (part for address in addresses for part in self.parts(address))
         self._resync_addresses[unit] = tuple(parts)

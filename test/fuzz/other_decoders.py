@@ -20,7 +20,6 @@ from nfo_sinus_driver.catalog import State, families, load_family
 from nfo_sinus_driver.families import USUAL
 from nfo_sinus_driver.families.sinus_g2 import words
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
-from nfo_sinus_driver.link import classic
 from nfo_sinus_driver.simulator.classic import Classic
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.line import Receiver
@@ -85,7 +84,6 @@ def _catalog(random: Random, frames: int) -> None:
         word = random.getrandbits(16)
         assert words.state_of(word) in State
         assert words_optimal.state_of(word) in State
-        assert len(classic.flag_names(word)) == bin(word).count('1')
 
 
 # --- the simulator's receivers --------------------------------------------------------------------

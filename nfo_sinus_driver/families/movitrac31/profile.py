@@ -41,6 +41,14 @@ PROFILE = Profile(
         'status.motor_utilization_2',
         'status.terminals',
     ),
+    resync_reads={
+        'movitrac': (
+            'serial.inverter_address',
+            'serial.response_time',
+            'status.frequency',
+            'status.heat_sink_temperature',
+        )
+    },
     # a tenth above what the display values have [M4 §4]: the motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 440.0, Role.ACTUAL_SPEED: 9999.0},
 )

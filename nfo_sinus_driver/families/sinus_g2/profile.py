@@ -98,9 +98,9 @@ _READY = (
 _DIRECTIONS = Control.ENABLE_OP | Control.ENABLE_REV_OP
 _RUN = Control.SWITCH_ON | _DIRECTIONS
 
-#: SioErr, bit by bit [M2 table 4], but for the first, that a fault kept a message from being
-#: carried out: that a stop was refused since then is no reason of the fault.
+#: SioErr, bit by bit [M2 table 4].
 _LINE_FAULTS = {
+    0: 'the inverter is blocked by an alarm',
     1: 'wrong parity',
     2: 'wrong check sum',
     3: 'wrong message structure',
@@ -113,6 +113,13 @@ _LINE_FAULTS = {
     10: 'the value is out of range',
     14: 'receive buffer overrun',
 }
+#: Prefix, unknown, unreadable, not to be written.
+_ADDRESS_FLAGS = 1 << 5 | 1 << 7 | 1 << 8 | 1 << 9
+_VALUE_FLAG = 1 << 10
+#: The inverter status of a serial fault [M0 table 19], and those that are faults.
+_SERIAL_FAULT, _FAULTS = 14, range(1, 24)
+#: The exception codes of Modbus for an address, a value and a state that do not allow a write.
+_ADDRESS, _VALUE, _FAILURE = 2, 3, 4
 _NOT_NOW = 'control of the drive cannot be taken now (MODE is Inhibit: tuning?)'
 #: Why a serial fault is left that MODE = Stop would end.
 _CONTROLLED_ELSEWHERE = (
@@ -124,6 +131,29 @@ _CONTROLLED_ELSEWHERE = (
 def _masked(keep: Control, add: Control) -> int:
     """Return what changes bits of DriveControl at once: AND mask, then OR mask [M0 §7.1]."""
     return int(keep) & 0xFFFF | int(add) << 16
+
+
+def _in_words(flags: int) -> str:
+    bits = (bit for bit in range(16) if flags >> bit & 1)
+    return ', '.join(_LINE_FAULTS.get(bit, f'flag {bit}') for bit in bits)
+
+
+def _why_refused(read: Callable[[str], int], before: int | None) -> tuple[int, str]:
+    """Find out why a write was answered by NAK [M0 §6.1.5]; clear nothing but our own error."""
+    status = read(INV_ST)
+    # a serial fault that was not active just before: the write is its cause
+    if status == _SERIAL_FAULT and before not in (None, _SERIAL_FAULT):
+        flags = read(_SIO_ERR)
+        text = f'the drive refused: {_in_words(flags) or "it does not say why"}'
+        text += '; its serial fault (Sio Fail) by this is cleared (NAK)'
+        code = _ADDRESS if flags & _ADDRESS_FLAGS else _FAILURE
+        return _VALUE if flags & _VALUE_FLAG else code, text
+    if status in _FAULTS:
+        what = 'a serial fault (Sio Fail) is active'
+        what = what if status == _SERIAL_FAULT else f'a fault is active (InvSt {status})'
+        return _FAILURE, f'{what}: until it is acknowledged nothing can be done (NAK)'
+    text = 'the drive does not accept this value, or not in its present state'
+    return _VALUE, f'{text} (NAK, InvSt {status})'
 
 
 class _G2(ControlMethod):
@@ -154,8 +184,8 @@ class _G2(ControlMethod):
         if not self._reaches(_SIO_ERR):
             return ''
         flags = int((yield Acknowledge(_SIO_ERR)))
-        bits = [bit for bit in range(1, 16) if flags >> bit & 1]
-        return ', '.join(_LINE_FAULTS.get(bit, f'flag {bit}') for bit in bits)
+        # that a fault kept a message, such as a stop, from being carried out is no reason of it
+        return _in_words(flags & ~1)
 
 
 class ModeScmd(_G2):
@@ -520,6 +550,9 @@ PROFILE = Profile(
     most=MOST,
     # with OFF the motor runs on, whatever SioTot is ([M0 §5.3.5], [C91])
     timeout_conditions={'serial.auto_stop': (True,)},
+    # in the tables of both firmwares ([M0 tables 2, 3], [M2 tables 1, 2])
+    resync_reads={'classic': (INV_ST, MODE, 'control.mode', 'motor.f_nom')},
+    why_refused=_why_refused,
     # a module with a drive profile need not have them [M0 §7]
     may_lack={'canopen': DriveControl.needs},
     # before it code 1 is another format ([C3], [C5])

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from support.addresses import packed, register
 
-from nfo_sinus_driver.link import PROTOCOLS, Address, NoAnswer, Remarks, Reply, Supervision
+from nfo_sinus_driver.link import PROTOCOLS, Address, NoAnswer, Remarks, Reply, Supervision, Why
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 #: No honest wait takes this long, on any machine, s.
@@ -128,7 +128,7 @@ class FakeLink:
             self.read(unit, source)
         return self.write(unit, address, data)
 
-    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
         self.resync_reads[unit] = tuple(addresses)
 
     def _transact(self, done: Done) -> Reply:

@@ -21,6 +21,7 @@ from nfo_sinus_driver.link import (
     Refused,
     Remarks,
     Reply,
+    Why,
 )
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 
@@ -67,7 +68,7 @@ class FarEnd:
     def close(self) -> None:
         """Nothing has to be closed."""
 
-    def use_resync_reads(self, unit: int, addresses: Sequence[Address]) -> None:
+    def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
         """Nothing is ever in doubt."""
 
     def identify(self, unit: int) -> Plan[Identification]:

@@ -12,6 +12,7 @@ import pytest
 from support.addresses import classic_id, packed
 from virtual_wire import Wire
 
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.link.classic import ClassicLink
 from nfo_sinus_driver.link.interface import Address, LineSettings, Refused, Reply
 
@@ -25,6 +26,23 @@ B = classic_id(0xB6)
 LONG = classic_id(0x27, 0x127)
 
 _T = TypeVar('_T')
+_G2 = load_family('sinus_g2')
+
+
+def know_g2(link: ClassicLink) -> None:
+    """Have a link know what a Sinus G2 is, at each address."""
+
+    def at(key: str) -> Address:
+        return Address(*_G2[key].at('classic').place)
+
+    why = _G2.profile.why_refused
+    assert why is not None
+    for unit in link.protocol.units:
+        link.use_resync_reads(
+            unit,
+            tuple(map(at, _G2.profile.resync_reads['classic'])),
+            lambda read, before: why(lambda key: read(at(key)), before),
+        )
 
 
 class Bench:
@@ -34,6 +52,7 @@ class Bench:
         self.wire = Wire(settings)
         self.drive = FarEnd(self.wire, iter(fates))
         self.link = ClassicLink(self.wire, settings, self.wire.monotonic)
+        know_g2(self.link)
         self.unit = unit
         self.link.open()
 

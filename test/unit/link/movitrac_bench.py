@@ -43,6 +43,8 @@ class Bench:
         self.drive = FarEnd(self.wire, iter(fates))
         self.drive.sizes[LONG.index] = 8
         self.link = MovitracLink(self.wire, settings, self.wire.monotonic)
+        for unit in self.link.protocol.units:
+            self.link.use_resync_reads(unit, tuple(map(at, (206, 207, 0, 4))))
         self.link.open()
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from classic_far_end import INV_ST, Fate
-from classic_link_bench import MODE, TIMEOUT, UNIT, A, B, Bench
+from classic_link_bench import MODE, TIMEOUT, A, B, Bench
 from hypothesis import example, given, settings as hypothesis_settings, strategies as st
 import pytest
 from support.addresses import classic_id
@@ -101,9 +101,8 @@ def test_late_nak_is_not_taken_for_the_answer_to_another_question() -> None:
 
 
 def test_resync_reads_are_those_that_every_firmware_has() -> None:
-    # whatever is named: to ask for what a drive does not have makes it stop
+    # to ask for what a drive does not have makes it stop
     bench = Bench(*[Fate(what='drop')] * 5)
-    bench.link.use_resync_reads(UNIT, [classic_id(0x7D)])
     for _ in range(5):
         with pytest.raises(NoAnswer):
             bench.read(A)

@@ -13,6 +13,7 @@ import time
 import tty
 
 import classic_far_end as far
+from classic_link_bench import know_g2
 import pytest
 from support.addresses import classic_id, packed
 
@@ -120,6 +121,7 @@ def connect(drive: PtyDrive, timeout: float = PATIENT, char_format: str = '') ->
         drive.path, 'classic', char_format=char_format, response_timeout=timeout
     ).open()
     assert isinstance(link, ClassicLink)
+    know_g2(link)
     link.open()
     return link
 

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 import pytest
 
 from nfo_sinus_driver.catalog import Access, load_family
-from nfo_sinus_driver.link import NotReady, classic, movitrac
+from nfo_sinus_driver.link import NotReady
 from nfo_sinus_driver.link.late_replies import LATEST_REPLY, SUSPECT_FOR, Doubt, LateReplies
 
 TIMEOUT = 0.2
@@ -191,20 +191,16 @@ def test_a_slow_reply_is_remembered_and_forgotten(seconds: list[float]) -> None:
 
 def test_what_is_asked_over_classic_is_in_the_table_of_every_firmware_and_does_nothing() -> None:
     model = load_family('sinus_g2')
-    for number in classic._EVERYWHERE:
-        (parameter,) = (
-            parameter
-            for parameter in model.values()
-            if 'classic' in parameter.addresses
-            and parameter.at('classic').numbers == (number,)
-        )
+    for key in model.profile.resync_reads['classic']:
+        parameter = model[key]
+        assert len(parameter.at('classic').numbers) == 1
         assert parameter.since is None
         assert parameter.access in (Access.READ, Access.READ_WRITE)
 
 
 def test_what_is_asked_of_a_movitrac_is_in_its_table_and_does_nothing() -> None:
-    rows = load_family('movitrac31').values()
-    for index in movitrac._EVERYWHERE:
-        (parameter,) = (row for row in rows if row.at('movitrac').index == index)
+    model = load_family('movitrac31')
+    for key in model.profile.resync_reads['movitrac']:
+        parameter = model[key]
         assert parameter.option == '', 'every drive has it'
         assert parameter.access in (Access.READ, Access.READ_WRITE)
