@@ -492,7 +492,6 @@ class Drive:
             await self._recogniser.read_nameplate()
         await self._watchdog.recall()
         self._poller.connected()
-        self.setpoint.connected()
         self.log.connected()
         state.found()
         if self._controller is not None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-import enum
 import functools
 import math
 from typing import NamedTuple
@@ -21,7 +20,6 @@ from nfo_sinus_driver.link import (
     Address,
     Interrupted,
     LinkError,
-    NoAnswer,
     Refused,
     Write,
     WriteAndRead,
@@ -58,16 +56,6 @@ class Request(NamedTuple):
 _NONE = Request(NAN, -math.inf)
 
 
-class _Combining(enum.Enum):
-    """Whether the drive takes a set-point and returns its status in one transaction."""
-
-    #: Not known, for none has been answered yet.
-    UNTRIED = enum.auto()
-    TAKEN = enum.auto()
-    #: Not while it stays connected: it has refused the function, or has none.
-    GIVEN_UP = enum.auto()
-
-
 class Setpoint:
     """The set-point that the motor follows while the drive is enabled."""
 
@@ -83,7 +71,6 @@ class Setpoint:
             # a motor is to stand still, whether the drive answers or not
             urgent=lambda: self._request.value == 0,
         )
-        self._combining = _Combining.GIVEN_UP
         #: The newest request; written by any thread, at once.
         self._request = _NONE
         self.control_mode = ''
@@ -138,11 +125,6 @@ class Setpoint:
         """How long ago the newest valid set-point came, s; NaN if none did since the enable."""
         at = self._request.at
         return self._bus.now() - at if at > self.following_since else NAN
-
-    def connected(self) -> None:
-        """Find out anew whether the drive returns its status with a set-point."""
-        able = self._params.writes_and_reads
-        self._combining = _Combining.UNTRIED if able else _Combining.GIVEN_UP
 
     def follow(self, control_mode: str, limits: Limits, target: SetpointTarget | None) -> None:
         """
@@ -322,7 +304,7 @@ class Setpoint:
         self._sent = limited
         self._may_have(self._decoded({**self._in_drive, address: data}))
         by_itself = len(due) > 1 or self._is_once(address)
-        if by_itself or self._combining is _Combining.GIVEN_UP:
+        if by_itself or not self._params.writes_and_reads:
             return Write(address, data)
         return WriteAndRead(address, data, self._params.address(self._state.word_key))
 
@@ -340,16 +322,10 @@ class Setpoint:
     def _done(self, written: Written, error: LinkError | None) -> None:
         if not self.following:
             return
-        combined = isinstance(written, WriteAndRead)
         if error is None:
-            if combined:
-                self._combining = _Combining.TAKEN
             self._take_note(written.address, written.data)
             if len(self._keys) > 1:
                 self._bus.request(self._slot)
-        elif combined and self._gives_up_combining(error):
-            # if the set-point itself is wrong, the drive refuses this, too
-            self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
             asked = self._decoded({**self._in_drive, written.address: written.data})
             why = Report(Cause.SETPOINT_REFUSED, value=asked, error=str(error))
@@ -386,24 +362,6 @@ class Setpoint:
         else:
             self._written = {}
         self._state.missed()
-
-    def _gives_up_combining(self, error: LinkError) -> bool:
-        """
-        Return whether a drive may have refused the transaction, and not the set-point in it.
-
-        One that has never taken any may refuse it with any code, or not answer a function that it
-        does not know.
-        """
-        untried = self._combining is _Combining.UNTRIED
-        if not isinstance(error, Refused):
-            if untried and isinstance(error, NoAnswer):
-                self._combining = _Combining.GIVEN_UP
-            return False
-        unknown = error.code == Refused.ILLEGAL_FUNCTION
-        if unknown or (untried and error.code != Refused.BUSY):
-            self._combining = _Combining.GIVEN_UP
-            return True
-        return False
 
     def _may_be_busy(self, error: Refused) -> bool:
         """Return whether a refusal only means that the drive is busy, and not for long yet."""

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import enum
 import struct
-from typing import NamedTuple, NoReturn, TypeVar
+from typing import NamedTuple, NoReturn
 
 from nfo_sinus_driver.link.interface import (
     Address,
@@ -35,9 +35,6 @@ from nfo_sinus_driver.link.interface import (
     Reply,
     Unconfirmed,
 )
-from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write, WriteAndRead
-
-_T = TypeVar('_T')
 
 #: The first register of a mailbox in its block.
 FIRST = 16
@@ -63,7 +60,8 @@ _CODES = {
     0x14: Refused.ILLEGAL_VALUE,
 }
 
-Ask = Callable[[Request[_T]], tuple[_T, float]]
+#: Reads registers of a unit: the first and how many, with what is written from which one on.
+Exchange = Callable[[int, int, int, int, bytes], tuple[bytes, float]]
 
 
 class _Stage(enum.Enum):
@@ -158,14 +156,14 @@ class Mailbox:
     """
     The mailbox of one block.
 
-    :param ask: sends a request of Modbus; returns its answer and when that came.
+    :param exchange: reads registers of a PLC, see :meth:`ModbusLink.exchange`.
     :param now: the clock of these moments, s.
     :param unit: the unit of the PLC.
     :param start: the first register of the block.
     """
 
-    def __init__(self, ask: Ask[bytes], now: Clock, unit: int, start: int) -> None:
-        self._ask = ask
+    def __init__(self, exchange: Exchange, now: Clock, unit: int, start: int) -> None:
+        self._transact = exchange
         self._now = now
         self._unit = unit
         self._first = start + FIRST
@@ -174,8 +172,6 @@ class Mailbox:
         self._unconfirmed: _Pending | None = None
         #: What waits for its turn, in order, and when its caller last repeated it.
         self._waiting: dict[_Wanted, float] = {}
-        #: Function 23 was refused.
-        self._apart = False
 
     def forget(self) -> None:
         """Note that the connection is a new one."""
@@ -271,17 +267,7 @@ class Mailbox:
         """Write registers, if any, and read all."""
         at, count = self._first, _LAYOUT.size // 2
         try:
-            if data and not self._apart:
-                try:
-                    written = WriteAndRead(self._unit, at + offset, data, at, count)
-                    return _Shown(*self._ask(written))
-                except Refused as refusal:
-                    if refusal.code != Refused.ILLEGAL_FUNCTION:
-                        raise
-                    self._apart = True
-            if data:
-                self._ask(Write(self._unit, at + offset, data, multiple=True))
-            return _Shown(*self._ask(Read(self._unit, at, count)))
+            return _Shown(*self._transact(self._unit, at, count, at + offset, data))
         except Refused as refusal:
             raise self._of_registers(refusal) from None
 

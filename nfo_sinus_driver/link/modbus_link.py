@@ -8,6 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 import re
 from typing import TypeVar
 
@@ -16,11 +17,24 @@ from nfo_sinus_driver.link.interface import (
     Ask,
     Identification,
     LineProtocol,
+    LinkError,
+    NoAnswer,
+    NotReady,
     Plan,
+    Refused,
     Remarks,
     Reply,
 )
-from nfo_sinus_driver.link.modbus_pdu import Request, read_of, write_and_read_of, write_of
+from nfo_sinus_driver.link.modbus_pdu import (
+    Read,
+    Request,
+    Write,
+    WriteAndRead,
+    read_of,
+    write_and_read_of,
+    write_of,
+)
+from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 _T = TypeVar('_T')
 
@@ -31,6 +45,13 @@ class ModbusLink(ABC):
     protocol: LineProtocol
     remarks: Remarks
     supervision = None
+    clock: ThreadClock
+    stop_waits: Callable[[], bool]
+
+    @cached_property
+    def _combines(self) -> dict[int, bool]:
+        """Whether a unit writes and reads in one transaction (function 23), if that is known."""
+        return {}
 
     def parts(self, address: Address) -> tuple[Address, ...]:
         """Return the address; where the first register is apart, it and then the others."""
@@ -48,11 +69,68 @@ class ModbusLink(ABC):
         return Reply(*self._ask(write_of(unit, address, data)))
 
     def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
-        """Write one parameter and read another, in one transaction (function 23)."""
-        return Reply(*self._ask(write_and_read_of(unit, address, data, source)))
+        """Write one parameter and read another, in one transaction, or only write it."""
+        answer = self._combined(write_and_read_of(unit, address, data, source))
+        if answer is not None:
+            return Reply(*answer)
+        if self.stop_waits():
+            raise NotReady(self.clock())
+        return self.write(unit, address, data)
+
+    def exchange(
+        self, unit: int, first: int, count: int, at: int, data: bytes
+    ) -> tuple[bytes, float]:
+        """
+        Read registers of a PLC, in the same transaction as ``data`` is written to others.
+
+        It takes two where the unit refuses that; with no data nothing is written.
+
+        :raises LinkError: as its subclasses say; :attr:`LinkError.maybe_done` once it was written.
+        """
+        # its program is known: it refuses a function by its name
+        self._combines.setdefault(unit, True)
+        if data:
+            answer = self._combined(WriteAndRead(unit, at, data, first, count))
+            if answer is not None:
+                return answer
+            self._ask(Write(unit, at, data, multiple=True))
+        try:
+            return self._ask(Read(unit, first, count))
+        except LinkError as error:
+            error.maybe_done |= bool(data)
+            raise
+
+    def _combined(self, request: WriteAndRead) -> tuple[bytes, float] | None:
+        """
+        Write and read in one transaction; ``None``: nothing was done, each has to go by itself.
+
+        A unit that has never done it may refuse it with any code, or not answer a function that it
+        does not know.
+        """
+        unit = request.unit
+        if not self._combines.get(unit, True):
+            return None
+        try:
+            answer = self._write_and_read(request)
+        except (NoAnswer, Refused) as error:
+            code = error.code if isinstance(error, Refused) else None
+            untried = unit not in self._combines and code != Refused.BUSY
+            if untried or code == Refused.ILLEGAL_FUNCTION:
+                self._combines[unit] = False
+            if code is None or self._combines.get(unit, True):
+                raise
+            return None
+        if answer is not None:
+            self._combines[unit] = True
+        return answer
+
+    def _write_and_read(self, request: WriteAndRead) -> tuple[bytes, float] | None:
+        """Return the answer to a request, if it could be believed; else nothing was sent."""
+        return self._ask(request)
 
     def identify(self, unit: int) -> Plan[Identification]:
-        """Have a unit identify itself (functions 43/14 and 17)."""
+        """Have a unit identify itself (functions 43/14 and 17): it may be another one."""
+        self._combines.pop(unit, None)
         return questions(unit, self._ask)
 
     @abstractmethod

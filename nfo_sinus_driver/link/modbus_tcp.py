@@ -149,7 +149,7 @@ class TcpLink(ModbusLink):
         self._unanswered = False
         #: How many connections in a row the gateway has closed after one answer.
         self._closings = 0
-        self._blocks = telegram.Blocks(self._ask, now)
+        self._blocks = telegram.Blocks(self.exchange, now)
         self.remarks = Remarks()
 
     def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:

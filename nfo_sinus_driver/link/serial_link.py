@@ -30,9 +30,9 @@ from nfo_sinus_driver.link.modbus_pdu import (
     AnswerReader,
     Request,
     Write,
+    WriteAndRead,
     read_of,
     refusal_head,
-    write_and_read_of,
     write_of,
 )
 from nfo_sinus_driver.link.port import Port
@@ -98,22 +98,14 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         # a write answer names what was written, and it is not believed without reading back
         return Reply(*self._believed(request))
 
-    def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
-        """
-        Write one parameter and read another (function 23), or only write it.
-
-        It is only written where the answer could be confused with another: no write waits until the
-        line can be believed.
-
-        :raises LinkError: as its subclasses say.
-        """
-        request = write_and_read_of(unit, address, data, source)
+    def _write_and_read(self, request: WriteAndRead) -> tuple[bytes, float] | None:
+        # no write waits until the line can be believed
         self._await_gap(request, is_write=True)
-        quarantined = self._late.quarantined(unit, self._now())
+        quarantined = self._late.quarantined(request.unit, self._now())
         doubted = not quarantined.isdisjoint(answer_kinds(request))
         if doubted or self._another.is_there(self._now()):
-            return self.write(unit, address, data)
-        return Reply(*self._believed(request))
+            return None
+        return self._believed(request)
 
     # --- what differs by protocol -----------------------------------------------------------------
 

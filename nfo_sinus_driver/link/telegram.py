@@ -22,9 +22,7 @@ time of the last one before the word, so that it is never taken for an answer to
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import struct
-from typing import TypeVar
 
 from nfo_sinus_driver.link.by_address import ByAddress
 from nfo_sinus_driver.link.interface import (
@@ -41,10 +39,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Reply,
 )
-from nfo_sinus_driver.link.mailbox import Mailbox
-from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write, WriteAndRead
-
-_T = TypeVar('_T')
+from nfo_sinus_driver.link.mailbox import Exchange, Mailbox
 
 #: The addressing of parameters in a block, and their space; the sub-index is the part of the block,
 #: as follows.
@@ -92,7 +87,6 @@ _NO_CONTROL_WORD = (
     f'was not reached for longer than its time, {PLC_TIME:g} s; enable again'
 )
 
-Ask = Callable[[Request[_T]], tuple[_T, float]]
 #: A write.
 _Written = tuple[Address, bytes]
 #: The registers that were read, and a moment.
@@ -103,14 +97,14 @@ class Block:
     """
     One block: its content, and how old that is.
 
-    :param ask: sends a request of Modbus; returns its answer and when that came.
+    :param exchange: reads registers of a PLC, see :meth:`ModbusLink.exchange`.
     :param now: the clock of these moments, s.
     :param unit: the unit of the PLC.
     :param start: its first register.
     """
 
-    def __init__(self, ask: Ask[bytes], now: Clock, unit: int, start: int) -> None:
-        self._ask = ask
+    def __init__(self, exchange: Exchange, now: Clock, unit: int, start: int) -> None:
+        self._transact = exchange
         self._now = now
         self._unit = unit
         self._start = start
@@ -132,11 +126,9 @@ class Block:
         self._beside: tuple[_Shown, float] | None = None
         #: The layout that was read; 0: none yet.
         self._layout = 0
-        #: Function 23 was refused.
-        self._apart = False
         #: The last reading, and when.
         self._last: tuple[_Shown, float] | None = None
-        self._mailbox = Mailbox(ask, now, unit, start)
+        self._mailbox = Mailbox(exchange, now, unit, start)
         self._by_address = ByAddress(self._mailbox, now)
 
     def forget(self) -> None:
@@ -278,8 +270,9 @@ class Block:
 
     def _look(self) -> _Shown:
         """Only read."""
+        count = _SHOWN[self._layout]
         try:
-            data, arrived = self._ask(Read(self._unit, self._start, _SHOWN[self._layout]))
+            data, arrived = self._transact(self._unit, self._start, count, 0, b'')
         except Refused as refusal:
             raise self._of_block(refusal) from None
         return self._take(_words(data), arrived)
@@ -288,24 +281,10 @@ class Block:
         """Write and read."""
         at, count = self._start + WRITTEN_FROM, _SHOWN[self._layout]
         try:
-            if not self._apart:
-                request = WriteAndRead(self._unit, at, data, self._start, count)
-                try:
-                    answer, arrived = self._ask(request)
-                    return _words(answer), arrived
-                except Refused as refusal:
-                    if refusal.code != Refused.ILLEGAL_FUNCTION:
-                        raise
-                    self._apart = True
-            self._ask(Write(self._unit, at, data))
-            try:
-                answer, arrived = self._ask(Read(self._unit, self._start, count))
-            except LinkError as error:
-                error.maybe_done = True
-                raise
-            return _words(answer), arrived
+            answer, arrived = self._transact(self._unit, self._start, count, at, data)
         except Refused as refusal:
             raise self._of_block(refusal) from None
+        return _words(answer), arrived
 
     def _take(self, shown: tuple[int, ...], arrived: float) -> _Shown:
         version = shown[4]
@@ -344,8 +323,8 @@ class Block:
 class Blocks:
     """The blocks of one line, by unit and first register."""
 
-    def __init__(self, ask: Ask[bytes], now: Clock) -> None:
-        self._ask = ask
+    def __init__(self, exchange: Exchange, now: Clock) -> None:
+        self._transact = exchange
         self._now = now
         self._blocks: dict[tuple[int, int], Block] = {}
 
@@ -354,7 +333,7 @@ class Blocks:
         assert address.block is not None
         place = unit, address.block
         if place not in self._blocks:
-            self._blocks[place] = Block(self._ask, self._now, *place)
+            self._blocks[place] = Block(self._transact, self._now, *place)
         return self._blocks[place]
 
     def forget(self) -> None:

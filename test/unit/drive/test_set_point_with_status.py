@@ -11,7 +11,7 @@ import pytest
 from support.rig import Rig
 from support.wire import understand
 
-from nfo_sinus_driver.link import Refused
+from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.modbus import server
 
 SETPOINT, STATUS, INV_ST = 'status.frq_set', 'fieldbus.drive_status', 'fieldbus.inv_st'
@@ -57,11 +57,11 @@ def refuse_both(rig: Rig, code: int) -> list[int]:
     """Have it refuse the function; return how much had been asked, each time."""
     tried: list[int] = []
 
-    def refuse(*_: Any) -> None:
+    def refuse(*_: Any) -> tuple[int, ...]:
         tried.append(len(rig.asked))
-        raise Refused(code)
+        raise Refused(Reason(code), 'it does not like it')
 
-    rig.link.write_and_read = refuse  # type: ignore[method-assign]
+    server(rig.far).write_and_read = refuse  # type: ignore[method-assign]
     return tried
 
 
@@ -103,23 +103,23 @@ def test_the_optimal_is_never_asked_for_it() -> None:
         assert rig.drive.following
 
 
-@pytest.mark.parametrize('code', [Refused.ILLEGAL_FUNCTION, Refused.ILLEGAL_VALUE, 0])
+@pytest.mark.parametrize('code', [Reason.FUNCTION, Reason.VALUE, 0])
 def test_one_that_does_not_have_the_function_is_given_up_for_the_connection(code: int) -> None:
     with Rig(telemetry_rate=0.0) as rig:
         rig.connect()
-        both = rig.link.write_and_read
+        both = server(rig.far).write_and_read
         tried = refuse_both(rig, code) if code else []
         if not code:
             # it does not know it, and is silent
             rig.line.plan = lambda frame: 'unheard' if frame[1] == BOTH else None
         rig.turn()
-        assert (len(tried), functions(rig).count(BOTH)) == ((1, 0) if code else (0, 1))
+        assert (len(tried), functions(rig).count(BOTH)) == (bool(code), 1)
         # the plain write follows at once: a poll may have waited longer, and a stop might
         assert not code or (SETPOINT, 200) in asked(rig, tried[0])[:2]
         assert rig.drive.following and not rig.notes.events
         assert abs(rig.far.motor.frequency - 20.0) < 0.2
         # and is tried anew after another connection
-        rig.link.write_and_read = both  # type: ignore[method-assign]
+        server(rig.far).write_and_read = both  # type: ignore[method-assign]
         rig.line.plan = lambda frame: None
         rig.line.state = 'silent'
         rig.pass_time(2.0)
@@ -135,7 +135,7 @@ def test_one_that_does_not_have_the_function_is_given_up_for_the_connection(code
 
 def test_a_refused_set_point_stops() -> None:
     with quiet() as rig:
-        refuse_both(rig, Refused.ILLEGAL_VALUE)
+        refuse_both(rig, Reason.VALUE)
         rig.drive.set_setpoint(30.0)
         rig.pass_time(0.3)
         assert not rig.drive.following

@@ -288,8 +288,6 @@ def test_what_was_not_sent_was_not_done() -> None:
 
 def test_a_write_and_read_whose_answer_would_be_in_doubt_is_a_write() -> None:
     bench = Bench()
-    bench.wire.far_end = lambda frame, end: None
-    bench.expect(NoAnswer, lambda: bench.write_and_read(A, packed(7), B))
 
     def answer(frame: bytes, end: float) -> None:
         message = bytes((UNIT, 23, 2, 0, 5))
@@ -297,12 +295,16 @@ def test_a_write_and_read_whose_answer_would_be_in_doubt_is_a_write() -> None:
         bench.wire.arrive(end, reply)
 
     bench.wire.far_end = answer
+    assert bench.write_and_read(A, packed(6), B).data == packed(5)
+    bench.wire.far_end = lambda frame, end: None
+    bench.expect(NoAnswer, lambda: bench.write_and_read(A, packed(7), B))
+    bench.wire.far_end = answer
     before = bench.wire.now
     assert bench.write_and_read(A, packed(8), B).data == b''
     assert bench.wire.now < before + 0.1
     # what was late has come before the answer to that
     assert bench.write_and_read(A, packed(9), B).data == packed(5)
-    assert [frame[1] for _, frame in bench.wire.sent] == [23, 6, 23]
+    assert [frame[1] for _, frame in bench.wire.sent] == [23, 23, 6, 23]
 
 
 def test_a_write_and_read_goes_out_at_once_on_a_line_that_is_never_silent() -> None:

@@ -9,7 +9,7 @@ from identify_bench import ONE, TWO, Unit, refuses, write_and_read_request
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.link.interface import NoAnswer, Refused
+from nfo_sinus_driver.link.interface import NoAnswer, NotReady
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 
 
@@ -34,9 +34,18 @@ def test_its_answer_is_put_in_quarantine_as_that_of_a_read() -> None:
     assert unit.functions == [23, 6]
 
 
-def test_write_and_read_refused() -> None:
+def test_what_a_unit_refuses_to_do_in_one_transaction_is_only_written() -> None:
     unit = Unit()
     unit.answers[23] = refuses
-    with pytest.raises(Refused) as refusal:
+    for value in (7, 8):
+        assert unit.link.write_and_read(1, ONE, packed(value), ONE).data == b''
+    assert unit.functions == [23, 6, 6]
+
+
+def test_a_stop_goes_between_a_refusal_and_what_is_only_written() -> None:
+    unit = Unit()
+    unit.answers[23] = refuses
+    unit.link.end_listening_if(lambda: bool(unit.functions))
+    with pytest.raises(NotReady):
         unit.link.write_and_read(1, ONE, packed(7), ONE)
-    assert refusal.value.code == Refused.ILLEGAL_FUNCTION
+    assert unit.functions == [23]
