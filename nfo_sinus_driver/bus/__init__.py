@@ -48,8 +48,18 @@ link, and virtual time is harder); a thread for each drive (the line is the limi
 in one place of the worker (it hides how often a status was missed, which drive control counts).
 """
 
+from nfo_sinus_driver.bus.by_address import ByAddress
 from nfo_sinus_driver.bus.statistics import Statistics
 from nfo_sinus_driver.bus.tasks import Cancelled, Exchange, LatestValue, Priority, Task
 from nfo_sinus_driver.bus.worker import Bus
 
-__all__ = ['Bus', 'Cancelled', 'Exchange', 'LatestValue', 'Priority', 'Statistics', 'Task']
+__all__ = [
+    'Bus',
+    'ByAddress',
+    'Cancelled',
+    'Exchange',
+    'LatestValue',
+    'Priority',
+    'Statistics',
+    'Task',
+]

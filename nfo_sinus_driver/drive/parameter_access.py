@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping
 from fractions import Fraction
 
-from nfo_sinus_driver.bus import Bus, Priority
+from nfo_sinus_driver.bus import Bus, ByAddress, Priority
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Role, Value, profile
 from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.recognition import Recognition
 from nfo_sinus_driver.link import (
-    BY_MAILBOX,
+    MAILBOX,
     Address,
     DamagedAnswer,
     Identification,
@@ -29,6 +29,9 @@ from nfo_sinus_driver.link import (
 #: How often a request to a busy drive is repeated, s, and how many times.
 _BUSY_PERIOD = 0.05
 _BUSY_TRIES = 10
+#: The space of the addresses of the drive itself, and all that is reached by the mailbox of a PLC.
+_OWN = 'drive_address'
+_BY_MAILBOX = frozenset((MAILBOX, _OWN))
 #: How a drive answers that lacks the option card of a parameter, and how often until that is
 #: believed.
 NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
@@ -91,6 +94,7 @@ class ParameterAccess:
         self._block = block_address if self.in_block else None
         #: The PLC has a mailbox by which parameters of the drive are reached.
         self._has_mailbox = False
+        self._by_address = ByAddress(bus)
         usual = (model.key(role) for role in _RESYNC_READS if role in model.roles)
         reads = model.profile.resync_reads.get(self.protocol, usual)
         ask = model.profile.why_refused
@@ -161,12 +165,12 @@ class ParameterAccess:
 
     def reaches_space(self, space: str) -> bool:
         """Return whether a space of addresses can be reached over this line."""
-        return space not in BY_MAILBOX or not self.in_block or self._has_mailbox
+        return space not in _BY_MAILBOX or not self.in_block or self._has_mailbox
 
     def by_mailbox(self, key: str) -> bool:
         """Return whether a parameter is reached by the mailbox of a PLC, which is slow."""
         there = self.in_block and self.is_addressable(key)
-        return there and self.model[key].at(self.protocol).space in BY_MAILBOX
+        return there and self.model[key].at(self.protocol).space in _BY_MAILBOX
 
     def use_mailbox(self, has_mailbox: bool) -> None:
         """Note whether parameters are reached by the mailbox of the PLC."""
@@ -357,9 +361,20 @@ class ParameterAccess:
         *,
         patient: bool = False,
     ) -> Reply:
+        there = operation.address
+        if there.space == _OWN:
+
+            def ask(pnu: int, word: int | None) -> Awaitable[Reply]:
+                at = Address(MAILBOX, pnu, None, 2, False, there.block)
+                step = Read(at) if word is None else Write(at, word.to_bytes(2, 'big'))
+                # the PLC does nothing twice, so what is lost of it may be repeated
+                return self._ask(step, priority, True, require_wanted)
+
+            word = None if isinstance(operation, Read) else int.from_bytes(operation.data, 'big')
+            return await self._by_address.access(there.index, word, ask)
         has_effect = not isinstance(operation, Read) or operation.once
         # a mailbox is asked by a write to the registers of the PLC
-        if has_effect or (self.in_block and operation.address.space in BY_MAILBOX):
+        if has_effect or (self.in_block and there.space in _BY_MAILBOX):
             await self.require_recognised()
 
             def require() -> None:

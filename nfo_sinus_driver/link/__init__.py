@@ -46,7 +46,7 @@ for it, too); a link with threads or callbacks of its own (only the bus knows wh
 """
 
 from nfo_sinus_driver.link.interface import (
-    BY_MAILBOX,
+    MAILBOX,
     Address,
     Ask,
     Clock,
@@ -90,7 +90,7 @@ from nfo_sinus_driver.link.reconnect import Reconnect
 __all__ = [
     'ADDRESSES',
     'BIT_RATES',
-    'BY_MAILBOX',
+    'MAILBOX',
     'PROTOCOLS',
     'Address',
     'Ask',

@@ -30,10 +30,6 @@ Clock = Callable[[], float]
 
 #: The space of addresses that are PNUs: parameters that a PLC reads from a drive.
 MAILBOX = 'pnu'
-#: The space of addresses of the drive itself, which are reached by such parameters.
-DRIVE_ADDRESS = 'drive_address'
-#: Both: all that is reached by the mailbox of a PLC.
-BY_MAILBOX = frozenset((MAILBOX, DRIVE_ADDRESS))
 
 
 class Address(NamedTuple):

@@ -24,9 +24,7 @@ from __future__ import annotations
 
 import struct
 
-from nfo_sinus_driver.link.by_address import ByAddress
 from nfo_sinus_driver.link.interface import (
-    BY_MAILBOX,
     MAILBOX,
     Address,
     Clock,
@@ -129,13 +127,11 @@ class Block:
         #: The last reading, and when.
         self._last: tuple[_Shown, float] | None = None
         self._mailbox = Mailbox(exchange, now, unit, start)
-        self._by_address = ByAddress(self._mailbox, now)
 
     def forget(self) -> None:
         """Write nothing any more, only read: the connection is a new one."""
         self._layout = 0
         self._mailbox.forget()
-        self._by_address.forget()
         self._command, self._live = None, False
         self._acknowledged = None
 
@@ -146,7 +142,7 @@ class Block:
         The actual value is that of the status that was read just before: the two are of one
         telegram, and one request is enough.
         """
-        if address.space in BY_MAILBOX:
+        if address.space == MAILBOX:
             return self._access(address)
         shared = self._shared_with(address)
         if shared is not None:
@@ -168,7 +164,7 @@ class Block:
 
     def write(self, address: Address, data: bytes) -> Reply:
         """Write a part of it."""
-        if address.space in BY_MAILBOX:
+        if address.space == MAILBOX:
             return self._access(address, data)
         _, arrived = self._exchange((address, data))
         return Reply(b'', arrived)
@@ -191,8 +187,7 @@ class Block:
             raise InProgress(self._now())
         if self._layout == 1:
             raise NotSent(Refused.ILLEGAL_ADDRESS, _NO_MAILBOX)
-        by = self._mailbox if address.space == MAILBOX else self._by_address
-        return by.access(address, data)
+        return self._mailbox.access(address, data)
 
     def _part(self, shown: tuple[int, ...], address: Address) -> bytes:
         word, actual, _, flags = shown[:4]

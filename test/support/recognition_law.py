@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from nfo_sinus_driver.link import (
-    BY_MAILBOX,
+    MAILBOX,
     Address,
     LinkError,
     NotReady,
@@ -48,7 +48,7 @@ class RecognitionLaw:
 
     def asked(self, unit: int, address: Address, *, writes: bool, now: float) -> None:
         """Judge a request before it is sent."""
-        if not writes and (address.block is None or address.space not in BY_MAILBOX):
+        if not writes and (address.block is None or address.space != MAILBOX):
             return
         least = _LEAST if address.block is None else _LEAST_OF_PLC
         answers, silent = self._answers[unit], now - self._silent_since.get(unit, now)

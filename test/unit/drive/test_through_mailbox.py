@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import Any
 
@@ -336,6 +337,18 @@ def test_parameters_of_a_sinus_h_are_those_that_the_user_names_by_address() -> N
         assert rig.far.peek('drv.acc_time') == 7.5 and rig.far.writes['drv.acc_time'] == 1
         with raises(Cause.NO_SETTING):
             rig.result(rig.drive.parameters.change({'drv.max_freq': 50.0}))
+
+
+@pytest.mark.parametrize('fate', ['unheard', 'drop'])
+@pytest.mark.parametrize('at', range(1, 16, 2))
+def test_a_loss_while_an_address_is_written_writes_it_no_second_time(fate: str, at: int) -> None:
+    with Rig(SINUS_H, drive_addresses=OWN, poll_rate=1.0, telemetry_rate=0.0) as rig:
+        rig.connect(parameters=True)
+        requests = itertools.count()
+        rig.line.plan = lambda frame: fate if next(requests) == at else None
+        rig.answer(rig.drive.parameters.change({'drv.acc_time': 7.5}))
+        assert next(requests) > at
+        assert rig.far.peek('drv.acc_time') == 7.5 and rig.far.writes['drv.acc_time'] == 1
 
 
 def test_an_address_that_the_drive_lacks_is_reported() -> None:
