@@ -227,7 +227,7 @@ class Bus:
 
         :param require_wanted: called when its turn has come; if it raises, nothing is sent.
         """
-        parts = self._link.parts(operation.address) if isinstance(operation, Read) else ()
+        parts = self.protocol.parts(operation.address) if isinstance(operation, Read) else ()
         if len(parts) > 1:
             return consistent_read(unit, parts, priority)
         return Exchange(unit, operation, priority, require_wanted)

@@ -246,10 +246,6 @@ class CanopenLink:
     def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
         """Take parameters that are safe to read; here those are read that every node has."""
 
-    def parts(self, address: Address) -> tuple[Address]:
-        """Return the address: a transfer carries the whole value."""
-        return (address,)
-
     def read(self, unit: int, address: Address) -> Reply:
         """Read one parameter; a number in as many bytes as the catalog has for it."""
         sub_index = self._shapes.sub_index(unit, address)

@@ -293,19 +293,12 @@ class ClassicLink(CodecLink):
         super().use_resync_reads(unit, addresses)
         self._why[unit] = why
 
-    def parts(self, address: Address) -> tuple[Address, ...]:
-        """Return the words: a message carries one."""
-        if address.sub_index is None:
-            return (address,)
-        ids = address.index, address.sub_index
-        return tuple(Address(address.space, id_, None, _WORD.size) for id_ in ids)
-
     def read(self, unit: int, address: Address) -> Reply:
-        """Read one parameter of one word, or one word of another."""
-        (part,) = self.parts(address)
+        """Read one parameter of one word, or one part of another."""
+        assert address.sub_index is None
         if unit == BROADCAST:
             raise ValueError('a broadcast is not answered')
-        word, arrived = self._enquire(unit, part.index)
+        word, arrived = self._enquire(unit, address.index)
         return Reply(_WORD.pack(word), arrived)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:

@@ -194,6 +194,8 @@ class LineProtocol:
         gateway's.
     :ivar broadcast: the address that every drive obeys and none answers; ``None``: there is none.
     :ivar point_to_point: the address at which a drive that is alone answers, whatever its own is.
+    :ivar has_parts: the sub-index of an address is the place of its second part, which takes a
+        transaction of its own to read.
     :ivar identifies: a drive can be asked for its identity.
     :ivar writes_and_reads: it can write one parameter and read another in one transaction.
     :ivar most_requests: how many requests a second a PLC or gateway gets at most by default [C118];
@@ -213,6 +215,7 @@ class LineProtocol:
     char_formats: Sequence[str] = ()
     broadcast: int | None = None
     point_to_point: int | None = None
+    has_parts: bool = False
     identifies: bool = False
     writes_and_reads: bool = False
     most_requests: float = 0.0
@@ -223,6 +226,13 @@ class LineProtocol:
     def reaches_by(self, addressing: str) -> bool:
         """Return whether parameters are reached by this addressing; ``''``: that of the line."""
         return addressing in ('', self.addressing, *self.carries)
+
+    def parts(self, address: Address) -> tuple[Address, ...]:
+        """Return the parts that each take a transaction to read, the first one of one word."""
+        if not self.has_parts or address.sub_index is None or address.block is not None:
+            return (address,)
+        first = address._replace(sub_index=None, size=2)
+        return first, first._replace(index=address.sub_index, size=address.size - 2)
 
     def require_unit(self, address: int) -> None:
         """
@@ -295,9 +305,6 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
-
-    def parts(self, address: Address) -> Sequence[Address]:
-        """Return the parts that each take a transaction to read, the low part first."""
 
     def read(self, unit: int, address: Address) -> Reply:
         """

@@ -53,13 +53,6 @@ class ModbusLink(ABC):
         """Whether a unit writes and reads in one transaction (function 23), if that is known."""
         return {}
 
-    def parts(self, address: Address) -> tuple[Address, ...]:
-        """Return the address; where the first register is apart, it and then the others."""
-        if address.sub_index is None or address.block is not None:
-            return (address,)
-        first = address._replace(sub_index=None, size=2)
-        return first, first._replace(index=address.sub_index, size=address.size - 2)
-
     def read(self, unit: int, address: Address) -> Reply:
         """Read one parameter (function 03; 04 for input registers, 01 for coils)."""
         return Reply(*self._ask(read_of(unit, address)))

@@ -399,10 +399,6 @@ class MovitracLink(CodecLink):
     _codec = CODEC
     _longest_response = LONGEST_RESPONSE_TIME
 
-    def parts(self, address: Address) -> tuple[Address]:
-        """Return the address: a frame carries the whole value."""
-        return (address,)
-
     def read(self, unit: int, address: Address) -> Reply:
         """Read one parameter, of 4 or of 8 bytes."""
         answer, arrived = self._ask(Enquiry(unit, address.index))

@@ -34,6 +34,7 @@ MODBUS_RTU = LineProtocol(
     # more than the manuals of the shipped drives have, for drives that files describe
     baud_rates=(*BAUD_RATES, 115_200),
     char_formats=('8E1', '8O1', '8N2', '8N1', '8E2', '8O2'),
+    has_parts=True,
     identifies=True,
     writes_and_reads=True,
 )
@@ -45,6 +46,7 @@ MODBUS_ASCII = LineProtocol(
     baud_rate=19200,
     char_format='7E1',
     char_formats=('7E1', '7O1', '7N2', '7N1', '7E2', '7O2'),
+    has_parts=True,
     identifies=True,
     writes_and_reads=True,
 )
@@ -56,6 +58,7 @@ MODBUS_TCP = LineProtocol(
     # the line behind a gateway is set in the gateway
     baud_rate=19200,
     char_format='8E1',
+    has_parts=True,
     identifies=True,
     writes_and_reads=True,
     most_requests=50.0,
@@ -69,6 +72,7 @@ CLASSIC = LineProtocol(
     baud_rate=9600,
     char_format='7E1',
     char_formats=('7E1', '7O1', '7N2', '8E1', '8O1', '8N2', '8N1'),
+    has_parts=True,
     broadcast=BROADCAST,
     point_to_point=POINT_TO_POINT,
 )

@@ -88,7 +88,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
-        parts = (part for address in addresses for part in self.parts(address))
+        parts = (part for address in addresses for part in self.protocol.parts(address))
         self._resync_addresses[unit] = tuple(parts)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:

@@ -510,7 +510,7 @@ class Rig:
         params, keys = drive.params, {}
         for key in params.model:
             if params.protocol in params.model[key].addresses:
-                for part in self.link.parts(params.address(key)):
+                for part in self.link.protocol.parts(params.address(key)):
                     keys.setdefault(part[:3], key)
         return keys
 

@@ -12,7 +12,7 @@ import threading
 import time
 from typing import Any, NamedTuple
 
-from support.addresses import packed, register
+from support.addresses import packed
 
 from nfo_sinus_driver.link import PROTOCOLS, Address, NoAnswer, Remarks, Reply, Supervision, Why
 from nfo_sinus_driver.link.thread_clock import ThreadClock
@@ -104,11 +104,6 @@ class FakeLink:
     def close(self) -> None:
         self.closed += 1
         self.closing()
-
-    def parts(self, address: Address) -> Sequence[Address]:
-        if address.sub_index is None:
-            return (address,)
-        return tuple(register(number) for number in (address.index, address.sub_index))
 
     def read(self, unit: int, address: Address) -> Reply:
         return self._transact(Done(unit, address.index, None))

@@ -76,10 +76,6 @@ class FarEnd:
         yield from ()
         return Identification()
 
-    def parts(self, address: Address) -> Sequence[Address]:
-        """Whatever it has is read at once."""
-        return (address,)
-
     def read(self, unit: int, address: Address) -> Reply:
         numbers = self._numbers(address)
         self.reads.append(address.index)

@@ -62,7 +62,7 @@ def test_a_value_is_as_long_as_the_node_says() -> None:
     # [C102]
     bench = Bench()
     assert len(bench.read(at(A.index, size=4)).data) == 2
-    assert bench.link.parts(TEXT) == (TEXT,)
+    assert bench.link.protocol.parts(TEXT) == (TEXT,)
 
 
 def test_a_refusal_says_why() -> None:

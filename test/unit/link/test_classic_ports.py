@@ -150,7 +150,7 @@ def test_read_and_write(drive: PtyDrive, link: ClassicLink, unit: int) -> None:
     assert link.read(unit, SPEED).data == packed(1450)
     assert link.write(unit, SETPOINT, packed(500)).data == b''
     assert link.read(unit, SETPOINT).data == packed(500)
-    words = [link.read(unit, part).data for part in link.parts(OP_TIME)]
+    words = [link.read(unit, part).data for part in link.protocol.parts(OP_TIME)]
     assert words == [packed(0xFFFE), packed(2)]
     assert drive.asked[-2:] == [(0x27, None), (0x127, None)]
 

@@ -49,7 +49,7 @@ def test_read_and_write(lump: bool, unit: int) -> None:
 
 
 def test_a_long_value_is_one_transaction() -> None:
-    assert Bench().link.parts(LONG) == (LONG,)
+    assert Bench().link.protocol.parts(LONG) == (LONG,)
 
 
 def test_the_line_is_used_to_its_limit() -> None:

@@ -48,14 +48,12 @@ def test_it_reaches_parameters_and_no_drive_by_its_broadcast(protocol: LineProto
 
 @EVERY
 def test_the_parts_of_every_parameter_are_the_whole_of_it(protocol: LineProtocol) -> None:
-    port = PORTS.get(protocol.name, '/dev/x')
-    link = BusSettings(port, protocol.name).open()
     for row in ROWS[protocol.name]:
         place = row.at(protocol.addressing)
         address = Address(*place.place)
-        parts = link.parts(address)
+        parts = protocol.parts(address)
         assert sum(part.size for part in parts) == address.size == place.codec.size
-        assert all(link.parts(part) == (part,) for part in parts), 'each is one transaction'
+        assert all(protocol.parts(part) == (part,) for part in parts), 'each is one transaction'
         # all but Classic read what belongs together at once
         assert parts == (address,) or protocol.name == 'classic'
 
