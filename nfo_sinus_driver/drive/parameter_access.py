@@ -24,6 +24,8 @@ from nfo_sinus_driver.link import (
     Refused,
     Reply,
     Write,
+    WriteAndRead,
+    Written,
 )
 
 #: How often a request to a busy drive is repeated, s, and how many times.
@@ -127,10 +129,11 @@ class ParameterAccess:
     def _parameter(self, key: str) -> Parameter:
         return self._rescaled.get(key) or self.model[key]
 
-    @property
-    def writes_and_reads(self) -> bool:
-        """The drive has a function that writes one parameter and reads another, on this line."""
-        return self._bus.protocol.writes_and_reads and self.model.profile.writes_and_reads
+    def with_status(self, address: Address, data: bytes) -> Written:
+        """Return a write that brings the status word, too, where line and drive can do that."""
+        if self._bus.protocol.writes_and_reads and self.model.profile.writes_and_reads:
+            return WriteAndRead(address, data, self.address(self.model.key(Role.STATUS_WORD)))
+        return Write(address, data)
 
     def encode(self, key: str, value: Value) -> bytes:
         """Return the bytes to write for a value."""

@@ -22,7 +22,6 @@ from nfo_sinus_driver.link import (
     LinkError,
     Refused,
     Write,
-    WriteAndRead,
     Written,
 )
 
@@ -304,9 +303,7 @@ class Setpoint:
         self._sent = limited
         self._may_have(self._decoded({**self._in_drive, address: data}))
         by_itself = len(due) > 1 or self._is_once(address)
-        if by_itself or not self._params.writes_and_reads:
-            return Write(address, data)
-        return WriteAndRead(address, data, self._params.address(self._state.word_key))
+        return Write(address, data) if by_itself else self._params.with_status(address, data)
 
     def _report_limited(self, value: float, limited: float) -> None:
         chosen = self._state.settings.setpoint_max
