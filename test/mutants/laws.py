@@ -65,6 +65,14 @@ LAWS = (
     ),
     Mutant(
         1,
+        'a refused write over Classic ends a serial fault that was there before',
+        G2,
+        ' and before not in (None, _SERIAL_FAULT):',
+        ':',
+        ('test/unit/link/test_classic_refusals.py', '-k', 'serial_fault'),
+    ),
+    Mutant(
+        1,
         'the command line takes control of a drive unasked',
         'nfo_sinus_driver/cli/session.py',
         'if not options.may_take_control:',
