@@ -144,14 +144,16 @@ def _why_refused(read: Callable[[str], int], before: int | None) -> tuple[int, s
     # a serial fault that was not active just before: the write is its cause
     if status == _SERIAL_FAULT and before not in (None, _SERIAL_FAULT):
         flags = read(_SIO_ERR)
-        text = f'the drive refused: {_in_words(flags) or "it does not say why"}'
-        text += '; its serial fault (Sio Fail) by this is cleared (NAK)'
+        why = _in_words(flags) or 'it does not say why'
+        text = f'the drive refused: {why}; its serial fault (Sio Fail) by this is cleared (NAK)'
         code = _ADDRESS if flags & _ADDRESS_FLAGS else _FAILURE
         return _VALUE if flags & _VALUE_FLAG else code, text
+    if status == _SERIAL_FAULT:
+        text = 'a serial fault (Sio Fail) is active: until it is acknowledged nothing can be done'
+        return _FAILURE, f'{text} (NAK)'
     if status in _FAULTS:
-        what = 'a serial fault (Sio Fail) is active'
-        what = what if status == _SERIAL_FAULT else f'a fault is active (InvSt {status})'
-        return _FAILURE, f'{what}: until it is acknowledged nothing can be done (NAK)'
+        text = f'a fault is active (InvSt {status}): until it is acknowledged nothing can be done'
+        return _FAILURE, f'{text} (NAK)'
     text = 'the drive does not accept this value, or not in its present state'
     return _VALUE, f'{text} (NAK, InvSt {status})'
 
