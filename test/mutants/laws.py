@@ -979,6 +979,14 @@ LAWS = (
         also=((WATCH, 'if self._bus.paused == paused:', 'if True:'),),
     ),
     Mutant(
+        1,
+        'what acknowledges is read again after a pause of the driver',
+        'nfo_sinus_driver/drive/parameter_access.py',
+        'Read(self.address(key), once=True)',
+        'Read(self.address(key))',
+        (STANDS_STILL, '-k', 'is_acknowledged'),
+    ),
+    Mutant(
         3,
         'a motor whose status cannot be read is not stopped',
         WATCH,

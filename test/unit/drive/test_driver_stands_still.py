@@ -20,6 +20,9 @@ _STOOD, _SHORT = 5.0, 2.5
 #: When the operator stops the motor after that, s, and how soon that is on the wire, s.
 _LATER = 0.15
 _AT_ONCE = 0.05
+#: Where a fault is acknowledged by a read behind which nothing is written.
+_ACKNOWLEDGED_BY_READ = ('rtu', 'ascii', 'classic', 'canopen, ds402 alone', 'optimal')
+_OVERLOAD, _OVERHEATED, _SIO_FAIL = 5, 3, 14
 #: How long it takes to recognise a drive anew, s.
 _RECOGNISED = 1.0
 #: The moments at which it begins, within the time of some transactions, s; all that are tried.
@@ -127,6 +130,37 @@ def test_nothing_old_is_published_after_that(connection: str) -> None:
             later = rig.notes.snapshots
             assert later and all(not one.enabled for one in later)
             assert all(one.status is None or one.status.faulted for one in later)
+
+
+def stand_still_while_acknowledging(connection: str, fault: int, key: str) -> None:
+    """Stand still when a drive has carried out a read that acknowledges; another fault comes."""
+    with Rig(connection) as rig:
+        rig.connect()
+        rig.far.trip(fault)
+        rig.wait_until(lambda: rig.notes.snapshot.status.code == fault, 5.0)
+
+        def stand_still() -> None:
+            if not rig.far.faults.codes:
+                rig.looked = lambda: None
+                rig.line.later(rig.clock.now + 1.0, lambda: rig.far.trip(_OVERHEATED))
+                rig.line.stand_still(rig.clock.now, _SHORT)
+
+        rig.looked = stand_still
+        rig.acknowledged = 1
+        rig.answer(rig.drive.acknowledge())
+        rig.pass_time(1.0)
+        assert [asked for _, asked, _ in rig.asked].count(key) == 1
+        # read again it would have ended what the user has not seen
+        assert rig.far.faults.codes == [_OVERHEATED]
+
+
+@pytest.mark.parametrize('connection', _ACKNOWLEDGED_BY_READ)
+def test_no_later_fault_is_acknowledged_after_that(connection: str) -> None:
+    stand_still_while_acknowledging(connection, _OVERLOAD, 'fieldbus.inv_st_with_ack')
+
+
+def test_no_fault_behind_a_serial_one_is_acknowledged_after_that() -> None:
+    stand_still_while_acknowledging('classic v5.0', _SIO_FAIL, 'fieldbus.sio_err')
 
 
 def test_a_drive_that_was_unplugged_is_found_as_soon_after_that() -> None:
