@@ -25,7 +25,7 @@ from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.own_parameters import own_parameter
 from nfo_sinus_driver.catalog.parameter import Access, Address, Parameter, Value
 from nfo_sinus_driver.catalog.profile import Profile, SetpointTarget
-from nfo_sinus_driver.catalog.status import Kind, Meaning, Role, StatusCode
+from nfo_sinus_driver.catalog.status import SPEED, Kind, Meaning, Role, StatusCode
 
 _FAMILIES = 'nfo_sinus_driver.families'
 #: Roles of what is read beside the polls, and in no hurry: such parameters may take their time, as
@@ -336,7 +336,7 @@ def _in_speed_mode(family: Family, nominal_speed: float) -> Family:
         roles={role_of.get(role, role): key for role, key in family.roles.items()},
         profile=replace(
             profile,
-            setpoints={'Speed': target},
+            setpoints={SPEED.mode: target},
             # as much above as of frequencies
             most={Role.ACTUAL_SPEED: most * _BEYOND_SETPOINTS},
         ),

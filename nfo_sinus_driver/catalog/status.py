@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import enum
 from fractions import Fraction
 import functools
+from typing import NamedTuple
 
 
 class _LookedUp(enum.Enum):
@@ -283,3 +284,27 @@ class Role(_LookedUp):
     BUS_ADDRESS = 'bus_address'
     BAUD_RATE = 'baud_rate'
     CHARACTER_FORMAT = 'character_format'
+
+
+class Quantity(NamedTuple):
+    """
+    What a drive controls in one control mode.
+
+    :ivar mode: that control mode, as an NFO drive displays it.
+    :ivar unit: of its set-points; ``''``: a parameter of the drive tells it.
+    :ivar role: its actual value.
+    :ivar hertz: what one of the unit is, Hz: of a speed, turns a second; 0: it is no speed.
+    """
+
+    mode: str
+    unit: str
+    role: Role
+    hertz: float = 0.0
+
+
+FREQUENCY = Quantity('Freque', 'Hz', Role.ACTUAL_FREQUENCY, 1.0)
+SPEED = Quantity('Speed', 'rpm', Role.ACTUAL_SPEED, 1 / 60)
+TORQUE = Quantity('Torque', '%', Role.ACTUAL_TORQUE)
+PROCESS_VALUE = Quantity('PI-Reg', '', Role.ACTUAL_PROCESS_VALUE)
+#: By the control mode.
+QUANTITIES = {one.mode: one for one in (FREQUENCY, SPEED, TORQUE, PROCESS_VALUE)}

@@ -11,6 +11,7 @@ import time
 from typing import Any
 
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog.status import QUANTITIES
 from nfo_sinus_driver.cli.console import CliError, UsageError, as_json, say
 from nfo_sinus_driver.cli.control_session import (
     INTERRUPTED,
@@ -167,7 +168,7 @@ class _Run:
             return
         if mode not in offline.model.profile.setpoints:
             raise CliError(f'the drive takes no set-point over the bus in control mode {mode}')
-        unit = {'Freque': 'Hz', 'Speed': 'rpm'}.get(mode) or offline.state.unit
+        unit = QUANTITIES[mode].unit or offline.state.unit
         limits = offline.do(lambda: read_limits(offline.state, mode))
         if not limits.least <= options.setpoint <= limits.most:
             raise CliError(

@@ -16,6 +16,7 @@ import threading
 from typing import TextIO
 
 from nfo_sinus_driver.catalog import Role
+from nfo_sinus_driver.catalog.status import PROCESS_VALUE, TORQUE
 from nfo_sinus_driver.drive import Snapshot
 
 _CLEAR_LINE = '\r\x1b[K'
@@ -133,7 +134,7 @@ def as_line(snapshot: Snapshot, values: Mapping[Role, float], more: str = '') ->
         return '  '.join((*cells, 'not connected'))
     cells.append(f'{f"{snapshot.status.code} {snapshot.text}":<11}')
     cells.append(f'set {_number(snapshot.setpoint, 1):>5} {snapshot.unit}')
-    if snapshot.control_mode in ('Torque', 'PI-Reg'):
+    if snapshot.control_mode in (TORQUE.mode, PROCESS_VALUE.mode):
         cells.append(f'actual {_number(snapshot.actual, 1):>5} {snapshot.unit}')
     cells += [f'{_number(snapshot.frequency, 1):>5} Hz', f'{_number(snapshot.speed, 0):>5} rpm']
     cells += [

@@ -659,7 +659,7 @@ class Controller:
 
     def _why_slower(self, status: InverterStatus, before: InverterStatus | None) -> Report | None:
         turning = self._state.turning
-        by_it = self._setpoint.control_mode == turning.control_mode
+        by_it = self._setpoint.control_mode == turning.mode
         if before is None or before.at < self._control.since or not by_it:
             return None
         reverse = self._setpoint.directed and before.frequency < 0

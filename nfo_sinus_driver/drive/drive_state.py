@@ -11,12 +11,10 @@ import contextlib
 from dataclasses import replace
 import logging
 import math
-from typing import NamedTuple
 
 from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.catalog import (
     Fact,
-    Family,
     Holder,
     InverterStatus,
     Kind,
@@ -25,6 +23,7 @@ from nfo_sinus_driver.catalog import (
     load_family,
 )
 from nfo_sinus_driver.catalog.inverter_status import NO_CODE
+from nfo_sinus_driver.catalog.status import FREQUENCY, PROCESS_VALUE, QUANTITIES, SPEED
 from nfo_sinus_driver.drive.communication_timeout import CommunicationTimeout
 from nfo_sinus_driver.drive.control_state import ControlTable
 from nfo_sinus_driver.drive.direction import Direction
@@ -60,29 +59,6 @@ _FIXED = (
     'reference',
     'scales',
 )
-_UNITS = {'Freque': 'Hz', 'Speed': 'rpm', 'Torque': '%'}
-
-
-class SpeedSource(NamedTuple):
-    """
-    How the speed of a motor is measured.
-
-    :ivar role: the measured value, in ``unit``.
-    :ivar control_mode: the one with set-points in that unit.
-    :ivar hertz: what one of the unit is, Hz: of a speed, turns a second.
-    """
-
-    role: Role
-    unit: str
-    control_mode: str
-    hertz: float
-
-
-def _speed_source(model: Family) -> SpeedSource:
-    """Return how: by the frequency, or by the speed where there is only that."""
-    if Role.ACTUAL_FREQUENCY not in model.roles and Role.ACTUAL_SPEED in model.roles:
-        return SpeedSource(Role.ACTUAL_SPEED, 'rpm', 'Speed', 1 / 60)
-    return SpeedSource(Role.ACTUAL_FREQUENCY, 'Hz', 'Freque', 1.0)
 
 
 def _nothing(*_: object) -> None:
@@ -124,7 +100,10 @@ class DriveState:
             settings.telegram_speed,
             settings.own_parameters,
         )
-        self.turning = _speed_source(self.model)
+        roles = self.model.roles
+        only_speed = FREQUENCY.role not in roles and SPEED.role in roles
+        #: What shows how fast the motor turns.
+        self.turning = SPEED if only_speed else FREQUENCY
         #: Which way the motor turns, where the drive does not report that.
         self.direction = Direction()
         method = settings.method_class
@@ -605,6 +584,12 @@ class DriveState:
         return NOT_MEASURED if role is None else self._polled.get(role, NOT_MEASURED)
 
     @property
+    def controlled(self) -> Role | None:
+        """The actual value of what the control mode controls, measured with every poll."""
+        quantity = QUANTITIES.get(self.control_mode)
+        return quantity and quantity.role
+
+    @property
     def turned(self) -> Measured:
         """How fast the motor turns, as a poll has measured it last, Hz."""
         value, at = self.last_polled(self.turning.role)
@@ -636,8 +621,8 @@ class DriveState:
             mode = await self._read_mode_by_mailbox(key, priority, self.control_mode or expected)
         else:
             mode = str(await self.params.read(key, priority, retry=retry))
-        unit = _UNITS.get(mode, '')
-        if mode == 'PI-Reg' and not self.params.in_block:
+        unit = QUANTITIES[mode].unit if mode in QUANTITIES else ''
+        if mode == PROCESS_VALUE.mode and not self.params.in_block:
             key = self.model.key(Role.PROCESS_UNIT)
             unit = str(await self.params.read(key, priority, retry=retry))
         # both at once: neither is published without the other

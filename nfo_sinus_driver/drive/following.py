@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 
-from nfo_sinus_driver.catalog import Meaning, Role
+from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog.status import FREQUENCY, SPEED
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, Report, Severity
 from nfo_sinus_driver.drive.setpoint import Setpoint
@@ -31,7 +32,7 @@ _BEYOND_BY = 3.0
 #: How far below its set-points a motor is, and by how much it has slowed down, if it stops: Hz.
 _SHORT, _FALLEN = 1.0, 0.4
 #: What is compared with set-points, and what one of its units is for 1 Hz of a four-pole motor.
-_COMPARED = {'Freque': (Role.ACTUAL_FREQUENCY, 1.0), 'Speed': (Role.ACTUAL_SPEED, 30.0)}
+_COMPARED = {FREQUENCY.mode: (FREQUENCY.role, 1.0), SPEED.mode: (SPEED.role, 30.0)}
 
 
 class _DecelerationCheck:

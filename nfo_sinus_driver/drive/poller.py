@@ -59,13 +59,6 @@ _LATEST_SHARE = 0.5
 _LAST_CHANCE = 0.6
 #: The shortest pause between two tries, if the port is gone, too, s.
 _SHORTEST_PAUSE = 0.02
-#: The quantity that a control mode controls, which is measured with every poll.
-_ACTUAL = {
-    'Freque': Role.ACTUAL_FREQUENCY,
-    'Speed': Role.ACTUAL_SPEED,
-    'Torque': Role.ACTUAL_TORQUE,
-    'PI-Reg': Role.ACTUAL_PROCESS_VALUE,
-}
 #: What is measured in every control mode.
 _BASIC = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
 #: How often the rest of a poll is read, s: the other one of frequency and speed, and an inverter
@@ -453,7 +446,7 @@ class Poller:
 
     async def _poll(self) -> None:
         state = self._state
-        last = state.last_polled(_ACTUAL.get(state.control_mode)).value
+        last = state.last_polled(state.controlled).value
         paused = self._bus.paused
         status = await self._read_status()
         rare = self._rare_is_due
@@ -465,7 +458,7 @@ class Poller:
         if rare and answered:
             self._rare_read_at = started
             self._rare_reads += 1
-        actual = _ACTUAL.get(state.control_mode)
+        actual = state.controlled
         steady = True
         # the mailbox of a PLC is too slow for a poll
         if actual is not None and not self._params.by_mailbox(state.model.key(actual)):
@@ -663,8 +656,7 @@ class Poller:
             # a command has read a newer one: the drive may be enabled since, its fault acknowledged
             status = state.status
         frequency, speed = (state.last_polled(role) for role in _BASIC)
-        role = _ACTUAL.get(state.control_mode)
-        actual = state.shown(role, state.last_polled(role).value)
+        actual = state.shown(state.controlled, state.last_polled(state.controlled).value)
         stop = None if self._controller is None else self._controller.stopped_for
         self.snapshot = take_snapshot(
             state, self._setpoint, status, frequency, speed, actual, stop

@@ -24,6 +24,7 @@ from nfo_sinus_driver.catalog import (
     usual_family,
 )
 from nfo_sinus_driver.catalog.finding import find
+from nfo_sinus_driver.catalog.status import SPEED
 from nfo_sinus_driver.link import ADDRESSES, PROTOCOLS, LineProtocol
 from nfo_sinus_driver.setting import UNCONFIGURED, setting, settings_of
 
@@ -59,7 +60,7 @@ def _control_modes(model: str, method: str = '') -> tuple[str, ...]:
     """Return the control modes of a model, as far as a control method knows them."""
     profiles = _profiles(model) if model == AUTO else [load_profile(model, method)]
     modes = dict.fromkeys(mode for profile in profiles for mode in profile.setpoints)
-    return (*modes, 'Speed') if _has_speed_mode(model, method) else tuple(modes)
+    return (*modes, SPEED.mode) if _has_speed_mode(model, method) else tuple(modes)
 
 
 def _has_speed_mode(model: str, method: str) -> bool:
@@ -269,7 +270,7 @@ class DriveSettings:
     @functools.cached_property
     def telegram_speed(self) -> float:
         """The nominal speed, rpm, where a telegram has speeds for frequencies; else 0."""
-        in_speed = self.expected_control_mode == 'Speed'
+        in_speed = self.expected_control_mode == SPEED.mode
         return self.nominal_speed if in_speed and _has_speed_mode(self.model, self.method) else 0.0
 
     @property
@@ -342,7 +343,7 @@ class DriveSettings:
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
         self._require_measured()
         self._require_own_addresses()
-        if self.expected_control_mode == 'Speed' and not self.nominal_speed:
+        if self.expected_control_mode == SPEED.mode and not self.nominal_speed:
             self._require_no_speed_mode()
         self._check_drive_timeout()
         for name, one in settings.items():

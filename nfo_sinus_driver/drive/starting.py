@@ -19,6 +19,7 @@ from nfo_sinus_driver.catalog import (
     Meaning,
     Role,
 )
+from nfo_sinus_driver.catalog.status import SPEED
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
@@ -120,7 +121,7 @@ class StartSequence:
         scales = state.nameplate.scales
         if key := scales.impossible:
             raise DriveError(Cause.SCALE_IMPOSSIBLE, key=key, value=scales.found[key])
-        if control_mode == 'Speed':
+        if control_mode == SPEED.mode:
             await self._require_no_scale()
         return control_mode, await read_limits(state, control_mode)
 

@@ -23,14 +23,12 @@ from std_msgs.msg import Header
 
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Fact, Family, Kind, Role, State
+from nfo_sinus_driver.catalog.status import FREQUENCY, QUANTITIES, SPEED
 from nfo_sinus_driver.drive import Drive, InverterStatus, LogEntry, Snapshot, Telemetry
 from nfo_sinus_driver.node.scale import Scale
 
 _CONTROL_MODES = {
-    'Freque': DriveStatus.FREQUE,
-    'PI-Reg': DriveStatus.PI_REG,
-    'Torque': DriveStatus.TORQUE,
-    'Speed': DriveStatus.SPEED,
+    mode: getattr(DriveStatus, mode.upper().replace('-', '_')) for mode in QUANTITIES
 }
 #: A method without a constant is a family's own: CUSTOM.
 _METHODS = {
@@ -233,9 +231,9 @@ class Joint:
         """Return the set-point for a velocity of the shaft, rad/s, or a ValueError."""
         rpm = velocity * self._ratio() / _RPM
         mode = control_mode(drive)
-        if mode == 'Speed':
+        if mode == SPEED.mode:
             return rpm
-        if mode != 'Freque':
+        if mode != FREQUENCY.mode:
             raise ValueError(f'the control mode is {mode}, not Speed or Freque')
         # slip is left out: how much there is depends on the load
         return rpm * _pole_pairs(drive) / 60

@@ -17,6 +17,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
+from nfo_sinus_driver.catalog.status import FREQUENCY, PROCESS_VALUE, SPEED, TORQUE
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.node.bus_context import BusContext
@@ -24,17 +25,12 @@ from nfo_sinus_driver.node.log_limit import LogLimit
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import Joint, control_mode, require_whole
 
+#: The control mode that each unit is for, and what it is called.
 _UNITS = {
-    'Freque': Setpoint.HZ,
-    'Speed': Setpoint.RPM,
-    'Torque': Setpoint.PERCENT_TORQUE,
-    'PI-Reg': Setpoint.PROCESS,
-}
-_NAMES = {
-    Setpoint.HZ: 'Hz',
-    Setpoint.RPM: 'rpm',
-    Setpoint.PERCENT_TORQUE: '% of nominal torque',
-    Setpoint.PROCESS: 'the process unit',
+    Setpoint.HZ: (FREQUENCY.mode, 'Hz'),
+    Setpoint.RPM: (SPEED.mode, 'rpm'),
+    Setpoint.PERCENT_TORQUE: (TORQUE.mode, '% of nominal torque'),
+    Setpoint.PROCESS: (PROCESS_VALUE.mode, 'the process unit'),
 }
 
 
@@ -84,8 +80,8 @@ class Setpoints:
         except ValueError as error:
             self._ignore('mode', f'set-point ignored: {error}')
             return
-        if message.unit != _UNITS.get(mode):
-            unit = _NAMES.get(message.unit, f'unit {message.unit}')
+        meant, unit = _UNITS.get(message.unit, ('', f'unit {message.unit}'))
+        if mode != meant:
             self._ignore('unit', f'set-point in {unit} ignored: the control mode is {mode}')
             return
         if self._is_of_now(message.header.stamp):

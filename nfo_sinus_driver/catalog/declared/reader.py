@@ -42,7 +42,7 @@ from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters
 from nfo_sinus_driver.catalog.declared.unused import unused
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
 from nfo_sinus_driver.catalog.parameter import Access, Parameter, Value
-from nfo_sinus_driver.catalog.status import Role
+from nfo_sinus_driver.catalog.status import FREQUENCY, SPEED, Role
 
 #: What the name of a file ends with.
 SUFFIX = '.vfd.yaml'
@@ -50,7 +50,7 @@ SETPOINT_KEY = 'line.setpoint'
 SETPOINT_READ_KEY = 'line.setpoint_read'
 #: With a number behind it.
 IDENTITY_KEY = 'line.identity'
-_MODES = {'Hz': 'Freque', 'rpm': 'Speed'}
+_MODES = {one.unit: one.mode for one in (FREQUENCY, SPEED)}
 #: Where faults that are bits begin to be counted.
 _FLAGS_FROM = 100
 _MOST_FAULTS = 64

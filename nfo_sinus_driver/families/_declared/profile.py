@@ -41,7 +41,7 @@ from nfo_sinus_driver.catalog.profile import (
     Write,
     try_steps,
 )
-from nfo_sinus_driver.catalog.status import Role, StatusCode
+from nfo_sinus_driver.catalog.status import QUANTITIES, StatusCode
 from nfo_sinus_driver.families._declared.setpoints import Target, target_of
 from nfo_sinus_driver.families._declared.words import is_remote, words_of
 
@@ -240,7 +240,6 @@ def profile_of(drive: Description) -> Profile:
         'control_retained': '' if drive.release else 'nothing in its file gives it back',
     }
     most = _BEYOND * target.most
-    of_speed = Role.ACTUAL_FREQUENCY if drive.setpoint.mode == 'Freque' else Role.ACTUAL_SPEED
     holders: dict[Value, Holder] = {}
     if drive.holder is not None:
         key, values = drive.holder
@@ -257,7 +256,7 @@ def profile_of(drive: Description) -> Profile:
         releases='' if drive.stop_mode is None else drive.stop_mode[1],
         in_charge=_in_charge,
         identify=drive.identify,
-        most={of_speed: most},
+        most={QUANTITIES[drive.setpoint.mode].role: most},
         start_settings=frozenset(one.key for one in drive.requires),
         line=drive.line.factory,
         refusals=drive.line.exceptions,
