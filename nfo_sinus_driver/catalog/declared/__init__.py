@@ -4,13 +4,10 @@
 """Drives that a file describes, ``NAME.vfd.yaml``: what it says, and what is wrong in it."""
 
 from nfo_sinus_driver.catalog.declared.description import (
-    Assign,
     Await,
     Condition,
     Description,
     Direction,
-    Pause,
-    Put,
     SetBits,
     SetpointPlace,
     Step,
@@ -21,24 +18,23 @@ from nfo_sinus_driver.catalog.declared.reader import SUFFIX, read
 from nfo_sinus_driver.catalog.declared.register_map import FAULT_KEY, STATUS_KEY
 from nfo_sinus_driver.catalog.declared.tables import Code, status_codes
 from nfo_sinus_driver.catalog.declared.yaml_file import DescriptionError
+from nfo_sinus_driver.catalog.profile import Write
 
 __all__ = [
     'FAULT_KEY',
     'STATUS_KEY',
     'SUFFIX',
-    'Assign',
     'Await',
     'Code',
     'Condition',
     'Description',
     'DescriptionError',
     'Direction',
-    'Pause',
-    'Put',
     'SetBits',
     'SetpointPlace',
     'Step',
     'Steps',
+    'Write',
     'drive_number',
     'read',
     'status_codes',

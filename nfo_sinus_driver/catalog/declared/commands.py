@@ -6,14 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 from nfo_sinus_driver.catalog.declared.description import (
-    Assign,
     Await,
     Direction,
-    Pause,
-    Put,
     SetBits,
     StatusPlace,
     Step,
@@ -23,6 +20,7 @@ from nfo_sinus_driver.catalog.declared.register_map import WORD, PlacedCondition
 from nfo_sinus_driver.catalog.declared.settings import Settings
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
 from nfo_sinus_driver.catalog.parameter import Parameter
+from nfo_sinus_driver.catalog.profile import Wait, Write
 
 #: All of them, in the order in which a drive is used.
 NAMES = ('prepare', 'run', 'stop', 'coast', 'quick_stop', 'reset', 'release')
@@ -106,7 +104,7 @@ class StepReader:
         if place is None:
             return None
         word = node.integer('value') & WORD
-        return Put(self._map.word(name, place, word), word)
+        return Write(self._map.word(name, place, word), word)
 
     def _put_several(self, node: Node, name: str) -> Step | None:
         place = self._place(node, name)
@@ -125,7 +123,7 @@ class StepReader:
         raw = 0
         for word in words:
             raw = raw << 16 | word
-        return Put(self._map.word(name, place, *words), raw)
+        return Write(self._map.word(name, place, *words), raw)
 
     def _change(self, node: Node, name: str) -> Step | None:
         place = self._place(node, name)
@@ -140,7 +138,7 @@ class StepReader:
         if 'coil' not in node:
             self._problems.add(node.line, f'a step of {name} needs the coil that is on or off')
             return None
-        return Put(self._map.coil_key(name, node['coil']), int(node.flag('on')))
+        return Write(self._map.coil_key(name, node['coil']), int(node.flag('on')))
 
     def _assign(self, node: Node, name: str) -> Step | None:
         key = self._settings.known(node.get('parameter'))
@@ -149,10 +147,10 @@ class StepReader:
                 self._problems.add(node.line, f'a step of {name} needs the parameter to write')
             return None
         value = self._settings.value(key, node['to'])
-        return None if value is None else Assign(key, value)
+        return None if value is None else Write(key, value)
 
     def _pause(self, node: Node, name: str) -> Step:
-        return Pause(float(node.number('wait') or 0))
+        return Wait(float(node.number('wait') or 0))
 
     def _await(self, node: Node, name: str) -> Step | None:
         if name in (*_AT_ONCE, 'after_write'):
@@ -232,11 +230,15 @@ class CommandLists:
                         f'{self._control["run"].line}), and the motor would turn',
                     )
 
+    def _is_setting(self, step: Step) -> TypeGuard[Write]:
+        """Return whether a step writes to a parameter of the table."""
+        return isinstance(step, Write) and step.key not in self._made
+
     def _words(self, step: Step) -> Iterator[tuple[_Place, int, int]]:
         """Yield what a step writes: where, the word, and which bits of it are known then."""
-        if isinstance(step, Assign):
+        if self._is_setting(step):
             yield step.key, hash(step.value), -1
-        elif isinstance(step, (Put, SetBits)):
+        elif isinstance(step, (Write, SetBits)):
             address = self._made[step.key].at('modbus')
             coil = address.space == 'coil'
             if isinstance(step, SetBits):
@@ -244,7 +246,7 @@ class CommandLists:
                 return
             count = 1 if coil else address.codec.size // 2
             for number in range(count):
-                word = step.raw >> 16 * (count - 1 - number) & WORD
+                word = int(step.value) >> 16 * (count - 1 - number) & WORD
                 yield (address.index + number, coil), word, -1
 
     def _states(self, steps: Steps) -> Iterator[tuple[_Place, int, int]]:
@@ -293,7 +295,7 @@ class CommandLists:
     def _check_settings(self) -> None:
         """Ensure that no setting is the run command."""
         run, stop = (
-            {step.key for step in self._lists[name] if isinstance(step, Assign)}
+            {step.key for step in self._lists[name] if self._is_setting(step)}
             for name in ('run', 'stop')
         )
         for key in sorted(run & stop):
@@ -305,11 +307,11 @@ class CommandLists:
 
     def check_pauses(self, name: str, steps: Steps, line: int) -> None:
         """Make sure that a list does not pause for too long."""
-        pauses = [step.seconds for step in steps if isinstance(step, Pause)]
+        pauses = [step.seconds for step in steps if isinstance(step, Wait)]
         most = _LONGEST_PAUSE if name in _AT_ONCE else _LONGEST
         if sum(pauses) > most:
             self._problems.add(line, f'{name} pauses for more than {most:g} s in all')
-        if name in _AT_ONCE and steps and isinstance(steps[0], Pause):
+        if name in _AT_ONCE and steps and isinstance(steps[0], Wait):
             self._problems.add(line, f'{name} begins with a pause: a stop is never delayed')
 
     def _check_direction(self) -> None:

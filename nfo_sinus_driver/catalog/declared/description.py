@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from nfo_sinus_driver.catalog.parameter import Address, Parameter, Value
+from nfo_sinus_driver.catalog.profile import Wait, Write
 from nfo_sinus_driver.catalog.status import Role
 
 #: Status codes that say what the drive does; faults with such a number are moved behind.
@@ -55,35 +56,12 @@ class Condition:
 
 
 @dataclass(frozen=True)
-class Put:
-    """Write a value, raw, to a register, several or a coil: to the parameter with a key."""
-
-    key: str
-    raw: int
-
-
-@dataclass(frozen=True)
 class SetBits:
     """Set some bits of a register, clear others, and keep the rest."""
 
     key: str
     set: int
     clear: int
-
-
-@dataclass(frozen=True)
-class Assign:
-    """Write a value to a parameter of the table."""
-
-    key: str
-    value: Value
-
-
-@dataclass(frozen=True)
-class Pause:
-    """Let time pass, s."""
-
-    seconds: float
 
 
 @dataclass(frozen=True)
@@ -94,7 +72,8 @@ class Await:
     seconds: float
 
 
-Step = Put | SetBits | Assign | Pause | Await
+#: What is written to the parameter of a register, several or a coil, stands there as it is.
+Step = Write | SetBits | Wait | Await
 Steps = Sequence[Step]
 
 
@@ -306,7 +285,7 @@ class Description:
     quick_stop: Steps = ()
     reset: Steps = ()
     release: Steps = ()
-    after_write: Sequence[Put | Pause] = ()
+    after_write: Sequence[Write | Wait] = ()
     requires: Sequence[Requirement] = ()
     holder: tuple[str, tuple[Value, ...]] | None = None
     stop_mode: tuple[str, Value] | None = None

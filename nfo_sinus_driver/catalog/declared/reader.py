@@ -19,8 +19,6 @@ from nfo_sinus_driver.catalog.declared.description import (
     Fault,
     FaultCodes,
     LineDefaults,
-    Pause,
-    Put,
     Requirement,
     SetpointPlace,
     StatusPlace,
@@ -42,6 +40,7 @@ from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters
 from nfo_sinus_driver.catalog.declared.unused import unused
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
 from nfo_sinus_driver.catalog.parameter import Access, Parameter, Value
+from nfo_sinus_driver.catalog.profile import Wait, Write
 from nfo_sinus_driver.catalog.status import FREQUENCY, SPEED, Role
 
 #: What the name of a file ends with.
@@ -382,13 +381,13 @@ class _Reader:
                 if value is not None:
                     yield Requirement(key, value, node.flag('write'), _sentence(node, 'text'))
 
-    def _after_write(self, steps: StepReader, commands: CommandLists) -> Iterator[Put | Pause]:
+    def _after_write(self, steps: StepReader, commands: CommandLists) -> Iterator[Write | Wait]:
         node = self._root.get('after_write')
         listed = steps.read(node, 'after_write')
         commands.require_no_run('after_write', listed, node.line)
         commands.check_pauses('after_write', listed, node.line)
         for step in listed:
-            if isinstance(step, (Put, Pause)):
+            if isinstance(step, Wait) or (isinstance(step, Write) and step.key in self._map.made):
                 yield step
             else:
                 self._problems.add(

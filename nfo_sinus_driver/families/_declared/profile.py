@@ -16,11 +16,8 @@ from typing import ClassVar
 
 from nfo_sinus_driver.catalog.declared import (
     STATUS_KEY,
-    Assign,
     Await,
     Description,
-    Pause,
-    Put,
     SetBits,
     Steps as Listed,
 )
@@ -132,7 +129,7 @@ class Declared(ControlMethod):
         A direction of its own may be left from before: it is written first, at set-point 0.
         """
         direction = self._drive.setpoint.direction
-        written = {step.key for step in self._drive.run if isinstance(step, Put)}
+        written = {step.key for step in self._drive.run if isinstance(step, Write)}
         if direction is not None and direction.key not in written:
             yield Write(direction.key, direction.forward, retry=False)
         yield from _carry_out(self._drive.run, retry=False)
@@ -181,16 +178,14 @@ def _carry_out(
 ) -> Steps[None]:
     """Carry out the steps of a list; ``holds``: go on where a condition is never met."""
     for step in steps:
-        if isinstance(step, Pause):
-            yield Wait(step.seconds)
-        elif isinstance(step, Await):
+        if isinstance(step, Await):
             condition = _fulfils(step)
             yield Hold(condition, step.seconds) if holds else Until(condition)
-        elif isinstance(step, Assign):
-            yield Write(step.key, step.value, retry=retry, head=head)
+        elif isinstance(step, Wait):
+            yield step
         else:
-            raw = step.raw if isinstance(step, Put) else (yield from _changed(step, retry))
-            yield Write(step.key, raw, retry=retry, head=head)
+            value = step.value if isinstance(step, Write) else (yield from _changed(step, retry))
+            yield Write(step.key, value, retry=retry, head=head)
 
 
 def _each(steps: Listed, *, retry: bool = False) -> Steps[None]:
@@ -265,10 +260,7 @@ def profile_of(drive: Description) -> Profile:
         pole_pairs=drive.pole_pairs,
         keeps_run=drive.keeps_run,
         fault_code=int if drive.codes is None else drive.codes.code,
-        after_write=tuple(
-            Wait(step.seconds) if isinstance(step, Pause) else Write(step.key, step.raw)
-            for step in drive.after_write
-        ),
+        after_write=drive.after_write,
         line_check=dict.fromkeys(('modbus_rtu', 'modbus_ascii', 'modbus_tcp'), drive.line.shown)
         if drive.line.shown
         else {},

@@ -7,29 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from nfo_sinus_driver.catalog.declared import (
-    Assign,
-    Await,
-    Condition,
-    Description,
-    Put,
-    SetBits,
-    Step,
-)
+from nfo_sinus_driver.catalog import to_words
+from nfo_sinus_driver.catalog.declared import Await, Condition, Description, SetBits, Step, Write
 
 #: The first register or coil of a key, and whether it is a coil.
 Place = tuple[int, bool]
 
 
-def words_of(drive: Description, step: Put) -> Iterator[tuple[Place, int]]:
+def words_of(drive: Description, step: Write) -> Iterator[tuple[Place, int]]:
     """Yield where each word of a step goes."""
-    address = drive.parameters[step.key].at('modbus')
+    parameter = drive.parameters[step.key]
+    address = parameter.at('modbus')
     if address.space == 'coil':
-        yield (address.index, True), step.raw
+        yield (address.index, True), int(step.value)
         return
-    count = address.codec.size // 2
-    for number in range(count):
-        yield (address.index + number, False), step.raw >> 16 * (count - 1 - number) & 0xFFFF
+    for index, word in enumerate(to_words(parameter.encode(step.value)), address.index):
+        yield (index, False), word
 
 
 class Order:
@@ -46,18 +39,13 @@ class Order:
         self._passed = 0
         setpoint = drive.parameters[drive.setpoint.key].at('modbus').index
         for step in steps:
-            if isinstance(step, Put):
+            if isinstance(step, Write):
                 for place, word in words_of(drive, step):
                     if place != (setpoint, False):
                         self._row.append((place, 0xFFFF, word))
             elif isinstance(step, SetBits):
                 index = drive.parameters[step.key].at('modbus').index
                 self._row.append(((index, False), step.set | step.clear, step.set))
-            elif isinstance(step, Assign):
-                parameter = drive.parameters[step.key]
-                address = parameter.at('modbus')
-                raw = address.number.decode(parameter.encode(step.value))
-                self._row.append(((address.index, False), 0xFFFF, raw & 0xFFFF))
             elif isinstance(step, Await):
                 self._shown[len(self._row)] = step.condition
         self.places = {place for place, _, _ in self._row}
