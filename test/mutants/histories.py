@@ -222,16 +222,16 @@ HISTORIES = (
         6,
         'in any order: both directions at once',
         G2,
-        'switched_on | Control.ENABLE_OP,',
-        'switched_on | Control.ENABLE_OP | Control.ENABLE_REV_OP,',
+        'switched_on | ControlWord.ENABLE_OP,',
+        'switched_on | ControlWord.ENABLE_OP | ControlWord.ENABLE_REV_OP,',
         G2_CONTROL,
     ),
     Mutant(
         6,
         'in any order: the register of the other method is written',
         G2,
-        '        yield from self._stop_by(self._change_or_write(~_RUN, Control(0)), *zeroes)\n',
-        '        yield from self._stop_by(self._change_or_write(~_RUN, Control(0)), *zeroes)\n'
+        '        yield from self._stop_by(self._change_or_write(~_RUN, ControlWord(0)), *zeroes)\n',
+        '        yield from self._stop_by(self._change_or_write(~_RUN, ControlWord(0)), *zeroes)\n'
         "        yield Write('fieldbus.scmd', 0)\n",
         G2_CONTROL,
     ),

@@ -230,7 +230,7 @@ LAWS = (
         3,
         'a Sinus H that ignores its stops is not released',
         'nfo_sinus_driver/families/sinus_h/profile.py',
-        'yield method.begin(int(OFF & ~Control.NO_COAST_STOP))',
+        'yield method.begin(int(OFF & ~ControlWord.NO_COAST_STOP))',
         'yield method.begin(int(OFF))',
         ('test/unit/drive/test_telegram1.py', '-k', 'ignores_its_stops'),
     ),

@@ -10,7 +10,7 @@ from fractions import Fraction
 import re
 
 from nfo_sinus_driver.catalog import Access, load_family
-from nfo_sinus_driver.families.sinus_optimal.words import Control, Mode, Smode, Status
+from nfo_sinus_driver.families.sinus_optimal.words import ControlWord, Mode, Smode, Status
 from support.manual_text import Fact, between, manual
 
 OPTIMAL = load_family('sinus_optimal')
@@ -73,7 +73,7 @@ def codes_of_optimal() -> Iterator[Fact]:
 def bits_of_optimal() -> Iterator[Fact]:
     """The bits of the control word and of the status word."""
     for bits, title, end in (
-        (Control, 'Drive control bit field', 'Drive status bit field'),
+        (ControlWord, 'Drive control bit field', 'Drive status bit field'),
         (Status, 'Drive status bit field', 'An example of communication'),
     ):
         ours = {bit.value.bit_length() - 1: bit.name for bit in bits}
@@ -83,7 +83,7 @@ def bits_of_optimal() -> Iterator[Fact]:
                 echo = re.search(r'bit (\d)', description)
                 if echo and name == 'Not used':
                     # both words number an echo by the bit of the control word
-                    name = f'echo {number if bits is Control else echo[1]}'
+                    name = f'echo {number if bits is ControlWord else echo[1]}'
                 printed = name.removesuffix(' cmd').upper().replace(' ', '_')
                 yield f'{title} {number}', printed, ours.pop(int(number), 'NOT_USED')
         yield title, {}, ours

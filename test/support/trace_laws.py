@@ -12,7 +12,7 @@ import itertools
 from typing import Any
 
 from nfo_sinus_driver.catalog import Access, load_family
-from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd
+from nfo_sinus_driver.families.sinus_g2.words import ControlWord, Mode, Scmd
 from support.movitrac_laws import MovitracJudge
 from support.wire import PROFILE, WITH_GAP, Request, understand
 
@@ -27,7 +27,7 @@ _SETPOINTS = {
 _CONTROL_WORD, _ENABLED = 0x6040, 0x0F
 _TARGETS = frozenset((0x6042, 0x6071))
 
-_DIRECTIONS = Control.ENABLE_OP | Control.ENABLE_REV_OP
+_DIRECTIONS = ControlWord.ENABLE_OP | ControlWord.ENABLE_REV_OP
 
 #: A master waits at least so long for an answer, s; a later one may meet the next request, and
 #: so many frames behind it are looked at.
@@ -149,7 +149,7 @@ class _Judge:
             yield from wrong
             if not wrong and words[1] & _DIRECTIONS and not self._stands.get(unit):
                 yield 'another direction beside a set-point'
-            if words[1] & Control.SWITCH_ON:
+            if words[1] & ControlWord.SWITCH_ON:
                 yield 'a mask switches on'
         if place == places.control:
             yield from _wrong_control_word(words[0])
@@ -186,7 +186,7 @@ def _stops(request: Request, places: _Places) -> bool:
 
 
 def _wrong_control_word(word: int) -> Iterator[str]:
-    if word & Control.ENABLE_OP and word & Control.ENABLE_REV_OP:
+    if word & ControlWord.ENABLE_OP and word & ControlWord.ENABLE_REV_OP:
         yield 'both directions at once are no direction'
 
 
@@ -194,7 +194,7 @@ def _runs(request: Request, places: _Places) -> bool:
     """Return whether a write makes the motor follow the set-point of the bus."""
     assert request.words is not None
     if request.place == places.control:
-        wanted = Control.SWITCH_ON | Control.NET_REF
+        wanted = ControlWord.SWITCH_ON | ControlWord.NET_REF
         return request.words[0] & wanted == wanted and bool(request.words[0] & _DIRECTIONS)
     if request.place == _CONTROL_WORD:
         return request.words[0] & _ENABLED == _ENABLED

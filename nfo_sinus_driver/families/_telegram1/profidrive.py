@@ -15,7 +15,7 @@ import functools
 from nfo_sinus_driver.catalog.status import State
 
 
-class Control(enum.IntFlag):
+class ControlWord(enum.IntFlag):
     """STW1."""
 
     ON = 1 << 0
@@ -47,15 +47,15 @@ class Status(enum.IntFlag):
 
 #: STW1 by which a drive is switched off ("ready to switch on"), switched on, and in operation.
 OFF = (
-    Control.NO_COAST_STOP
-    | Control.NO_QUICK_STOP
-    | Control.ENABLE_RAMP
-    | Control.UNFREEZE_RAMP
-    | Control.ENABLE_SETPOINT
-    | Control.CONTROL_BY_PLC
+    ControlWord.NO_COAST_STOP
+    | ControlWord.NO_QUICK_STOP
+    | ControlWord.ENABLE_RAMP
+    | ControlWord.UNFREEZE_RAMP
+    | ControlWord.ENABLE_SETPOINT
+    | ControlWord.CONTROL_BY_PLC
 )
-ON = OFF | Control.ON
-RUN = ON | Control.ENABLE_OPERATION
+ON = OFF | ControlWord.ON
+RUN = ON | ControlWord.ENABLE_OPERATION
 
 _PATTERN = (
     Status.SWITCHING_ON_INHIBITED

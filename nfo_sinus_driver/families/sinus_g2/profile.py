@@ -40,7 +40,7 @@ from nfo_sinus_driver.catalog.status import Meaning, Role, State, StatusCode
 from nfo_sinus_driver.families.sinus_g2 import words
 from nfo_sinus_driver.families.sinus_g2.ds402.method import Ds402
 from nfo_sinus_driver.families.sinus_g2.telegram1.profile import G2Telegram1
-from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd
+from nfo_sinus_driver.families.sinus_g2.words import ControlWord, Mode, Scmd
 
 MODE = 'fieldbus.mode'
 CONTROL_WORD = 'fieldbus.drive_control'
@@ -88,15 +88,15 @@ _COMMANDS = {
 }
 #: Power and ramps; with it the G2 waits in READY_TO_SWITCH_ON.
 _READY = (
-    Control.NET_CTRL
-    | Control.ENABLE_VOLTAGE
-    | Control.DISABLE_QUICK_STOP
-    | Control.ENABLE_RFG
-    | Control.UNLOCK_RFG
-    | Control.USE_REF_FOR_RFG
+    ControlWord.NET_CTRL
+    | ControlWord.ENABLE_VOLTAGE
+    | ControlWord.DISABLE_QUICK_STOP
+    | ControlWord.ENABLE_RFG
+    | ControlWord.UNLOCK_RFG
+    | ControlWord.USE_REF_FOR_RFG
 )
-_DIRECTIONS = Control.ENABLE_OP | Control.ENABLE_REV_OP
-_RUN = Control.SWITCH_ON | _DIRECTIONS
+_DIRECTIONS = ControlWord.ENABLE_OP | ControlWord.ENABLE_REV_OP
+_RUN = ControlWord.SWITCH_ON | _DIRECTIONS
 
 #: SioErr, bit by bit [M2 table 4].
 _LINE_FAULTS = {
@@ -128,7 +128,7 @@ _CONTROLLED_ELSEWHERE = (
 )
 
 
-def _masked(keep: Control, add: Control) -> int:
+def _masked(keep: ControlWord, add: ControlWord) -> int:
     """Return what changes bits of DriveControl at once: AND mask, then OR mask [M0 §7.1]."""
     return int(keep) & 0xFFFF | int(add) << 16
 
@@ -351,7 +351,7 @@ class DriveControl(_G2):
     def __init__(self, reference: str, reaches: Callable[[str], bool]) -> None:
         super().__init__(reference, reaches)
         # without NetRef the reference is the drive's own, not the one from the bus
-        self._ready = _READY | Control.NET_REF if reference == 'fieldbus' else _READY
+        self._ready = _READY | ControlWord.NET_REF if reference == 'fieldbus' else _READY
 
     def in_control(self) -> Steps[bool]:
         """Return whether the network has control, taken by this session or an earlier one."""
@@ -380,11 +380,11 @@ class DriveControl(_G2):
             lambda status: status.state in startable
             and bool((status.word or 0) & words.Status.CTRL_FROM_NET)
         )
-        switched_on = self._ready | Control.SWITCH_ON
+        switched_on = self._ready | ControlWord.SWITCH_ON
         yield Write(CONTROL_WORD, switched_on, retry=False)
         yield Until(lambda status: status.state in (State.SWITCHED_ON, State.STOPPING))
         # both direction bits at once mean no change [C36]
-        yield Write(CONTROL_WORD, switched_on | Control.ENABLE_OP, retry=False)
+        yield Write(CONTROL_WORD, switched_on | ControlWord.ENABLE_OP, retry=False)
 
     def setpoint_target(self, target: SetpointTarget) -> SetpointTarget:
         """
@@ -395,11 +395,11 @@ class DriveControl(_G2):
         if target is _SETPOINTS['PI-Reg']:
             return target
         if self._reaches(_MASK):
-            forward = _masked(~_DIRECTIONS, Control.ENABLE_OP)
-            reverse = _masked(~_DIRECTIONS, Control.ENABLE_REV_OP)
+            forward = _masked(~_DIRECTIONS, ControlWord.ENABLE_OP)
+            reverse = _masked(~_DIRECTIONS, ControlWord.ENABLE_REV_OP)
             return with_direction(target, _MASK, forward, reverse)
-        on = self._ready | Control.SWITCH_ON
-        forward, reverse = int(on | Control.ENABLE_OP), int(on | Control.ENABLE_REV_OP)
+        on = self._ready | ControlWord.SWITCH_ON
+        forward, reverse = int(on | ControlWord.ENABLE_OP), int(on | ControlWord.ENABLE_REV_OP)
         return with_direction(target, CONTROL_WORD, forward, reverse)
 
     def stop(self, control_mode: str) -> Steps[None]:
@@ -410,13 +410,13 @@ class DriveControl(_G2):
         control: who has control stays as it is.
         """
         zeroes = (target.zero(retry=False) for target in self._targets(control_mode))
-        yield from self._stop_by(self._change_or_write(~_RUN, Control(0)), *zeroes)
+        yield from self._stop_by(self._change_or_write(~_RUN, ControlWord(0)), *zeroes)
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Go to QUICK_STOP, which coasts [C96]; control is kept."""
-        coast = ~(_RUN | Control.DISABLE_QUICK_STOP)
+        coast = ~(_RUN | ControlWord.DISABLE_QUICK_STOP)
         zeroes = (target.zero(retry=True) for target in self._targets(control_mode))
-        change = self._change_or_write(coast, Control.OVERRIDE_COAST, retry=True)
+        change = self._change_or_write(coast, ControlWord.OVERRIDE_COAST, retry=True)
         yield from self._stop_by(change, *zeroes)
 
     def force_stop(self, control_mode: str) -> Steps[bool]:
@@ -436,7 +436,7 @@ class DriveControl(_G2):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Reset the run bits; where that is refused, write set-point 0 and MODE = Stop."""
-        if (yield from try_steps(self._change_or_write(~_RUN, Control(0), retry=True))):
+        if (yield from try_steps(self._change_or_write(~_RUN, ControlWord(0), retry=True))):
             return Removal.COMMAND
         released = yield from try_steps(one(Write(MODE, Mode.STOP)))
         if released and not (yield from self.perhaps_in_control()):
@@ -464,8 +464,8 @@ class DriveControl(_G2):
                     yield Write(MODE, Mode.STOP)
             why = yield from self._clear_line_faults()
         try:
-            for add in (Control(0), Control.RESET_MALFUNCTION, Control(0)):
-                yield from self._change(~(_RUN | Control.RESET_MALFUNCTION), add)
+            for add in (ControlWord(0), ControlWord.RESET_MALFUNCTION, ControlWord(0)):
+                yield from self._change(~(_RUN | ControlWord.RESET_MALFUNCTION), add)
                 if add:
                     yield FAULT_GONE
         except Refusal:
@@ -480,22 +480,24 @@ class DriveControl(_G2):
             raise NotPossible(_CONTROLLED_ELSEWHERE)
         return why
 
-    def _change(self, keep: Control, add: Control, *, retry: bool = False) -> Steps[None]:
+    def _change(self, keep: ControlWord, add: ControlWord, *, retry: bool = False) -> Steps[None]:
         """Change some bits of the control word and leave the others to who has control."""
         if self._reaches(_MASK):
             yield Write(_MASK, _masked(keep, add), retry=retry)
             return
-        word = Control(int((yield Read(CONTROL_WORD))))
+        word = ControlWord(int((yield Read(CONTROL_WORD))))
         yield Write(CONTROL_WORD, word & keep | add, retry=retry)
 
-    def _change_or_write(self, keep: Control, add: Control, *, retry: bool = False) -> Steps[None]:
+    def _change_or_write(
+        self, keep: ControlWord, add: ControlWord, *, retry: bool = False
+    ) -> Steps[None]:
         """Change some bits of the control word for a stop, in whatever way the drive takes it."""
         masked = self._reaches(_MASK)
         if masked and (yield from try_steps(self._change(keep, add, retry=retry))):
             return
         word = self._ready
         try:
-            word = Control(int((yield Read(CONTROL_WORD, retry=retry))))
+            word = ControlWord(int((yield Read(CONTROL_WORD, retry=retry))))
         except Refusal:
             # then what the driver wrote last, but never while keypad or terminals have control
             if not (yield from self.perhaps_in_control()):

@@ -64,7 +64,7 @@ class Scmd(enum.IntEnum):
     RESET_E_OUT = 0x900
 
 
-class Control(enum.IntFlag):
+class ControlWord(enum.IntFlag):
     """DriveControl, the control word of the generic state machine [M0 table 14]."""
 
     SWITCH_ON = 1 << 0

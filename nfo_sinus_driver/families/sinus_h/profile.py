@@ -15,7 +15,7 @@ from nfo_sinus_driver.catalog.profile import Profile, Read, Steps, Until
 from nfo_sinus_driver.catalog.status import Role, State
 from nfo_sinus_driver.families._telegram1 import method
 from nfo_sinus_driver.families._telegram1.method import Telegram1
-from nfo_sinus_driver.families._telegram1.profidrive import OFF, ON, RUN, Control, state_of
+from nfo_sinus_driver.families._telegram1.profidrive import OFF, ON, RUN, ControlWord, state_of
 from nfo_sinus_driver.families.sinus_h.words import STATUS_WORD
 
 
@@ -29,7 +29,7 @@ class HTelegram1(Telegram1):
         'and the motor runs on), and PRT-13 to the time after which it does that'
     )
     ready = int(OFF)
-    runs = int(Control.ENABLE_OPERATION)
+    runs = int(ControlWord.ENABLE_OPERATION)
     # bit 9 of ZSW1 is bit 10 of STW1 [C104]
     echoes = True
 
@@ -56,11 +56,11 @@ class HTelegram1(Telegram1):
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor by CoastStop, which leaves S4 for S1; control is kept [M3 §7.2.1]."""
-        yield method.begin(int(OFF & ~Control.NO_COAST_STOP))
+        yield method.begin(int(OFF & ~ControlWord.NO_COAST_STOP))
 
     def rapid_stop(self, control_mode: str) -> Steps[None]:
         """Stop by QuickStop, as ADV-8 says, which leaves S4 for S1; control is kept [M3 §6]."""
-        yield method.begin(int(OFF & ~Control.NO_QUICK_STOP))
+        yield method.begin(int(OFF & ~ControlWord.NO_QUICK_STOP))
 
 
 PROFILE = Profile(

@@ -43,7 +43,7 @@ from nfo_sinus_driver.families.sinus_g2.profile import (
 )
 from nfo_sinus_driver.families.sinus_optimal import words
 from nfo_sinus_driver.families.sinus_optimal.telegram1.profile import OptimalTelegram1
-from nfo_sinus_driver.families.sinus_optimal.words import Control, Mode, Smode
+from nfo_sinus_driver.families.sinus_optimal.words import ControlWord, Mode, Smode
 
 _HOLDERS: Mapping[Value, Holder] = {
     Mode.MANUAL: Holder.LOCAL,
@@ -58,9 +58,9 @@ _SETPOINTS = {
         'fieldbus.input_speed_setpoint', 9000.0, followed='status.control_speed'
     ),
 }
-_READY = Control.BUS_CONTROL
-_ENABLED = _READY | Control.ENABLE
-_RUN = Control.SWITCH_ON
+_READY = ControlWord.BUS_CONTROL
+_ENABLED = _READY | ControlWord.ENABLE
+_RUN = ControlWord.SWITCH_ON
 #: Where control is handed to the bus, and Enable is taken; [M1] does not say what of a motor that
 #: is enabled already.
 _ENABLES = words.Status.READY | words.Status.ENABLED
@@ -158,11 +158,11 @@ class DriveControl(ControlMethod):
         shown = int((yield Read(STATUS_WORD)))
         from_bus = bool(shown & words.Status.CONTROL_FROM_BUS)
         word = int((yield Read(CONTROL_WORD)))
-        asked = bool(word & Control.BUS_CONTROL)
-        ramps = from_bus and bool(shown & _DRIVEN) and bool(word & Control.ENABLE)
+        asked = bool(word & ControlWord.BUS_CONTROL)
+        ramps = from_bus and bool(shown & _DRIVEN) and bool(word & ControlWord.ENABLE)
         ready = _ENABLED if ramps else _READY
         if asked and not from_bus:
-            yield Write(CONTROL_WORD, Control(0))
+            yield Write(CONTROL_WORD, ControlWord(0))
             yield Wait(_UNSHOWN)
         yield Write(CONTROL_WORD, ready)
         if from_bus and not asked:
@@ -224,11 +224,11 @@ class DriveControl(ControlMethod):
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
         """Acknowledge a fault by one rising edge of bit 7 [M1]."""
         word = int((yield Read(CONTROL_WORD)))
-        low = word & ~(Control.FAULT_ACK | _RUN)
+        low = word & ~(ControlWord.FAULT_ACK | _RUN)
         yield Write(CONTROL_WORD, low)
-        if word & Control.FAULT_ACK:
+        if word & ControlWord.FAULT_ACK:
             yield Wait(_UNSHOWN)
-        yield Write(CONTROL_WORD, low | Control.FAULT_ACK)
+        yield Write(CONTROL_WORD, low | ControlWord.FAULT_ACK)
         yield FAULT_GONE
         yield Write(CONTROL_WORD, low)
         return ''
@@ -237,7 +237,7 @@ class DriveControl(ControlMethod):
 def _in_charge(status: Status | None) -> Steps[str]:
     """Return by which control method the motor was started."""
     word = int((yield Read(CONTROL_WORD)))
-    return 'drive_control' if word & Control.SWITCH_ON else 'mode_scmd'
+    return 'drive_control' if word & ControlWord.SWITCH_ON else 'mode_scmd'
 
 
 PROFILE = Profile(

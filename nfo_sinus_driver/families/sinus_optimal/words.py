@@ -35,7 +35,7 @@ class Smode(enum.IntEnum):
     FIELDBUS = 0x101
 
 
-class Control(enum.IntFlag):
+class ControlWord(enum.IntFlag):
     """Drive Control: BUS_CONTROL before ENABLE, and that before SWITCH_ON ([M1], [C54])."""
 
     SWITCH_ON = 1 << 0

@@ -14,7 +14,7 @@ from fractions import Fraction
 from typing import ClassVar
 
 from nfo_sinus_driver.catalog import Parameter, Value
-from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd, Status
+from nfo_sinus_driver.families.sinus_g2.words import ControlWord, Mode, Scmd, Status
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
 from nfo_sinus_driver.simulator.motor import Regulation, nearest
 from nfo_sinus_driver.simulator.sinus import control_unit
@@ -198,7 +198,7 @@ class G2ControlUnit(SinusControlUnit):
     def write(self, key: str, raw: int) -> bool:
         """Carry out MODE, SCMD, DriveControl or its mask."""
         if key == 'fieldbus.drv_ctrl_write_mask':
-            keep, add = Control(raw & 0xFFFF), Control(raw >> 16)
+            keep, add = ControlWord(raw & 0xFFFF), ControlWord(raw >> 16)
             self._write_control(self.word & keep | add)
             return True
         if key == ds402.CONTROL_WORD:
@@ -243,9 +243,9 @@ class G2ControlUnit(SinusControlUnit):
         self.source = Source.SCMD
         self.scmd = scmd
 
-    def control(self, word: Control) -> None:
+    def control(self, word: ControlWord) -> None:
         """Take a control word from DriveControl; without NetCtrl control is free."""
-        if word & Control.NET_CTRL:
+        if word & ControlWord.NET_CTRL:
             self.source = Source.CONTROL_WORD
         elif self.source is Source.CONTROL_WORD:
             self.take(Source.STOP)
@@ -310,7 +310,7 @@ class G2ControlUnit(SinusControlUnit):
         self.motor.plate = self.nameplate()
 
     def _write_control(self, raw: int) -> None:
-        word = Control(raw)
+        word = ControlWord(raw)
         self._refuse_when_tuning()
         # acknowledging goes this way, so a fault does not refuse it [M0 table 16, FAULTED]
         if self.machine.asks_reset(word):
@@ -393,7 +393,7 @@ class G2ControlUnit(SinusControlUnit):
         self.word = self._translated()
         effective = self.word
         if self.source is Source.CONTROL_WORD and (not self.run_input or self._delay_left):
-            effective &= ~Control.SWITCH_ON
+            effective &= ~ControlWord.SWITCH_ON
         motor, machine = self.motor, self.machine
         conditions = Conditions(
             initialised=self.initialised,
@@ -414,7 +414,7 @@ class G2ControlUnit(SinusControlUnit):
             motor.release()
 
     @property
-    def control_word(self) -> Control:
+    def control_word(self) -> ControlWord:
         """DriveControl, or what MODE and SCMD are translated to."""
         return self.word
 
@@ -449,7 +449,7 @@ class G2ControlUnit(SinusControlUnit):
             status &= ~(Status.OP_ENABLED | Status.REV_OP_ENABLED)
         if self.on_bus:
             status |= Status.CTRL_FROM_NET
-            if self.word & Control.NET_REF:
+            if self.word & ControlWord.NET_REF:
                 status |= Status.REF_FROM_NET
         running = self.machine.phase is Phase.OPERATION_ENABLED and not self.preparing
         if running and self.motor.reached:
@@ -467,7 +467,7 @@ class G2ControlUnit(SinusControlUnit):
             return nominal * local_share(self.scmd, self._fixed_shares())
         if self.source is Source.CONTROL_WORD and self._by_profile:
             return self._profile.reference
-        if not self.word & Control.NET_REF:
+        if not self.word & ControlWord.NET_REF:
             return nominal * TERMINAL_SHARE
         setpoint = self.memory.number(self.setpoint_key)
         scale = {
@@ -486,26 +486,26 @@ class G2ControlUnit(SinusControlUnit):
 
     def _commanded(self) -> bool:
         if self.source is Source.CONTROL_WORD:
-            return bool(self.word & Control.SWITCH_ON)
+            return bool(self.word & ControlWord.SWITCH_ON)
         return self.source is Source.EXT or self.scmd in RUN_COMMANDS
 
-    def _translated(self) -> Control:
+    def _translated(self) -> ControlWord:
         """The control word for the command that stands [M0 §7]."""
         if self.source is Source.CONTROL_WORD:
             return self.word
         if self.source is Source.STOP:
             return RELEASED
-        net = Control(0)
+        net = ControlWord(0)
         if self.source is Source.SCMD:
-            net = Control.NET_CTRL
+            net = ControlWord.NET_CTRL
             if self.scmd == Scmd.FIELDBUS:
-                net |= Control.NET_REF
+                net |= ControlWord.NET_REF
         self.word = net
         if not self._wanted or self._delay_left != 0:
             return STANDBY | net
         reference = self.reference()
         forward = reference > 0 or (reference == 0 and self.machine.direction > 0)
-        return RUNNING | net | (Control.ENABLE_OP if forward else Control.ENABLE_REV_OP)
+        return RUNNING | net | (ControlWord.ENABLE_OP if forward else ControlWord.ENABLE_REV_OP)
 
     def _demand(self) -> None:
         motor = self.motor
@@ -538,9 +538,9 @@ class G2ControlUnit(SinusControlUnit):
 
     def _through_rfg(self, reference: float) -> float:
         """What the ramp generator's bits of DriveControl make of the reference [M0 table 14]."""
-        if not self.word & Control.ENABLE_RFG:
+        if not self.word & ControlWord.ENABLE_RFG:
             self.motor.accel = self.motor.retard = _RESET_TIME
             return 0.0
-        if not self.word & Control.UNLOCK_RFG:
+        if not self.word & ControlWord.UNLOCK_RFG:
             return self.motor.ramp
-        return reference if self.word & Control.USE_REF_FOR_RFG else 0.0
+        return reference if self.word & ControlWord.USE_REF_FOR_RFG else 0.0

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 import math
 
-from nfo_sinus_driver.families.sinus_g2.words import Control, Status
+from nfo_sinus_driver.families.sinus_g2.words import ControlWord, Status
 from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused
 from nfo_sinus_driver.simulator.motor import Motor
@@ -65,9 +65,9 @@ _ERRORS: Mapping[int, int] = {
 _GENERIC = 0x1000
 
 
-def control(word: int) -> Control:
+def control(word: int) -> ControlWord:
     """Return what a ControlWord is to the state machine; the module has control."""
-    return Control(word & _SHARED) | Control.NET_CTRL | Control.NET_REF
+    return ControlWord(word & _SHARED) | ControlWord.NET_CTRL | ControlWord.NET_REF
 
 
 def status_word(status: Status, phase: Phase, ramp: str) -> int:

@@ -19,7 +19,7 @@ import functools
 import zlib
 
 from nfo_sinus_driver.catalog import Access, Family, Parameter, to_bytes, to_words
-from nfo_sinus_driver.families.sinus_g2.words import Control, Mode, Scmd
+from nfo_sinus_driver.families.sinus_g2.words import ControlWord, Mode, Scmd
 from nfo_sinus_driver.simulator import canopen, classic, telegram1
 from nfo_sinus_driver.simulator.canopen import Entries, Entry, Identity
 from nfo_sinus_driver.simulator.classic import LineError, Wrong
@@ -339,15 +339,15 @@ class CanopenServer(canopen.Server):
 
 #: What each bit of STW1 of PROFIdrive is in DriveControl.
 _CONTROL = {
-    Stw1.ON: Control.SWITCH_ON,
-    Stw1.NO_COAST_STOP: Control.ENABLE_VOLTAGE,
-    Stw1.NO_QUICK_STOP: Control.DISABLE_QUICK_STOP,
-    Stw1.ENABLE_OPERATION: Control.ENABLE_OP,
-    Stw1.ENABLE_RAMP: Control.ENABLE_RFG,
-    Stw1.UNFREEZE_RAMP: Control.UNLOCK_RFG,
-    Stw1.ENABLE_SETPOINT: Control.USE_REF_FOR_RFG,
-    Stw1.FAULT_ACKNOWLEDGE: Control.RESET_MALFUNCTION,
-    Stw1.CONTROL_BY_PLC: Control.NET_CTRL | Control.NET_REF,
+    Stw1.ON: ControlWord.SWITCH_ON,
+    Stw1.NO_COAST_STOP: ControlWord.ENABLE_VOLTAGE,
+    Stw1.NO_QUICK_STOP: ControlWord.DISABLE_QUICK_STOP,
+    Stw1.ENABLE_OPERATION: ControlWord.ENABLE_OP,
+    Stw1.ENABLE_RAMP: ControlWord.ENABLE_RFG,
+    Stw1.UNFREEZE_RAMP: ControlWord.UNLOCK_RFG,
+    Stw1.ENABLE_SETPOINT: ControlWord.USE_REF_FOR_RFG,
+    Stw1.FAULT_ACKNOWLEDGE: ControlWord.RESET_MALFUNCTION,
+    Stw1.CONTROL_BY_PLC: ControlWord.NET_CTRL | ControlWord.NET_REF,
 }
 #: The maker of the module: HMS.
 _HMS = 0x0109
@@ -428,7 +428,7 @@ class TelegramServer(telegram1.Server):
 
     def _by_level(self, word: int) -> int:
         """Add what makes the drive switch on by a bit that has been there all the time."""
-        return word | Control.AUTO_INIT if self._unit.variant.commands == 'levels' else word
+        return word | ControlWord.AUTO_INIT if self._unit.variant.commands == 'levels' else word
 
     def _zsw1(self, stw1: int) -> Zsw1:
         unit, motor = self._unit, self._unit.motor

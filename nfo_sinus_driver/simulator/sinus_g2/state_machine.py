@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import enum
 import math
 
-from nfo_sinus_driver.families.sinus_g2.words import Control, Scmd, Status
+from nfo_sinus_driver.families.sinus_g2.words import ControlWord, Scmd, Status
 from nfo_sinus_driver.simulator.faults import Faults
 from nfo_sinus_driver.simulator.memory import Memory
 from nfo_sinus_driver.simulator.sinus.control_unit import TERMINAL_SHARE
 
 #: Without both of these the power is off, or a quick stop is wanted [M0 table 14].
-_POWER = Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP
+_POWER = ControlWord.ENABLE_VOLTAGE | ControlWord.DISABLE_QUICK_STOP
 
 
 class Phase(enum.Enum):
@@ -68,7 +68,7 @@ class StateMachine:
 
     def __init__(self) -> None:
         self.phase = Phase.NOT_READY_TO_SWITCH_ON
-        self.word = Control(0)
+        self.word = ControlWord(0)
         self.direction = 1
         self._asked = 0
         self._asked_here = False
@@ -81,7 +81,7 @@ class StateMachine:
             return not self._braked
         return self.phase in (Phase.OPERATION_ENABLED, Phase.DISABLE)
 
-    def update(self, word: Control, conditions: Conditions) -> None:
+    def update(self, word: ControlWord, conditions: Conditions) -> None:
         """Take a control word and what became of the drive, and go as far as they lead."""
         self._take(word)
         for _ in Phase:
@@ -92,9 +92,9 @@ class StateMachine:
             self._asked_here = False
             self._braked = False
 
-    def asks_reset(self, word: Control) -> bool:
+    def asks_reset(self, word: ControlWord) -> bool:
         """Whether ``word``, coming now, acknowledges a fault: bit 7 rises in FAULTED."""
-        rises = bool(word & ~self.word & Control.RESET_MALFUNCTION)
+        rises = bool(word & ~self.word & ControlWord.RESET_MALFUNCTION)
         return rises and self.phase is Phase.FAULTED
 
     def status(self) -> Status:
@@ -102,17 +102,17 @@ class StateMachine:
         status = _PATTERNS[self.phase]
         if self.phase in _DIRECTED:
             status |= Status.OP_ENABLED if self.direction > 0 else Status.REV_OP_ENABLED
-        if self.word & Control.ENABLE_VOLTAGE or self.driven:
+        if self.word & ControlWord.ENABLE_VOLTAGE or self.driven:
             status |= Status.VOLTAGE_ENABLED
-        echo = self.phase in _ECHOES and self.word & Control.DISABLE_QUICK_STOP
+        echo = self.phase in _ECHOES and self.word & ControlWord.DISABLE_QUICK_STOP
         if echo:
             status |= Status.QUICK_STOP_DISABLED
         return status
 
-    def _take(self, word: Control) -> None:
+    def _take(self, word: ControlWord) -> None:
         self.word = word
-        forward = bool(word & Control.ENABLE_OP)
-        reverse = bool(word & Control.ENABLE_REV_OP)
+        forward = bool(word & ControlWord.ENABLE_OP)
+        reverse = bool(word & ControlWord.ENABLE_REV_OP)
         # both bits together mean: no change [M0 table 14, bit 3]
         asked = self._asked if forward and reverse else int(forward) - int(reverse)
         if asked != self._asked and self.phase is Phase.SWITCHED_ON:
@@ -125,8 +125,8 @@ class StateMachine:
         """The state after this one: the exits of [M0 table 16], one paragraph a state."""
         word, phase = self.word, self.phase
         power = word & _POWER == _POWER
-        on = bool(word & Control.SWITCH_ON)
-        coast = bool(word & Control.OVERRIDE_COAST)
+        on = bool(word & ControlWord.SWITCH_ON)
+        coast = bool(word & ControlWord.OVERRIDE_COAST)
 
         if phase is Phase.FAULT_REACTION_ACTIVE:
             return phase if now.voltage else Phase.FAULTED
@@ -139,7 +139,7 @@ class StateMachine:
             return Phase.SWITCH_ON_DISABLED if now.initialised else phase
 
         if phase is Phase.SWITCH_ON_DISABLED:
-            again = not on or bool(word & Control.AUTO_INIT)
+            again = not on or bool(word & ControlWord.AUTO_INIT)
             return Phase.READY_TO_SWITCH_ON if power and again else phase
 
         if phase is Phase.READY_TO_SWITCH_ON:
@@ -150,7 +150,7 @@ class StateMachine:
         if phase is Phase.SWITCHED_ON:
             if not (power and on):
                 return phase if now.voltage else Phase.READY_TO_SWITCH_ON
-            event = self._asked_here or not word & Control.EVENT_TRIGGERED_OP
+            event = self._asked_here or not word & ControlWord.EVENT_TRIGGERED_OP
             return Phase.OPERATION_ENABLED if self._asked and event else phase
 
         if phase is Phase.QUICK_STOP:
@@ -212,12 +212,16 @@ _ECHOES = frozenset(
 
 
 #: The motor is released: MODE = Stop.
-RELEASED = Control(0)
+RELEASED = ControlWord(0)
 #: Ready, waiting for a run command. From a run it stops the motor as StMode says.
-STANDBY = Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP | Control.AUTO_INIT
+STANDBY = ControlWord.ENABLE_VOLTAGE | ControlWord.DISABLE_QUICK_STOP | ControlWord.AUTO_INIT
 #: Runs, but for the direction.
 RUNNING = (
-    STANDBY | Control.SWITCH_ON | Control.ENABLE_RFG | Control.UNLOCK_RFG | Control.USE_REF_FOR_RFG
+    STANDBY
+    | ControlWord.SWITCH_ON
+    | ControlWord.ENABLE_RFG
+    | ControlWord.UNLOCK_RFG
+    | ControlWord.USE_REF_FOR_RFG
 )
 
 #: SCMD codes that run the motor.

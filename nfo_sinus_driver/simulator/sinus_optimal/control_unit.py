@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from nfo_sinus_driver.families.sinus_optimal.words import Control, Mode, Smode, Status, state_of
+from nfo_sinus_driver.families.sinus_optimal.words import ControlWord, Mode, Smode, Status, state_of
 from nfo_sinus_driver.simulator.control_unit import choice
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused, home
 from nfo_sinus_driver.simulator.motor import Regulation, nearest
@@ -81,7 +81,7 @@ class OptimalControlUnit(SinusControlUnit):
         return Mode.AUTO if self.source is Source.EXT else Mode.MANUAL
 
     @property
-    def control_word(self) -> Control:
+    def control_word(self) -> ControlWord:
         """The control word, as it was written."""
         return self._steps.word
 
@@ -125,10 +125,10 @@ class OptimalControlUnit(SinusControlUnit):
         self.scmd = Smode(raw)
 
     def _write_control(self, raw: int) -> None:
-        word = Control(raw)
+        word = ControlWord(raw)
         shown = self.status_word
         faulted = bool(self.faults)
-        if word & ~self.control_word & Control.FAULT_ACK:
+        if word & ~self.control_word & ControlWord.FAULT_ACK:
             self.faults.acknowledge()
         self._steps.write(word, shown)
         if faulted and not self.faults:
@@ -196,8 +196,8 @@ class OptimalControlUnit(SinusControlUnit):
             (Status.SWITCHED_ON, motor.driven),
             (Status.ENABLED, ready and self._steps.enabled and not self.stopping),
             (Status.FAULT_ACTIVE, bool(self.faults)),
-            (Status.ECHO_1, bool(self.control_word & Control.ECHO_1)),
-            (Status.ECHO_2, bool(self.control_word & Control.ECHO_2)),
+            (Status.ECHO_1, bool(self.control_word & ControlWord.ECHO_1)),
+            (Status.ECHO_2, bool(self.control_word & ControlWord.ECHO_2)),
             (Status.DISABLED, not self.run_input),
             (Status.ALARM_ACTIVE, alarm),
             (Status.CONTROL_FROM_BUS, self.on_bus),
@@ -267,9 +267,9 @@ class OptimalControlUnit(SinusControlUnit):
 
 #: The commands in their order, and the status bits that must be there for one to be taken.
 _STEPS = (
-    (Control.BUS_CONTROL, Status(0)),
-    (Control.ENABLE, Status.CONTROL_FROM_BUS | Status.READY),
-    (Control.SWITCH_ON, Status.CONTROL_FROM_BUS | Status.ENABLED),
+    (ControlWord.BUS_CONTROL, Status(0)),
+    (ControlWord.ENABLE, Status.CONTROL_FROM_BUS | Status.READY),
+    (ControlWord.SWITCH_ON, Status.CONTROL_FROM_BUS | Status.ENABLED),
 )
 #: How long the drive takes to respond (s): longer than a write, so that it matters to wait.
 _RESPONSE = 0.05
@@ -288,13 +288,13 @@ class ControlSteps:
     """
 
     def __init__(self, *, by_level: bool = False) -> None:
-        self.word = Control(0)
+        self.word = ControlWord(0)
         self._by_level = by_level
         self._asked = 0
         self._reached = 0
         self._left = 0.0
 
-    def write(self, word: Control, shown: Status) -> None:
+    def write(self, word: ControlWord, shown: Status) -> None:
         """Take a control word; ``shown`` is the status word until now."""
         rises = word & ~self.word
         self.word = word

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nfo_sinus_driver.catalog import Family, load_family
-from nfo_sinus_driver.families.sinus_optimal.words import Control
+from nfo_sinus_driver.families.sinus_optimal.words import ControlWord
 from nfo_sinus_driver.simulator import telegram1
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
@@ -31,11 +31,11 @@ _MODES = {0: 'Freque', 3: 'Speed'}
 PLC_CONTROL = 1 << 10
 #: The bits that are the same in both.
 _SAME = (
-    Control.SWITCH_ON
-    | Control.ECHO_1
-    | Control.ECHO_2
-    | Control.ENABLE
-    | Control.FAULT_ACK
+    ControlWord.SWITCH_ON
+    | ControlWord.ECHO_1
+    | ControlWord.ECHO_2
+    | ControlWord.ENABLE
+    | ControlWord.FAULT_ACK
 )
 
 
@@ -67,9 +67,9 @@ class TelegramServer(telegram1.Server):
 
     def exchange(self, stw1: int, setpoint: int) -> tuple[int, int]:
         """Take control word and set-point; return status word and actual value."""
-        word = Control(stw1) & _SAME
+        word = ControlWord(stw1) & _SAME
         if stw1 & PLC_CONTROL:
-            word |= Control.BUS_CONTROL
+            word |= ControlWord.BUS_CONTROL
         self._unit.take_telegram(int(word), setpoint)
         return int(self._unit.status_word), clipped(self._unit.telegram_actual)
 

@@ -185,20 +185,20 @@ def test_codes_of_commands() -> None:
 
 #: The bits of the words from bit 0 on, with a hyphen for what is reserved [M0 tables 14, 15], [M1].
 BITS = {
-    g2.Control: 'SWITCH_ON ENABLE_VOLTAGE DISABLE_QUICK_STOP ENABLE_OP ENABLE_RFG UNLOCK_RFG '
+    g2.ControlWord: 'SWITCH_ON ENABLE_VOLTAGE DISABLE_QUICK_STOP ENABLE_OP ENABLE_RFG UNLOCK_RFG '
     'USE_REF_FOR_RFG RESET_MALFUNCTION - - EVENT_TRIGGERED_OP OVERRIDE_COAST AUTO_INIT '
     'ENABLE_REV_OP NET_CTRL NET_REF',
     g2.Status: 'READY_TO_SWITCH_ON SWITCHED_ON OP_ENABLED FAULTED VOLTAGE_ENABLED '
     'QUICK_STOP_DISABLED SWITCH_ON_DISABLED - REF_FROM_NET CTRL_FROM_NET SETPOINT_REACHED '
     'LIMIT_ACTIVE - - REV_OP_ENABLED STOPPING',
-    optimal.Control: 'SWITCH_ON ECHO_1 ECHO_2 ENABLE - - - FAULT_ACK - - - - - - BUS_CONTROL -',
+    optimal.ControlWord: 'SWITCH_ON ECHO_1 ECHO_2 ENABLE - - - FAULT_ACK - - - - - - BUS_CONTROL -',
     optimal.Status: 'READY SWITCHED_ON ENABLED FAULT_ACTIVE ECHO_1 ECHO_2 DISABLED ALARM_ACTIVE - '
     'CONTROL_FROM_BUS SETPOINT_REACHED LIMIT_ACTIVE SLEEP_ACTIVE STOPMODE_BRAKE REVERSE STOPPING',
 }
 
 
 @pytest.mark.parametrize('word', BITS, ids=lambda word: f'{word.__module__}.{word.__name__}')
-def test_bits_of_the_words(word: type[g2.Control]) -> None:
+def test_bits_of_the_words(word: type[g2.ControlWord]) -> None:
     names = {bit.value.bit_length() - 1: bit.name for bit in word}
     assert [names.get(bit, '-') for bit in range(16)] == BITS[word].split()
 

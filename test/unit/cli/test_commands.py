@@ -15,7 +15,7 @@ from unittest import mock
 from cli_bench import PATIENCE, QUICK, Bench, Done, MakeBench, wait_until
 import pytest
 
-from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import ControlWord
 from nfo_sinus_driver.families.sinus_optimal import words as words_optimal
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.simulator.motor import Motor
@@ -59,25 +59,25 @@ def test_stop(make_bench: MakeBench, connection: str) -> None:
 
 #: What is written into the control word, step by step, until the motor runs.
 _READY = (
-    Control.NET_CTRL
-    | Control.NET_REF
-    | Control.ENABLE_VOLTAGE
-    | Control.DISABLE_QUICK_STOP
-    | Control.ENABLE_RFG
-    | Control.UNLOCK_RFG
-    | Control.USE_REF_FOR_RFG
+    ControlWord.NET_CTRL
+    | ControlWord.NET_REF
+    | ControlWord.ENABLE_VOLTAGE
+    | ControlWord.DISABLE_QUICK_STOP
+    | ControlWord.ENABLE_RFG
+    | ControlWord.UNLOCK_RFG
+    | ControlWord.USE_REF_FOR_RFG
 )
-_ENABLED = words_optimal.Control.BUS_CONTROL | words_optimal.Control.ENABLE
+_ENABLED = words_optimal.ControlWord.BUS_CONTROL | words_optimal.ControlWord.ENABLE
 STEPS = {
     'sinus_g2': (
         _READY,
-        _READY | Control.SWITCH_ON,
-        _READY | Control.SWITCH_ON | Control.ENABLE_OP,
+        _READY | ControlWord.SWITCH_ON,
+        _READY | ControlWord.SWITCH_ON | ControlWord.ENABLE_OP,
     ),
     'sinus_optimal': (
-        words_optimal.Control.BUS_CONTROL,
+        words_optimal.ControlWord.BUS_CONTROL,
         _ENABLED,
-        _ENABLED | words_optimal.Control.SWITCH_ON,
+        _ENABLED | words_optimal.ControlWord.SWITCH_ON,
     ),
 }
 

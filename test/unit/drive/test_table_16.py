@@ -19,20 +19,25 @@ from support.rig import Rig
 
 from nfo_sinus_driver.catalog import Fact, State
 from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.families.sinus_g2.words import Control
+from nfo_sinus_driver.families.sinus_g2.words import ControlWord
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions, Phase, StateMachine
 
 OVERLOAD = 5
 CONNECTION = 'rtu, control word'
 CONTROL, MASK = 'fieldbus.drive_control', 'fieldbus.drv_ctrl_write_mask'
-POWER = Control.NET_CTRL | Control.NET_REF | Control.ENABLE_VOLTAGE | Control.DISABLE_QUICK_STOP
-RAMP = Control.ENABLE_RFG | Control.UNLOCK_RFG | Control.USE_REF_FOR_RFG
-ON = POWER | RAMP | Control.SWITCH_ON
-FORWARD = ON | Control.ENABLE_OP
-REVERSE = ON | Control.ENABLE_REV_OP
-EVENT = Control.EVENT_TRIGGERED_OP
-WITHOUT_VOLTAGE, QUICK_STOP = ~Control.ENABLE_VOLTAGE, ~Control.DISABLE_QUICK_STOP
+POWER = (
+    ControlWord.NET_CTRL
+    | ControlWord.NET_REF
+    | ControlWord.ENABLE_VOLTAGE
+    | ControlWord.DISABLE_QUICK_STOP
+)
+RAMP = ControlWord.ENABLE_RFG | ControlWord.UNLOCK_RFG | ControlWord.USE_REF_FOR_RFG
+ON = POWER | RAMP | ControlWord.SWITCH_ON
+FORWARD = ON | ControlWord.ENABLE_OP
+REVERSE = ON | ControlWord.ENABLE_REV_OP
+EVENT = ControlWord.EVENT_TRIGGERED_OP
+WITHOUT_VOLTAGE, QUICK_STOP = ~ControlWord.ENABLE_VOLTAGE, ~ControlWord.DISABLE_QUICK_STOP
 N, D, R, S, E, B, X, Q, A, F = Phase
 #: A state and that behind it, as ``ER``.
 Exits = list[str]
@@ -69,7 +74,7 @@ def shown(rig: Rig) -> State:
     return State.UNKNOWN if status is None else status.state
 
 
-def command(rig: Rig, *words: Control) -> None:
+def command(rig: Rig, *words: ControlWord) -> None:
     """Write control words, as another master does: no poll comes between them."""
     for word in words:
         rig.far.write_raw(CONTROL, int(word))
@@ -104,7 +109,7 @@ def require_stopped(rig: Rig) -> None:
     rig.far.memory.set('control.retard', 0.3)
     rig.pass_time(1.5)
     assert not rig.drive.following and not rig.drive.stop_unconfirmed
-    assert not rig.far.motor.driven and not unit(rig).word & Control.SWITCH_ON
+    assert not rig.far.motor.driven and not unit(rig).word & ControlWord.SWITCH_ON
 
 
 def rows_that_fail(rows: Sequence[tuple[Any, ...]], check: Callable[..., None]) -> list[str]:
@@ -254,7 +259,7 @@ def test_the_sign_of_a_process_value_is_no_direction() -> None:
         rig.enable()
         rig.send(-20.0)
         rig.pass_time(1.0)
-        assert rig.written(MASK) == [] and unit(rig).word & Control.ENABLE_OP
+        assert rig.written(MASK) == [] and unit(rig).word & ControlWord.ENABLE_OP
         assert rig.far.memory.number('status.reg_set') == -20
 
 
@@ -266,7 +271,7 @@ def test_a_reverse_gives_no_run_command_that_another_master_has_taken_back() -> 
         rig.drive.set_setpoint(-20.0)
         rig.send(None)
         rig.pass_time(0.1)
-        assert not unit(rig).word & Control.SWITCH_ON
+        assert not unit(rig).word & ControlWord.SWITCH_ON
         require_stopped(rig)
 
 
@@ -274,30 +279,30 @@ def test_a_reverse_gives_no_run_command_that_another_master_has_taken_back() -> 
 
 STOPPED, LOST = 'the drive stopped by itself', 'the bus has lost control'
 #: From a motor that turns: the exits, the words, and what the driver says; '' if it goes on.
-MISLED: list[tuple[str, list[Control], str]] = [
+MISLED: list[tuple[str, list[ControlWord], str]] = [
     ('EQ QD', [FORWARD & WITHOUT_VOLTAGE], STOPPED),
     ('EQ QD', [FORWARD & QUICK_STOP], STOPPED),
-    ('EQ QD', [FORWARD & ~Control.NET_CTRL], LOST),
+    ('EQ QD', [FORWARD & ~ControlWord.NET_CTRL], LOST),
     ('EX', [POWER | RAMP], STOPPED),
     # and on by the driver, which removes bit 0
     ('EB BX', [ON], STOPPED),
     ('EB BQ', [ON, ON & WITHOUT_VOLTAGE], STOPPED),
     ('EB BQ', [ON, ON & QUICK_STOP], STOPPED),
     ('EB BX', [ON, POWER | RAMP], STOPPED),
-    ('EB BS', [ON, ON | Control.OVERRIDE_COAST], STOPPED),
+    ('EB BS', [ON, ON | ControlWord.OVERRIDE_COAST], STOPPED),
     # it follows us again before that can be seen
     ('EB BE', [ON, FORWARD], ''),
     ('EX XE', [POWER | RAMP, FORWARD], ''),
     ('EX XE EB', [POWER | RAMP, ON], STOPPED),
     ('EX XQ', [POWER, POWER & WITHOUT_VOLTAGE], STOPPED),
-    ('EX XR', [POWER | RAMP | Control.OVERRIDE_COAST], STOPPED),
+    ('EX XR', [POWER | RAMP | ControlWord.OVERRIDE_COAST], STOPPED),
 ]
 
 
 def test_table_16_misled(exits: Exits) -> None:
     with Rig(CONNECTION, telemetry_rate=0.0).connect() as rig:
 
-        def check(wanted: str, words: list[Control], cause: str) -> None:
+        def check(wanted: str, words: list[ControlWord], cause: str) -> None:
             turn(rig, 20.0)
             exits.clear()
             rig.notes.events.clear()
@@ -315,8 +320,8 @@ def test_table_16_misled(exits: Exits) -> None:
 
 UNASKED = 'although it was not enabled'
 #: From a motor that stands under our control: the last exits, the words, and what the driver says.
-IDLE: list[tuple[str, list[Control], str]] = [
-    ('DR RS', [Control(0), ON | Control.AUTO_INIT], ''),
+IDLE: list[tuple[str, list[ControlWord], str]] = [
+    ('DR RS', [ControlWord(0), ON | ControlWord.AUTO_INIT], ''),
     # it stays there while bit 0 is set
     ('RD', [POWER & QUICK_STOP, ON], ''),
     ('RD', [POWER & QUICK_STOP], ''),
@@ -326,15 +331,15 @@ IDLE: list[tuple[str, list[Control], str]] = [
     # both directions at once are none
     ('RS', [ON, FORWARD | REVERSE], ''),
     # nor is an old one where an event is required, but one that changes is
-    ('RS', [POWER | Control.ENABLE_OP, FORWARD | EVENT], ''),
-    ('RS SE', [POWER | Control.ENABLE_OP, FORWARD | EVENT, REVERSE | EVENT], UNASKED),
+    ('RS', [POWER | ControlWord.ENABLE_OP, FORWARD | EVENT], ''),
+    ('RS SE', [POWER | ControlWord.ENABLE_OP, FORWARD | EVENT, REVERSE | EVENT], UNASKED),
 ]
 
 
 def test_table_16_idle(exits: Exits) -> None:
     with Rig(CONNECTION, telemetry_rate=0.0).connect() as rig:
 
-        def check(wanted: str, words: list[Control], cause: str) -> None:
+        def check(wanted: str, words: list[ControlWord], cause: str) -> None:
             # whatever another master left behind, the first word of an enable ends
             stops(rig)
             require_stopped(rig)
@@ -355,8 +360,8 @@ def test_table_16_idle(exits: Exits) -> None:
 #: How to come to each state, from a motor that turns, and for how long to wait there, s.
 TO_A_FAULT = [
     (D, FORWARD & QUICK_STOP, 0.1),
-    (R, POWER | Control.OVERRIDE_COAST, 0.1),
-    (S, ON | Control.OVERRIDE_COAST, 0.0),
+    (R, POWER | ControlWord.OVERRIDE_COAST, 0.1),
+    (S, ON | ControlWord.OVERRIDE_COAST, 0.0),
     (E, FORWARD, 0.0),
     (B, ON, 0.0),
     (X, POWER | RAMP, 0.0),
@@ -367,7 +372,7 @@ TO_A_FAULT = [
 def test_table_16_fault(exits: Exits) -> None:
     with Rig(CONNECTION, telemetry_rate=0.0).connect() as rig:
 
-        def check(state: Phase, word: Control, wait: float) -> None:
+        def check(state: Phase, word: ControlWord, wait: float) -> None:
             turn(rig)
             exits.clear()
             rig.notes.events.clear()

@@ -6,16 +6,16 @@
 from hypothesis import given, strategies as st
 
 from nfo_sinus_driver.catalog import State
-from nfo_sinus_driver.families.sinus_g2.words import Control, Status, state_of
+from nfo_sinus_driver.families.sinus_g2.words import ControlWord, Status, state_of
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import Conditions, Phase, StateMachine
 
-VOLTAGE, QUICK = Control.ENABLE_VOLTAGE, Control.DISABLE_QUICK_STOP
+VOLTAGE, QUICK = ControlWord.ENABLE_VOLTAGE, ControlWord.DISABLE_QUICK_STOP
 POWER = VOLTAGE | QUICK
-ON = POWER | Control.SWITCH_ON
-FORWARD = ON | Control.ENABLE_OP
-REVERSE = ON | Control.ENABLE_REV_OP
+ON = POWER | ControlWord.SWITCH_ON
+FORWARD = ON | ControlWord.ENABLE_OP
+REVERSE = ON | ControlWord.ENABLE_REV_OP
 BOTH = FORWARD | REVERSE
-EVENT, COAST = Control.EVENT_TRIGGERED_OP, Control.OVERRIDE_COAST
+EVENT, COAST = ControlWord.EVENT_TRIGGERED_OP, ControlWord.OVERRIDE_COAST
 
 MOVING = Conditions(at_zero=False, voltage=True)
 RESTING = Conditions()
@@ -36,7 +36,7 @@ EXITS = (
     ('SWITCH_ON_DISABLED', VOLTAGE, RESTING, 'SWITCH_ON_DISABLED', 0),
     ('SWITCH_ON_DISABLED', QUICK, RESTING, 'SWITCH_ON_DISABLED', 0),
     ('SWITCH_ON_DISABLED', POWER, RESTING, 'READY_TO_SWITCH_ON', ON),
-    ('SWITCH_ON_DISABLED', ON | Control.AUTO_INIT, RESTING, 'SWITCHED_ON', 0),
+    ('SWITCH_ON_DISABLED', ON | ControlWord.AUTO_INIT, RESTING, 'SWITCHED_ON', 0),
     ('READY_TO_SWITCH_ON', POWER, RESTING, 'READY_TO_SWITCH_ON', 0),
     ('READY_TO_SWITCH_ON', VOLTAGE, RESTING, 'SWITCH_ON_DISABLED', 0),
     ('READY_TO_SWITCH_ON', QUICK, RESTING, 'SWITCH_ON_DISABLED', 0),
@@ -57,7 +57,7 @@ EXITS = (
     ('OPERATION_ENABLED', BOTH, MOVING, 'OPERATION_ENABLED', FORWARD),
     ('OPERATION_ENABLED', FORWARD & ~VOLTAGE, MOVING, 'QUICK_STOP', FORWARD),
     ('OPERATION_ENABLED', FORWARD & ~QUICK, MOVING, 'QUICK_STOP', FORWARD),
-    ('OPERATION_ENABLED', FORWARD & ~Control.SWITCH_ON, MOVING, 'SHUTDOWN', FORWARD),
+    ('OPERATION_ENABLED', FORWARD & ~ControlWord.SWITCH_ON, MOVING, 'SHUTDOWN', FORWARD),
     ('OPERATION_ENABLED', ON, MOVING, 'DISABLE', FORWARD),
     ('DISABLE', ON, MOVING, 'DISABLE', ON),
     ('DISABLE', ON & ~VOLTAGE, MOVING, 'QUICK_STOP', ON),
@@ -95,8 +95,8 @@ def machine_in(phase, word=FORWARD):
 def test_every_exit_of_table_16_leads_where_it_says():
     wrong = []
     for begin, word, conditions, end, before in EXITS:
-        machine = machine_in(Phase[begin], Control(before))
-        machine.update(Control(word), conditions)
+        machine = machine_in(Phase[begin], ControlWord(before))
+        machine.update(ControlWord(word), conditions)
         if machine.phase is not Phase[end]:
             wrong.append((begin, word, conditions, end, machine.phase))
     assert not wrong
@@ -136,13 +136,13 @@ def test_only_a_rising_bit_7_resets_and_only_when_faulted():
         (Phase.FAULT_REACTION_ACTIVE, True, False),
         (Phase.OPERATION_ENABLED, True, False),
     ):
-        machine = machine_in(phase, Control(0) if rises else Control.RESET_MALFUNCTION)
-        assert machine.asks_reset(Control.RESET_MALFUNCTION) is resets, phase
+        machine = machine_in(phase, ControlWord(0) if rises else ControlWord.RESET_MALFUNCTION)
+        assert machine.asks_reset(ControlWord.RESET_MALFUNCTION) is resets, phase
 
 
 @given(st.sampled_from(list(Phase)), st.integers(0, 0xFFFF), st.booleans())
 def test_the_status_word_shows_the_state(phase, word, reverse):
-    machine = machine_in(phase, Control(word))
+    machine = machine_in(phase, ControlWord(word))
     machine.direction = -1 if reverse else 1
     stopping = phase in (Phase.DISABLE, Phase.SHUTDOWN)
     expected = State.STOPPING if stopping else State.__members__.get(phase.value)
@@ -162,6 +162,6 @@ def test_the_direction_is_kept_while_it_stops():
 def test_any_words_in_any_conditions_leave_it_in_a_state(inputs):
     machine = StateMachine()
     for word, (initialised, fault, brake, at_zero, voltage) in inputs:
-        machine.update(Control(word), Conditions(initialised, fault, brake, at_zero, voltage))
+        machine.update(ControlWord(word), Conditions(initialised, fault, brake, at_zero, voltage))
         assert machine.phase in Phase
         assert not (machine.driven and fault)

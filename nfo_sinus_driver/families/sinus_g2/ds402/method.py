@@ -189,7 +189,7 @@ class Ds402(ControlMethod):
             yield from self._acknowledge_by_reading(control_mode)
         return error
 
-    def _command(self, word: words.Control, control_mode: str, *, retry: bool) -> Steps[None]:
+    def _command(self, word: words.ControlWord, control_mode: str, *, retry: bool) -> Steps[None]:
         target = SETPOINTS.get(control_mode)
         zeroes = () if target is None else (target.zero(retry=retry),)
         yield from self._stop_by(one(Write(CONTROL_WORD, word, retry=retry)), *zeroes)
@@ -197,7 +197,7 @@ class Ds402(ControlMethod):
     @staticmethod
     def _reset_fault() -> Steps[None]:
         yield Write(CONTROL_WORD, words.DISABLE_VOLTAGE, retry=False)
-        reset = words.DISABLE_VOLTAGE | words.Control.FAULT_RESET
+        reset = words.DISABLE_VOLTAGE | words.ControlWord.FAULT_RESET
         yield Write(CONTROL_WORD, reset, retry=False)
         yield FAULT_GONE
         yield Write(CONTROL_WORD, words.DISABLE_VOLTAGE, retry=False)

@@ -15,7 +15,7 @@ import functools
 from nfo_sinus_driver.catalog.status import Fact, State, StatusWord
 
 
-class Control(enum.IntFlag):
+class ControlWord(enum.IntFlag):
     """ControlWord (6040h)."""
 
     SWITCH_ON = 1 << 0
@@ -48,15 +48,15 @@ class Status(enum.IntFlag):
 
 #: The commands "shutdown", "switch on" and "enable operation", with the ramp generator in use.
 SHUTDOWN = (
-    Control.ENABLE_VOLTAGE
-    | Control.NO_QUICK_STOP
-    | Control.ENABLE_RAMP
-    | Control.UNLOCK_RAMP
-    | Control.REFERENCE_RAMP
+    ControlWord.ENABLE_VOLTAGE
+    | ControlWord.NO_QUICK_STOP
+    | ControlWord.ENABLE_RAMP
+    | ControlWord.UNLOCK_RAMP
+    | ControlWord.REFERENCE_RAMP
 )
-SWITCH_ON = SHUTDOWN | Control.SWITCH_ON
-ENABLE_OPERATION = SWITCH_ON | Control.ENABLE_OPERATION
-DISABLE_VOLTAGE = Control(0)
+SWITCH_ON = SHUTDOWN | ControlWord.SWITCH_ON
+ENABLE_OPERATION = SWITCH_ON | ControlWord.ENABLE_OPERATION
+DISABLE_VOLTAGE = ControlWord(0)
 
 #: Which bits count, and which of them are set.
 _STATES = (

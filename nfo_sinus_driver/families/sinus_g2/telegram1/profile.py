@@ -37,7 +37,7 @@ class G2Telegram1(Telegram1):
     coasts = True
     unfollowed_scale = _SPEED_SCALE
     ready = int(profidrive.OFF)
-    runs = int(profidrive.Control.ON)
+    runs = int(profidrive.ControlWord.ON)
     # bit 9 of ZSW1 asks for control, and does not say that the bus has it
     echoes = True
 
@@ -57,25 +57,25 @@ class G2Telegram1(Telegram1):
 
     def stopping(self, word: int) -> int:
         """Return the word that leaves operation enabled: without it the motor would coast."""
-        return self.ready | profidrive.Control.ENABLE_OPERATION
+        return self.ready | profidrive.ControlWord.ENABLE_OPERATION
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once, by the coast stop; control is kept."""
-        yield method.begin(self.ready & ~profidrive.Control.NO_COAST_STOP)
+        yield method.begin(self.ready & ~profidrive.ControlWord.NO_COAST_STOP)
 
 
 _READY = (
-    drivecontrol.Control.ENABLE_VOLTAGE
-    | drivecontrol.Control.DISABLE_QUICK_STOP
-    | drivecontrol.Control.ENABLE_RFG
-    | drivecontrol.Control.UNLOCK_RFG
-    | drivecontrol.Control.USE_REF_FOR_RFG
-    | drivecontrol.Control.NET_CTRL
-    | drivecontrol.Control.NET_REF
+    drivecontrol.ControlWord.ENABLE_VOLTAGE
+    | drivecontrol.ControlWord.DISABLE_QUICK_STOP
+    | drivecontrol.ControlWord.ENABLE_RFG
+    | drivecontrol.ControlWord.UNLOCK_RFG
+    | drivecontrol.ControlWord.USE_REF_FOR_RFG
+    | drivecontrol.ControlWord.NET_CTRL
+    | drivecontrol.ControlWord.NET_REF
 )
 
 
-_ON = int(_READY | drivecontrol.Control.SWITCH_ON)
+_ON = int(_READY | drivecontrol.ControlWord.SWITCH_ON)
 
 
 class G2DriveControl(Telegram1):
@@ -85,9 +85,9 @@ class G2DriveControl(Telegram1):
     unfollowed_scale = _SPEED_SCALE
     ready = int(_READY)
     runs = int(
-        drivecontrol.Control.SWITCH_ON
-        | drivecontrol.Control.ENABLE_OP
-        | drivecontrol.Control.ENABLE_REV_OP
+        drivecontrol.ControlWord.SWITCH_ON
+        | drivecontrol.ControlWord.ENABLE_OP
+        | drivecontrol.ControlWord.ENABLE_REV_OP
     )
 
     def take_control(self) -> Steps[None]:
@@ -100,18 +100,18 @@ class G2DriveControl(Telegram1):
         yield Until(lambda status: status.state in _STARTABLE)
         yield method.following(_ON, retry=False)
         yield Until(lambda status: status.state in (State.SWITCHED_ON, State.STOPPING))
-        yield method.following(_ON | drivecontrol.Control.ENABLE_OP, retry=False)
+        yield method.following(_ON | drivecontrol.ControlWord.ENABLE_OP, retry=False)
 
     def setpoint_target(self, target: SetpointTarget) -> SetpointTarget:
         """Return where sizes go, with the direction by bits 3 and 13 ([M0 table 14], [C120])."""
-        forward = method.following(_ON | drivecontrol.Control.ENABLE_OP)
-        reverse = method.following(_ON | drivecontrol.Control.ENABLE_REV_OP)
+        forward = method.following(_ON | drivecontrol.ControlWord.ENABLE_OP)
+        reverse = method.following(_ON | drivecontrol.ControlWord.ENABLE_REV_OP)
         return with_direction(target, method.NEXT, int(forward.value), int(reverse.value))
 
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Go to QUICK_STOP, which coasts [C96]; control is kept."""
-        word = self.ready & ~drivecontrol.Control.DISABLE_QUICK_STOP
-        yield method.begin(int(word | drivecontrol.Control.OVERRIDE_COAST))
+        word = self.ready & ~drivecontrol.ControlWord.DISABLE_QUICK_STOP
+        yield method.begin(int(word | drivecontrol.ControlWord.OVERRIDE_COAST))
 
 
 _Bits = profidrive.Status
