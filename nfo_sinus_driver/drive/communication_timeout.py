@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The time-outs by which a drive notices that the line is silent."""
+"""The communication time-outs: by them a drive notices that the line is silent."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The time-out of the drive itself: what stops the motor when the driver is gone."""
+"""The communication time-out of the drive: what stops the motor when the driver is gone."""
 
 from __future__ import annotations
 
@@ -144,15 +144,15 @@ class CommunicationWatchdog:
         Failing to set the default prevents no start; the next enable tries again.
         """
         settings = self._state.settings
-        if self._is_settled(settings.own_timeout):
+        if self._is_settled(settings.communication_timeout):
             return
         done = True
         if settings.drive_timeout == AS_THE_DRIVE_CAN:
-            done = await self._try_usual(settings.own_timeout)
+            done = await self._try_usual(settings.communication_timeout)
         else:
-            await self.set_now(settings.own_timeout)
+            await self.set_now(settings.communication_timeout)
         if done:
-            self._settled = settings.own_timeout, self._state.timeout.stops_motor
+            self._settled = settings.communication_timeout, self._state.timeout.stops_motor
         self._report_timeout()
         self.warn_if_unfit()
 
@@ -370,7 +370,7 @@ class CommunicationWatchdog:
             return state.report(Cause.NO_OWN_TIMEOUT)
         name = state.timeout.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
         asked = settings.drive_timeout
-        if not timeout and not settings.own_timeout:
+        if not timeout and not settings.communication_timeout:
             return Report(Cause.OWN_TIMEOUT_OFF, name=name, asked=asked)
         if prevented := state.timeout.prevented_by:
             return Report(

@@ -504,7 +504,7 @@ LAWS = (
         9,
         'the usual time-out of the drive is not set',
         WATCHDOG,
-        '            done = await self._try_usual(settings.own_timeout)',
+        '            done = await self._try_usual(settings.communication_timeout)',
         '            done = True',
         ('test/unit/drive/test_own_timeout.py', '-k', 'was_killed'),
     ),

@@ -198,7 +198,7 @@ def test_9_a_default_that_the_drive_did_not_take_is_set_by_the_next_enable(
         assert rig.notes.said(Cause.OWN_TIMEOUT_NOT_TAKEN) and own_timeout(rig) == 0.0
         rig.meet = lambda key, data: None
         rig.enable()
-        assert own_timeout(rig) == rig.drive.settings.own_timeout
+        assert own_timeout(rig) == rig.drive.settings.communication_timeout
 
 
 @timed
