@@ -555,8 +555,8 @@ class Profile:
     :ivar holders: who has control, by the value of the control source.
     :ivar methods: the ways to command it, by name; the first one is the usual one.
     :ivar setpoints: where set-points go, by control mode.
-    :ivar in_charge: finds out by which control method the bus has control of a drive, taken by an
-        earlier session; given the last status, or ``None``.
+    :ivar active_method: finds out by which control method the bus has control of a drive, taken by
+        an earlier session; given the last status, or ``None``.
     :ivar broadcast_stop: releases the motors of all drives of a line that has a broadcast.
     :ivar names_itself: it reports who it is by Modbus functions 43 and 17.
     :ivar product: reads who it is, where parameters report that; :class:`NotPossible` if it is none
@@ -608,7 +608,7 @@ class Profile:
     holders: Mapping[Value, Holder]
     methods: Mapping[str, type[ControlMethod]]
     setpoints: Mapping[str, SetpointTarget]
-    in_charge: Callable[[Status | None], Steps[str]]
+    active_method: Callable[[Status | None], Steps[str]]
     enable_input: str = 'enable input'
     has_enable_input: bool = True
     broadcast_stop: Write | None = None

@@ -400,7 +400,7 @@ class Drive:
     @on_bus
     async def active_control_method(self) -> str:
         """Return the control method by which the bus runs the drive, or could stop it."""
-        steps = self.model.profile.in_charge(self.state.status)
+        steps = self.model.profile.active_method(self.state.status)
         return await carry_out(self.state, steps, Priority.SERVICE)
 
     @on_bus

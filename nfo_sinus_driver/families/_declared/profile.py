@@ -219,7 +219,7 @@ def _fulfils(step: Await) -> Callable[[Status], bool]:
     return lambda status: step.condition.holds(status.word or 0)
 
 
-def _in_charge(status: Status | None) -> Steps[str]:
+def _active_method(status: Status | None) -> Steps[str]:
     yield from ()
     return METHOD
 
@@ -249,7 +249,7 @@ def profile_of(drive: Description) -> Profile:
         methods={METHOD: type('Control', (Declared,), members)},
         setpoints={drive.setpoint.mode: target},
         releases='' if drive.stop_mode is None else drive.stop_mode[1],
-        in_charge=_in_charge,
+        active_method=_active_method,
         identify=drive.identify,
         most={QUANTITIES[drive.setpoint.mode].role: most},
         start_settings=frozenset(one.key for one in drive.requires),

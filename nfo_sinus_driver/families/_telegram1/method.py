@@ -197,7 +197,7 @@ def following(word: int, *, retry: bool = True) -> Write:
     return Write(NEXT, word << 16, retry=retry)
 
 
-def in_charge(status: Status | None) -> Steps[str]:
+def active_method(status: Status | None) -> Steps[str]:
     """Return the control method, of which there is one behind a PLC."""
     yield from ()
     return 'telegram1'

@@ -14,7 +14,7 @@ from nfo_sinus_driver.families.movitrac31.product import SPELLED, read_product
 from nfo_sinus_driver.families.movitrac31.remote_setpoint import RemoteSetpoint
 
 
-def _in_charge(status: Status | None) -> Steps[str]:
+def _active_method(status: Status | None) -> Steps[str]:
     """Return the control method by which the line has control, or would have it."""
     by_terminals = (yield Read(CONTROL_MODE)) == words.REMOTE_SETPOINT
     return 'remote_setpoint' if by_terminals else 'function_bits'
@@ -28,7 +28,7 @@ PROFILE = Profile(
     holders=RemoteSetpoint.holders,
     methods={'function_bits': FunctionBits, 'remote_setpoint': RemoteSetpoint},
     setpoints=FunctionBits.setpoints,
-    in_charge=_in_charge,
+    active_method=_active_method,
     product=read_product,
     spelled=SPELLED,
     start_settings=START_SETTINGS,

@@ -505,7 +505,7 @@ class DriveControl(_G2):
         yield Write(CONTROL_WORD, word & keep | add, retry=retry)
 
 
-def _in_charge(status: Status | None) -> Steps[str]:
+def _active_method(status: Status | None) -> Steps[str]:
     """Return by which control method the bus has control; MODE and SCMD where it has none."""
     # older firmware has no more to ask for
     if status is None or not status.from_bus:
@@ -532,7 +532,7 @@ PROFILE = Profile(
         'status.reg_set',
         'status.reg_act',
     ),
-    in_charge=_in_charge,
+    active_method=_active_method,
     # it works even on drives with a serial fault ([M0 §6.1.5], [C9])
     broadcast_stop=Write(MODE, Mode.STOP),
     # functions 43, 17 and 23 ([M0 §6.2.3], [C57]); its vendor is object 00h of 43 [M0 §6.2.4]

@@ -69,7 +69,7 @@ PROFILE = Profile(
     holders={},
     methods={'telegram1': HTelegram1},
     setpoints=method.setpoints(327.67, forward_only=True),
-    in_charge=method.in_charge,
+    active_method=method.active_method,
     writes_and_reads=True,
     # the operation command and STW1 [M3 §7.2.1]
     own_addresses=OwnAddresses('drive_address', frozenset((0x0382, 0x047F)), 'M3 §10; C124'),

@@ -234,7 +234,7 @@ class DriveControl(ControlMethod):
         return ''
 
 
-def _in_charge(status: Status | None) -> Steps[str]:
+def _active_method(status: Status | None) -> Steps[str]:
     """Return by which control method the motor was started."""
     word = int((yield Read(CONTROL_WORD)))
     return 'drive_control' if word & ControlWord.SWITCH_ON else 'mode_scmd'
@@ -257,7 +257,7 @@ PROFILE = Profile(
         'status.control_freq',
         'status.control_speed',
     ),
-    in_charge=_in_charge,
+    active_method=_active_method,
     # it has no function 43 [C57]: who answers it as another maker is none
     vendor='NFO',
     most=MOST,

@@ -77,7 +77,7 @@ def test_p841_says_which_control_method_is_in_charge() -> None:
         (REMOTE, 'function_bits'), (STANDARD, 'function_bits'), (FIELDBUS, 'function_bits'),
         (REMOTE_SETPOINT, 'remote_setpoint'),
     ):
-        assert play(MOVITRAC.profile.in_charge(None), (Read(MODE), mode)) == name
+        assert play(MOVITRAC.profile.active_method(None), (Read(MODE), mode)) == name
 
 
 # --- before an enable -----------------------------------------------------------------------------

@@ -365,12 +365,12 @@ def test_under_the_control_word_a_sign_is_a_direction(classic: bool) -> None:
         assert scmd(classic=classic).setpoint_target(target) is target
 
 
-def test_in_charge() -> None:
-    in_charge = G2.profile.in_charge
+def test_active_method() -> None:
+    active_method = G2.profile.active_method
     # what has no control is asked for nothing: older firmware may not know it
-    assert play(in_charge(None)) == play(in_charge(status())) == 'mode_scmd'
-    assert play(in_charge(status(from_bus=True)), (Read(MODE), BUS)) == 'mode_scmd'
-    assert play(in_charge(status(from_bus=True)), (Read(MODE), STOP)) == 'drive_control'
+    assert play(active_method(None)) == play(active_method(status())) == 'mode_scmd'
+    assert play(active_method(status(from_bus=True)), (Read(MODE), BUS)) == 'mode_scmd'
+    assert play(active_method(status(from_bus=True)), (Read(MODE), STOP)) == 'drive_control'
 
 
 def test_every_parameter_that_is_named_is_one() -> None:

@@ -162,7 +162,7 @@ def test_a_fault_is_acknowledged_by_an_edge() -> None:
     play(control.zero_setpoint('Freque'))
 
 
-def test_in_charge() -> None:
+def test_active_method() -> None:
     for seen in (None, status(from_bus=True), status()):
         for word, method in ((0x4009, 'drive_control'), (0x4008, 'mode_scmd')):
-            assert play(OPTIMAL.profile.in_charge(seen), (Read(WORD), word)) == method
+            assert play(OPTIMAL.profile.active_method(seen), (Read(WORD), word)) == method

@@ -141,7 +141,7 @@ PROFILE = Profile(
     holders={},
     methods={'telegram1': G2Telegram1},
     setpoints=method.setpoints(150.0),
-    in_charge=method.in_charge,
+    active_method=method.active_method,
     writes_and_reads=True,
     mailbox='profibus',
     # it decides what a set-point means

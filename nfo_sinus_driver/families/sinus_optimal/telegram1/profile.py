@@ -85,7 +85,7 @@ PROFILE = Profile(
     holders={},
     methods={'telegram1': OptimalTelegram1},
     setpoints=method.setpoints(150.0),
-    in_charge=method.in_charge,
+    active_method=method.active_method,
     writes_and_reads=True,
     # a tenth above what a set-point may be, for a motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 165.0},

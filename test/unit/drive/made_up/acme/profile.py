@@ -125,7 +125,7 @@ def _state(word: int) -> State:
     return State.OPERATION_ENABLED if word & StatusBit.RUNNING else State.READY_TO_SWITCH_ON
 
 
-def _in_charge(status: Status | None) -> Steps[str]:
+def _active_method(status: Status | None) -> Steps[str]:
     yield from ()
     return 'drive_control'
 
@@ -144,7 +144,7 @@ PROFILE = Profile(
     holders={},
     methods={'drive_control': DriveControl},
     setpoints={'Freque': _FREQUENCY},
-    in_charge=_in_charge,
+    active_method=_active_method,
     identified_by='bus.kind',
     most={Role.ACTUAL_FREQUENCY: 480.0, Role.ACTUAL_SPEED: 24000.0},
 )

@@ -133,7 +133,7 @@ def _state(word: int) -> State:
     return State.OPERATION_ENABLED if word & StatusBit.RUNNING else State.READY_TO_SWITCH_ON
 
 
-def _in_charge(status: Status | None) -> Steps[str]:
+def _active_method(status: Status | None) -> Steps[str]:
     yield from ()
     return 'function_bits'
 
@@ -156,7 +156,7 @@ PROFILE = Profile(
     holders=_HOLDERS,
     methods={'function_bits': FunctionBits},
     setpoints={'Freque': _FREQUENCY},
-    in_charge=_in_charge,
+    active_method=_active_method,
     identified_by=_STATUS,
     most={Role.ACTUAL_FREQUENCY: 120.0},
 )
