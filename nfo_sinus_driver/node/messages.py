@@ -27,9 +27,7 @@ from nfo_sinus_driver.catalog.status import FREQUENCY, QUANTITIES, SPEED
 from nfo_sinus_driver.drive import Drive, InverterStatus, LogEntry, Snapshot, Telemetry
 from nfo_sinus_driver.node.scale import Scale
 
-_CONTROL_MODES = {
-    mode: getattr(DriveStatus, mode.upper().replace('-', '_')) for mode in QUANTITIES
-}
+_CONTROL_MODES = {mode: getattr(DriveStatus, mode.upper().replace('-', '_')) for mode in QUANTITIES}
 #: A method without a constant is a family's own: CUSTOM.
 _METHODS = {
     'mode_scmd': DriveStatus.MODE_SCMD,
