@@ -857,6 +857,14 @@ LAWS = (
     ),
     Mutant(
         11,
+        'a fault is acknowledged at a drive that is not recognised',
+        'nfo_sinus_driver/drive/parameter_access.py',
+        'not isinstance(operation, Read) or operation.once',
+        'not isinstance(operation, Read)',
+        (RECOGNITION, '-k', 'is_acknowledged'),
+    ),
+    Mutant(
+        11,
         'a drive that was not recognised is written to',
         GATE,
         '        if not self.holds:',

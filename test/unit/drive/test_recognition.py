@@ -263,6 +263,19 @@ def test_one_that_was_recognised_is_stopped_whatever_its_status_word_says() -> N
         rig.wait_until(lambda: not rig.turns, _SOON)
 
 
+def test_no_fault_of_what_is_no_nfo_drive_is_acknowledged() -> None:
+    # it answers where ours was, and its status says that a fault is active
+    with Rig(lost_after=20.0) as rig:
+        rig.connect()
+        rig.line.state = 'silent'
+        rig.pass_time(5.0)
+        answer_as(rig, 'fieldbus.drive_status', b'\xff' * 4)
+        rig.line.mend()
+        answer = rig.answer(rig.drive.acknowledge())
+        assert Cause.NOT_RECOGNISED in answer.causes, answer
+        assert rig.far.control_unit.ack_reads == 0
+
+
 @pytest.mark.parametrize(('maker', 'is_ours'), [(b'NFO Drives AB', True), (b'Acme', False)])
 def test_another_maker_in_function_43_is_another_drive(maker: bytes, is_ours: bool) -> None:
     with Rig() as rig:
