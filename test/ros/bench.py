@@ -62,8 +62,8 @@ _STACKS_PATIENCE = 5.0
 #: For how long something must not happen, s; longer than a few polls and a ramp's first step.
 A_WHILE = 2.0
 
-#: How often a drive is polled where a test does not want it as fast as the line allows, Hz.
-POLL_RATE = 10.0
+#: How often a drive is polled and measured where a test does not want it otherwise, Hz.
+_RATES = {'poll_rate': 10.0, 'telemetry_rate': 0.5}
 #: For how long a PLC misses the driver, or the drive, before it stops the motor, s.
 _PLC_TIME = 5.0
 #: For a test that does.
@@ -263,8 +263,9 @@ class Bench(contextlib.ExitStack):
         It polls at a modest rate unless they say otherwise: tests share the processors.
         """
         given = {'port': self.port, **self.connection.driver}
-        if not any('poll_rate' in argument for argument in arguments):
-            given['poll_rate'] = POLL_RATE
+        for name, rate in _RATES.items():
+            if not any(name in argument for argument in arguments):
+                given[name] = rate
         settings = [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
         return self.bare_driver(*settings, *arguments, through=through, fails=fails)
 

@@ -32,7 +32,7 @@ _SETTINGS = {
     'address': 1,
     'control_method': '',
     'autostart': True,
-    'poll_rate': 0.0,
+    'poll_rate': 50.0,
     'idle_poll_rate': 0.0,
     'telemetry_rate': 2.0,
     'setpoint_timeout': 2.5,
@@ -271,7 +271,8 @@ def test_quality_of_service(idle: Client) -> None:
 @needs('direct')
 def test_the_settings_have_their_defaults_and_descriptions(bench: Bench) -> None:
     bench.simulator()
-    bench.driver(*FULL_RATE)
+    given = {'port': bench.port, **bench.connection.driver}
+    bench.bare_driver(*(word for one in given.items() for word in ('-p', '{}:={}'.format(*one))))
     client = bench.client().connected()
     names = client.parameter_names()
     for name, default in {**_SETTINGS, 'model': bench.connection.model}.items():
