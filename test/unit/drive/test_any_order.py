@@ -26,7 +26,7 @@ SEED = int(os.environ.get('SEED', '0'))
 _SHARE = 100
 #: Always the same histories, so that what passes once passes on every machine.
 NORMAL = settings(
-    max_examples=40 if FULL else 4,
+    max_examples=40 if FULL else 2,
     stateful_step_count=30,
     derandomize=True,
     deadline=None,
@@ -64,9 +64,13 @@ def test_each_event_ends_a_run(machine: type[AnyOrder]) -> None:
         for give in ('', 'stop', 'deactivate'):
             state.lose_line('silent', give, 9.0, wait=2.5)
         state.put_right()
+        # a program that has ended
+        state.run_motor(wait=1.0)
+        state.send(None, wait=4.0)
         state.run_motor(wait=1.0)
         # the next driver finds the motor running
-        state.kill(wait=2.5)
+        state.kill(wait=1.0)
+        state.let(2.5)
     finally:
         state.teardown()
 
