@@ -249,7 +249,8 @@ class Rig:
             'model': connection.model,
             'control_method': connection.method,
             'reference': connection.reference,
-            'poll_rate': 20.0,
+            'poll_rate': 10.0,
+            'telemetry_rate': 0.5,
             'drive_timeout': 0.0,
             **connection.driver,
             **settings,
@@ -469,12 +470,11 @@ class Rig:
     def assert_only_enable_helps(self, frequency: float = 20.0) -> None:
         """Nothing turns although set-points keep arriving, until enable is called."""
         self.send(frequency)
-        self.pass_time(1.5)
+        self.pass_time(1.0)
         assert not self.drive.following
         assert not self.turns
         self.enable()
-        self.pass_time(1.5)
-        assert abs(self.far.motor.frequency) > 0.9 * frequency
+        self.wait_until(lambda: abs(self.far.motor.frequency) > 0.9 * frequency, 1.5)
 
     # --- requests ---
 

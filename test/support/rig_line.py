@@ -233,7 +233,8 @@ class Line:
         """Let the clock go on to a moment, and do everything that is due until then."""
         while (due := self._due) <= moment:
             self._tick(max(due, self.clock.now))
-        self._tick(max(moment, self.clock.now))
+        if moment > self.clock.now:
+            self._tick(moment)
 
     def later(self, at: float, do: Callable[[], None]) -> None:
         """Have something done at a moment."""
@@ -263,7 +264,7 @@ class Line:
         # something catches up at that moment
         if self.clock.now < self._seldom_at:
             return
-        self._seldom_at = self.clock.now + (0.02 if len(self.drives) > 2 else 0.002)
+        self._seldom_at = self.clock.now + (0.02 if len(self.drives) > 2 else 0.01)
         for far in self.drives.values():
             far.advance_to(self.clock.now)
 

@@ -71,7 +71,6 @@ class AnyOrder(RuleBasedStateMachine):
             options=options,
             line=self.line,
             poll_rate=POLL_RATE,
-            telemetry_rate=1.0,
             setpoint_timeout=SETPOINT_TIMEOUT,
             shutdown_timeout=SHUTDOWN_TIMEOUT,
             **settings,

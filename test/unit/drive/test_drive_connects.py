@@ -147,7 +147,7 @@ MEASURED: dict[Role, Callable[[SimulatedDrive], float]] = {
 def test_telemetry_is_what_the_drive_measures_and_nothing_else(
     connection: str, measures: list[Role]
 ) -> None:
-    with Rig(connection, poll_rate=5.0).turn() as rig:
+    with Rig(connection, poll_rate=5.0, telemetry_rate=2.0).turn() as rig:
         # beyond 16 bits, in each unit
         rig.far.counters.operating_time = 7000.0
         rig.far.counters.running_time = 6700.0

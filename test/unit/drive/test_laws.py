@@ -72,7 +72,7 @@ def acknowledge(rig: Rig) -> None:
 def assert_only_enable_helps(rig: Rig) -> None:
     """Nothing turns although set-points arrive, until it is enabled."""
     give_setpoints(rig)
-    rig.pass_time(1.5)
+    rig.pass_time(1.0)
     assert not rig.drive.following and not rig.turns
     rig.enable()
     rig.wait_until(lambda: abs(rig.far.motor.frequency) > 0.5 * _SPEED, 5.0)

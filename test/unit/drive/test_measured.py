@@ -24,7 +24,7 @@ OWN_SETPOINT = {
 
 @pytest.mark.parametrize('connection', CONNECTIONS)
 def test_what_matters_of_a_model_is_measured_without_being_named(connection: str) -> None:
-    with Rig(connection).turn() as rig:
+    with Rig(connection, telemetry_rate=2.0).turn() as rig:
         rig.pass_time(4.0)
         values = rig.notes.telemetry[-1].measured
         model = rig.drive.model
@@ -38,14 +38,14 @@ def test_what_matters_of_a_model_is_measured_without_being_named(connection: str
 
 def test_the_manuals_own_example_of_a_safety_value_is_there() -> None:
     # heat sink temperature, P001 [M4 §1.1]
-    with Rig('movitrac').turn() as rig:
+    with Rig('movitrac', telemetry_rate=2.0).turn() as rig:
         rig.pass_time(1.0)
         assert 0 < rig.notes.telemetry[-1].measured['status.heat_sink_temperature'] < 90
 
 
 def test_names_choose_and_keep_their_order() -> None:
     names = ['status.dc_link', 'status.reg_act', 'status.frq_act']
-    with Rig(measured=names).turn() as rig:
+    with Rig(measured=names, telemetry_rate=2.0).turn() as rig:
         rig.pass_time(1.0)
         values = rig.notes.telemetry[-1].measured
         assert list(values) == names
@@ -54,7 +54,7 @@ def test_names_choose_and_keep_their_order() -> None:
 
 
 def test_a_value_that_is_lost_is_nan_and_not_the_old_one() -> None:
-    with Rig(measured=['status.reg_act']).turn() as rig:
+    with Rig(measured=['status.reg_act'], telemetry_rate=2.0).turn() as rig:
         rig.pass_time(1.0)
         rig.meet = lambda key, data: 'refused' if key == 'status.reg_act' else None
         rig.pass_time(1.0)
@@ -76,7 +76,7 @@ def test_the_usual_ones_of_every_model_are_measured_values_of_it(model: str) -> 
 
 
 def test_a_monitored_drive_reports_the_setpoint_of_another_master() -> None:
-    with Rig(control_method='monitor').connect() as rig:
+    with Rig(control_method='monitor', telemetry_rate=2.0).connect() as rig:
         target = rig.drive.model.profile.setpoints['Freque'].key
         rig.far.memory.set(target, 12.5)
         rig.pass_time(1.5)
@@ -93,6 +93,7 @@ def test_a_monitored_optimal_reports_the_setpoint_that_it_follows(
         parameters={'control.mode': mode},
         control_method='monitor',
         expected_control_mode=mode,
+        telemetry_rate=2.0,
     ).connect() as rig:
         rig.far.memory.set(rig.drive.model.profile.setpoints[mode].key, 12)
         rig.far.control_unit.press('ext')

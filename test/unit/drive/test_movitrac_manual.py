@@ -188,7 +188,7 @@ def test_everything_that_is_only_read_is_shown_as_the_manual_codes_it(card: str)
 
 
 def test_what_is_measured_is_that_of_the_motor() -> None:
-    with Rig('movitrac') as rig:
+    with Rig('movitrac', telemetry_rate=2.0) as rig:
         rig.turn()
         motor = rig.far.motor
         for hertz in (20.0, -35.0):

@@ -87,7 +87,7 @@ def test_a_port_with_any_drive_that_answers_stays_open() -> None:
 
 
 def test_the_longest_lost_after_of_the_line_counts() -> None:
-    with Rig(drives=2, own={2: {'lost_after': 5.0}}) as rig:
+    with Rig(drives=2, poll_rate=20.0, own={2: {'lost_after': 5.0}}) as rig:
         rig.turn()
         rig.line.state = 'mute'
         rig.pass_time(4.9)

@@ -539,8 +539,8 @@ def test_a_motor_that_others_run_shows_and_is_left_alone(press: str) -> None:
 
 
 def test_current_limit_is_no_stop() -> None:
-    # its code stands in for the one that says who runs the motor
-    with Rig('classic v5.0').turn() as rig:
+    # its code stands in for the one that says who runs the motor; no ramp reaches it before
+    with Rig('classic v5.0', parameters={'control.accel': 1.0}).turn() as rig:
         rig.far.motor.load = 6.0
         rig.pass_time(3.0)
         status = rig.drive.snapshot.status
@@ -567,7 +567,7 @@ def test_counters_have_24_bits_over_classic(monkeypatch: pytest.MonkeyPatch) -> 
         return word | 0xA500 if number in (0x0127, 0x0128, 0x00DE) else word
 
     monkeypatch.setattr(Server, 'enquiry', filled)
-    with Rig('classic v5.0').connect() as rig:
+    with Rig('classic v5.0', telemetry_rate=2.0).connect() as rig:
         rig.pass_time(10.0)
         values = rig.notes.telemetry[-1].values
         assert values[Role.OPERATING_TIME] == pytest.approx(1234.5, abs=0.2)

@@ -18,7 +18,7 @@ from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.link import Reply
 
 #: How often a drive is polled, s.
-_POLL = 0.05
+_POLL = 0.1
 #: How long the frames of a transaction take at most, s.
 _FRAMES = 0.1
 #: A MOVITRAC may be set to answer so much later (P843), s.
