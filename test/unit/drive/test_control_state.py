@@ -102,7 +102,7 @@ def test_every_row_is_visited(monkeypatch: pytest.MonkeyPatch) -> None:
     with history() as state:
         # a tuning: to its end, stopped, lost, and the end
         state.tune(Procedure.CALCULATE, give='', wait=5.0)
-        state.let(10.0)
+        state.let(5.0)
         for end in ('stop', 'lost', 'shut down', 'stop and shut down'):
             state.tune(Procedure.STATOR_RESISTANCE, after=1.0, give='')
             if 'stop' in end:
@@ -112,7 +112,7 @@ def test_every_row_is_visited(monkeypatch: pytest.MonkeyPatch) -> None:
                 state.mend_line(wait=5.0)
             if 'shut' in end:
                 state.shut_down(wait=1.0)
-            state.let(15.0)
+            state.let(6.0)
     with history() as state:
         # a tuning that is refused before it has written anything, and the port gone in one: once
         # it is the poll that finds out
@@ -125,7 +125,7 @@ def test_every_row_is_visited(monkeypatch: pytest.MonkeyPatch) -> None:
             state.tune(Procedure.STATOR_RESISTANCE, after=0.4 + 0.005 * step, give='')
             state.break_line('gone', wait=1.0)
             state.mend_line(wait=2.5)
-            state.let(15.0)
+            state.let(6.0)
     with Rig('classic v5.0') as rig:
         # firmware that has to be under control to take a setting, before it is connected to again
         rig.connect()

@@ -34,7 +34,7 @@ UNREPORTED = ('classic v5.0', 'canopen, no DriveStatus', 'canopen, ds402')
 
 @pytest.mark.parametrize('connection', UNREPORTED)
 @pytest.mark.parametrize('value', [20.0, -20.0])
-@pytest.mark.parametrize('retard', [10.0, 80.0])
+@pytest.mark.parametrize('retard', [10.0, 40.0])
 def test_a_run_input_that_is_back_before_the_motor_stands_does_not_start_it(
     connection: str, value: float, retard: float
 ) -> None:
