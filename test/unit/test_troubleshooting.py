@@ -21,7 +21,6 @@ from support.places import ROOT
 from nfo_sinus_driver.link import LinkError, Refused
 
 _TOOL = runpy.run_path(str(ROOT / 'tools' / 'troubleshooting_page.py'))
-BY_HAND = _TOOL['by_hand']()
 nodes, texts = _TOOL['nodes'], _TOOL['texts']
 #: Modules whose ``ValueError`` no operator reads: it is of a table, which every test loads, or of
 #: the file of a drive, and is reported with its line; of a frame that no request makes; of what the
@@ -95,9 +94,10 @@ def test_what_is_logged_raised_and_answered_has_an_entry() -> None:
 
 def test_an_entry_by_hand_is_still_said_and_the_rest_is_short() -> None:
     said = {parts for _, node in nodes() if isinstance(node, ast.Module) for parts in texts(node)}
-    assert len(entries(BY_HAND)) > 200
-    assert without(entries(BY_HAND), said | REFUSALS)[0] == []
-    about_no_message = re.sub(r'^\| `.*', '', BY_HAND, flags=re.MULTILINE)
+    by_hand = _TOOL['by_hand']()
+    assert len(entries(by_hand)) > 200
+    assert without(entries(by_hand), said | REFUSALS)[0] == []
+    about_no_message = re.sub(r'^\| `.*', '', by_hand, flags=re.MULTILINE)
     assert len(about_no_message.split()) <= 1500
 
 
