@@ -235,8 +235,12 @@ class Bench(contextlib.ExitStack):
         """What a test over every connection knows of its drives."""
         return self.connection.drives
 
-    def simulator(self, *arguments: str, paced: bool = True) -> Simulated:
-        """Start a simulated line, as slow as a real one if paced; return what looks into it."""
+    def simulator(self, *arguments: str, paced: bool = False) -> Simulated:
+        """
+        Start a simulated line, and return what looks into it.
+
+        :param paced: it is as slow as a real one, which each byte costs both ends a turn.
+        """
         command = [_executable('simulator'), '--trace', str(self.trace)]
         command += [word for name, value in self.line.items() for word in (f'--{name}', str(value))]
         if self.connection.method == 'telegram1':

@@ -167,7 +167,7 @@ OTHERS = (Walk.enable, Walk.set_points, Walk.no_set_points)
     ],
 )
 def test_any_order(bench: Bench, method: str, seed: int) -> None:
-    drive = bench.simulator(*bench.drives.ramps(0.2), *_BOOT)
+    drive = bench.simulator(*bench.drives.ramps(0.2), *_BOOT, paced=True)
     bench.driver(*_EAGER, '-p', f'control_method:={method}')
     history = random.Random(seed)
     with Walk(bench.drives, drive, bench.client().connected()) as walk:

@@ -42,7 +42,6 @@ class Conveyor:
         self.simulator = bench.simulator(
             *bench.drives.ramps(1), '--boot-time', '0',
             *(f'--address={address}' for address in NAMES),
-            paced=False,
         )
         parameters = bench.folder / 'conveyor.yaml'
         parameters.write_text('\n'.join((

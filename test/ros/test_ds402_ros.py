@@ -28,7 +28,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 def test_a_run_by_the_drive_profile_alone(bench: Bench) -> None:
     alone = ('--canopen-state-machine', 'absent', '--set', 'control.mode=Speed')
-    drive = bench.simulator(*RAMPS, *alone, paced=False)
+    drive = bench.simulator(*RAMPS, *alone)
     bench.driver('-p', 'control_method:=ds402')
     client = bench.client().connected()
     with client.run_at(-600.0):
@@ -52,7 +52,7 @@ def test_a_run_by_the_drive_profile_alone(bench: Bench) -> None:
 
 
 def test_drive_control_that_a_module_lacks_is_refused_and_said(bench: Bench) -> None:
-    bench.simulator('--canopen-state-machine', 'absent', paced=False)
+    bench.simulator('--canopen-state-machine', 'absent')
     driver = bench.driver('-p', 'control_method:=drive_control')
     client = bench.client()
     client.wait_for('status', lambda status: not status.connected, 'it is not connected')

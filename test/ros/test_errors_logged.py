@@ -28,7 +28,7 @@ _KINDS = {
 def test_an_error_in_any_callback_is_logged_once_in_ten_seconds_with_how_many_were_not(
     bench: Bench,
 ) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     began = time.monotonic()
     driver = bench.driver(*FULL_RATE, through=(sys.executable, _FAILING), fails=True)
     client = bench.client()

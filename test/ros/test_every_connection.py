@@ -37,7 +37,7 @@ _MODEST = ('-p', 'poll_rate:=10')
 _NAMES = {line.split(',')[2] for line in SETTINGS.splitlines() if line}
 
 def _simulator(bench: Bench) -> Simulated:
-    return bench.simulator(*bench.drives.ramps(0.3), *_BOOT, paced=False)
+    return bench.simulator(*bench.drives.ramps(0.3), *_BOOT)
 
 
 class Rig:

@@ -52,7 +52,7 @@ def idle(tmp_path_factory: pytest.TempPathFactory, connection: Connection) -> It
         own_domain() as domain,
         Bench(domain, tmp_path_factory.mktemp('idle'), connection) as bench,
     ):
-        bench.simulator()
+        bench.simulator(paced=True)
         bench.driver()
         yield bench.client().connected()
 
@@ -65,7 +65,7 @@ def _stamps_increase(client: Client, topic: str) -> bool:
 
 @needs('direct')
 def test_every_topic_says_what_the_drive_does(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     bench.driver(*FULL_RATE, '-p', 'frame_id:=drive', '-p', 'telemetry_rate:=10.0')
     client = bench.client().connected()
     with client.run_at(25.0):
@@ -122,7 +122,7 @@ def test_every_topic_says_what_the_drive_does(bench: Bench) -> None:
 
 
 def test_bus_statistics_and_diagnostics_flow_before_any_drive_answers(bench: Bench) -> None:
-    bench.simulator('--address', '7')
+    bench.simulator('--address', '7', paced=True)
     driver = bench.driver(*FULL_RATE)
     client = bench.client()
     wait_until(lambda: len(client.messages['statistics']) > 1, 'statistics')
@@ -153,7 +153,7 @@ def _values(status: DiagnosticStatus) -> dict[str, str]:
 
 @needs('direct')
 def test_diagnostics_of_an_address_without_a_drive_are_steady(bench: Bench) -> None:
-    bench.simulator('--address', '7')
+    bench.simulator('--address', '7', paced=True)
     driver = bench.driver(*FULL_RATE)
     client = bench.client()
     first, *others = bench.connection.no_answer
@@ -184,7 +184,7 @@ def test_diagnostics_of_an_address_without_a_drive_are_steady(bench: Bench) -> N
 
 @needs('direct')
 def test_diagnostics_name_a_fault_with_its_remedy(bench: Bench) -> None:
-    drive = bench.simulator()
+    drive = bench.simulator(paced=True)
     bench.driver(*FULL_RATE)
     client = bench.client().connected()
 
@@ -210,7 +210,7 @@ def test_diagnostics_name_a_fault_with_its_remedy(bench: Bench) -> None:
 
 
 def test_diagnostics_of_a_node_that_is_not_configured_are_no_error(bench: Bench) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     bench.driver('-p', 'autostart:=false')
     client = bench.client()
     status = wait_until(lambda: _diagnosis(client, 'nfo_sinus: drive'), 'its diagnosis')
@@ -225,7 +225,7 @@ def test_diagnostics_of_a_node_that_is_not_configured_are_no_error(bench: Bench)
 def test_diagnostics_of_a_run_name_its_fault_and_cry_over_no_stop_that_goes_well(
     bench: Bench,
 ) -> None:
-    drive = bench.simulator()
+    drive = bench.simulator(paced=True)
     bench.driver(*FULL_RATE)
     client = bench.client().connected()
 
@@ -248,7 +248,7 @@ def test_diagnostics_of_a_run_name_its_fault_and_cry_over_no_stop_that_goes_well
 
 @needs('direct')
 def test_inv_st_is_there_for_late_comers(bench: Bench) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     bench.driver()
     bench.client().connected()
     late = bench.client()
@@ -270,7 +270,7 @@ def test_quality_of_service(idle: Client) -> None:
 
 @needs('direct')
 def test_the_settings_have_their_defaults_and_descriptions(bench: Bench) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     given = {'port': bench.port, **bench.connection.driver}
     bench.bare_driver(*(word for one in given.items() for word in ('-p', '{}:={}'.format(*one))))
     client = bench.client().connected()
@@ -310,7 +310,7 @@ def test_a_setting_that_makes_no_sense_is_refused_with_the_reason(
 
 
 def test_settings_take_effect_at_once_and_integers_are_taken_for_doubles(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     bench.driver(*FULL_RATE)
     client = bench.client().connected()
     assert client.set_parameters(setpoint_max=10, telemetry_rate=20).successful
@@ -332,7 +332,7 @@ def test_settings_take_effect_at_once_and_integers_are_taken_for_doubles(bench: 
 
 @needs('timeout')
 def test_what_the_drive_has_already_is_not_written(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.timeout(2))
+    drive = bench.simulator(*bench.drives.timeout(2), paced=True)
     bench.driver(*FULL_RATE, '-p', 'drive_timeout:=2.0')
     client = bench.client().connected()
     assert not drive.state()['writes']
@@ -343,13 +343,13 @@ def test_what_the_drive_has_already_is_not_written(bench: Bench) -> None:
 
 
 def test_an_integer_on_the_command_line_is_taken_for_a_double(bench: Bench) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     bench.driver(*FULL_RATE, '-p', 'setpoint_timeout:=3')
     assert bench.client().connected().parameter('setpoint_timeout') == 3.0
 
 
 def test_lifecycle_by_hand(bench: Bench) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     bench.driver(*FULL_RATE, '-p', 'autostart:=false')
     client = bench.client()
     client.wait_for('status', lambda status: not status.connected, 'the node is there')
@@ -374,7 +374,7 @@ def test_lifecycle_by_hand(bench: Bench) -> None:
 
 @needs('modbus', 'scmd')
 def test_another_control_method_waits_until_the_motor_stands(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.accel=0.5', '--set', 'control.retard=30')
+    drive = bench.simulator('--set', 'control.accel=0.5', '--set', 'control.retard=30', paced=True)
     driver = bench.driver(*FULL_RATE, '-p', 'shutdown_timeout:=0.1')
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -398,7 +398,7 @@ def test_another_control_method_waits_until_the_motor_stands(bench: Bench) -> No
 
 @needs('watched')
 def test_monitor_writes_nothing(bench: Bench) -> None:
-    drive = bench.simulator()
+    drive = bench.simulator(paced=True)
     driver = bench.driver(*FULL_RATE, '-p', 'control_method:=monitor', '-p', 'drive_timeout:=2.0')
     client = bench.client().connected()
     with client.setpoints(20.0):
@@ -419,7 +419,7 @@ def test_monitor_writes_nothing(bench: Bench) -> None:
 
 @needs('reverse')
 def test_two_drives_on_one_bus_and_one_of_them_silent(bench: Bench) -> None:
-    drive = bench.simulator('--address', '1', '--address', '2', *bench.drives.ramps(1))
+    drive = bench.simulator('--address', '1', '--address', '2', *bench.drives.ramps(1), paced=True)
     parameters = bench.folder / 'two.yaml'
     parameters.write_text(
         'nfo_sinus_bus: {ros__parameters: {drives: [left, right]}}\n'
@@ -443,7 +443,7 @@ def test_two_drives_on_one_bus_and_one_of_them_silent(bench: Bench) -> None:
 
 @needs('direct')
 def test_each_drive_publishes_its_own_statistics(bench: Bench) -> None:
-    drive = bench.simulator('--address', '1', '--address', '2')
+    drive = bench.simulator('--address', '1', '--address', '2', paced=True)
     parameters = bench.folder / 'two.yaml'
     # so long that no answer of the other is late on a busy machine; and one that is silent is
     # asked several times before it is lost

@@ -30,7 +30,7 @@ _QUALITY = QoSProfile(depth=1000)
 def test_many_calls_at_once_are_all_answered(
     bench: Bench, service: str, request_: Any, calls: int
 ) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1), paced=False)
+    drive = bench.simulator(*bench.drives.ramps(1))
     bench.driver()
     client = bench.client().connected()
     type_ = SetBool if isinstance(request_, SetBool.Request) else Trigger

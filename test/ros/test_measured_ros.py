@@ -26,7 +26,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 
 def test_measured_values_and_what_is_only_read(bench: Bench) -> None:
-    bench.simulator(paced=False)
+    bench.simulator()
     bench.driver('-p', 'telemetry_rate:=5.0')
     client: Client = bench.client().connected()
     client.listen('measured', Measured, '/nfo_sinus/measured', RELIABLE)

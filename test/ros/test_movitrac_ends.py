@@ -40,7 +40,7 @@ class Rig:
 
     def __init__(self, bench: Bench) -> None:
         self.trace = bench.trace
-        self.drive = bench.simulator('--interface', 'rs232', paced=False)
+        self.drive = bench.simulator('--interface', 'rs232')
         bench.driver(*COUNTED, '-p', 'allow_communication_changes:=true')
         self.client: Client = bench.client().connected()
         self._read = 0
@@ -137,7 +137,7 @@ def test_the_user_menu_is_switched_off_and_no_more_on(rig: Rig) -> None:
 def test_the_telegrams_of_the_manual(tmp_path: Path) -> None:
     """Reading the heat sink temperature, and setting t11 to 3.7 s [M4 §2.4.3, §2.4.4]."""
     with own_domain() as domain, Bench(domain, tmp_path, CONNECTIONS['movitrac']) as bench:
-        bench.simulator('--address', '0', paced=False)
+        bench.simulator('--address', '0')
         _read_the_temperature(bench)
         _set_the_ramp(bench)
 

@@ -80,7 +80,7 @@ class DeviceServer:
 @pytest.fixture
 def server(bench: Bench) -> Iterator[DeviceServer]:
     """Return a device server between a driver and its drive."""
-    bench.drive = bench.simulator(*bench.drives.ramps(0.3))
+    bench.drive = bench.simulator(*bench.drives.ramps(0.3), paced=True)
     server = DeviceServer(bench.port)
     bench.port = server.port
     yield server

@@ -44,7 +44,7 @@ def _succeeds(client: Client, driver: Process, out: str) -> bool:
 def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
     bench: Bench, out: str
 ) -> None:
-    drive = bench.simulator(*_REFUSING)
+    drive = bench.simulator(*_REFUSING, paced=True)
     driver = bench.driver('-p', 'shutdown_timeout:=1.0', '-p', 'response_timeout:=1.0')
     client = bench.client().connected()
     client.call_async('tune_full', Trigger)
@@ -65,7 +65,7 @@ def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
 
 
 def test_no_enable_survives_a_later_stop(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(0.5), paced=False)
+    drive = bench.simulator(*bench.drives.ramps(0.5))
     bench.driver()
     client = bench.client().connected()
     with client.setpoints(20.0, period=0.01):
@@ -88,7 +88,7 @@ def test_no_enable_survives_a_later_stop(bench: Bench) -> None:
 
 def test_an_enable_that_waits_behind_a_stop_is_refused_when_its_turn_comes(bench: Bench) -> None:
     # slow answers keep the stop on its way
-    drive = bench.simulator('--turnaround', '0.1', *bench.drives.ramps(1))
+    drive = bench.simulator('--turnaround', '0.1', *bench.drives.ramps(1), paced=True)
     bench.driver('-p', 'response_timeout:=1.0')
     client = bench.client().connected()
     with client.run_at(20.0), client.setpoints(20.0):
@@ -117,7 +117,7 @@ def test_a_time_of_reception_counts() -> None:
 
 
 def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(0.5))
+    drive = bench.simulator(*bench.drives.ramps(0.5), paced=True)
     first = bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -140,7 +140,7 @@ def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(benc
 
 
 def test_an_exit_after_the_only_answer_of_a_drive_is_no_success(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(0.5))
+    drive = bench.simulator(*bench.drives.ramps(0.5), paced=True)
     _run_by_another(bench)
     asked = _frames_of_before(bench)
     # it takes several answers until it is known which drive it is
@@ -179,7 +179,8 @@ def _run_by_another(bench: Bench) -> None:
 def test_callers_of_a_drive_that_is_gone_do_not_delay_the_stop_of_its_neighbour(
     bench: Bench,
 ) -> None:
-    drive = bench.simulator(*bench.drives.ramps(0.5), '--address', '1', '--address', '2')
+    addresses = ('--address', '1', '--address', '2')
+    drive = bench.simulator(*bench.drives.ramps(0.5), *addresses, paced=True)
     parameters = bench.folder / 'two.yaml'
     parameters.write_text(
         'nfo_sinus_bus: {ros__parameters: {drives: [good, silent]}}\n'

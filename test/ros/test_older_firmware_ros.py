@@ -34,7 +34,7 @@ def _untouched(drive: Simulated) -> None:
 
 
 def test_settings_are_written_and_control_is_given_back(bench: Bench) -> None:
-    drive = bench.simulator(*_QUICK, paced=False)
+    drive = bench.simulator(*_QUICK)
     bench.driver('-p', 'drive_timeout:=14.0', '-p', 'freque.f_fix2:=21.5')
     client: Client = bench.client().connected()
     assert drive.state()['parameters']['serial.sio_tot'] == 0.0, 'it was not enabled'
@@ -52,7 +52,7 @@ def test_settings_are_written_and_control_is_given_back(bench: Bench) -> None:
 
 
 def test_settings_are_written_while_the_motor_turns_by_the_bus(bench: Bench) -> None:
-    drive = bench.simulator(*_QUICK, paced=False)
+    drive = bench.simulator(*_QUICK)
     bench.driver()
     client: Client = bench.client().connected()
     with client.run_at(10.0):
@@ -63,7 +63,7 @@ def test_settings_are_written_while_the_motor_turns_by_the_bus(bench: Bench) -> 
 
 
 def test_another_holder_of_control_keeps_it(bench: Bench) -> None:
-    drive = bench.simulator(*_QUICK, '--no-run-input', paced=False)
+    drive = bench.simulator(*_QUICK, '--no-run-input')
     bench.driver()
     client: Client = bench.client().connected()
     drive.inject('keypad', 'ext')

@@ -39,7 +39,7 @@ class Rig:
 
     def __init__(self, bench: Bench) -> None:
         self.connection = bench.connection
-        self.drive = bench.simulator(paced=False)
+        self.drive = bench.simulator()
         bench.driver(*COUNTED, '-p', 'allow_communication_changes:=true')
         self.client: Client = bench.client().connected()
         self.wire = Wire(bench)

@@ -34,7 +34,7 @@ def _changes(client: Client, name: str) -> list[Any]:
 
 
 def test_a_change_at_the_keypad_shows_and_is_reported_once(bench: Bench) -> None:
-    drive = bench.simulator(paced=False)
+    drive = bench.simulator()
     driver = bench.driver(*COUNTED)
     client = _listening(bench)
     wire = Wire(bench)
@@ -56,7 +56,7 @@ def test_a_change_at_the_keypad_shows_and_is_reported_once(bench: Bench) -> None
 
 
 def test_refresh_answers_what_has_changed(bench: Bench) -> None:
-    drive = bench.simulator(paced=False)
+    drive = bench.simulator()
     bench.driver(*COUNTED)
     client = _listening(bench)
     wire = Wire(bench)

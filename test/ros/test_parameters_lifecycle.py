@@ -24,7 +24,7 @@ pytestmark = needs('parameters')
 
 
 def test_monitor_writes_nothing_whatever_is_called(bench: Bench) -> None:
-    drive = bench.simulator(paced=False)
+    drive = bench.simulator()
     driver = bench.driver(
         *QUIET,
         '-p', 'control_method:=monitor',
@@ -62,7 +62,7 @@ def test_monitor_writes_nothing_whatever_is_called(bench: Bench) -> None:
 
 
 def test_parameters_go_with_cleanup_and_come_back_as_they_are(bench: Bench) -> None:
-    drive = bench.simulator(paced=False)
+    drive = bench.simulator()
     bench.driver(*QUIET)
     client = bench.client().connected()
     everything = client.parameter_names()
@@ -102,7 +102,7 @@ def _load(client: Client, dump: dict[str, object]) -> None:
 
 
 def test_a_dump_loads_again_after_a_reset_and_into_another_driver(bench: Bench) -> None:
-    drive = bench.simulator(paced=False)
+    drive = bench.simulator()
     driver = bench.driver(*QUIET)
     client = bench.client().connected()
     changed = {
@@ -156,7 +156,7 @@ def test_a_dump_loads_again_after_a_reset_and_into_another_driver(bench: Bench) 
 
 
 def test_two_drives_have_parameters_of_their_own(bench: Bench) -> None:
-    left = bench.simulator('--address', '1', '--address', '2', paced=False)
+    left = bench.simulator('--address', '1', '--address', '2')
     path = bench.folder / 'two.yaml'
     path.write_text(
         '/**/nfo_sinus_bus:\n  ros__parameters:\n    drives: [left, right]\n'

@@ -46,7 +46,7 @@ def _listed(client: Client) -> set[str]:
 
 
 def test_every_setting_that_can_be_reached_is_there_and_described(bench: Bench) -> None:
-    bench.simulator(paced=False)
+    bench.simulator()
     bench.driver(*QUIET)
     client = bench.client().connected()
     wire = Wire(bench)
@@ -70,7 +70,7 @@ def test_every_setting_that_can_be_reached_is_there_and_described(bench: Bench) 
 
 @needs('modbus')
 def test_any_bus_has_no_register_and_is_not_there(bench: Bench) -> None:
-    bench.simulator(paced=False)
+    bench.simulator()
     driver = bench.driver(*QUIET, '-p', 'control.any_bus:=PPO3')
     client = bench.client().connected()
     assert 'control.any_bus' not in _listed(client)

@@ -21,7 +21,7 @@ _SETTINGS = {
 
 
 def test_a_dump_has_the_nodes_own_parameters_and_loads_again(bench: Bench) -> None:
-    bench.simulator(paced=False)
+    bench.simulator()
     bench.driver(*QUIET)
     client = bench.client().connected()
     wire = Wire(bench)
@@ -40,7 +40,7 @@ def test_a_dump_has_the_nodes_own_parameters_and_loads_again(bench: Bench) -> No
 
 
 def test_settings_are_refused_one_by_one_and_with_others(bench: Bench) -> None:
-    bench.simulator(paced=False)
+    bench.simulator()
     bench.driver(*QUIET)
     client = bench.client().connected()
     wire = Wire(bench)
@@ -54,7 +54,7 @@ def test_settings_are_refused_one_by_one_and_with_others(bench: Bench) -> None:
 
 
 def test_settings_in_a_parameter_file_are_warned_about_and_do_no_harm(bench: Bench) -> None:
-    drive = bench.simulator(paced=False)
+    drive = bench.simulator()
     path = bench.folder / 'drive.yaml'
     path.write_text(
         '/**/nfo_sinus:\n  ros__parameters:\n    control: {accel: 6.0}\n    setpoint_max: 30.0\n'

@@ -54,7 +54,7 @@ def _again(client: Client) -> None:
 
 
 def test_what_differs_is_written_once_and_drift_is_left_alone(bench: Bench) -> None:
-    drive = bench.simulator(paced=False)
+    drive = bench.simulator()
     wire = Wire(bench)
     driver = bench.driver(
         *COUNTED,
@@ -114,7 +114,7 @@ def test_what_differs_is_written_once_and_drift_is_left_alone(bench: Bench) -> N
 
 
 def test_apply_parameters_false_only_reports(bench: Bench) -> None:
-    bench.simulator(paced=False)
+    bench.simulator()
     driver = bench.driver(
         *COUNTED, *_given(bench, 'apply_parameters: false', 'control.accel: 6', 'motor.u_nom: 400')
     )
@@ -132,7 +132,7 @@ def test_apply_parameters_false_only_reports(bench: Bench) -> None:
 @needs('local')
 def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
     # it runs by its terminals from power-up on
-    drive = bench.simulator('--set', 'control.auto_start=ON', paced=False)
+    drive = bench.simulator('--set', 'control.auto_start=ON')
     drive.wait_for(lambda state: state['turning'], PATIENCE)
     wire = Wire(bench)
     driver = bench.driver(*COUNTED, *_given(bench, 'control.accel: 6', 'motor.u_nom: 230'))
@@ -155,7 +155,7 @@ def test_a_turning_motor_keeps_what_needs_a_standstill(bench: Bench) -> None:
 def test_a_drive_that_comes_later_is_brought_into_the_state_then(bench: Bench) -> None:
     driver = bench.driver(*COUNTED, '-p', 'control.accel:=6', '-p', 'control.acel:=7.0')
     wait_until(lambda: bench.connection.absent[0] in driver.text, 'no drive answers yet')
-    bench.simulator(paced=False)
+    bench.simulator()
     client = bench.client().connected()
     assert Wire(bench).writes() == [written('control.accel', (6000, 0))]
     assert client.parameter('control.accel') == 6.0
@@ -165,7 +165,7 @@ def test_a_drive_that_comes_later_is_brought_into_the_state_then(bench: Bench) -
 
 @pytest.mark.parametrize('allowed', [False, True])
 def test_communication_settings_need_permission_in_a_file_too(bench: Bench, allowed: bool) -> None:
-    bench.simulator(paced=False)
+    bench.simulator()
     wire = Wire(bench)
     driver = bench.driver(
         *COUNTED,
@@ -212,6 +212,6 @@ def _cannot_start(driver: Process, *parts: str) -> None:
 def test_what_the_drive_cannot_have_ends_the_start(
     bench: Bench, line: str, parts: tuple[str, ...]
 ) -> None:
-    drive = bench.simulator(paced=False)
+    drive = bench.simulator()
     _cannot_start(bench.driver(*_given(bench, line, 'control.retard: 6')), 'nfo_sinus', *parts)
     assert not drive.state()['writes']

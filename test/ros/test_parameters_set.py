@@ -39,7 +39,7 @@ class Rig:
 
     def __init__(self, bench: Bench) -> None:
         self.names = settings(bench.connection)
-        self.drive = bench.simulator(paced=False)
+        self.drive = bench.simulator()
         self.driver = bench.driver(*COUNTED)
         self.client: Client = bench.client().connected()
         self.wire = Wire(bench)
@@ -224,7 +224,7 @@ def test_a_change_of_the_line_says_how_to_follow(rig: Rig) -> None:
 def test_a_change_of_the_line_that_loses_the_drive_says_how_to_follow(
     bench: Bench, name: str, value: Value, setting: str
 ) -> None:
-    bench.simulator(paced=False)
+    bench.simulator()
     bench.driver(*COUNTED, '-p', 'allow_communication_changes:=true')
     client = bench.client().connected()
     result = set_one(client, name, value)

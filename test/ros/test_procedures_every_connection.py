@@ -37,7 +37,7 @@ class Rig:
         # an enable has left P841 so; with another one a MOVITRAC ignores the reset bit [C110]
         movitrac = ('--set', 'serial.control_mode=Remote control')
         options = movitrac if bench.connection.model == 'movitrac31' else ()
-        self.drive: Simulated = bench.simulator('--boot-time', '0.5', *options, paced=False)
+        self.drive: Simulated = bench.simulator('--boot-time', '0.5', *options)
         bench.driver('-p', 'poll_rate:=2.0')
         self.client: Client = bench.client().connected()
         self.client.listen('entry', ErrorLogEntry, '/nfo_sinus/error_log_entry', _KEPT)

@@ -30,7 +30,7 @@ def node(domain: int) -> Iterator[Node]:
 
 
 def test_a_remapped_topic_in_a_namespace_belongs_to_the_drive_node(bench: Bench) -> None:
-    drive = bench.simulator()
+    drive = bench.simulator(paced=True)
     bench.driver(*FULL_RATE, '-r', '__ns:=/plant', '-r', '~/setpoint:=/hand/speed')
     client = bench.client('/plant/nfo_sinus').connected()
 
@@ -88,7 +88,7 @@ def test_it_ends_without_a_message(node: Node) -> None:
 def test_who_publishes_another_type_is_warned_of_once_with_what_to_type(
     bench: Bench, node: Node
 ) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     driver = bench.driver('-r', '__ns:=/plant', '-r', '~/setpoint:=/hand/speed')
     bench.client('/plant/nfo_sinus').connected()
     wrong = {
@@ -120,7 +120,7 @@ def test_who_publishes_another_type_is_warned_of_once_with_what_to_type(
 
 
 def test_another_node_of_its_name_is_warned_of(bench: Bench, node: Node) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     driver = bench.driver()
     bench.client().connected()
     # it looks, and says nothing

@@ -55,7 +55,7 @@ def _children(pid: int) -> list[int]:
 def test_the_end_of_the_ros2_run_that_started_it_stops_the_motor(
     bench: Bench, number: int
 ) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     ros2 = bench.driver(through=_like_ros2_run(bench.folder))
     client = bench.client().connected()
     (driver,) = _children(ros2.pid)
@@ -70,7 +70,7 @@ def test_the_end_of_the_ros2_run_that_started_it_stops_the_motor(
 
 
 def test_a_driver_outlives_a_parent_that_is_not_ros2(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     number = bench.folder / 'number'
     # as a daemon is started: the parent ends at once, and a supervisor of orphans takes over
     shell = bench.driver(through=('sh', '-c', f'"$@" & echo $! >{number}; sleep 2', 'sh'))
@@ -88,7 +88,7 @@ def test_a_driver_outlives_a_parent_that_is_not_ros2(bench: Bench) -> None:
 
 @pytest.mark.parametrize('module', ['rclpy', 'nfo_sinus_driver.node.drive_node'])
 def test_a_signal_while_it_is_still_loading_ends_it_cleanly(bench: Bench, module: str) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     code = _SIGNALLED.replace('MODULE', repr(module))
     driver = bench.driver(through=(sys.executable, '-c', code))
     assert driver.wait() == 0, driver.text
@@ -97,7 +97,7 @@ def test_a_signal_while_it_is_still_loading_ends_it_cleanly(bench: Bench, module
 
 
 def test_an_end_before_the_first_answer_says_that_a_motor_may_run_on(bench: Bench) -> None:
-    drive = bench.simulator()
+    drive = bench.simulator(paced=True)
     drive.inject('line-dead', 60.0)
     driver = bench.driver()
     wait_until(bench.frames, 'the driver asks for the drive')
@@ -107,7 +107,7 @@ def test_an_end_before_the_first_answer_says_that_a_motor_may_run_on(bench: Benc
 
 
 def test_as_process_1_under_ros2_run_it_says_that_no_signal_will_reach_it(bench: Bench) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     isolated = ('unshare', '--user', '--map-root-user', '--pid', '--fork', '--mount-proc')
     if subprocess.run((*isolated, 'true'), check=False, capture_output=True).returncode:
         pytest.skip('no process namespace may be made here')

@@ -50,7 +50,7 @@ def bench(tmp_path: Path, behind: Connection) -> Iterator[Bench]:
 
 
 def start(bench: Bench, *plc: str, settings: tuple[str, ...] = PATIENT) -> tuple[Simulated, Client]:
-    drive = bench.simulator(*RAMPS[bench.connection.model], *plc, paced=False)
+    drive = bench.simulator(*RAMPS[bench.connection.model], *plc)
     bench.driver(*settings)
     client = bench.client()
     wait_until(lambda: client.state() == 'active', 'it is active')
@@ -151,7 +151,7 @@ def test_in_speed_mode_the_speed_is_published(bench: Bench) -> None:
 
 @pytest.mark.parametrize('behind', ['sinus_optimal'], indirect=True)
 def test_without_its_nominal_speed_speed_mode_is_refused(bench: Bench) -> None:
-    bench.simulator(paced=False)
+    bench.simulator()
     bench.driver('-p', 'expected_control_mode:=Speed')
     wait_until(lambda: 'set nominal_speed first, in rpm, such as 1500' in bench.log, 'the reason')
 

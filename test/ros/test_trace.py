@@ -31,7 +31,7 @@ def _requests(bench: Bench) -> list[Request]:
 
 def test_a_run_breaks_no_law_on_the_wire(bench: Bench) -> None:
     connection = bench.connection
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     driver = bench.driver(*FULL_RATE, '-p', 'drive_timeout:=16.0')
     client = bench.client().connected()
     with client.run_at(20.0):

@@ -42,7 +42,7 @@ def _stops(bench: Bench) -> list[float]:
 
 
 def test_a_stop_overtakes_a_hanging_configure_and_a_slow_parameter(bench: Bench) -> None:
-    drive = bench.simulator('--address', '1', '--address', '2')
+    drive = bench.simulator('--address', '1', '--address', '2', paced=True)
     parameters = bench.folder / 'two.yaml'
     parameters.write_text(
         'nfo_sinus_bus: {ros__parameters: {drives: [good, silent]}}\n'
@@ -83,7 +83,7 @@ def test_a_stop_overtakes_a_hanging_configure_and_a_slow_parameter(bench: Bench)
 
 def test_nothing_is_sent_between_a_stop_and_its_confirmation_but_its_own(bench: Bench) -> None:
     """The order on the wire does not depend on how fast the machine is."""
-    bench.simulator('--address', '1', '--address', '2')
+    bench.simulator('--address', '1', '--address', '2', paced=True)
     parameters = bench.folder / 'two.yaml'
     parameters.write_text(
         'nfo_sinus_bus: {ros__parameters: {drives: [one, two]}}\n'
@@ -103,7 +103,7 @@ def test_nothing_is_sent_between_a_stop_and_its_confirmation_but_its_own(bench: 
 
 
 def test_a_stop_is_on_the_wire_at_once_after_the_driver_was_suspended(bench: Bench) -> None:
-    bench.simulator('--address', '1', '--address', '2')
+    bench.simulator('--address', '1', '--address', '2', paced=True)
     parameters = bench.folder / 'two.yaml'
     given = '{setpoint_timeout: 0.0, drive_timeout: 0.0, address: '
     parameters.write_text(

@@ -39,7 +39,7 @@ def _stops(bench: Bench, state: dict) -> bool:
     ids=lambda number: number.name,
 )
 def test_a_signal_stops_the_motor_and_leaves_no_fault(bench: Bench, number: int) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     # as a background job of a shell is started, and worse
     driver = bench.driver(through=('env', '--ignore-signal=INT,QUIT,HUP,TERM,USR1,RTMIN'))
     client = bench.client().connected()
@@ -53,7 +53,7 @@ def test_a_signal_stops_the_motor_and_leaves_no_fault(bench: Bench, number: int)
 
 
 def test_no_thread_of_a_library_can_take_a_signal(bench: Bench) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     driver = bench.driver(through=EXECUTED)
     bench.client().connected()
     threads = Path(f'/proc/{driver.pid}/task')
@@ -66,7 +66,7 @@ def test_no_thread_of_a_library_can_take_a_signal(bench: Bench) -> None:
 
 
 def test_the_end_of_the_launch_that_started_it_stops_the_motor(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     with subprocess.Popen(('sleep', '1000')) as launch:
         driver = bench.driver('--', '--end-with', str(launch.pid))
         client = bench.client().connected()
@@ -101,7 +101,7 @@ def test_a_driver_without_a_folder_for_its_log_says_what_to_do(bench: Bench) -> 
 
 
 def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1, 60))
+    drive = bench.simulator(*bench.drives.ramps(1, 60), paced=True)
     driver = bench.driver('-p', 'shutdown_timeout:=1.0')
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -118,7 +118,7 @@ def test_a_signal_does_not_wait_for_the_end_of_a_long_ramp(bench: Bench) -> None
 def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
     bench: Bench,
 ) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1, 60))
+    drive = bench.simulator(*bench.drives.ramps(1, 60), paced=True)
     driver = bench.driver('-p', 'shutdown_timeout:=1.0', '-p', 'drive_timeout:=2.0')
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -136,7 +136,7 @@ def test_a_clean_exit_during_a_long_ramp_leaves_no_fault_behind_a_drive_timeout(
 def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
     drive = bench.simulator(
         *bench.drives.ramps(1, 60), *bench.drives.no_timeout
-    )
+    , paced=True)
     # so long that no busy machine is silent for it
     driver = bench.driver('-p', 'drive_timeout:=3.0')
     client = bench.client().connected()
@@ -152,7 +152,7 @@ def test_kill_is_survived_by_the_drive_timeout_alone(bench: Bench) -> None:
 def test_the_driver_after_one_that_was_killed_puts_back_what_that_one_has_found(
     bench: Bench,
 ) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1), *bench.drives.timeout(8.0))
+    drive = bench.simulator(*bench.drives.ramps(1), *bench.drives.timeout(8.0), paced=True)
     settings = ('-p', 'drive_timeout:=-1.0', '-p', 'lost_after:=3.0')
     driver = bench.driver(*settings)
     client = bench.client().connected()
@@ -175,7 +175,7 @@ def test_the_driver_after_one_that_was_killed_puts_back_what_that_one_has_found(
 
 @needs('timeout')
 def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     # what keeps it alive is polls, and parameters that are read again; polls alone have a test of
     # their own (test_poll_schedule)
     settings = ('drive_timeout:=6.0', 'poll_rate:=0.1', 'telemetry_rate:=0.0')
@@ -199,7 +199,7 @@ def test_a_drive_is_kept_alive_while_its_node_is_inactive(bench: Bench) -> None:
 
 @needs('direct')
 def test_without_a_drive_timeout_the_driver_warns_once(bench: Bench) -> None:
-    bench.simulator()
+    bench.simulator(paced=True)
     driver = bench.driver()
     bench.client().connected()
     warning = (
@@ -210,7 +210,7 @@ def test_without_a_drive_timeout_the_driver_warns_once(bench: Bench) -> None:
 
 
 def test_deactivate_stops_the_motor_and_is_not_undone(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -228,7 +228,7 @@ def test_deactivate_stops_the_motor_and_is_not_undone(bench: Bench) -> None:
 
 def test_deactivate_ends_an_enable_that_is_on_its_way(bench: Bench) -> None:
     # slow answers keep the enable long enough on its way
-    drive = bench.simulator('--turnaround', '0.1', *bench.drives.ramps(1))
+    drive = bench.simulator('--turnaround', '0.1', *bench.drives.ramps(1), paced=True)
     driver = bench.driver('-p', 'response_timeout:=1.0')
     client = bench.client().connected()
     with client.setpoints(20.0):
@@ -250,7 +250,7 @@ def test_deactivate_ends_an_enable_that_is_on_its_way(bench: Bench) -> None:
 
 @needs('delay')
 def test_disable_does_not_wait_for_an_enable_in_its_start_delay(bench: Bench) -> None:
-    drive = bench.simulator('--set', 'control.run_dly=3000')
+    drive = bench.simulator('--set', 'control.run_dly=3000', paced=True)
     bench.driver()
     client = bench.client().connected()
     enable = client.call_async('enable', SetBool, data=True)
@@ -265,7 +265,7 @@ def test_disable_does_not_wait_for_an_enable_in_its_start_delay(bench: Bench) ->
 
 
 def test_cleanup_gives_control_back_without_mode_ext(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -277,7 +277,7 @@ def test_cleanup_gives_control_back_without_mode_ext(bench: Bench) -> None:
 
 
 def test_lifecycle_shutdown_stops_the_motor(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -288,7 +288,7 @@ def test_lifecycle_shutdown_stops_the_motor(bench: Bench) -> None:
 
 
 def test_a_setpoint_that_is_no_longer_refreshed_ramps_the_motor_down(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     driver = bench.driver('-p', 'setpoint_timeout:=3.0')
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -302,7 +302,7 @@ def test_a_setpoint_that_is_no_longer_refreshed_ramps_the_motor_down(bench: Benc
 
 
 def test_ctrl_z_does_not_suspend_the_driver(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     driver = bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -313,7 +313,7 @@ def test_ctrl_z_does_not_suspend_the_driver(bench: Bench) -> None:
 
 
 def test_a_driver_that_was_suspended_takes_no_signal_for_granted(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     driver = bench.driver()
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -329,7 +329,7 @@ def test_a_driver_that_was_suspended_takes_no_signal_for_granted(bench: Bench) -
 
 
 def test_an_exit_does_not_wait_for_a_reader_that_does_not_read(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     pipe = bench.folder / 'pipe'
     os.mkfifo(pipe)
     with open(os.open(pipe, os.O_RDWR | os.O_NONBLOCK), 'wb', buffering=0) as full:
@@ -346,7 +346,7 @@ def test_an_exit_does_not_wait_for_a_reader_that_does_not_read(bench: Bench) -> 
 
 
 def test_a_driver_whose_streams_are_closed_takes_its_log_for_no_signal(bench: Bench) -> None:
-    bench.simulator(*bench.drives.ramps(1))
+    bench.simulator(*bench.drives.ramps(1), paced=True)
     driver = bench.driver(through=('sh', '-c', 'exec "$@" <&- >&- 2>&-', 'sh'))
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -355,7 +355,7 @@ def test_a_driver_whose_streams_are_closed_takes_its_log_for_no_signal(bench: Be
 
 
 def test_an_exit_with_a_dead_line_says_that_the_stop_is_not_confirmed(bench: Bench) -> None:
-    drive = bench.simulator(*bench.drives.ramps(1))
+    drive = bench.simulator(*bench.drives.ramps(1), paced=True)
     driver = bench.driver('-p', 'shutdown_timeout:=1.0')
     client = bench.client().connected()
     with client.run_at(20.0):
@@ -368,7 +368,7 @@ def test_an_exit_with_a_dead_line_says_that_the_stop_is_not_confirmed(bench: Ben
 def test_an_exit_that_cannot_release_a_drive_whose_stop_is_confirmed_says_only_that(
     bench: Bench,
 ) -> None:
-    drive = bench.simulator(*bench.drives.ramps(10))
+    drive = bench.simulator(*bench.drives.ramps(10), paced=True)
     driver = bench.driver('-p', 'shutdown_timeout:=2.0')
     client = bench.client().connected()
     with client.run_at(20.0):
