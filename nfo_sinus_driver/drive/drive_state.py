@@ -11,6 +11,7 @@ import contextlib
 from dataclasses import replace
 import logging
 import math
+from typing import NamedTuple
 
 from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.catalog import (
