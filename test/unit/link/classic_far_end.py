@@ -5,18 +5,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-import itertools
+from collections.abc import Callable
 import re
 
-from virtual_wire import Wire
+from virtual_wire import Asked, FarEnd, Wire
 
 EOT, ENQ, STX, ETX, ACK, NAK = b'\x04', b'\x05', b'\x02', b'\x03', b'\x06', b'\x15'
 REQUEST = re.compile(
     rb'\x04([ -\x7f])(?:E([0-9A-F]{4})\x05|\x02(E([0-9A-F]{4})=([0-9A-F]{4})\x03)(.))', re.DOTALL
 )
 INV_ST, INV_ST_ACK, SIO_ERR = 0xE9, 0xE8, 0xAC
+BROADCAST = 95
 
 
 def bcc(body: bytes) -> bytes:
@@ -47,78 +46,38 @@ def parsed(frame: bytes) -> tuple[int, int, int | None]:
     return address[0] - 32, int(written, 16), int(word, 16)
 
 
-@dataclass(frozen=True)
-class Fate:
+class Drives(FarEnd):
     """
-    What becomes of one request.
+    Drives that speak Classic.
 
-    :ivar delay: how long the drive takes, in time-outs.
-    :ivar what: ``answer``, ``refuse``, ``drop`` (carried out, not answered), ``damage``,
-        ``double``, ``refuse twice``.
-    """
-
-    delay: float = 0.0
-    what: str = 'answer'
-    lump: bool = False
-
-
-GOOD = Fate()
-
-
-class FarEnd:
-    """
-    Answers in order, each request as its fate says; a value tells which request it answers.
-
-    :ivar requests: every request that arrived, and the fate that it had.
     :ivar values: parameters that have a value of their own.
-    :ivar pace: how long a request takes on the line, in the time that its characters need.
     :ivar address: what stands in its answers; ``None``: the address that was asked.
+    :ivar lower: they write digits in lower case.
     """
 
-    def __init__(self, wire: Wire, fates: Iterator[Fate] | None = None) -> None:
-        self._wire = wire
-        self._fates = fates or itertools.repeat(GOOD)
-        self._free = 0.0
-        self.requests: list[tuple[int, int, int | None, str]] = []
+    def __init__(self, wire: Wire) -> None:
+        super().__init__(wire)
         self.values: dict[int, int | Callable[[], int]] = {}
         self.address: int | None = None
-        self.pace = 1.0
         self.lower = False
-        self.before = b''
-        self.echo = False
-        wire.far_end = self.take
 
-    def heal(self, *fates: Fate) -> None:
-        """Answer from now on, but for the next requests' fates."""
-        self._fates = iter(fates)
+    def value(self, place: int, size: int, number: int) -> bytes:
+        value = self.values.get(place)
+        word = value() if callable(value) else value
+        return super().value(place, size, number) if word is None else word.to_bytes(2, 'big')
 
-    @staticmethod
-    def word(number: int, index: int) -> int:
-        """What a parameter holds when the request with this index is carried out."""
-        return (number * 7 + index * 131) & 0xFFFF
-
-    def take(self, frame: bytes, end: float) -> None:
-        index = len(self.requests)
+    def parsed(self, frame: bytes) -> Asked:
         unit, number, written = parsed(frame)
-        fate = next(self._fates, GOOD)
-        self.requests.append((unit, number, written, fate.what))
-        if self.echo:
-            self._wire.arrive(end - len(frame) * self._wire.settings.char_time, frame)
-        if fate.what == 'drop' or unit == 95:
-            return
-        address = unit if self.address is None else self.address
-        if fate.what.startswith('refuse'):
-            answer = verdict(address, False)
-        elif written is not None:
-            answer = verdict(address, True)
-        else:
-            value = self.values.get(number, self.word(number, index))
-            word = value() if callable(value) else value
-            answer = reply(address, number, word, lower=self.lower)
-        if fate.what == 'damage':
-            answer = answer[:-1] + bytes((answer[-1] ^ 1,))
-        if fate.what in ('double', 'refuse twice'):
-            answer += answer
-        end -= (1 - self.pace) * len(frame) * self._wire.settings.char_time
-        start = max(self._free, end + fate.delay * self._wire.settings.response_timeout)
-        self._free = self._wire.arrive(start, self.before + answer, lump=fate.lump)
+        return Asked(unit, number, 2, None if written is None else written.to_bytes(2, 'big'))
+
+    def answer(self, asked: Asked, frame: bytes, number: int) -> bytes:
+        if asked.unit == BROADCAST:
+            return b''
+        unit = asked.unit if self.address is None else self.address
+        if asked.written is not None:
+            return verdict(unit, True)
+        word = int.from_bytes(self.value(asked.place, 2, number), 'big')
+        return reply(unit, asked.place, word, lower=self.lower)
+
+    def refusal(self, asked: Asked, frame: bytes, number: int) -> bytes:
+        return verdict(asked.unit if self.address is None else self.address, False)

@@ -5,11 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-import itertools
-
-from virtual_wire import Wire
+from virtual_wire import Asked, FarEnd, Wire
 
 ENQUIRY, SELECT, LONG_SELECT = 0xB5, 0xA9, 0xAD
 _REQUESTS = {ENQUIRY: 5, SELECT: 9, LONG_SELECT: 13}
@@ -40,83 +36,27 @@ def parsed(frame: bytes) -> tuple[int, int, bytes | None]:
     return frame[1], int.from_bytes(frame[2:4], 'big'), value
 
 
-@dataclass(frozen=True)
-class Fate:
+class Drives(FarEnd):
     """
-    What becomes of one request.
+    Drives that speak the MOVITRAC's protocol.
 
-    :ivar delay: how long the drive takes, in time-outs.
-    :ivar what: ``answer``, ``refuse``, ``drop`` (carried out, not answered), ``damage``,
-        ``double``, ``refuse twice``.
-    """
-
-    delay: float = 0.0
-    what: str = 'answer'
-    lump: bool = False
-
-
-GOOD = Fate()
-
-
-class FarEnd:
-    """
-    Answers in order, each request as its fate says; a value tells which request it answers.
-
-    :ivar requests: every request that arrived, and the fate that it had.
     :ivar sizes: of the values that are not of 4 bytes.
-    :ivar response_time: P843 of every drive, s.
-    :ivar pace: how long a request takes on the line, in the time that its characters need.
-    :ivar code: the return code with which it refuses.
-    :ivar before: what comes before each answer, and after it.
+    :ivar code: the return code with which they refuse.
     """
 
-    def __init__(self, wire: Wire, fates: Iterator[Fate] | None = None) -> None:
-        self._wire = wire
-        self._fates = fates or itertools.repeat(GOOD)
-        self._free: dict[int, float] = {}
-        self.requests: list[tuple[int, int, bytes | None, str]] = []
+    def __init__(self, wire: Wire) -> None:
+        super().__init__(wire)
         self.sizes: dict[int, int] = {}
-        self.response_time = 0.0
-        self.pace = 1.0
         self.code = 0x13
-        self.before = self.after = b''
-        self.echo = False
-        wire.far_end = self.take
 
-    def heal(self, *fates: Fate) -> None:
-        """Answer from now on, but for the next requests' fates."""
-        self.meet(iter(fates))
-
-    def meet(self, fates: Iterator[Fate]) -> None:
-        """Meet the next requests with some fates, each decided when its request comes."""
-        self._fates = fates
-
-    def value(self, index: int, number: int) -> bytes:
-        """What a parameter holds when the request with this number is carried out."""
-        return (index * 7 + number * 131).to_bytes(self.sizes.get(index, 4), 'big')
-
-    def take(self, frame: bytes, end: float) -> None:
-        number = len(self.requests)
+    def parsed(self, frame: bytes) -> Asked:
         unit, index, written = parsed(frame)
-        fate = next(self._fates, GOOD)
-        self.requests.append((unit, index, written, fate.what))
-        char_time = self._wire.settings.char_time
-        if self.echo:
-            self._wire.arrive(end - len(frame) * char_time, frame)
-        if fate.what == 'drop':
-            return
-        if fate.what.startswith('refuse'):
-            answer = nack(self.code)
-        elif written is not None:
-            answer = ACK
-        else:
-            answer = data(index, self.value(index, number))
-        if fate.what == 'damage':
-            answer = answer[:-1] + bytes((answer[-1] ^ 1,))
-        if fate.what in ('double', 'refuse twice'):
-            answer += answer
-        end -= (1 - self.pace) * len(frame) * char_time
-        delay = self.response_time + fate.delay * self._wire.settings.response_timeout
-        start = max(self._free.get(unit, 0.0), end + delay)
-        stream = self.before + answer + self.after
-        self._free[unit] = self._wire.arrive(start, stream, lump=fate.lump)
+        return Asked(unit, index, self.sizes.get(index, 4), written)
+
+    def answer(self, asked: Asked, frame: bytes, number: int) -> bytes:
+        if asked.written is not None:
+            return ACK
+        return data(asked.place, self.value(asked.place, asked.size, number))
+
+    def refusal(self, asked: Asked, frame: bytes, number: int) -> bytes:
+        return nack(self.code)

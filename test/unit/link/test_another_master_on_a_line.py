@@ -8,18 +8,18 @@ from __future__ import annotations
 from typing import Any
 
 import classic_far_end
-import classic_link_bench
-from link_bench import UNIT, A, B, Bench as RtuBench, C
-import movitrac_bench
+from line_bench import UNIT, Ascii, Classic, Movitrac, Rtu
 import movitrac_far_end
 import pytest
-from virtual_wire import AsciiWire, Fate
+from support.addresses import packed
+from virtual_wire import DROP, Fate
 
 from nfo_sinus_driver.link import classic, modbus_ascii, movitrac, rtu
 from nfo_sinus_driver.link.interface import Address, DamagedAnswer
 from nfo_sinus_driver.link.modbus_link import ReportSlaveId
 from nfo_sinus_driver.link.modbus_pdu import Read, Write
 
+A, B, C = Rtu.A, Rtu.B, Rtu.C
 OTHER_VALUE = bytes.fromhex('000000aa')
 #: A register that the unit does not have.
 NOWHERE = 0xEEE0
@@ -27,51 +27,37 @@ NOWHERE = 0xEEE0
 SLOW = Fate(delay=0.3)
 
 
-class AsciiBench(RtuBench):
-    link_class = modbus_ascii.AsciiLink
-    wire_class = AsciiWire
-
-
-def classic_bench(*fates: str) -> classic_link_bench.Bench:
-    return classic_link_bench.Bench(*[classic_far_end.Fate(what=fate) for fate in fates])
-
-
-def movitrac_line(*fates: str) -> movitrac_bench.Bench:
-    return movitrac_bench.Bench(*[movitrac_far_end.Fate(what=fate) for fate in fates])
-
-
-def test_the_ack_to_another_master_confirms_no_write_of_ours_on_classic() -> None:
-    bench = classic_bench('drop')
-    begun = bench.wire.arrive(bench.wire.now, classic.encode(classic.Select(1, 0xB6, 5)))
-    bench.wire.arrive(begun + 0.05, classic_far_end.verdict(1, True))
+@pytest.mark.parametrize(
+    ('way', 'request_', 'ack'),
+    [
+        (Classic, classic.encode(classic.Select(1, 0xB6, 5)), classic_far_end.verdict(1, True)),
+        (Movitrac, movitrac.encode(movitrac.Select(2, 0x11C, OTHER_VALUE)), movitrac_far_end.ACK),
+    ],
+    ids=['classic', 'movitrac'],
+)
+def test_the_ack_to_another_master_confirms_no_write_of_ours(
+    way: type[Classic | Movitrac], request_: bytes, ack: bytes
+) -> None:
+    bench = way(DROP)
+    begun = bench.wire.arrive(bench.wire.now, request_)
+    bench.wire.arrive(begun + 0.05, ack)
     with pytest.raises(DamagedAnswer) as raised:
-        bench.write(classic_link_bench.A, 5)
-    assert raised.value.maybe_done
-    assert bench.link.remarks.foreign_frames == 1
-
-
-def test_the_ack_to_another_master_confirms_no_write_of_ours_on_a_movitrac() -> None:
-    bench = movitrac_line('drop')
-    request = movitrac.Select(2, 0x11C, OTHER_VALUE)
-    begun = bench.wire.arrive(bench.wire.now, movitrac.encode(request))
-    bench.wire.arrive(begun + 0.05, movitrac_far_end.ACK)
-    with pytest.raises(DamagedAnswer) as raised:
-        bench.write(movitrac_bench.A)
+        bench.write(way.A)
     assert raised.value.maybe_done
     assert bench.link.remarks.foreign_frames == 1
 
 
 def test_what_another_drive_says_to_another_master_is_no_value_of_ours() -> None:
     # the same index, and the answer names no drive
-    bench = movitrac_line()
-    request = movitrac.Enquiry(2, movitrac_bench.A.index)
-    answer = movitrac_far_end.data(movitrac_bench.A.index, OTHER_VALUE)
+    bench = Movitrac()
+    request = movitrac.Enquiry(2, Movitrac.A.index)
+    answer = movitrac_far_end.data(Movitrac.A.index, OTHER_VALUE)
     # as if it had begun just after ours
-    bench.read(movitrac_bench.B)
-    begun = bench.wire.now + 6 * movitrac_bench.CHAR
-    bench.drive.heal(movitrac_far_end.Fate(what='drop'))
+    bench.read(Movitrac.B)
+    begun = bench.wire.now + 6 * bench.line.char_time
+    bench.drive.heal(DROP)
     bench.wire.arrive(begun, movitrac.encode(request) + answer)
-    assert bench.read(movitrac_bench.A).data == bench.answer_of(len(bench.asked) - 1) != OTHER_VALUE
+    assert bench.read(Movitrac.A).data == bench.answer_of() != OTHER_VALUE
     assert bench.link.remarks.foreign_frames == 1
 
 
@@ -79,7 +65,7 @@ def test_a_request_that_comes_twice_is_no_answer_to_itself() -> None:
     # function 17 is asked by the very beginning of its answer
     frame = rtu.encode(ReportSlaveId(1))
     answer = bytes((1, 17, 1, 65))
-    link = RtuBench().link
+    link = Rtu().link
     assert not link._another.was_answered_in(frame + frame)
     assert link._another.was_answered_in(frame + answer + rtu.crc(answer))
 
@@ -92,7 +78,7 @@ FOREIGN = {
     'writes what is not there': Write(UNIT, NOWHERE, b'\0\1'),
     'writes several that are not there': Write(UNIT, NOWHERE, b'\0\1\0\2'),
 }
-LINKS = {'rtu': (RtuBench, rtu.encode), 'ascii': (AsciiBench, modbus_ascii.encode)}
+LINKS = {'rtu': (Rtu, rtu.encode), 'ascii': (Ascii, modbus_ascii.encode)}
 
 
 class SharedLine:
@@ -104,12 +90,12 @@ class SharedLine:
     """
 
     def __init__(self, protocol: str, foreign: str, *, before: bool, times: int = 1) -> None:
-        bench_class, self._encode = LINKS[protocol]
-        self.bench = bench = bench_class(trusted=True)
+        way, self._encode = LINKS[protocol]
+        self.bench = bench = way(trusted=True)
         self.number = -1
         self._request, self._before, self._times = FOREIGN[foreign], before, times
-        self._ours, self._write = 0, bench.wire.write
-        bench.slave.heal(*[SLOW] * 1000)
+        self._write = bench.wire.write
+        bench.drive.heal(*[SLOW] * 1000)
         bench.wire.write = self._send  # type: ignore[method-assign]
         for _ in range(2):
             self._another(Read(UNIT, 0x111, 1), bench.wire.now)
@@ -132,14 +118,13 @@ class SharedLine:
         bench = self.bench
         end = bench.wire.arrive(at, self._encode(request))
         refused = request.register == NOWHERE
-        bench.slave.heal(Fate(delay=0.3, what='refuse' if refused else 'answer'), *[SLOW] * 1000)
+        bench.drive.heal(Fate(delay=0.3, what='refuse' if refused else 'answer'), *[SLOW] * 1000)
         bench.wire.far_end(rtu.encode(request), end)
         return end
 
     def answers_of(self, address: Address) -> list[bytes]:
         """Return what the unit said to the requests for this address, ours and others."""
-        requests = self.bench.slave.requests
-        asked = [number for number, one in enumerate(requests) if one[2] == address.index]
+        asked = [number for number, one in enumerate(self.bench.asked) if one == address.index]
         return [self.bench.answer_of(number) for number in asked]
 
 
@@ -166,9 +151,10 @@ def test_the_refusal_of_another_master_s_write_refuses_no_write_of_ours(
     foreign = 'writes several that are not there' if words[1:] else 'writes what is not there'
     line = SharedLine(protocol, foreign, before=before)
     line.number = 1
+    address = A._replace(size=2 * len(words))
     for _ in range(3):
         try:
-            line.bench.write(A, *words)
+            line.bench.write(address, packed(*words))
         except DamagedAnswer as error:
             assert error.maybe_done
         else:

@@ -1,14 +1,16 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A line and a slave in virtual time: nothing here ever waits."""
+"""A line in virtual time, and drives at its far end: nothing here ever waits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 import heapq
 import itertools
+from typing import NamedTuple
 
 import pymodbus_opinion as opinion
 
@@ -24,7 +26,7 @@ _PATIENCE = 100_000
 
 class Wire:
     """
-    The port of a :class:`SerialLink`, and the clock that it sees.
+    The port of a link, and the clock that it sees.
 
     :ivar gap: the silence before a frame, s.
     :ivar sent: every frame sent, and when it began.
@@ -152,7 +154,7 @@ class Fate:
     """
     What becomes of one request.
 
-    :ivar delay: how long the slave takes, in time-outs.
+    :ivar delay: how long the drive takes, in time-outs.
     :ivar what: ``answer``, ``refuse``, ``drop`` (carried out, not answered), ``damage``,
         ``double``, ``refuse twice``.
     :ivar again: how much later the second of two answers comes, in time-outs.
@@ -165,69 +167,96 @@ class Fate:
 
 
 GOOD = Fate()
+DROP = Fate(what='drop')
+REFUSE = Fate(what='refuse')
 
 
-class Slave:
+class Asked(NamedTuple):
     """
-    Answers in order, each request as its fate says; a value tells which request it answers.
+    A request that arrived.
 
-    :ivar requests: every request that arrived: unit, function, register, count.
+    :ivar place: the number of the parameter.
+    :ivar written: what is written; ``None``: it is read.
+    :ivar fate: what became of it.
     """
 
-    def __init__(self, wire: Wire, fates: Iterator[Fate] | None = None) -> None:
+    unit: int
+    place: int
+    size: int
+    written: bytes | None = None
+    fate: str = ''
+
+
+class FarEnd(ABC):
+    """
+    Drives that answer in order, as each request's fate says; a value tells which it answers.
+
+    :ivar requests: every request that arrived.
+    :ivar response_time: how long every drive takes besides, s.
+    :ivar pace: how long a request takes on the line, in the time that its characters need.
+    :ivar echo: what comes back of a request.
+    :ivar before: what comes before each answer; ``after``: and after it.
+    """
+
+    def __init__(self, wire: Wire) -> None:
         self._wire = wire
-        self._fates = fates or itertools.repeat(GOOD)
-        self._free = 0.0
-        self.requests: list[tuple[int, int, int, int]] = []
-        wire.far_end = self._take
+        self._fates: Iterable[Fate] = iter(())
+        self._free: dict[int, float] = {}
+        self.requests: list[Asked] = []
+        self.response_time = 0.0
+        self.pace = 1.0
+        self.echo: Callable[[bytes], bytes] = lambda frame: b''
+        self.before = self.after = b''
+        wire.far_end = self.take
 
     def heal(self, *fates: Fate) -> None:
         """Answer from now on, but for the next requests' fates."""
+        self.meet(fates)
+
+    def meet(self, fates: Iterable[Fate]) -> None:
+        """Meet the next requests with some fates, each decided when its request comes."""
         self._fates = iter(fates)
 
-    def identified(self, frame: bytes) -> bytes:
-        """What it says to functions 17 and 43/14: it does not have them; nothing if empty."""
-        return opinion.exception(frame[0], frame[1], 1)
+    def value(self, place: int, size: int, number: int) -> bytes:
+        """What a parameter holds when the request with this number is carried out."""
+        return (place * 7 + number * 131 & 0xFFFF).to_bytes(size, 'big')
 
-    @staticmethod
-    def words(register: int, count: int, number: int) -> tuple[int, ...]:
-        """What a register holds when the request with this number is carried out."""
-        return tuple((register * 7 + number * 131 + word * 57) & 0xFFFF for word in range(count))
+    @abstractmethod
+    def parsed(self, frame: bytes) -> Asked:
+        """What a request asks for."""
 
-    @staticmethod
-    def code(number: int) -> int:
-        """With which code the request with this number is refused."""
-        return number % 200 + 20
+    @abstractmethod
+    def answer(self, asked: Asked, frame: bytes, number: int) -> bytes:
+        """The frame that carries a value, or confirms; nothing if empty."""
 
-    def _take(self, frame: bytes, end: float) -> None:
+    @abstractmethod
+    def refusal(self, asked: Asked, frame: bytes, number: int) -> bytes:
+        """The frame that refuses."""
+
+    def take(self, frame: bytes, end: float) -> None:
+        fate = next(iter(self._fates), GOOD)
         number = len(self.requests)
-        if frame[1] in (17, 43):
-            unit, function, register, count, words = frame[0], frame[1], 0, 0, ()
-        else:
-            unit, function, register, count, words = opinion.decoded(frame)
-        self.requests.append((unit, function, register, count))
-        fate = next(self._fates, GOOD)
+        asked = self.parsed(frame)._replace(fate=fate.what)
+        self.requests.append(asked)
+        wire, length = self._wire, len(self._wire.pack(frame)) * self._wire.settings.char_time
+        wire.arrive(end - length, self.echo(wire.pack(frame)))
         if fate.what == 'drop':
             return
-        if fate.what.startswith('refuse'):
-            answer = opinion.exception(unit, function, self.code(number))
-        elif function in (17, 43):
-            answer = self.identified(frame)
-        elif function == 3:
-            answer = opinion.read_answer(unit, self.words(register, count, number))
-        else:
-            answer = opinion.write_answer(unit, register, words)
+        refused = fate.what.startswith('refuse')
+        answer = (self.refusal if refused else self.answer)(asked, frame, number)
         if not answer:
             return
-        answer = self._wire.pack(answer)
+        answer = wire.pack(answer)
         if fate.what == 'damage':
             answer = answer[:-1] + bytes((answer[-1] ^ 1,))
-        timeout = self._wire.settings.response_timeout
-        start = max(self._free, end + fate.delay * timeout)
         twice = fate.what in ('double', 'refuse twice')
         if twice and not fate.again:
             answer += answer
-        self._free = self._wire.arrive(start, answer, lump=fate.lump)
+        timeout = wire.settings.response_timeout
+        start = end - (1 - self.pace) * length + self.response_time + fate.delay * timeout
+        start = max(self._free.get(asked.unit, 0.0), start)
+        stream = self.before + answer + self.after
+        free = wire.arrive(start, stream, lump=fate.lump)
         if twice and fate.again:
-            again = self._free + fate.again * timeout
-            self._free = self._wire.arrive(again, answer, lump=fate.lump)
+            free = wire.arrive(free + fate.again * timeout, stream, lump=fate.lump)
+        self._free[asked.unit] = free
