@@ -677,7 +677,7 @@ LAWS = (
         'nfo_sinus_driver/link/canopen_link.py',
         '        if sdo.is_among(found, self._late.quarantined(unit, now)) or (',
         '        if (',
-        ('test/unit/link/test_canopen_link.py',),
+        (LINE, '-k', 'canopen and late'),
     ),
     Mutant(
         8,

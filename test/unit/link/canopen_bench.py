@@ -5,13 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 import heapq
 import itertools
-from typing import TypeVar
+from typing import Any
 
 from canopen_far_end import Server
+import line_bench
+from virtual_wire import DROP, GOOD, Asked, Fate
 
 from nfo_sinus_driver.link.can import Frame
 from nfo_sinus_driver.link.canopen_link import CanopenLink
@@ -23,8 +24,6 @@ UNIT = 5
 _PATIENCE = 100_000
 #: How long a frame takes on the bus, s.
 FRAME_TIME = 0.001
-
-_T = TypeVar('_T')
 
 
 def at(index: int, sub_index: int = 0, size: int = 2) -> Address:
@@ -39,31 +38,14 @@ TEXT = at(0x1008, size=64)
 MANDATORY = {(0x1000, 0): bytes(4), (0x1001, 0): b'\0', (0x1018, 0): b'\4', (0x1018, 1): bytes(4)}
 
 
-@dataclass(frozen=True)
-class Fate:
-    """
-    What becomes of one message to a node.
-
-    :ivar delay: how long the node takes, in time-outs.
-    :ivar what: ``answer``, ``refuse``, ``drop`` (carried out, not answered), ``double``.
-    """
-
-    delay: float = 0.0
-    what: str = 'answer'
-
-
-GOOD = Fate()
-DROP = Fate(what='drop')
-
-
 class Bus:
     """
-    The port of a link, the clock that it sees, and the nodes.
+    The port of a link, the clock that it sees, and the nodes; of a fate no ``damage``, no lump.
 
     :ivar sent: every message, and to which node.
     :ivar other: whatever else was sent, and when.
     :ivar begun: of the messages with which a transfer begins: node, index, sub-index, whether it
-        writes, and its fate.
+        writes, and its fate; ``begun_at``: and when.
     :ivar kept: the objects that hold what was written, and not what the test makes up.
     """
 
@@ -79,6 +61,9 @@ class Bus:
         self.sent: list[tuple[int, bytes]] = []
         self.other: list[tuple[float, Frame]] = []
         self.begun: list[tuple[int, int, int, bool, str]] = []
+        self.begun_at: list[float] = []
+        self.gap = 0.0
+        self.seen: list[tuple[float, int]] = []
         self.kept: set[tuple[int, int]] = set()
         self._free: dict[int, float] = {}
         self._arrivals: list[tuple[float, int, Frame]] = []
@@ -129,6 +114,7 @@ class Bus:
             if command == 2 and known and (index, sub_index) not in self.kept:
                 server.objects[index, sub_index] = self.value(index, len(self.begun))
             self.begun.append((unit, index, sub_index, command == 1, fate.what))
+            self.begun_at.append(self.now)
         answer = server.answer(frame.data)
         if answer is None or fate.what == 'drop':
             return
@@ -151,28 +137,56 @@ class Bus:
         found = []
         while self._arrivals and self._arrivals[0][0] <= self.now:
             found.append(heapq.heappop(self._arrivals)[2])
+        self.seen.append((self.now, len(found)))
         return found
 
 
-class Bench:
+class Bench(line_bench.Bench):
     """A link on a virtual bus; everything done with it happens in virtual time."""
 
+    line = SETTINGS
+    A, B = A, B
+    VALUE = b'\1\2'
+    lost = (A.index, 0x1000, 0x1001, 0x1018, A.index)
+    units = (UNIT, 6)
+
     def __init__(self, *fates: Fate) -> None:
-        self.bus = Bus(fates)
+        self.bus: Any = Bus(fates)
+        self.wire = self.drive = self.bus
         self.link = CanopenLink(self.bus, SETTINGS, self.bus.monotonic)
         self.link.open()
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:
-        return self.link.read(unit, address)
+        return super().read(address, unit)
 
-    def write(self, address: Address, value: bytes = b'\1\2', unit: int = UNIT) -> Reply:
-        return self.link.write(unit, address, value)
+    def write(self, address: Address, data: bytes = b'', unit: int = UNIT) -> Reply:
+        return super().write(address, data, unit)
 
     @property
-    def asked(self) -> list[int]:
-        """The objects of all transfers so far."""
-        return [index for _, index, *_ in self.bus.begun]
+    def requests(self) -> list[Asked]:
+        """All transfers; of what was written that it was."""
+        return [
+            Asked(unit, index, 2, b'' if writes else None, fate)
+            for unit, index, _, writes, fate in self.bus.begun
+        ]
 
-    def answer_of(self, number: int) -> bytes:
+    @property
+    def sent_at(self) -> list[float]:
+        at_times: list[float] = self.bus.begun_at
+        return at_times
+
+    def answer_of(self, number: int = -1) -> bytes:
         """What the node says to the transfer with this number."""
-        return self.bus.value(self.asked[number], number)
+        number %= len(self.asked)
+        value: bytes = self.bus.value(self.asked[number], number)
+        return value
+
+    @staticmethod
+    def distinct(fates: Iterable[Fate]) -> Iterator[Fate]:
+        """Let what was sent twice be followed by an answer at once; what is damaged is lost."""
+        twice = False
+        for fate in fates:
+            if fate.what in ('damage', 'refuse twice'):
+                fate = DROP
+            yield GOOD if twice else fate
+            twice = fate.what == 'double'

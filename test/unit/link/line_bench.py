@@ -42,6 +42,7 @@ class Bench:
     :ivar names_it: a value names its parameter, and the answer to a write names nothing; else it
         is the other way round.
     :ivar most: how many requests a write takes at most, and a read.
+    :ivar units: two drives.
     """
 
     link_class: type[RequestLink[Any]]
@@ -55,6 +56,7 @@ class Bench:
     patience = 1.0
     names_it = True
     most = (2, 2)
+    units = (UNIT, 2)
 
     def __init__(self, *fates: Fate, settings: LineSettings | None = None) -> None:
         self.line = settings or self.settings
@@ -74,7 +76,7 @@ class Bench:
         return reply
 
     def read_then_write(self, source: Address, address: Address) -> Reply:
-        reply: Reply = self.link.read_then_write(UNIT, source, address, self.VALUE)
+        reply: Reply = self.link.read_then_write(self.units[0], source, address, self.VALUE)
         return reply
 
     def expect(
@@ -82,25 +84,34 @@ class Bench:
     ) -> LinkError:
         with pytest.raises(error) as raised:
             action()
-        assert isinstance(error, tuple) or type(raised.value) is error
         return raised.value
 
     @property
     def asked(self) -> list[int]:
         """The parameters of all requests so far."""
-        return [request.place for request in self.drive.requests]
+        return [request.place for request in self.requests]
+
+    @property
+    def requests(self) -> list[Asked]:
+        """All requests that arrived."""
+        requests: list[Asked] = self.drive.requests
+        return requests
+
+    @property
+    def sent_at(self) -> list[float]:
+        """When each of them was sent."""
+        return [at for at, _ in self.wire.sent]
 
     def answer_of(self, number: int = -1) -> bytes:
         """What the drive answers to the request with this number."""
         number %= len(self.asked)
-        request = self.drive.requests[number]
+        request = self.requests[number]
         value: bytes = self.drive.value(request.place, request.size, number)
         return value
 
     def is_refusal_of(self, refused: Refused, number: int) -> bool:
         """Whether the drive has refused the request with this number so."""
-        fate: str = self.drive.requests[number].fate
-        return fate.startswith('refuse')
+        return self.requests[number].fate.startswith('refuse')
 
     @staticmethod
     def distinct(fates: Iterable[Fate]) -> Iterator[Fate]:

@@ -21,7 +21,6 @@ from canopen_bench import (
     Fate,
     at,
 )
-from hypothesis import example, given, settings as hypothesis_settings, strategies as st
 import pytest
 from support.plans import followed
 
@@ -32,7 +31,6 @@ from nfo_sinus_driver.link.interface import (
     Identification,
     LineSettings,
     NoAnswer,
-    NotReady,
     Refused,
 )
 
@@ -49,13 +47,6 @@ def test_read_and_write() -> None:
     assert bench.bus.servers[UNIT].objects[TEXT.index, 0] == b'a longer text'
     assert [unit for unit, _ in bench.bus.sent] == [UNIT] * len(bench.bus.sent)
     assert bench.bus.sent[0] == (UNIT, bytes.fromhex('4013200000000000'))
-
-
-def test_reply_says_when_it_came() -> None:
-    bench = Bench(Fate(0.5))
-    assert bench.read(A).arrived == bench.bus.now
-    bench.bus.now += 1
-    assert bench.write(A).arrived == bench.bus.now
 
 
 def test_a_value_is_as_long_as_the_node_says() -> None:
@@ -88,23 +79,6 @@ def test_identity_of_a_node() -> None:
         serial=number[2],
         product=bench.answer_of(3).decode(),
     )
-
-
-def test_write_and_read_is_two_transfers() -> None:
-    bench = Bench()
-    reply = bench.link.write_and_read(UNIT, A, b'\1\2', B)
-    assert reply.data == bench.answer_of(1)
-    assert bench.asked == [A.index, B.index]
-
-
-@pytest.mark.parametrize('what', ['answer', 'refuse', 'drop', 'double'])
-def test_nothing_comes_between_a_read_that_does_something_and_the_write(what: str) -> None:
-    bench = Bench(Fate(what=what))
-    assert bench.link.read_then_write(UNIT, A, B, b'\1\2').data == b''
-    assert [(index, writes) for _, index, _, writes, _ in bench.bus.begun] == [
-        (A.index, False),
-        (B.index, True),
-    ]
 
 
 def test_a_write_that_fails_behind_a_read_may_be_done() -> None:
@@ -168,23 +142,6 @@ def test_answers_to_others_are_not_silence() -> None:
 # --- late -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('late', [1.1, 2.0, 3.0])
-def test_late_answer_is_not_taken_for_that_to_the_same_question(late: float) -> None:
-    bench = Bench(Fate(late))
-    with pytest.raises(NoAnswer):
-        bench.read(A)
-    for _ in range(50):
-        try:
-            reply = bench.read(A).data
-        except (NoAnswer, DamagedAnswer, NotReady):
-            bench.bus.now += 0.1 * TIMEOUT
-            continue
-        assert bench.asked[-1] == A.index
-        assert reply == bench.answer_of(len(bench.asked) - 1)
-        return
-    raise AssertionError('never answered')
-
-
 def test_another_object_is_read_at_once() -> None:
     bench = Bench(DROP)
     with pytest.raises(NoAnswer):
@@ -192,36 +149,6 @@ def test_another_object_is_read_at_once() -> None:
     assert bench.read(B).data == bench.answer_of(1)
     assert bench.read(A).data == bench.answer_of(2)
     assert bench.asked == [A.index, B.index, A.index]
-
-
-def test_late_answer_is_not_taken_for_that_to_another_write_of_the_same() -> None:
-    bench = Bench(Fate(1.1), DROP)
-    with pytest.raises(NoAnswer):
-        bench.write(A)
-    with pytest.raises((NoAnswer, DamagedAnswer)) as raised:
-        bench.write(A, b'\3\4')
-    assert raised.value.maybe_done
-
-
-def test_a_write_in_doubt_goes_out_at_once_and_clears_the_line() -> None:
-    bench = Bench(DROP)
-    with pytest.raises(NoAnswer):
-        bench.write(A)
-    start = bench.bus.now
-    with pytest.raises(DamagedAnswer, match='an earlier request') as raised:
-        bench.write(A)
-    assert raised.value.maybe_done and bench.bus.now - start < 0.01
-    assert bench.asked == [A.index, A.index, 0x1000]
-    bench.write(A)
-    assert len(bench.asked) == 4
-
-
-def test_four_questions_are_enough_for_one_to_be_certain() -> None:
-    bench = Bench(*[DROP] * 9)
-    for _ in range(9):
-        with pytest.raises(NoAnswer):
-            bench.read(A)
-    assert bench.asked[:5] == [A.index, 0x1000, 0x1001, 0x1018, A.index]
 
 
 def test_a_node_without_the_objects_that_each_has_serves_as_well() -> None:
@@ -232,14 +159,6 @@ def test_a_node_without_the_objects_that_each_has_serves_as_well() -> None:
         bench.read(A)
     assert bench.read(A).data == bench.answer_of(2)
     assert bench.asked == [A.index, 0x1000, A.index]
-
-
-def test_what_is_late_of_one_node_is_nothing_to_another() -> None:
-    bench = Bench(DROP)
-    with pytest.raises(NoAnswer):
-        bench.read(A)
-    assert bench.read(A, unit=6).data == bench.answer_of(1)
-    assert bench.asked == [A.index, A.index]
 
 
 def test_an_answer_sent_twice_is_taken_once() -> None:
@@ -264,16 +183,6 @@ def test_same_values_cost_no_request_and_no_time() -> None:
     for _ in range(10):
         assert bench.read(A).data == b'\4'
     assert bench.bus.now - start == pytest.approx(10 * 2 * FRAME_TIME)
-
-
-def test_closing_ends_every_quarantine() -> None:
-    bench = Bench(DROP)
-    with pytest.raises(NoAnswer):
-        bench.read(A)
-    bench.link.close()
-    bench.link.open()
-    bench.read(A)
-    assert bench.asked == [A.index, A.index]
 
 
 # --- who is there ---------------------------------------------------------------------------------
@@ -350,77 +259,6 @@ def test_a_client_that_writes_sends_ten_heartbeats_a_second() -> None:
     pauses = [after - before for before, after in itertools.pairwise(beats)]
     assert min(pauses) >= 0.1 and max(pauses) < 0.12
     assert len(beats) >= 18
-
-
-# --- whatever happens -----------------------------------------------------------------------------
-
-
-
-def one_fault_at_a_time(fates: list[Fate]) -> list[Fate]:
-    """Let what was sent twice be followed by the next answer at once."""
-    before = [GOOD, *fates]
-    return [
-        GOOD if former.what == 'double' else fate
-        for former, fate in zip(before, fates, strict=False)
-    ]
-
-
-FATES = st.lists(
-    st.builds(
-        Fate,
-        st.one_of(st.just(0.0), st.floats(0, 3)),
-        st.sampled_from(['answer', 'answer', 'answer', 'drop', 'refuse', 'double']),
-    ),
-    max_size=30,
-).map(one_fault_at_a_time)
-STEPS = st.lists(
-    st.tuples(
-        st.sampled_from(['A', 'B', 'text', 'type', 'write A', 'write B', 'write text']),
-        st.one_of(st.just(0.0), st.just(0.0), st.floats(0, 4)),
-    ),
-    max_size=25,
-)
-NAMES = {'A': A, 'B': B, 'text': TEXT, 'type': at(0x1000)}
-
-
-@hypothesis_settings(max_examples=300)
-@given(FATES, STEPS)
-@example([Fate(1.1), DROP], [('write A', 0.0), ('write A', 0.0)])
-@example([Fate(1.5), Fate(1.5), Fate(1.5)], [('A', 0.0), ('B', 0.0), ('A', 0.0)])
-@example([Fate(), Fate(), Fate(1.5)], [('text', 0.0), ('text', 0.0)])
-def test_every_answer_belongs_to_its_request(
-    fates: list[Fate], steps: list[tuple[str, float]]
-) -> None:
-    bench = Bench(*fates)
-    begun = bench.bus.begun
-    for what, pause in steps:
-        bench.bus.now += pause * TIMEOUT
-        address = NAMES[what.split()[-1]]
-        value = b'a text to be written' if address is TEXT else b'\1\2'
-        before = len(begun)
-        try:
-            if what.startswith('write'):
-                assert bench.write(address, value).data == b''
-                # one transfer, and this very one was confirmed
-                assert len(begun) == before + 1
-                assert begun[before][4] in ('answer', 'double')
-                assert bench.bus.servers[UNIT].objects[address.index, 0] == value
-            else:
-                reply = bench.read(address).data
-                assert begun[-1][1] == address.index
-                assert reply == bench.answer_of(len(begun) - 1)
-        except Refused:
-            refused = before if what.startswith('write') else len(begun) - 1
-            assert begun[refused][1] == address.index
-        except NotReady as refusal:
-            assert not what.startswith('write')
-            assert len(begun) == before
-            assert refusal.until > bench.bus.now
-        except (NoAnswer, DamagedAnswer) as error:
-            assert error.maybe_done or begun[-1][1] != address.index
-        assert len(begun) - before <= 2
-        if what.startswith('write'):
-            assert begun[before][1:4] == (address.index, 0, True)
 
 
 # --- ports ----------------------------------------------------------------------------------------

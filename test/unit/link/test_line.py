@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-One request after the other on a serial line in virtual time, by each protocol.
+One request after the other on a line in virtual time, by each protocol.
 
-What differs by protocol is in ``test_modbus_line.py``, ``test_classic_line.py`` and
-``test_movitrac_line.py``.
+What differs is in ``test_modbus_line.py``, ``test_classic_line.py``, ``test_movitrac_line.py`` and
+``test_canopen_link.py``.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import heapq
 import itertools
 from typing import Any
 
+import canopen_bench
 from hypothesis import example, given, settings as hypothesis_settings, strategies as st
 from line_bench import (
     UNIT,
@@ -49,6 +50,9 @@ from nfo_sinus_driver.link.interface import (
 )
 
 Way = type[Bench]
+#: The same on a bus whose messages are frames.
+Canopen = canopen_bench.Bench
+of_any = pytest.mark.parametrize('way', [*WAYS.values(), Canopen], ids=[*WAYS, 'canopen'])
 FAILED = (NoAnswer, DamagedAnswer)
 LUMPS = pytest.mark.parametrize('lump', [False, True])
 READ_AND_WRITE = pytest.mark.parametrize('action', ['read', 'write'])
@@ -75,17 +79,17 @@ def test_read_and_write(way: Way, lump: bool) -> None:
         value = (2 * way.VALUE)[: address.size]
         assert bench.read(address).data == bench.answer_of()
         assert bench.write(address, value).data == b''
-        asked, written = bench.drive.requests[-2:]
+        asked, written = bench.requests[-2:]
         assert asked[:4] == (UNIT, address.index, address.size, None)
         assert written[:4] == (UNIT, address.index, address.size, value)
     assert len(bench.asked) == 6
 
 
-@of_each
+@of_any
 def test_reply_says_when_its_last_byte_came(way: Way) -> None:
     bench = way(Fate(0.5), Fate(0.5))
     for action in ('read', 'write'):
-        assert act(bench, action).arrived == bench.wire.seen[-1][0] == bench.wire.now
+        assert act(bench, action).arrived == bench.wire.now
         bench.wire.now += 1
 
 
@@ -188,7 +192,7 @@ def test_answer_that_stops_in_the_middle(way: Way, cut: int) -> None:
     assert bench.wire.now - bench.wire.sent[0][0] < 3 * bench.line.response_timeout
 
 
-@of_each
+@of_any
 def test_a_refusal_is_an_answer(way: Way) -> None:
     bench = way(REFUSE)
     error = bench.expect(Refused, lambda: bench.read(way.A))
@@ -198,7 +202,7 @@ def test_a_refusal_is_an_answer(way: Way) -> None:
     assert bench.asked == [way.A.index] * 2
 
 
-@of_each
+@of_any
 def test_closing_ends_every_quarantine(way: Way) -> None:
     bench = way(DROP)
     bench.expect(NoAnswer, lambda: bench.read(way.A))
@@ -245,14 +249,14 @@ def test_nothing_is_asked_for_an_identity(way: Way) -> None:
     assert bench.asked == []
 
 
-@of_named
+@pytest.mark.parametrize('way', [Classic, Movitrac, Canopen])
 def test_write_and_read_is_two_transactions(way: Way) -> None:
     bench = way()
-    reply = bench.link.write_and_read(UNIT, way.A, way.VALUE, way.B)
+    reply = bench.link.write_and_read(way.units[0], way.A, way.VALUE, way.B)
     assert reply.data == bench.answer_of()
-    assert [(one.place, one.written) for one in bench.drive.requests] == [
-        (way.A.index, way.VALUE),
-        (way.B.index, None),
+    assert [(one.place, one.written is None) for one in bench.requests] == [
+        (way.A.index, False),
+        (way.B.index, True),
     ]
 
 
@@ -262,7 +266,7 @@ def test_write_and_read_is_two_transactions(way: Way) -> None:
 @pytest.mark.parametrize('more', [0.05, 0.2, 1.0, 2.0])
 @pytest.mark.parametrize('what', ['answer', 'refuse'])
 @pytest.mark.parametrize('second', 'AB')
-@of_each
+@of_any
 def test_a_late_answer_is_not_taken_for_that_to_the_next_question(
     way: Way, second: str, what: str, more: float
 ) -> None:
@@ -286,7 +290,7 @@ def test_a_late_answer_is_not_taken_for_that_to_the_next_question(
 
 @pytest.mark.parametrize('more', [0.05, 0.2, 1.0, 2.0])
 @pytest.mark.parametrize('what', ['answer', 'refuse'])
-@of_each
+@of_any
 def test_a_late_answer_to_a_write_is_not_taken_for_that_to_another(
     way: Way, what: str, more: float
 ) -> None:
@@ -296,7 +300,7 @@ def test_a_late_answer_to_a_write_is_not_taken_for_that_to_another(
     assert bench.expect(FAILED, lambda: bench.write(way.B)).maybe_done
 
 
-@of_each
+@of_any
 def test_a_write_goes_out_at_once_whatever_is_in_quarantine(way: Way) -> None:
     for lost in range(6):
         bench = way(*[DROP] * lost)
@@ -306,11 +310,11 @@ def test_a_write_goes_out_at_once_whatever_is_in_quarantine(way: Way) -> None:
         before, asked = bench.wire.now, len(bench.asked)
         # a read leaves no confirmation in doubt
         assert bench.write(way.A).data == b''
-        assert bench.wire.sent[asked][0] - before <= bench.wire.gap + 1e-9
+        assert bench.sent_at[asked] - before <= bench.wire.gap + 1e-9
         assert bench.asked[asked:] == [way.A.index]
 
 
-@of_named
+@pytest.mark.parametrize('way', [Classic, Movitrac, Canopen])
 def test_a_write_in_doubt_clears_the_line(way: Way) -> None:
     bench = way(DROP)
     bench.expect(NoAnswer, lambda: bench.write(way.A))
@@ -318,7 +322,7 @@ def test_a_write_in_doubt_clears_the_line(way: Way) -> None:
     with pytest.raises(DamagedAnswer, match='an earlier request') as raised:
         bench.write(way.A)
     assert raised.value.maybe_done
-    assert bench.wire.sent[1][0] == start
+    assert bench.sent_at[1] == start
     assert bench.asked == [way.A.index, way.A.index, way.lost[1]]
     bench.write(way.A)
     assert len(bench.asked) == 4
@@ -331,11 +335,11 @@ def test_a_stop_that_failed_is_given_again_before_anything_is_read(way: Way, wha
     for _ in range(2):
         before = bench.wire.now
         bench.expect(FAILED, lambda: bench.write(way.A))
-        assert bench.wire.sent[-1][0] - before <= bench.wire.gap + 1e-9
+        assert bench.sent_at[-1] - before <= bench.wire.gap + 1e-9
     assert bench.asked == [way.A.index] * 2
 
 
-@of_each
+@of_any
 def test_however_many_answers_are_lost_something_is_asked_at_once(way: Way) -> None:
     bench = way(*[DROP] * 30)
     # not what is named, where a drive may lack it and stop for that
@@ -343,12 +347,12 @@ def test_however_many_answers_are_lost_something_is_asked_at_once(way: Way) -> N
     for _ in range(30):
         before = bench.wire.now
         bench.expect(NoAnswer, lambda: bench.read(way.A))
-        assert bench.wire.sent[-1][0] - before <= bench.wire.gap + 1e-9
+        assert bench.sent_at[-1] - before <= bench.wire.gap + 1e-9
     assert bench.asked[: len(way.lost)] == list(way.lost)
     assert bench.read(way.B).data == bench.answer_of()
 
 
-@of_each
+@of_any
 def test_a_resync_read_that_fails_has_done_nothing(way: Way) -> None:
     bench = way(DROP, DROP)
     first, second = (bench.expect(NoAnswer, lambda: bench.read(way.A)) for _ in range(2))
@@ -359,7 +363,7 @@ def test_a_resync_read_that_fails_has_done_nothing(way: Way) -> None:
     assert third.maybe_done
 
 
-@of_each
+@of_any
 def test_a_stop_goes_between_a_resync_read_and_its_request(way: Way) -> None:
     bench = way(DROP)
     bench.expect(NoAnswer, lambda: bench.read(way.A))
@@ -369,16 +373,16 @@ def test_a_stop_goes_between_a_resync_read_and_its_request(way: Way) -> None:
     assert bench.asked == list(way.lost[:2])
 
 
-@of_each
+@of_any
 def test_quarantine_of_one_unit_is_not_that_of_another(way: Way) -> None:
     bench = way()
-    for unit in (1, 2):
+    for unit in way.units:
         bench.read(way.A, unit)
     bench.drive.heal(DROP, DROP)
     bench.expect(NoAnswer, lambda: bench.read(way.A))
     bench.expect(NoAnswer, lambda: bench.write(way.A))
-    assert bench.read(way.A, unit=2).data == bench.answer_of()
-    bench.write(way.A, unit=2)
+    assert bench.read(way.A, way.units[1]).data == bench.answer_of()
+    bench.write(way.A, unit=way.units[1])
     assert bench.asked == [way.A.index] * 6
 
 
@@ -612,25 +616,25 @@ def test_closing_forgets_the_echo(way: Way) -> None:
     ],
     ids=str,
 )
-@of_each
+@of_any
 def test_a_write_is_the_very_next_frame(way: Way, fate: Fate) -> None:
     if way.names_it and fate.what == 'refuse twice':
         # a second one behind the gap would refuse the write, for it names nothing
         fate = replace(fate, again=0.0)
     bench = way(fate)
     assert bench.read_then_write(way.B, way.A).data == b''
-    assert [(one.place, one.written) for one in bench.drive.requests] == [
-        (way.B.index, None),
-        (way.A.index, way.VALUE),
+    assert [(one.place, one.written is None) for one in bench.requests] == [
+        (way.B.index, True),
+        (way.A.index, False),
     ]
     if fate.what.startswith('refuse'):
-        heard = [at for at, _ in bench.wire.seen if at < bench.wire.sent[-1][0]][-1]
-        assert bench.wire.sent[-1][0] - heard <= max(0.003, bench.wire.gap + 1e-9)
+        heard = [at for at, _ in bench.wire.seen if at <= bench.sent_at[-1]][-1]
+        assert bench.sent_at[-1] - heard <= max(0.003, bench.wire.gap + 1e-9)
     # and what is read then belongs to its question
     assert bench.read(way.B).data == bench.answer_of()
 
 
-@of_each
+@of_any
 def test_no_resync_read_goes_before_it(way: Way) -> None:
     bench = way(*[DROP] * 3)
     for _ in range(3):
@@ -638,7 +642,7 @@ def test_no_resync_read_goes_before_it(way: Way) -> None:
     began = bench.wire.now
     bench.read_then_write(way.B, way.A)
     assert bench.asked[3:] == [way.B.index, way.A.index]
-    assert bench.wire.sent[3][0] - began <= bench.wire.gap + 1e-9
+    assert bench.sent_at[3] - began <= bench.wire.gap + 1e-9
 
 
 @pytest.mark.parametrize(
@@ -687,11 +691,11 @@ STEPS = st.lists(
 
 def parameters(way: Way) -> dict[str, Address]:
     """Return two parameters whose answers look the same, and one of another length or kind."""
-    third = {Classic: Classic.INV_ST, Movitrac: Movitrac.LONG}
+    third = {Classic: Classic.INV_ST, Movitrac: Movitrac.LONG, Canopen: canopen_bench.TEXT}
     return {'A': way.A, 'B': way.B, 'C': third.get(way, Rtu.C)}
 
 
-@pytest.mark.parametrize('way', [*WAYS.values(), OldRtu])
+@pytest.mark.parametrize('way', [*WAYS.values(), OldRtu, Canopen])
 @hypothesis_settings(max_examples=400)
 @given(FATES, STEPS, st.booleans(), st.sampled_from([0.0, 0.01, 0.2]))
 @example([Fate(1.2), DROP], [('write A', 0.0), ('write B', 0.0)], False, 0.0)
@@ -721,41 +725,41 @@ def test_every_answer_belongs_to_its_request(
     bench = way(*way.distinct(fates))
     if way.patience > 1:
         bench.drive.response_time = response_time
-    if echo and way.names_it:
+    if echo and way in (Classic, Movitrac):
         bench.drive.echo = same
-    requests = bench.drive.requests
     timeout = bench.line.response_timeout
     for what, pause in steps:
         bench.wire.now += pause * timeout
         address = parameters(way)[what[-1]]
         value = (2 * way.VALUE)[: address.size]
         is_write = what.startswith('write')
-        before = len(requests)
+        before = len(bench.requests)
         try:
             if is_write:
                 assert bench.write(address, value).data == b''
                 # one transaction, and this very one was confirmed
-                assert len(requests) == before + 1
-                assert not way.names_it or requests[-1].fate in ('answer', 'double')
+                assert len(bench.requests) == before + 1
+                assert not way.names_it or bench.requests[-1].fate in ('answer', 'double')
             else:
                 reply = bench.read(address).data
-                assert requests[-1].place == address.index
+                assert bench.requests[-1].place == address.index
                 assert reply == bench.answer_of()
         except Refused as refusal:
-            refused = before if is_write else len(requests) - 1
-            assert requests[refused].place == address.index
+            refused = before if is_write else len(bench.requests) - 1
+            assert bench.requests[refused].place == address.index
             assert bench.is_refusal_of(refusal, refused)
         except NotReady as refusal:
             assert not is_write
-            assert len(requests) == before
+            assert len(bench.requests) == before
             assert bench.wire.now < refusal.until <= bench.wire.now + timeout + 1e-9
         except (NoAnswer, DamagedAnswer) as error:
-            resynced = len(requests) == before or requests[-1].place != address.index
+            resynced = len(bench.requests) == before or bench.requests[-1].place != address.index
             assert error.maybe_done or resynced
-        assert len(requests) - before <= way.most[not is_write]
+        assert len(bench.requests) - before <= way.most[not is_write]
         if is_write:
-            assert requests[before][1:4] == (address.index, address.size, value)
-    if way is not Classic:
+            assert bench.requests[before].place == address.index
+            assert bench.requests[before].written is not None
+    if way not in (Classic, Canopen):
         bench.wire.check_gaps()
 
 
