@@ -557,7 +557,7 @@ LAWS = (
         'nfo_sinus_driver/link/rtu.py',
         ' and crc(buffer[start : end - 2]) == buffer[end - 2 : end]:',
         ':',
-        ('test/unit/link/test_rtu_codec.py',),
+        ('test/unit/link/test_modbus_codec.py', '-k', 'rtu'),
     ),
     Mutant(
         8,
@@ -589,7 +589,7 @@ LAWS = (
         'nfo_sinus_driver/link/modbus_ascii.py',
         '        if lrc(message) == check:',
         '        if True:',
-        ('test/unit/link/test_ascii_codec.py',),
+        ('test/unit/link/test_modbus_codec.py', '-k', 'ascii'),
     ),
     Mutant(
         8,
