@@ -1,24 +1,15 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who a unit is, in frames of pymodbus's, and a unit that tells it on a line in virtual time."""
+"""Who a unit is, and function 23, in frames of pymodbus's."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pymodbus_opinion as opinion
-from support.addresses import register, words_of
-from support.plans import followed
-from virtual_wire import Wire
+from support.addresses import words_of
 
-from nfo_sinus_driver.link.interface import (
-    Address,
-    Identification,
-    LineSettings,
-)
+from nfo_sinus_driver.link.interface import Identification
 from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
-from nfo_sinus_driver.link.rtu import RtuLink
 
 if opinion.OLD:
     from pymodbus import mei_message, other_message
@@ -103,56 +94,3 @@ def spoil(frame: bytes, bit: int) -> bytes:
     damaged = bytearray(frame)
     damaged[bit // 8 % len(frame)] ^= 1 << bit % 8
     return bytes(damaged)
-
-
-# --- a unit on a line in virtual time -------------------------------------------------------------
-
-TIMEOUT = 0.1
-SETTINGS = LineSettings(baud_rate=19200, response_timeout=TIMEOUT)
-ONE = register(0x2A5)
-TWO = register(0x258, 2)
-
-
-class Unit:
-    """
-    A link on a virtual line, and a unit that answers each function as the test says, in order.
-
-    :ivar late: by how much the answer to a function is late, in time-outs.
-    """
-
-    def __init__(self, settings: LineSettings = SETTINGS) -> None:
-        self.wire = Wire(settings)
-        self.wire.far_end = self._take
-        self.link = RtuLink(self.wire, settings, self.wire.monotonic)
-        self.link.use_resync_reads(1, (ONE, TWO))
-        self.answers: dict[int, Callable[[bytes], bytes]] = {
-            3: lambda frame: opinion.read_answer(1, [len(self.functions)] * frame[5]),
-            17: lambda frame: g2_answer(1),
-            6: lambda frame: frame,
-            23: lambda frame: write_and_read_answer(1, (len(self.functions),) * frame[5]),
-            43: lambda frame: device_answer(1, frame[3], G2),
-        }
-        self.late: dict[int, float] = {}
-        self.functions: list[int] = []
-        self._free = 0.0
-        self.link.open()
-
-    def _take(self, frame: bytes, end: float) -> None:
-        self.functions.append(frame[1])
-        answer = self.answers[frame[1]](frame)
-        start = max(self._free, end + self.late.get(frame[1], 0) * TIMEOUT)
-        self._free = self.wire.arrive(start, answer)
-
-    def identify(self) -> Identification:
-        return followed(self.link.identify(1))
-
-    def read(self, address: Address = ONE) -> bytes:
-        return self.link.read(1, address).data
-
-
-def silent(frame: bytes) -> bytes:
-    return b''
-
-
-def refuses(frame: bytes) -> bytes:
-    return opinion.exception(1, frame[1], 1)

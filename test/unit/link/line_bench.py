@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import classic_far_end as classic
+from identify_bench import G2, device_answer, g2_answer, write_and_read_answer
 import movitrac_far_end as movitrac
 import pymodbus_opinion as opinion
 import pytest
@@ -135,27 +136,28 @@ class ModbusDrives(FarEnd):
     def parsed(self, frame: bytes) -> Asked:
         if frame[1] in (17, 43):
             return Asked(frame[0], frame[1], 0)
+        if frame[1] == 23:
+            source, count = words_of(frame[2:6])
+            return Asked(frame[0], source, 2 * count, frame[11:-2])
         unit, function, place, count, words = opinion.decoded(frame)
         return Asked(unit, place, 2 * count, None if function == 3 else packed(*words))
 
     def answer(self, asked: Asked, frame: bytes, number: int) -> bytes:
+        unit, function = frame[:2]
+        if function == 17 and self.identity == 'says':
+            return g2_answer(unit)
+        if function == 43 and self.identity == 'says':
+            # all of it, or one object [M0 §6.2.4]
+            one = {frame[4]: G2[frame[4]]}
+            return device_answer(unit, frame[3], one if frame[3] == 4 else G2)
         if not asked.size:
-            return self._identified(asked, frame, number)
+            return opinion.exception(unit, function, 1) if self.identity else b''
+        words = words_of(self.value(asked.place, asked.size, number))
+        if function == 23:
+            return write_and_read_answer(unit, words)
         if asked.written is not None:
-            return opinion.write_answer(asked.unit, asked.place, words_of(asked.written))
-        return opinion.read_answer(
-            asked.unit, words_of(self.value(asked.place, asked.size, number))
-        )
-
-    def _identified(self, asked: Asked, frame: bytes, number: int) -> bytes:
-        if self.identity != 'says':
-            return opinion.exception(*frame[:2], 1) if self.identity == 'refuses' else b''
-        if frame[1] == 17:
-            # [M0 §6.2.4]
-            message = frame[:2] + b'\x10' + b'0123456789ABCDEF'
-        else:
-            message = frame[:4] + bytes((0x82, 0, 0, 1, frame[4], 0))
-        return message + opinion.crc(message)
+            return opinion.write_answer(unit, asked.place, words_of(asked.written))
+        return opinion.read_answer(unit, words)
 
     @staticmethod
     def code(number: int) -> int:

@@ -8,23 +8,11 @@ from __future__ import annotations
 from typing import Any
 
 from hypothesis import given, strategies as st
-from identify_bench import (
-    G2,
-    KNOWN,
-    ONE,
-    SERIAL,
-    TIMEOUT,
-    TWO,
-    Unit,
-    device_answer,
-    g2_answer,
-    refuses,
-    silent,
-    spoil,
-)
+from identify_bench import G2, KNOWN, SERIAL
+from line_bench import UNIT, Rtu
 import pytest
-from support.addresses import packed
 from support.plans import followed
+from virtual_wire import DROP, REFUSE, Fate
 
 from nfo_sinus_driver.link.interface import (
     Ask,
@@ -49,6 +37,8 @@ from nfo_sinus_driver.link.modbus_link import (
     text,
 )
 from nfo_sinus_driver.link.modbus_pdu import Request
+
+TIMEOUT = Rtu.settings.response_timeout
 
 # --- what the bytes say ---------------------------------------------------------------------------
 
@@ -198,109 +188,85 @@ def test_a_question_that_could_not_be_sent_is_asked_later() -> None:
 
 # --- on a line in virtual time --------------------------------------------------------------------
 
+
+def identified(bench: Rtu) -> Identification:
+    return followed(bench.link.identify(UNIT))
+
+
+def check_read(bench: Rtu, functions: list[int]) -> None:
+    """What is read next is right, and nothing had to be asked before."""
+    assert bench.read(Rtu.A).data == bench.answer_of()
+    assert bench.functions == [*functions, 3]
+
+
 @pytest.mark.parametrize('baud', [1200, 19200, 57600])
 def test_a_g2_identifies_itself(baud: int) -> None:
-    unit = Unit(LineSettings(baud_rate=baud, response_timeout=TIMEOUT))
-    assert unit.identify() == KNOWN
-    assert unit.functions == [43, 17]
-    unit.wire.check_gaps()
-    assert unit.read() == packed(3), 'and there is no doubt'
+    bench = Rtu(settings=LineSettings(baud, response_timeout=TIMEOUT), trusted=True)
+    plan = bench.link.identify(UNIT)
+    assert bench.functions == [], 'nothing is sent before the first question'
+    assert followed(plan) == KNOWN
+    bench.wire.check_gaps()
+    check_read(bench, [43, 17])
 
 
-def test_nothing_is_sent_before_the_first_question() -> None:
-    unit = Unit()
-    unit.link.identify(1)
-    assert unit.functions == []
+@pytest.mark.parametrize('fate', [DROP, REFUSE])
+def test_a_drive_that_does_not_say_it_costs_little(fate: Fate) -> None:
+    bench = Rtu(fate, fate, trusted=True)
+    before = bench.wire.now
+    assert identified(bench) == Identification()
+    took = bench.wire.now - before
+    assert took < TIMEOUT / 2 if fate is REFUSE else 2 * TIMEOUT < took < 2.5 * TIMEOUT
+    check_read(bench, [43, 17])
+    # and the quarantine is over
+    bench.drive.heal(fate, fate)
+    assert identified(bench) == Identification()
+    assert bench.functions == [43, 17, 3, 43, 17]
 
 
-def test_refusals_cost_no_time_out() -> None:
-    unit = Unit()
-    unit.answers.update({17: refuses, 43: refuses})
-    before = unit.wire.now
-    assert unit.identify() == Identification()
-    assert unit.functions == [43, 17]
-    assert unit.wire.now - before < TIMEOUT / 2
-    assert unit.read() == packed(3)
-
-
-def test_silence_costs_one_time_out_each() -> None:
-    unit = Unit()
-    unit.answers.update({17: silent, 43: silent})
-    before = unit.wire.now
-    assert unit.identify() == Identification()
-    assert unit.functions == [43, 17]
-    assert 2 * TIMEOUT < unit.wire.now - before < 2.5 * TIMEOUT
-    assert unit.read() == packed(3)
-    assert unit.identify() == Identification()
-    assert unit.functions == [43, 17, 3, 43, 17], 'the quarantine was over'
-    unit.wire.check_gaps()
-
-
+@pytest.mark.parametrize('fate', [Fate(1.2), Fate(1.2, 'refuse'), Fate(what='damage')])
 @pytest.mark.parametrize('function', [43, 17])
-def test_late_answer_is_not_taken_for_another(function: int) -> None:
-    unit = Unit()
-    unit.late[function] = 1.2
-    found = unit.identify()
+def test_an_answer_that_fails_leaves_it_empty(function: int, fate: Fate) -> None:
+    bench = Rtu(*([fate] if function == 43 else [Fate(), fate]), trusted=True)
+    found = identified(bench)
     assert found.vendor == ('' if function == 43 else KNOWN.vendor)
     assert found.serial == ('' if function == 17 else KNOWN.serial)
-    assert unit.read() == packed(len(unit.functions))
-    assert unit.functions == [43, 17, 3]
-
-
-def test_a_late_refusal_is_not_taken_for_another_one() -> None:
-    unit = Unit()
-    unit.answers[43] = refuses
-    unit.late[43] = 1.2
-    assert unit.identify() == Identification(serial=KNOWN.serial)
-    assert unit.read() == packed(len(unit.functions))
-
-
-@pytest.mark.parametrize('function', [43, 17])
-def test_damaged_answer_leaves_it_empty(function: int) -> None:
-    unit = Unit()
-    good = unit.answers[function]
-    unit.answers[function] = lambda frame: spoil(good(frame), 90)
-    found = unit.identify()
-    assert (found.vendor == '', found.serial == '') == (function == 43, function == 17)
-    assert unit.read() == packed(len(unit.functions))
+    check_read(bench, [43, 17])
 
 
 @pytest.mark.parametrize('cut', [2, 5, 8, 9, 30, 80])
 def test_answer_that_stops_in_the_middle(cut: int) -> None:
-    unit = Unit()
-    unit.answers[43] = lambda frame: device_answer(1, REGULAR, G2)[:cut]
-    before = unit.wire.now
-    assert unit.identify() == Identification(serial=KNOWN.serial)
-    assert unit.wire.now - before < 3 * TIMEOUT
+    bench = Rtu(trusted=True)
+    answer = bench.drive.answer
+    bench.drive.answer = lambda asked, frame, number: answer(asked, frame, number)[
+        : cut if frame[1] == 43 else None
+    ]
+    before = bench.wire.now
+    assert identified(bench) == Identification(serial=KNOWN.serial)
+    assert bench.wire.now - before < 3 * TIMEOUT
 
 
 def test_answer_in_lumps_of_an_adapter() -> None:
-    unit = Unit()
-    whole = device_answer(1, REGULAR, G2)
+    bench = Rtu(trusted=True)
+    arrive = bench.wire.arrive
 
-    def far_end(frame: bytes, end: float) -> None:
-        if frame[1] != 43:
-            unit.wire.arrive(end, g2_answer(1))
-            return
-        for number, at in enumerate(range(0, len(whole), 31), start=1):
-            unit.wire.arrive(end + 0.025 * number, whole[at : at + 31], lump=True)
+    def in_lumps(at: float, data: bytes, *, lump: bool = False) -> float:
+        for number, start in enumerate(range(0, len(data), 31), start=1):
+            arrive(at + 0.025 * number, data[start : start + 31], lump=True)
+        return at
 
-    unit.wire.far_end = far_end
-    assert unit.identify() == KNOWN
+    bench.wire.arrive = in_lumps  # type: ignore[method-assign]
+    assert identified(bench) == KNOWN
 
 
 def test_doubled_answer_is_noticed() -> None:
-    unit = Unit()
-    unit.answers[43] = lambda frame: 2 * device_answer(1, REGULAR, G2)
-    assert unit.identify() == KNOWN
-    assert unit.read() == packed(len(unit.functions))
+    bench = Rtu(Fate(what='double'), trusted=True)
+    assert identified(bench) == KNOWN
+    check_read(bench, [43, 17])
 
 
 def test_a_unit_whose_reads_are_in_doubt_can_say_who_it_is() -> None:
-    unit = Unit()
-    unit.answers[3] = silent
-    for address in (ONE, TWO):
-        with pytest.raises(NoAnswer):
-            unit.read(address)
-    assert unit.identify() == KNOWN
-    assert unit.functions == [3, 3, 43, 17]
+    bench = Rtu(DROP, DROP, trusted=True)
+    for address in (Rtu.A, Rtu.C):
+        bench.expect(NoAnswer, lambda address=address: bench.read(address))
+    assert identified(bench) == KNOWN
+    assert bench.functions == [3, 3, 43, 17]

@@ -528,15 +528,16 @@ def test_what_comes_behind_an_echo(way: Way, what: str, error: type[LinkError]) 
 
 @of_each
 def test_what_comes_before_an_echo_is_no_answer(way: Way) -> None:
+    other = way()
+    other.read(way.B)
+    request = other.wire.unpack(other.wire.sent[0][1])
     bench = way()
     bench.drive.echo = same
-    assert bench.read(way.A).data
-    answer = bench.wire.pack(
-        bench.drive.answer(bench.drive.parsed(bench.wire.unpack(bench.wire.sent[0][1])), b'', 0)
-    )
+    bench.read(way.A)
+    answer = bench.drive.answer(bench.drive.parsed(request), request, 0)
     bench.drive.heal(DROP)
-    bench.drive.echo = lambda frame: answer + frame
-    bench.expect(FAILED, lambda: bench.read(way.A))
+    bench.drive.echo = lambda frame: bench.wire.pack(answer) + frame
+    bench.expect(FAILED, lambda: bench.read(way.B))
 
 
 @pytest.mark.parametrize('what', ['cut', 'spoilt', 'nothing'])

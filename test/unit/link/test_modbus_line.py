@@ -10,6 +10,7 @@ import contextlib
 from dataclasses import replace
 
 from hypothesis import example, given, settings as hypothesis_settings, strategies as st
+from identify_bench import write_and_read_request
 from line_bench import UNIT, Ascii, ModbusDrives, Rtu, SameWords, of_modbus, same
 import pymodbus_opinion as opinion
 import pytest
@@ -29,6 +30,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
 )
 from nfo_sinus_driver.link.late_replies import SUSPECT_FOR
+from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
 from nfo_sinus_driver.link.request_link import Echo
 
 Way = type[Rtu]
@@ -275,22 +277,25 @@ def write_and_read(bench: Rtu) -> bytes:
     return data
 
 
+def test_write_and_read_is_one_transaction() -> None:
+    bench = Rtu(Fate(), REFUSE)
+    assert write_and_read(bench) == bench.answer_of()
+    request = WriteAndRead(UNIT, A.index, packed(7), B.index, 1)
+    assert bench.wire.sent[0][1] == write_and_read_request(request)
+    error = bench.expect(Refused, lambda: write_and_read(bench))
+    assert isinstance(error, Refused) and error.code == bench.drive.code(1)
+    assert bench.functions == [23, 23]
+
+
 def test_a_write_and_read_whose_answer_would_be_in_doubt_is_a_write() -> None:
-    bench = Rtu()
-    bench.wire.far_end = lambda frame, end: None
-    bench.expect(NoAnswer, lambda: write_and_read(bench))
-
-    def answer(frame: bytes, end: float) -> None:
-        message = bytes((UNIT, 23, 2, 0, 5))
-        reply = frame if frame[1] == 6 else message + opinion.crc(message)
-        bench.wire.arrive(end, reply)
-
-    bench.wire.far_end = answer
+    bench = Rtu(Fate(1.5))
+    error = bench.expect(NoAnswer, lambda: write_and_read(bench))
+    assert error.maybe_done
     before = bench.wire.now
     assert write_and_read(bench) == b''
     assert bench.wire.now < before + 0.1
     # what was late has come before the answer to that
-    assert write_and_read(bench) == packed(5)
+    assert write_and_read(bench) == bench.answer_of()
     assert bench.functions == [23, 6, 23]
 
 
