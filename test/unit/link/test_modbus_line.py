@@ -450,6 +450,12 @@ def test_nothing_waits_behind_an_answer_like_the_one_before_where_a_write_follow
     assert bench.asked == [A.index, B.index, C.index]
     heard = [at for at, _ in bench.wire.seen if at < bench.wire.sent[-1][0]][-1]
     assert bench.wire.sent[-1][0] - heard <= max(0.003, bench.wire.gap + 1e-9)
+    # where nothing answers the write, the right answer to the read may still come
+    bench = saying_the_same(way, Fate(), Fate(), DROP)
+    bench.read(A)
+    bench.expect(NoAnswer, lambda: bench.read_then_write(B, C._replace(size=2)))
+    bench.read(A)
+    assert bench.asked == [A.index, B.index, C.index, TWO.index, A.index]
 
 
 class SameRefusal(ModbusDrives):

@@ -123,9 +123,10 @@ def test_a_glitch_when_a_transmitter_is_switched_costs_nothing(glitch: bytes) ->
     bench = Movitrac()
     bench.drive.before = bench.drive.after = glitch
     for _ in range(3):
-        assert bench.read(A).data == bench.answer_of()
+        for _ in range(2):
+            assert bench.read(A).data == bench.answer_of()
         bench.write(A)
-    assert bench.asked == [A.index] * 6
+    assert bench.asked == [A.index] * 9
 
 
 @pytest.mark.parametrize('noise', [b'\x00\x00\x00', b'\xac', b'\xc8\x00\x19', b'\xd2\xd3'])
