@@ -16,7 +16,6 @@ from nfo_sinus_driver.link.interface import (
     Clock,
     DamagedAnswer,
     LineSettings,
-    LinkError,
     NeverSilent,
     NoAnswer,
     NotReady,
@@ -126,15 +125,6 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         """Return how many bytes the frame of a message has."""
 
     # --- belief -----------------------------------------------------------------------------------
-
-    def _ask_once(self, request: Request[Any]) -> tuple[Any, float]:
-        self._await_gap(request)
-        resynced = self._make_certain(request)
-        try:
-            return self._believed(request)
-        except LinkError as error:
-            error.responded = resynced
-            raise
 
     def _believed(self, request: Request[_T]) -> tuple[_T, float]:
         """Return the answer to a request: not one sent twice, nor one to another master."""

@@ -546,7 +546,7 @@ LAWS = (
     Mutant(
         8,
         'a late answer is believed',
-        'nfo_sinus_driver/link/serial_link.py',
+        'nfo_sinus_driver/link/request_link.py',
         '        resynced = self._make_certain(request)',
         '        resynced = False',
         (LINE, '-k', 'rtu and late'),
