@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Classic on a line: no gap, ENQUIRIES, broadcasts, and why a drive says NAK."""
+"""Classic on a line: no gap, ENQUIRIES, broadcasts, and why a drive refuses (NAK)."""
 
 from __future__ import annotations
 
