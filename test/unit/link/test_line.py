@@ -53,6 +53,10 @@ Way = type[Bench]
 #: The same on a bus whose messages are frames.
 Canopen = canopen_bench.Bench
 of_any = pytest.mark.parametrize('way', [*WAYS.values(), Canopen], ids=[*WAYS, 'canopen'])
+#: Whose answers to a write do not say what was written.
+of_unconfirmed = pytest.mark.parametrize(
+    'way', [Classic, Movitrac, Canopen], ids=['classic', 'movitrac', 'canopen']
+)
 FAILED = (NoAnswer, DamagedAnswer)
 LUMPS = pytest.mark.parametrize('lump', [False, True])
 READ_AND_WRITE = pytest.mark.parametrize('action', ['read', 'write'])
@@ -249,7 +253,7 @@ def test_nothing_is_asked_for_an_identity(way: Way) -> None:
     assert bench.asked == []
 
 
-@pytest.mark.parametrize('way', [Classic, Movitrac, Canopen])
+@of_unconfirmed
 def test_write_and_read_is_two_transactions(way: Way) -> None:
     bench = way()
     reply = bench.link.write_and_read(way.units[0], way.A, way.VALUE, way.B)
@@ -290,14 +294,16 @@ def test_a_late_answer_is_not_taken_for_that_to_the_next_question(
 
 @pytest.mark.parametrize('more', [0.05, 0.2, 1.0, 2.0])
 @pytest.mark.parametrize('what', ['answer', 'refuse'])
+@pytest.mark.parametrize('second', 'AB')
 @of_any
 def test_a_late_answer_to_a_write_is_not_taken_for_that_to_another(
-    way: Way, what: str, more: float
+    way: Way, second: str, what: str, more: float
 ) -> None:
     bench = way(late(way, more, what), DROP)
     bench.expect(NoAnswer, lambda: bench.write(way.A))
     # the second is lost on the way: were the late answer believed, it would count as done
-    assert bench.expect(FAILED, lambda: bench.write(way.B)).maybe_done
+    address, value = getattr(way, second), way.VALUE[::-1]
+    assert bench.expect(FAILED, lambda: bench.write(address, value)).maybe_done
 
 
 @of_any
@@ -314,7 +320,7 @@ def test_a_write_goes_out_at_once_whatever_is_in_quarantine(way: Way) -> None:
         assert bench.asked[asked:] == [way.A.index]
 
 
-@pytest.mark.parametrize('way', [Classic, Movitrac, Canopen])
+@of_unconfirmed
 def test_a_write_in_doubt_clears_the_line(way: Way) -> None:
     bench = way(DROP)
     bench.expect(NoAnswer, lambda: bench.write(way.A))
@@ -696,7 +702,7 @@ def parameters(way: Way) -> dict[str, Address]:
     return {'A': way.A, 'B': way.B, 'C': third.get(way, Rtu.C)}
 
 
-@pytest.mark.parametrize('way', [*WAYS.values(), OldRtu, Canopen])
+@pytest.mark.parametrize('way', [*WAYS.values(), OldRtu, Canopen], ids=[*WAYS, 'old', 'canopen'])
 @hypothesis_settings(max_examples=400)
 @given(FATES, STEPS, st.booleans(), st.sampled_from([0.0, 0.01, 0.2]))
 @example([Fate(1.2), DROP], [('write A', 0.0), ('write B', 0.0)], False, 0.0)
