@@ -69,7 +69,7 @@ LAWS = (
         G2,
         ' and before not in (None, _SERIAL_FAULT):',
         ':',
-        ('test/unit/link/test_classic_refusals.py', '-k', 'serial_fault'),
+        ('test/unit/link/test_classic_line.py', '-k', 'serial_fault'),
     ),
     Mutant(
         1,

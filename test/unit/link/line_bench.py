@@ -16,6 +16,7 @@ import pytest
 from support.addresses import classic_id, packed, register, words_of
 from virtual_wire import AsciiWire, Asked, FarEnd, Fate, Wire
 
+from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.link.classic import ClassicLink
 from nfo_sinus_driver.link.interface import Address, LineSettings, LinkError, Refused, Reply
 from nfo_sinus_driver.link.modbus_ascii import AsciiLink
@@ -66,7 +67,12 @@ class Bench:
         self.drive.heal(*fates)
         self.link: Any = self.link_class(self.wire, self.line, self.wire.monotonic)
         self.wire.gap = self.link._gap
+        self.tell(self.link)
         self.link.open()
+
+    @staticmethod
+    def tell(link: Any) -> None:
+        """Tell a link what it has to know of its drives."""
 
     def read(self, address: Address, unit: int = UNIT) -> Reply:
         reply: Reply = self.link.read(unit, address)
@@ -255,6 +261,22 @@ class Classic(Bench):
     lost = (0x1E, classic.INV_ST, 0x29, 0x30, 0x1E)
     most = (3, 5)
 
+    @staticmethod
+    def tell(link: Any) -> None:
+        model = load_family('sinus_g2')
+        ask = model.profile.why_refused
+        assert ask is not None
+
+        def at(key: str) -> Address:
+            return Address(*model[key].at('classic').place)
+
+        def why(read: Callable[[Address], int], before: int | None) -> tuple[int, str]:
+            return ask(lambda key: read(at(key)), before)
+
+        reads = [at(key) for key in model.profile.resync_reads['classic']]
+        for unit in link.protocol.units:
+            link.use_resync_reads(unit, reads, why)
+
 
 def at(index: int, size: int = 4) -> Address:
     """Return the address of a parameter of a MOVITRAC."""
@@ -273,6 +295,11 @@ class Movitrac(Bench):
     VALUE = bytes.fromhex('00000370')
     lost = (0x19, 206, 207, 0x19)
     patience = 2.0
+
+    @staticmethod
+    def tell(link: Any) -> None:
+        for unit in link.protocol.units:
+            link.use_resync_reads(unit, [at(index) for index in (206, 207, 0, 4)])
 
     def __init__(self, *fates: Fate, settings: LineSettings | None = None) -> None:
         super().__init__(*fates, settings=settings)

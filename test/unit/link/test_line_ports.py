@@ -110,6 +110,7 @@ def connected(way: Way, port: str, timeout: float = PATIENT, char_format: str = 
     protocol = way.link_class.protocol.name
     settings = BusSettings(port, protocol, char_format=char_format, response_timeout=timeout)
     link = settings.open()
+    way.tell(link)
     link.open()
     return link
 

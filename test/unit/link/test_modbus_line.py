@@ -287,8 +287,19 @@ def test_write_and_read_is_one_transaction() -> None:
     assert bench.functions == [23, 23]
 
 
+def test_what_a_unit_refuses_to_do_in_one_transaction_is_only_written() -> None:
+    bench = Rtu(REFUSE)
+    assert write_and_read(bench) == write_and_read(bench) == b''
+    assert bench.functions == [23, 6, 6]
+    bench = Rtu(REFUSE)
+    bench.link.end_listening_if(lambda: bool(bench.asked))
+    bench.expect(NotReady, lambda: write_and_read(bench))
+    assert bench.functions == [23], 'a stop goes between'
+
+
 def test_a_write_and_read_whose_answer_would_be_in_doubt_is_a_write() -> None:
-    bench = Rtu(Fate(1.5))
+    bench = Rtu(Fate(), Fate(1.5))
+    assert write_and_read(bench) == bench.answer_of()
     error = bench.expect(NoAnswer, lambda: write_and_read(bench))
     assert error.maybe_done
     before = bench.wire.now
@@ -296,7 +307,7 @@ def test_a_write_and_read_whose_answer_would_be_in_doubt_is_a_write() -> None:
     assert bench.wire.now < before + 0.1
     # what was late has come before the answer to that
     assert write_and_read(bench) == bench.answer_of()
-    assert bench.functions == [23, 6, 23]
+    assert bench.functions == [23, 23, 6, 23]
 
 
 def test_a_write_and_read_goes_out_at_once_on_a_line_that_is_never_silent() -> None:

@@ -39,7 +39,7 @@ GAP = 2 * CHAR
 @pytest.mark.parametrize('unit', [0, 1, 63])
 def test_a_long_value_is_one_transaction(unit: int) -> None:
     bench = Movitrac()
-    assert bench.link.parts(LONG) == (LONG,)
+    assert bench.link.protocol.parts(LONG) == (LONG,)
     assert bench.read(LONG, unit).data == bench.answer_of()
     bench.write(LONG, 2 * VALUE, unit)
     assert bench.drive.requests[1][:4] == (unit, LONG.index, 8, 2 * VALUE)
