@@ -366,12 +366,19 @@ class ParameterAccess:
     ) -> Reply:
         there = operation.address
         if there.space == _OWN:
+            await self.require_recognised()
+            began = self.now()
+
+            def require_same() -> None:
+                # what was written before may be in another drive
+                self.recognition.require(began)
+                require_wanted()
 
             def ask(pnu: int, word: int | None) -> Awaitable[Reply]:
                 at = Address(MAILBOX, pnu, None, 2, False, there.block)
                 step = Read(at) if word is None else Write(at, word.to_bytes(2, 'big'))
                 # the PLC does nothing twice, so what is lost of it may be repeated
-                return self._ask(step, priority, True, require_wanted)
+                return self._ask(step, priority, True, require_same)
 
             word = None if isinstance(operation, Read) else int.from_bytes(operation.data, 'big')
             return await self._by_address.access(there.index, word, ask)

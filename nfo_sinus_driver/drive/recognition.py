@@ -31,7 +31,7 @@ class Recognition:
     @property
     def holds(self) -> bool:
         """It was recognised, and no other can be in its place by now."""
-        return self._since >= self._bus.silences.there_since(self._unit, self._bus.now())
+        return self._is_same_since(self._since)
 
     @property
     def since_port_opened(self) -> bool:
@@ -46,10 +46,17 @@ class Recognition:
         """Note that another one answers."""
         self._since = math.nan
 
-    def require(self) -> None:
-        """Make sure, at the moment of sending, that it may be written to (DriveError: not)."""
-        if not self.holds:
+    def require(self, began: float = math.inf) -> None:
+        """
+        Make sure, at the moment of sending, that it may be written to (DriveError: not).
+
+        :param began: when the first of several writes that belong together was wanted, s.
+        """
+        if not self.holds or not self._is_same_since(began):
             raise self.error(Report(Cause.NO_ANSWER_YET))
+
+    def _is_same_since(self, at: float) -> bool:
+        return at >= self._bus.silences.there_since(self._unit, self._bus.now())
 
     def error(self, why: Report) -> DriveError:
         """Return the error of a write that is not sent."""

@@ -351,6 +351,43 @@ def test_a_loss_while_an_address_is_written_writes_it_no_second_time(fate: str, 
         assert rig.far.peek('drv.acc_time') == 7.5 and rig.far.writes['drv.acc_time'] == 1
 
 
+@pytest.mark.parametrize('at', [6, 10, 31, 37, 57])
+def test_an_access_that_one_drive_has_begun_is_not_ended_in_another(at: int) -> None:
+    with Rig(SINUS_H, drive_addresses=OWN, poll_rate=1.0, telemetry_rate=0.0) as rig:
+        rig.connect(parameters=True)
+        server = rig.line.plc.channels[1].server
+        entries = server.parameters.entries
+        written: list[int] = []
+        requests = itertools.count()
+        goes_on = math.inf
+
+        def exchange() -> None:
+            server._by_address[:] = [0x1104, 1234, 0, 0]
+            for pnu in range(1000, 1004):
+                entry = entries[pnu, 0]
+
+                def write(word: int, pnu: int = pnu, entry: ParameterEntry = entry) -> None:
+                    if rig.clock.now >= goes_on:
+                        written.append(pnu)
+                    assert entry.write is not None
+                    entry.write(word)
+
+                entries[pnu, 0] = dataclasses.replace(entry, write=write)
+
+        def plan(frame: bytes) -> None:
+            nonlocal goes_on
+            if next(requests) == at:
+                # the driver stands still while this is answered
+                goes_on = rig.clock.now + 5.0
+                rig.line.later(goes_on - 1.0, exchange)
+                rig.line.stand_still(rig.clock.now, 5.0)
+
+        rig.line.plan = plan
+        rig.answer(rig.drive.parameters.change({'drv.acc_time': 7.5}))
+        rig.pass_time(3.0)
+        assert goes_on < math.inf and written[:1] in ([], [1000])
+
+
 def test_an_address_that_the_drive_lacks_is_reported() -> None:
     with Rig(SINUS_H, drive_addresses=(*OWN, 'drv.none=1')) as rig:
         rig.connect(parameters=True)
