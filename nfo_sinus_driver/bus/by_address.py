@@ -11,6 +11,7 @@ begins it. 1003 says when it is over, and 1001 then has a value that was read.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
+import math
 
 from nfo_sinus_driver.bus.worker import Bus
 from nfo_sinus_driver.link import MailboxSilent, Refused, Reply, Unconfirmed
@@ -31,7 +32,8 @@ class ByAddress:
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
-        self._is_busy = False
+        #: When another access may begin, s.
+        self._free_at = -math.inf
 
     async def access(self, address: int, data: int | None, ask: Ask) -> Reply:
         """
@@ -41,9 +43,10 @@ class ByAddress:
         :raises MailboxSilent: the drive did not end it; Unconfirmed: likewise a write.
         :raises LinkError: as the link does.
         """
-        while self._is_busy:
+        while self._bus.now() < self._free_at:
             await self._bus.sleep(_PERIOD)
-        self._is_busy = True
+        self._free_at = math.inf
+        ended = False
         try:
             await ask(_ADDRESS, address)
             if data is not None:
@@ -51,11 +54,16 @@ class ByAddress:
             await ask(_ACKNOWLEDGE, 0)
             await ask(_COMMAND, _READ if data is None else _WRITE)
             await self._require_over(f'{address:04X}h', data is not None, ask)
+            ended = True
             if data is None:
                 return await ask(_DATA, None)
             return Reply(b'', self._bus.now(), requests=0)
+        except Refused:
+            ended = True
+            raise
         finally:
-            self._is_busy = False
+            # else the drive may end it yet, which would pass for the end of the next one
+            self._free_at = -math.inf if ended else self._bus.now() + _TIME
 
     async def _require_over(self, place: str, writes: bool, ask: Ask) -> None:
         """Wait until the drive has done it."""

@@ -31,16 +31,18 @@ class Drive:
     The four PNUs of a drive, by a mailbox that answers at once; and the bus.
 
     :ivar values: what it has by address.
-    :ivar says: what PNU 1003 is after a command.
+    :ivar says: what PNU 1003 is after a command, and after how long, s.
     :ivar done: what went by the mailbox: PNU, and the word that was written.
     """
 
     time: float = 1000.0
     values: dict[int, int] = field(default_factory=lambda: {ACC_TIME: 50})
     says: int = 1
+    takes: float = 0.0
     done: list[tuple[int, int | None]] = field(default_factory=list)
     fails: Callable[[], LinkError | None] = lambda: None
     pnus: dict[int, int] = field(default_factory=dict)
+    pending: list[tuple[float, int, int, int]] = field(default_factory=list)
 
     def now(self) -> float:
         return self.time
@@ -55,16 +57,25 @@ class Drive:
         if error is not None:
             raise error
         self.done.append((pnu, word))
+        self.end()
         if word is None:
             return Reply(self.pnus[pnu].to_bytes(2, 'big'), self.time)
         self.pnus[pnu] = word
         if pnu == 1002:
-            self.pnus[1003] = self.says
-            if word == 1:
-                self.values[self.pnus[1000]] = self.pnus[1001]
-            else:
-                self.pnus[1001] = self.values.get(self.pnus[1000], 0)
+            address, data = self.pnus[1000], self.pnus.get(1001, 0)
+            self.pending.append((self.time + self.takes, word, address, data))
+            self.end()
         return Reply(b'', self.time)
+
+    def end(self) -> None:
+        """End what was begun long enough ago."""
+        while self.pending and self.pending[0][0] <= self.time:
+            _, command, address, data = self.pending.pop(0)
+            self.pnus[1003] = self.says
+            if command == 1:
+                self.values[address] = data
+            else:
+                self.pnus[1001] = self.values.get(address, 0)
 
 
 @pytest.fixture
@@ -136,3 +147,23 @@ def test_after_a_lost_step_the_next_access_begins_anew(
         asked(by_address, drive, 1)
     assert drive.done.count((1002, 1)) == (at > 3)
     assert asked(by_address, drive) == (b'\0\1' if at > 3 else b'\0\x32')
+
+
+@pytest.mark.parametrize('asks', range(1, 9))
+def test_the_late_end_of_one_that_was_cancelled_is_not_that_of_the_next(
+    drive: Drive, by_address: ByAddress, asks: int
+) -> None:
+    drive.values[OTHER] = 7
+    drive.takes = 0.06
+
+    async def cancelled() -> None:
+        first = asyncio.ensure_future(by_address.access(OTHER, None, drive.ask))
+        while len(drive.done) < asks and not first.done():
+            await asyncio.sleep(0)
+        first.cancel()
+        await asyncio.gather(first, return_exceptions=True)
+        await by_address.access(ACC_TIME, 0x4B, drive.ask)
+        assert (await by_address.access(ACC_TIME, None, drive.ask)).data == b'\0\x4b'
+
+    asyncio.run(cancelled())
+    assert drive.values == {ACC_TIME: 0x4B, OTHER: 7}
