@@ -867,7 +867,7 @@ LAWS = (
         11,
         'a drive that was not recognised is written to',
         GATE,
-        '        if not self.holds:',
+        '        if not self.holds or not self._is_same_since(began):',
         '        if False:',
         (RECOGNITION, '-k', 'another_make or before_an_answer'),
         also=((
@@ -875,6 +875,14 @@ LAWS = (
             '        if not self.recognition.holds and self._recognise is not None:',
             '        if False:',
         ),),
+    ),
+    Mutant(
+        11,
+        'an access that one drive has begun is ended in another',
+        GATE,
+        ' or not self._is_same_since(began):',
+        ':',
+        ('test/unit/drive/test_through_mailbox.py', '-k', 'begun_is_not'),
     ),
     Mutant(
         11,
