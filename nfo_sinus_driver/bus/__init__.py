@@ -35,12 +35,13 @@ drive; what was read meanwhile may be old, and is read again (:mod:`..link.threa
 What a public call guarantees:
 
 ===================  =============================================================================
-:meth:`Bus.run`      Nothing has been sent when it returns. The coroutine begins with the next step
-                     of the worker; its future always ends, with the bus at the latest.
+:meth:`Bus.run`      It waits for nothing. The coroutine begins with the next step of the worker;
+                     its future always ends, with the bus at the latest.
 ``stops=True``       Besides: what the link only listens for is cut short.
-:meth:`Bus.request`  Nothing has been sent. The newest value is made and written in its turn.
+:meth:`Bus.request`  It waits for nothing. The newest value is made and written in its turn.
 :meth:`Bus.close`    The transaction on the line is over, the port is closed, every coroutine has
-                     ended: nothing more is sent. It stops no motor.
+                     ended: nothing more is sent. It stops no motor. A transaction that takes longer
+                     than ``timeout`` is not waited for.
 ===================  =============================================================================
 
 Rejected: asyncio (with it, a command took two to four times as long from another thread to the

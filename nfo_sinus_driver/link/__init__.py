@@ -6,8 +6,8 @@ Transactions on one line, one at a time. No ROS, no knowledge of drives or param
 
 What is wanted of a unit is a value (``Read``, ``Write``, ``WriteAndRead``, ``ReadThenWrite``,
 ``Ask``), with an address and bytes that mean nothing here. :func:`carry_out` gives it to the link
-of the protocol. A link returns a reply, or raises an error whose type says two things: whether the
-unit answered, and whether it may have carried out the request (``maybe_done``).
+of the protocol. A link returns a reply, or raises an error that says two things: whether the unit
+answered (its type), and whether it may have carried out the request (``maybe_done``).
 
 **Nothing received is believed because it fits.** A Modbus answer does not say which register it is
 from, and after a missing answer the next frame of the right shape may be the late one: an old
@@ -20,9 +20,10 @@ A write is sent at once all the same, for it may be a stop; only its answer is n
 units, and what they hear is no answer to us (:mod:`.foreign_traffic`). On a line that is never
 silent, writes go out into the noise.
 
-**An operation is repeated here only if a second one changes nothing.** A run command and an
-acknowledgement are sent once; what comes of them, the status shows. Where an operation is several
-transactions, a stop goes between them, but never between a read and the write that depends on it.
+**No write is repeated here that could be carried out twice;** what comes of a run command, the
+status shows. A read is, where another master has damaged its answer or a gateway has closed the
+connection, also one that acknowledges. Where an operation is several transactions, a stop goes
+between them, but never between a read and the write that depends on it.
 
 **Frames are coded here, not by a library.** pymodbus codes the simulator's side: one mistake cannot
 be on both ends, and ours take a third of its time. pyserial opens and sets a port; its descriptor
@@ -33,11 +34,13 @@ while a read of pyserial ends by a number of bytes or a time-out.
 :func:`carry_out`
 ====================  ============================================================================
 returns               The unit has answered this request and no other: a read gives what it held
-                      between request and answer, a write was taken.
+                      between request and answer (behind a PLC: what that had of it at
+                      ``arrived``), a write was taken.
 raises ``NotSent``    Nothing was sent.
+raises ``NotReady``   Nothing was sent, or one transaction of several was done: call again, later.
 raises ``Refused``    The unit answered that it did not do it.
-raises ``NoAnswer``,  It was sent, and the unit may have done it; read what came of it.
-``DamagedAnswer``
+raises ``NoAnswer``,  The unit may have done it, unless ``maybe_done`` is false; read what came of
+``DamagedAnswer``     it.
 raises ``PortError``  The port is lost. What was sent just before, the unit may have done.
 ====================  ============================================================================
 
