@@ -46,36 +46,35 @@ class ByAddress:
         while self._bus.now() < self._free_at:
             await self._bus.sleep(_PERIOD)
         self._free_at = math.inf
-        ended = False
+        at_work = False
         try:
             await ask(_ADDRESS, address)
             if data is not None:
                 await ask(_DATA, data)
             await ask(_ACKNOWLEDGE, 0)
+            at_work = True
             await ask(_COMMAND, _READ if data is None else _WRITE)
-            await self._require_over(f'{address:04X}h', data is not None, ask)
-            ended = True
+            done = await self._wait(f'{address:04X}h', data is not None, ask)
+            at_work = False
+            if not done:
+                raise Refused(
+                    Refused.DEVICE_FAILURE,
+                    f'the drive refused the access to its address {address:04X}h (PNU 1003 is 2): '
+                    'check drive_addresses, and the value',
+                )
             if data is None:
                 return await ask(_DATA, None)
             return Reply(b'', self._bus.now(), requests=0)
-        except Refused:
-            ended = True
-            raise
         finally:
-            # else the drive may end it yet, which would pass for the end of the next one
-            self._free_at = -math.inf if ended else self._bus.now() + _TIME
+            # its end would pass for that of the next one
+            self._free_at = self._bus.now() + _TIME if at_work else -math.inf
 
-    async def _require_over(self, place: str, writes: bool, ask: Ask) -> None:
-        """Wait until the drive has done it."""
+    async def _wait(self, place: str, writes: bool, ask: Ask) -> bool:
+        """Wait for the end of an access; return whether the drive has done it."""
         until = self._bus.now() + _TIME
-        while (state := (await ask(_ACKNOWLEDGE, None)).data) != _OK:
-            if state == _NOT_OK:
-                raise Refused(
-                    Refused.DEVICE_FAILURE,
-                    f'the drive refused the access to its address {place} (PNU 1003 is 2): '
-                    'check drive_addresses, and the value',
-                )
+        while (state := (await ask(_ACKNOWLEDGE, None)).data) not in (_OK, _NOT_OK):
             if self._bus.now() >= until:
                 text = f'the drive did not end the access to its address {place} (PNU 1003 is 0)'
                 raise Unconfirmed(text) if writes else MailboxSilent(text)
             await self._bus.sleep(_PERIOD)
+        return state == _OK
