@@ -16,10 +16,10 @@ from nfo_sinus_driver.link.interface import (
     Address,
     Ask,
     Identification,
+    InProgress,
     LineProtocol,
     LinkError,
     NoAnswer,
-    NotReady,
     Plan,
     Refused,
     Remarks,
@@ -46,7 +46,6 @@ class ModbusLink(ABC):
     remarks: Remarks
     supervision = None
     clock: ThreadClock
-    stop_waits: Callable[[], bool]
 
     @cached_property
     def _combines(self) -> dict[int, bool]:
@@ -62,12 +61,17 @@ class ModbusLink(ABC):
         return Reply(*self._ask(write_of(unit, address, data)))
 
     def write_and_read(self, unit: int, address: Address, data: bytes, source: Address) -> Reply:
-        """Write one parameter and read another, in one transaction, or only write it."""
+        """
+        Write one parameter and read another, in one transaction, or only write it.
+
+        :raises InProgress: the unit refuses to do both: what is to be written by now goes alone.
+        """
+        combined = self._combines.get(unit, True)
         answer = self._combined(write_and_read_of(unit, address, data, source))
         if answer is not None:
             return Reply(*answer)
-        if self.stop_waits():
-            raise NotReady(self.clock())
+        if combined and not self._combines.get(unit, True):
+            raise InProgress(self.clock())
         return self.write(unit, address, data)
 
     def exchange(

@@ -32,6 +32,12 @@ def functions(rig: Rig, since: int = 0) -> list[int]:
     ]
 
 
+def _plain(frame: dict[str, Any]) -> Any:
+    """Return what a frame writes, unless it reads at the same time."""
+    data = bytes.fromhex(frame['hex'])
+    return understand(data, 'modbus_rtu') if data[1] in (WRITE, WRITE_SEVERAL) else None
+
+
 def requests(rig: Rig, since: int = 0) -> list[dict[str, Any]]:
     return [one for one in rig.line.frames[since:] if one['direction'] == 'request']
 
@@ -131,6 +137,25 @@ def test_one_that_does_not_have_the_function_is_given_up_for_the_connection(code
         rig.enable()
         rig.pass_time(0.5)
         assert BOTH in functions(rig, begun)
+
+
+def test_only_the_newest_set_point_is_written_to_one_that_does_not_have_it() -> None:
+    with Rig(poll_rate=1.0, telemetry_rate=0.0) as rig:
+        rig.connect()
+        rig.enable()
+
+        def refuse(*_: Any) -> tuple[int, ...]:
+            rig.drive.set_setpoint(0.0)
+            raise Refused(Reason.FUNCTION, 'it does not like it')
+
+        server(rig.far).write_and_read = refuse  # type: ignore[method-assign]
+        begun = len(rig.line.frames)
+        rig.drive.set_setpoint(30.0)
+        rig.pass_time(0.3)
+        assert functions(rig, begun)[0] == BOTH
+        written = [one.words for one in map(_plain, requests(rig, begun)) if one is not None]
+        assert (300,) not in written, 'the newer one had come'
+        assert rig.drive.following
 
 
 def test_a_refused_set_point_stops() -> None:
