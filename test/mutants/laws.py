@@ -877,6 +877,22 @@ LAWS = (
         ),),
     ),
     Mutant(
+        2,
+        'a set-point is written in whose place a newer one has come',
+        'nfo_sinus_driver/link/modbus_link.py',
+        '            raise InProgress(self.clock())',
+        '            pass',
+        ('test/unit/drive/test_set_point_with_status.py', '-k', 'newest_set_point'),
+    ),
+    Mutant(
+        8,
+        'the late end of an access by address is that of the next',
+        'nfo_sinus_driver/bus/by_address.py',
+        'self._bus.now() + _TIME if at_work else -math.inf',
+        '-math.inf',
+        ('test/unit/bus/test_by_address.py', '-k', 'late_end'),
+    ),
+    Mutant(
         11,
         'an access that one drive has begun is ended in another',
         GATE,
