@@ -349,7 +349,7 @@ def test_an_entry_has_its_wall_time_if_the_drive_has_had_power_ever_since() -> N
     with Rig(poll_rate=0.2, telemetry_rate=0.1).connect() as rig:
         for off in (False, True):
             began = rig.clock.now
-            rig.pass_time(800.0)
+            rig.pass_time(400.0)
             rig.far.trip(5)
             rig.answer(rig.drive.acknowledge())
             rig.acknowledged += 1
