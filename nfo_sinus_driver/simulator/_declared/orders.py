@@ -15,9 +15,11 @@ Place = tuple[int, bool]
 
 
 def words_of(drive: Description, step: Write) -> Iterator[tuple[Place, int]]:
-    """Yield where each word of a step goes."""
+    """Yield where each word of a step goes; a setting is kept as any other, and is no command."""
     parameter = drive.parameters[step.key]
     address = parameter.at('modbus')
+    if parameter.is_setting:
+        return
     if address.space == 'coil':
         yield (address.index, True), int(step.value)
         return

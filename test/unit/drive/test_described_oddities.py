@@ -96,6 +96,21 @@ ODD: dict[str, dict[str, Any]] = {
             ],
         },
     },
+    'a run that writes settings, too': {
+        'control': {
+            'run': [
+                {'parameter': 'motor.fan', 'to': 'Up'}, {'parameter': 'motor.level', 'to': 70000},
+                {'register': 10, 'value': 1},
+            ],
+            'stop': [{'register': 10, 'value': 0}],
+            'reset': [{'register': 10, 'value': 8}, {'register': 10, 'value': 0}],
+        },
+        'parameters': {
+            **PLAIN['parameters'],
+            'motor.fan': {'coil': 3, 'choices': {0: 'Down', 1: 'Up'}},
+            'motor.level': {'register': 34, 'type': 'uint32'},
+        },
+    },
     'function 16 alone': {'line': {'write': 16}},
     'function 06 alone': {'line': {'write': 6, 'most_registers': 2}},
     'input registers': {
