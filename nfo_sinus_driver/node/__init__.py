@@ -30,8 +30,6 @@ Each of these has a file for it:
 accepted; a refused one leaves node and drive as they were. A node that cannot be configured says
 which parameter, why, and what to set.
 
-When a service has returned:
-
 Requests and answers of services are those of :class:`~nfo_sinus_driver.drive.Drive`; what each
 guarantees stands there. Sentences are made here and in ``cli/``, where it is known what the user
 calls or types.
