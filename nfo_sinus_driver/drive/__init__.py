@@ -42,8 +42,8 @@ What a public call of :class:`Drive` guarantees when its future has a result:
 ``set_setpoint`` (no future)   Nothing was sent. The newest value goes out in its turn, limited,
                                while the motor is enabled; one from before never counts.
 ``stop``, ``rapid_stop``,      The run command is removed, and the status confirms that the drive
-``deactivate``                 stops; the motor may be on its ramp. On an error this was not
-                               confirmed in time: it is written until it is.
+``deactivate``,                stops; the motor may be on its ramp. On an error this was not
+``cancel_tuning``              confirmed in time: it is written until it is.
 ``quick_stop``                 The same, and the motor is released: it coasts.
 ``acknowledge``                The fault is over. Run command and set-point were removed before,
                                so nothing turns by it.
