@@ -20,10 +20,10 @@ A write is sent at once all the same, for it may be a stop; only its answer is n
 units, and what they hear is no answer to us (:mod:`.foreign_traffic`). On a line that is never
 silent, writes go out into the noise.
 
-**No write is repeated here that could be carried out twice;** what comes of a run command, the
-status shows. A read is, where another master has damaged its answer or a gateway has closed the
-connection, also one that acknowledges. Where an operation is several transactions, a stop goes
-between them, but never between a read and the write that depends on it.
+**Nothing is repeated here that has an effect:** no write, and no read that acknowledges (``once``);
+what comes of a run command, the status shows. Another read is, where another master has damaged its
+answer or a gateway has closed the connection. Where an operation is several transactions, a stop
+goes between them, but never between a read and the write that depends on it.
 
 **Frames are coded here, not by a library.** pymodbus codes the simulator's side: one mistake cannot
 be on both ends, and ours take a third of its time. pyserial opens and sets a port; its descriptor

@@ -246,15 +246,15 @@ class CanopenLink:
     def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
         """Take parameters that are safe to read; here those are read that every node has."""
 
-    def read(self, unit: int, address: Address) -> Reply:
+    def read(self, unit: int, address: Address, once: bool = False) -> Reply:
         """Read one parameter; a number in as many bytes as the catalog has for it."""
         sub_index = self._shapes.sub_index(unit, address)
         if sub_index is None:
             second = self._read_second(unit, address)
             if second is not None and address.sub_index == SECOND:
                 return self._fitted(unit, address, SECOND, second)
-            return self.read(unit, address)
-        reply = self._read_object(unit, address, sub_index)
+            return self.read(unit, address, once)
+        reply = self._read_object(unit, address, sub_index, once)
         return self._fitted(unit, address, sub_index, reply)
 
     def _fitted(self, unit: int, address: Address, sub_index: int, reply: Reply) -> Reply:
@@ -270,8 +270,10 @@ class CanopenLink:
         self._shapes.note_array(unit, address.index, refusal)
         return reply
 
-    def _read_object(self, unit: int, address: Address, sub_index: int) -> Reply:
-        for _ in range(_TRIES - 1):
+    def _read_object(
+        self, unit: int, address: Address, sub_index: int, once: bool = False
+    ) -> Reply:
+        for _ in range(0 if once else _TRIES - 1):
             try:
                 return self._read_once(unit, address, sub_index)
             except DamagedAnswer:

@@ -293,12 +293,12 @@ class ClassicLink(CodecLink):
         super().use_resync_reads(unit, addresses)
         self._why[unit] = why
 
-    def read(self, unit: int, address: Address) -> Reply:
+    def read(self, unit: int, address: Address, once: bool = False) -> Reply:
         """Read one parameter of one word, or one part of another."""
         assert address.sub_index is None
         if unit == BROADCAST:
             raise ValueError('a broadcast is not answered')
-        word, arrived = self._enquire(unit, address.index)
+        word, arrived = self._enquire(unit, address.index, once)
         return Reply(_WORD.pack(word), arrived)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
@@ -318,9 +318,9 @@ class ClassicLink(CodecLink):
             raise self._refusal(unit, began)
         return Reply(b'', arrived)
 
-    def _enquire(self, unit: int, number: int) -> tuple[int, float]:
+    def _enquire(self, unit: int, number: int, once: bool = False) -> tuple[int, float]:
         """Return the value of a parameter, and when it came."""
-        answer, arrived = self._ask(Enquiry(unit, number))
+        answer, arrived = self._ask(Enquiry(unit, number), once)
         if isinstance(answer, Nak):
             text = f'the drive has no parameter E{number:04X} that can be read (NAK)'
             raise Refused(Refused.ILLEGAL_ADDRESS, text)

@@ -90,7 +90,7 @@ class Identification:
 
 
 class Read(NamedTuple):
-    """Read a parameter; ``once``: not again where the answer may be old, for it has an effect."""
+    """Read a parameter; ``once``: sent once, whatever becomes of its answer: it has an effect."""
 
     address: Address
     once: bool = False
@@ -306,10 +306,11 @@ class Link(Protocol):
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
 
-    def read(self, unit: int, address: Address) -> Reply:
+    def read(self, unit: int, address: Address, once: bool = False) -> Reply:
         """
         Read one parameter, or one part of it where it has several.
 
+        :param once: not again where its answer may be to another master.
         :raises InProgress: it takes more transactions, and has to be called again for each; so does
             a write.
         :raises LinkError: as its subclasses say.
@@ -355,7 +356,7 @@ class Link(Protocol):
 def carry_out(link: Link, unit: int, operation: Operation) -> Reply:
     """Have a link carry out what is wanted of a unit (LinkError: as its subclasses say)."""
     if isinstance(operation, Read):
-        return link.read(unit, operation.address)
+        return link.read(unit, *operation)
     if isinstance(operation, Write):
         return link.write(unit, *operation)
     if isinstance(operation, WriteAndRead):

@@ -52,9 +52,9 @@ class ModbusLink(ABC):
         """Whether a unit writes and reads in one transaction (function 23), if that is known."""
         return {}
 
-    def read(self, unit: int, address: Address) -> Reply:
+    def read(self, unit: int, address: Address, once: bool = False) -> Reply:
         """Read one parameter (function 03; 04 for input registers, 01 for coils)."""
-        return Reply(*self._ask(read_of(unit, address)))
+        return Reply(*self._ask(read_of(unit, address), once))
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
         """Write one parameter (function 06 for one register, 16 for several, 05 for a coil)."""
@@ -131,8 +131,8 @@ class ModbusLink(ABC):
         return questions(unit, self._ask)
 
     @abstractmethod
-    def _ask(self, request: Request[_T]) -> tuple[_T, float]:
-        """Return the answer to a request, and when its last byte came."""
+    def _ask(self, request: Request[_T], once: bool = False) -> tuple[_T, float]:
+        """Return the answer to a request, sent ``once`` at most, and when its last byte came."""
 
 
 REPORT_SLAVE_ID = 17

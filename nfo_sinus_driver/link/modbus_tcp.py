@@ -179,11 +179,11 @@ class TcpLink(ModbusLink):
         if connection is not None:
             connection.close(discard=self._unanswered)
 
-    def read(self, unit: int, address: Address) -> Reply:
+    def read(self, unit: int, address: Address, once: bool = False) -> Reply:
         """Read one parameter, of a drive or of the block of a PLC."""
         if address.block is not None:
             return self._blocks(unit, address).read(address)
-        return super().read(unit, address)
+        return super().read(unit, address, once)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
         """Write one parameter, likewise."""
@@ -303,13 +303,13 @@ class TcpLink(ModbusLink):
 
     # --- one transaction --------------------------------------------------------------------------
 
-    def _ask(self, request: Request[_T]) -> tuple[_T, float]:
+    def _ask(self, request: Request[_T], once: bool = False) -> tuple[_T, float]:
         """Return the answer to a request, and when it came."""
         try:
             return self._exchange(request)
         except ConnectionError as error:
             first = not self._closes_after_one(request)
-            if first or isinstance(request, (Write, WriteAndRead)):
+            if first or once or isinstance(request, (Write, WriteAndRead)):
                 raise self._lost(error) from error
         except OSError as error:
             raise self._lost(error) from error

@@ -399,9 +399,9 @@ class MovitracLink(CodecLink):
     _codec = CODEC
     _longest_response = LONGEST_RESPONSE_TIME
 
-    def read(self, unit: int, address: Address) -> Reply:
+    def read(self, unit: int, address: Address, once: bool = False) -> Reply:
         """Read one parameter, of 4 or of 8 bytes."""
-        answer, arrived = self._ask(Enquiry(unit, address.index))
+        answer, arrived = self._ask(Enquiry(unit, address.index), once)
         if isinstance(answer, Nack):
             raise refusal(answer.code)
         if len(answer.value) != address.size:

@@ -245,9 +245,9 @@ class RequestLink(ABC, Generic[_Request]):
 
     # --- belief -----------------------------------------------------------------------------------
 
-    def _ask(self, request: _Request) -> tuple[Any, float]:
+    def _ask(self, request: _Request, once: bool = False) -> tuple[Any, float]:
         """Return the answer to a read, and when it came; another master may cost some tries."""
-        for tries_left in reversed(range(TRIES)):
+        for tries_left in reversed(range(1 if once else TRIES)):
             try:
                 return self._ask_once(request)
             except DamagedAnswer:
@@ -459,7 +459,7 @@ class CodecLink(RequestLink[Any]):
         return self.read(unit, source)
 
     @abstractmethod
-    def read(self, unit: int, address: Address) -> Reply:
+    def read(self, unit: int, address: Address, once: bool = False) -> Reply:
         """Read one parameter (LinkError: as its subclasses say)."""
 
     def identify(self, unit: int) -> Plan[Identification]:

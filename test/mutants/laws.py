@@ -1019,6 +1019,14 @@ LAWS = (
         (STANDS_STILL, '-k', 'is_acknowledged'),
     ),
     Mutant(
+        1,
+        'what acknowledges is read again where another master is',
+        'nfo_sinus_driver/link/request_link.py',
+        'range(1 if once else TRIES)',
+        'range(TRIES)',
+        ('test/unit/link/test_another_master_on_a_line.py', '-k', 'acknowledges'),
+    ),
+    Mutant(
         3,
         'a motor whose status cannot be read is not stopped',
         WATCH,

@@ -105,7 +105,7 @@ class FakeLink:
         self.closed += 1
         self.closing()
 
-    def read(self, unit: int, address: Address) -> Reply:
+    def read(self, unit: int, address: Address, once: bool = False) -> Reply:
         return self._transact(Done(unit, address.index, None))
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:

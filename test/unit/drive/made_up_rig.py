@@ -76,7 +76,7 @@ class FarEnd:
         yield from ()
         return Identification()
 
-    def read(self, unit: int, address: Address) -> Reply:
+    def read(self, unit: int, address: Address, once: bool = False) -> Reply:
         numbers = self._numbers(address)
         self.reads.append(address.index)
         self.was_read(address.index)

@@ -14,8 +14,8 @@ import pytest
 from support.addresses import packed
 from virtual_wire import DROP, Fate
 
-from nfo_sinus_driver.link import classic, modbus_ascii, movitrac, rtu
-from nfo_sinus_driver.link.interface import Address, DamagedAnswer
+from nfo_sinus_driver.link import classic, interface, modbus_ascii, movitrac, rtu
+from nfo_sinus_driver.link.interface import Address, DamagedAnswer, carry_out
 from nfo_sinus_driver.link.modbus_link import ReportSlaveId
 from nfo_sinus_driver.link.modbus_pdu import Read, Write
 
@@ -140,6 +140,21 @@ def test_what_is_read_or_refused_is_the_answer_to_us(
     line.number = number
     for address in (A, B, C, A, B):
         assert line.bench.read(address).data in line.answers_of(address)
+
+
+@pytest.mark.parametrize('protocol', LINKS)
+def test_what_acknowledges_is_sent_once(protocol: str) -> None:
+    doubted = 0
+    for foreign in FOREIGN:
+        line = SharedLine(protocol, foreign, before=False)
+        line.number = 1
+        sent = len(line.bench.wire.sent)
+        try:
+            carry_out(line.bench.link, UNIT, interface.Read(A, once=True))
+        except DamagedAnswer:
+            doubted += 1
+        assert len(line.bench.wire.sent) == sent + 1
+    assert doubted
 
 
 @pytest.mark.parametrize('before', [True, False], ids=['before', 'behind'])

@@ -9,7 +9,7 @@ from canopen_bench import TEXT, UNIT, A, B, Bench, Frame
 from canopen_far_end import WRONG_LENGTH
 import pytest
 
-from nfo_sinus_driver.link.interface import DamagedAnswer, Refused
+from nfo_sinus_driver.link.interface import DamagedAnswer, Read, Refused, carry_out
 
 REQUESTS = 0x600 + UNIT
 CANNOT = 0x08000022
@@ -85,6 +85,19 @@ def test_what_is_read_is_the_answer_to_us(foreign: str, number: int, before: boo
         asked = max(k for k, index in enumerate(bench.asked) if index == address.index)
         assert reply == bench.answer_of(asked)
     assert bench.link.remarks.foreign_frames == 1
+
+
+def test_what_acknowledges_is_sent_once() -> None:
+    doubted = 0
+    for foreign in FOREIGN.values():
+        bench = SharedBench(bytes.fromhex(foreign), 1, before=False)
+        bench.read(B)
+        try:
+            carry_out(bench.link, UNIT, Read(A, once=True))
+        except (DamagedAnswer, Refused):
+            doubted += 1
+        assert bench.asked.count(A.index) == 1
+    assert doubted
 
 
 @pytest.mark.parametrize('before', [True, False], ids=['before', 'behind'])

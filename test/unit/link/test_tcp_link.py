@@ -360,6 +360,16 @@ def test_connection_closed_between_two_requests(gateway: Gateway, patient: TcpLi
         patient.read(1, A)
 
 
+@pytest.mark.parametrize('once', [True, False])
+def test_what_acknowledges_is_sent_once(gateway: Gateway, patient: TcpLink, once: bool) -> None:
+    # a gateway that answers one request in each connection
+    gateway.then(answer, lambda frame: None)
+    patient.read(1, A)
+    with pytest.raises(PortError) if once else contextlib.nullcontext():
+        patient.read(1, A, once)
+    assert len(gateway.requests) == 2 + (not once)
+
+
 def test_tcp_itself_finds_out_that_an_idle_connection_is_gone(
     gateway: Gateway, patient: TcpLink
 ) -> None:
