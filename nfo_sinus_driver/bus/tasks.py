@@ -193,10 +193,15 @@ class Pause:
 
 
 class Task:
-    """A coroutine on the bus; :attr:`future` has its result."""
+    """A coroutine on the bus; :attr:`future` has its result, or what explains its error."""
 
-    def __init__(self, coroutine: Coroutine[Any, Any, Any]) -> None:
+    def __init__(
+        self,
+        coroutine: Coroutine[Any, Any, Any],
+        explain: Callable[[BaseException], BaseException] = lambda error: error,
+    ) -> None:
         self._coroutine = coroutine
+        self._explain = explain
         self.future: Future[Any] = Future()
         self.cancelled = False
         #: It is being stepped, so :class:`Cancelled` can only reach it where it awaits next.
@@ -256,7 +261,7 @@ class Task:
         except StopIteration as end:
             self.future.set_result(end.value)
         except BaseException as failure:
-            self.future.set_exception(failure)
+            self.future.set_exception(self._explain(failure))
         else:
             assert isinstance(awaited, (Exchange, Pause))
             self.awaited = awaited

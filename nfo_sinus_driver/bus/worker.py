@@ -139,13 +139,21 @@ class Bus:
         elif not self._closed:
             self._end()
 
-    def run(self, coroutine: Coroutine[Any, Any, _T], *, stops: bool = False) -> Future[_T]:
+    def run(
+        self,
+        coroutine: Coroutine[Any, Any, _T],
+        explain: Callable[[BaseException], BaseException] = lambda error: error,
+        *,
+        stops: bool = False,
+    ) -> Future[_T]:
         """
         Run a coroutine on the worker; the future has its result, or what it raises.
 
+        :param explain: returns what the future raises instead; :class:`Cancelled` may come before
+            the coroutine has begun, where it cannot catch that itself.
         :param stops: it stops a motor, so what is on the line ends as soon as it can.
         """
-        task = Task(coroutine)
+        task = Task(coroutine, explain)
         self._enter(task)
         if stops:
             # not before: the worker may be emptying its inbox

@@ -35,6 +35,7 @@ from nfo_sinus_driver.drive import (
     Report,
     Severity,
 )
+from nfo_sinus_driver.drive.diagnosis import ended
 from nfo_sinus_driver.drive.settings import MONITOR
 from nfo_sinus_driver.link import BusSettings, Refused
 from nfo_sinus_driver.state_folder import StateFolder
@@ -183,7 +184,7 @@ class Session:
             # on the bus, behind what was noted before
             return self._bus.statistics(address)
 
-        return self._bus.run(ask()).result()
+        return self._bus.run(ask(), ended).result()
 
     def _settings(self, address: int, **others: Any) -> DriveSettings:
         options = self._options

@@ -6,21 +6,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from concurrent.futures import Future
 
 from nfo_sinus_driver.bus import Bus, Priority
+from nfo_sinus_driver.drive.diagnosis import ended
 from nfo_sinus_driver.drive.drive import Drive
 from nfo_sinus_driver.drive.events import Cause, DriveError
 from nfo_sinus_driver.link import Address, Write
 
 
-async def broadcast_stop(bus: Bus, drives: Iterable[Drive]) -> None:
+def broadcast_stop(bus: Bus, drives: Iterable[Drive]) -> Future[None]:
     """
-    Release the motors of all drives of a line with a broadcast.
+    Release the motors of all drives of a line with a broadcast; from any thread.
 
     :param drives: those of the line; only what stops a family counts of which one was recognised
         since the port was opened.
-    :raises DriveError: none was, and nothing is written.
+    :raises DriveError: none was, and nothing is written; or the driver ends.
+    :raises LinkError: it was not sent.
     """
+    return bus.run(_broadcast(bus, drives), ended, stops=True)
+
+
+async def _broadcast(bus: Bus, drives: Iterable[Drive]) -> None:
     models = [drive.model for drive in drives if drive.params.recognition.since_port_opened]
     if not models:
         raise DriveError(Cause.NONE_RECOGNISED)

@@ -5,37 +5,38 @@
 
 from __future__ import annotations
 
-from nfo_sinus_driver.bus import Bus, Cancelled, Priority
+from concurrent.futures import Future
+
+from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.catalog import Family, families, load_family
-from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.diagnosis import explained
 from nfo_sinus_driver.drive.events import Cause, DriveError
-from nfo_sinus_driver.link import Address, Identification, LinkError, Read, Refused
+from nfo_sinus_driver.link import Address, Identification, Read, Refused
 
 
-async def detect_model(bus: Bus, unit: int) -> str:
+def detect_model(bus: Bus, unit: int) -> Future[str]:
     """
-    Find out which model a drive is, for coroutines on the bus.
+    Find out which model a drive is; from any thread.
 
     It is the only one with the protocol of the line, or the one that identifies itself, or the one
     with a parameter that no other has, or the only one left.
 
     :raises DriveError: it does not answer, or several are left; the message says what to do.
     """
+    return bus.run(_detect(bus, unit), lambda error: explained(error, unit, bus.protocol.check))
+
+
+async def _detect(bus: Bus, unit: int) -> str:
     addressing = bus.protocol.addressing
     models = [model for model in map(load_family, families()) if _speaks(model, addressing)]
-    try:
-        if len(models) > 1 and await bus.identify(unit, Priority.SERVICE) != Identification():
-            models = [model for model in models if model.profile.names_itself]
-        for model in models if len(models) > 1 else ():
-            if not model.profile.identified_by:
-                continue
-            if await _has(bus, unit, model, model.profile.identified_by):
-                return model.name
-            models = [other for other in models if other is not model]
-    except Cancelled:
-        raise DriveError(Cause.ENDING) from None
-    except LinkError as error:
-        raise DriveError(explain(error, unit, check=bus.protocol.check)) from error
+    if len(models) > 1 and await bus.identify(unit, Priority.SERVICE) != Identification():
+        models = [model for model in models if model.profile.names_itself]
+    for model in models if len(models) > 1 else ():
+        if not model.profile.identified_by:
+            continue
+        if await _has(bus, unit, model, model.profile.identified_by):
+            return model.name
+        models = [other for other in models if other is not model]
     if len(models) == 1:
         return models[0].name
     names = ' or '.join(model.name for model in models)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import math
 
+from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.catalog import Fact, InverterStatus, Kind, Meaning, State
 from nfo_sinus_driver.drive.drive_state import SHORTEST_POWER_OFF, DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
@@ -48,6 +49,20 @@ def explain(error: LinkError, address: int, *, check: str | None = None) -> Repo
         behind = f' ({error.hint})' if error.hint else ''
         return Report(Cause.NO_RESPONSE, address=address, behind=behind, check=check)
     return Report(Cause.NO_VALID_ANSWER, address=address, error=str(error), check=check)
+
+
+def ended(error: BaseException) -> BaseException:
+    """Return the error that a client gets: that the driver ends, where that cut a command short."""
+    return DriveError(Cause.ENDING) if isinstance(error, Cancelled) else error
+
+
+def explained(error: BaseException, address: int, check: str | None) -> BaseException:
+    """Return the error that a client gets, as :func:`ended`; ``check`` as for :func:`explain`."""
+    if not isinstance(error, LinkError):
+        return ended(error)
+    meant = DriveError(explain(error, address, check=check))
+    meant.__cause__ = error
+    return meant
 
 
 def explain_failure(error: LinkError | DriveError, state: DriveState) -> Report:

@@ -12,11 +12,11 @@ import logging
 import math
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Statistics, Task
+from nfo_sinus_driver.bus import Bus, Priority, Statistics, Task
 from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
 from nfo_sinus_driver.drive.controller import Controller, required
-from nfo_sinus_driver.drive.diagnosis import explain
+from nfo_sinus_driver.drive.diagnosis import explained
 from nfo_sinus_driver.drive.drive_state import DriveState, Hooks
 from nfo_sinus_driver.drive.error_log import ErrorLog, ErrorLogMonitor
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
@@ -223,16 +223,11 @@ class Drive:
         :param stops: it stops the motor.
         """
 
-        async def explained() -> _T:
-            try:
-                return await command()
-            except LinkError as error:
-                check = None if self.state.nameplate.identity else self.line_check
-                raise DriveError(explain(error, self._unit, check=check)) from error
-            except Cancelled:
-                raise DriveError(Cause.ENDING) from None
+        def explain(error: BaseException) -> BaseException:
+            check = None if self.state.nameplate.identity else self.line_check
+            return explained(error, self._unit, check)
 
-        return self._bus.run(explained(), stops=stops)
+        return self._bus.run(command(), explain, stops=stops)
 
     def on_stop(self, call: Callable[[Report], None]) -> None:
         """Call a function on the bus whenever the motor is stopped, with the reason."""

@@ -85,8 +85,7 @@ class AllDrives:
     def _broadcast(self) -> str:
         try:
             bus, drives = self._context.bus, self._context.drives
-            stop = broadcast_stop(bus, [managed.drive for managed in drives])
-            bus.run(stop, stops=True).result(_LONGEST_STOP)
+            broadcast_stop(bus, [one.drive for one in drives]).result(_LONGEST_STOP)
         except DriveError as error:
             return drives[0].wording.say(error)
         except Exception as error:

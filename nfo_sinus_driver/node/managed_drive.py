@@ -131,8 +131,7 @@ class ManagedDrive:
         if self._drive.stop_unconfirmed and not self._is_wanted:
             raise NodeError(f'the stop of the drive at {before.address} is not confirmed yet')
         if self._settings.model == AUTO:
-            detection = detect_model(self._bus, self._settings.address)
-            self._found_model = self._bus.run(detection).result()
+            self._found_model = detect_model(self._bus, self._settings.address).result()
         if before != self._concrete:
             if before.address == self._settings.address and (
                 before.method != self._concrete.method

@@ -118,4 +118,4 @@ class MadeUpRig(Rig):
     @property
     def found(self) -> Any:
         """The model that the driver takes it for."""
-        return self.result(self.bus.run(detect_model(self.bus, 1)))
+        return self.result(detect_model(self.bus, 1))

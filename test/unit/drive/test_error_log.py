@@ -327,8 +327,8 @@ def test_an_operating_time_that_cannot_be_does_not_end_the_watch(
         rig.pass_time(3.0)
         read, hours = rig.link.read, rig.drive.params.address('status.op_time').index
 
-        def absurd(unit: int, address: Address) -> Reply:
-            reply = read(unit, address)
+        def absurd(unit: int, address: Address, once: bool) -> Reply:
+            reply = read(unit, address, once)
             if address.index != hours:
                 return reply
             return Reply(packed(0xFFFF, 0x7FFF), reply.arrived)

@@ -114,8 +114,8 @@ def test_every_measured_value_is_what_stands_where_the_manual_has_it(
         there = planted(rig.connection.protocol)
         read = rig.link.read
 
-        def instead(unit: int, address: Address) -> Reply:
-            reply = read(unit, address)
+        def instead(unit: int, address: Address, once: bool) -> Reply:
+            reply = read(unit, address, once)
             data = there.get((address.index, address.sub_index))
             return reply if data is None else Reply(data, reply.arrived)
 

@@ -43,8 +43,8 @@ class Spoiler:
         self._read = rig.link.read
         rig.link.read = self._answer  # type: ignore[method-assign]
 
-    def _answer(self, unit: int, address: Address) -> Reply:
-        reply = self._read(unit, address)
+    def _answer(self, unit: int, address: Address, once: bool) -> Reply:
+        reply = self._read(unit, address, once)
         if self.left and self._rig.asked[-1][1] == self.key:
             self.left -= 1
             return reply._replace(data=bytes([self._data]) * len(reply.data))

@@ -101,7 +101,7 @@ def test_a_broadcast_is_no_sign_of_life() -> None:
     with Rig('classic') as rig:
         rig.turn()
         rig.line.state, rig.line.mute_for = 'mute', 10
-        rig.keep(lambda: rig.bus.run(broadcast_stop(rig.bus, [rig.drive])) and None)
+        rig.keep(lambda: broadcast_stop(rig.bus, [rig.drive]) and None)
         rig.pass_time(3.0)
         assert len(rig.line.opened) > 1
 

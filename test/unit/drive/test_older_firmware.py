@@ -395,7 +395,7 @@ def test_a_broadcast_of_mode_stop_ends_the_serial_faults_of_all() -> None:
             far.control_unit.serial_error(LineError.TIMEOUT)
         rig.pass_time(1.0)
         assert [far.faults.codes for far in rig.fars.values()] == 2 * [[SIO_FAIL]]
-        rig.result(rig.bus.run(broadcast_stop(rig.bus, rig.drives.values())))
+        rig.result(broadcast_stop(rig.bus, rig.drives.values()))
         rig.pass_time(1.0)
         for number, far in rig.fars.items():
             assert (far.faults.codes, far.faults.sio_err, far.control_unit.mode) == ([], 0, STOP)

@@ -128,12 +128,12 @@ def test_no_setting_is_written_to_another_make(tmp_path: Path) -> None:
 
 def test_a_stop_is_broadcast_only_where_a_drive_was_recognised() -> None:
     with Rig('classic') as rig:
-        answer = rig.answer(rig.bus.run(broadcast_stop(rig.bus, rig.drives.values())))
+        answer = rig.answer(broadcast_stop(rig.bus, rig.drives.values()))
         assert Cause.NONE_RECOGNISED in answer.causes and not written(rig)
         rig.turn()
         rig.line.state = 'deaf'
         rig.pass_time(6.0)
-        rig.result(rig.bus.run(broadcast_stop(rig.bus, rig.drives.values())))
+        rig.result(broadcast_stop(rig.bus, rig.drives.values()))
         assert not rig.far.motor.driven
 
 
@@ -230,8 +230,8 @@ def answer_as(rig: Rig, key: str, data: bytes) -> None:
     """Have a parameter read as these bytes."""
     read = rig.link.read
 
-    def answer(unit: int, address: Address) -> Reply:
-        reply = read(unit, address)
+    def answer(unit: int, address: Address, once: bool) -> Reply:
+        reply = read(unit, address, once)
         return reply._replace(data=data) if rig.asked[-1][1] == key else reply
 
     rig.link.read = answer  # type: ignore[method-assign]
