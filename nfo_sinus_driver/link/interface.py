@@ -128,12 +128,12 @@ class Ask(NamedTuple):
 Written = Write | WriteAndRead
 #: What may be wanted of a unit; each takes a turn on the line.
 Operation = Read | Written | ReadThenWrite | Ask
-#: Finds out why a unit refused a write whose answer does not say it: by a call that reads a
-#: parameter, and its status just before, if that is known. Returns code and text of the refusal.
-Why = Callable[[Callable[[Address], int], int | None], tuple[int, str]] | None
 #: Several of them, one by one, so that other requests go between; each brings its reply, or
 #: ``None`` where it failed.
 Plan = Generator[Operation, Reply | None, _Found]
+#: Finds out why a unit refused a write whose answer does not say it: by a call that reads a
+#: parameter, and its status just before, if that is known. Returns code and text of the refusal.
+Why = Callable[[Callable[[Address], int], int | None], tuple[int, str]] | None
 
 
 class Supervision(Protocol):

@@ -80,7 +80,8 @@ class PublishQueue:
             if not queued:
                 queued = True
                 self._streams.append(publish_waiting)
-            if is_urgent(value) or len(waiting) == _MOST_OF_A_STREAM:
+            # not only when it is full: this thread may come late
+            if is_urgent(value) or 2 * len(waiting) >= _MOST_OF_A_STREAM:
                 self._something.set()
 
         def publish_waiting() -> None:
