@@ -21,11 +21,11 @@ from typing import Any
 import pytest
 from support.rig import Notes
 from support.rig_line import Clock
-from support.said import said
+from support.said import raises, said
 from support.variants import ramps
 
-from nfo_sinus_driver.bus import Bus, Cancelled
-from nfo_sinus_driver.drive import Drive, DriveError, DriveSettings
+from nfo_sinus_driver.bus import Bus
+from nfo_sinus_driver.drive import Cause, Drive, DriveError, DriveSettings
 from nfo_sinus_driver.link import BusSettings, open_link
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.simulator import Simulator
@@ -216,7 +216,8 @@ def test_the_end_of_the_bus_ends_all_that_wait(real: Real) -> None:
     real.bus.close()
     later = real.drive.measure('status.trq_act')
     for future in (*waiting, later):
-        assert isinstance(future.exception(PATIENCE), Cancelled)
+        with raises(Cause.ENDING):
+            future.result(PATIENCE)
     assert not real.bus.alive
 
 
