@@ -239,7 +239,7 @@ class Bench(contextlib.ExitStack):
         """
         Start a simulated line, and return what looks into it.
 
-        :param paced: it is as slow as a real one, which each byte costs both ends a turn.
+        :param paced: it is as slow as a real one, for which both ends run at each byte.
         """
         command = [_executable('simulator'), '--trace', str(self.trace)]
         command += [word for name, value in self.line.items() for word in (f'--{name}', str(value))]
