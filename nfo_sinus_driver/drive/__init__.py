@@ -45,8 +45,9 @@ What a public call of :class:`Drive` guarantees when its future has a result:
 ``deactivate``,                stops; the motor may be on its ramp. On an error this was not
 ``cancel_tuning``              confirmed in time: it is written until it is.
 ``quick_stop``                 The same, and the motor is released: it coasts.
-``acknowledge``                The fault is over. Run command and set-point were removed before,
-                               so nothing turns by it.
+``acknowledge``                The fault is over. What would run the motor by the bus was removed
+                               before, as far as a drive takes that in a fault, or by the very
+                               next frame: nothing turns by it.
 ``disconnect``                 As ``stop``; control was given back at standstill, or the motor is
                                left to its ramp. Nothing is sent any more, unless a stop was not
                                confirmed.

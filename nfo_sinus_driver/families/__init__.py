@@ -7,8 +7,8 @@ What the makers' manuals say: a folder for each drive family, which the catalog 
 **Only this folder, and the simulated drives, name a family or one of its parameters.** Drive
 control knows roles (``actual_speed``), facts (``from_bus``) and steps. Drives differ in more than
 numbers: a G2 refuses nearly everything in a fault, a MOVITRAC has no status word, behind a PLC a
-word stands until the PLC has seen it. So a family is tables for what can be listed, and a Python
-file for what has an order.
+word stands until the PLC has passed it on. So a family is tables for what can be listed, and a
+Python file for what has an order.
 
 - ``parameters.csv``, ``addresses.csv``, ``status_codes.csv``, ``roles.csv``: one row a fact, each
   with its place in the manual. Where manuals disagree, ``docs/readings.md`` says what is followed.
@@ -27,7 +27,8 @@ could play by hand and no stop could end between two steps.
 - Set-point 0 before a run command, and the run command once.
 - A stop takes the run command first, then the set-point, then control, and goes on after a refusal.
 - What a drive echoes proves nothing: standstill, control and a run are taken from its status.
-- Where a drive would run on after a fault, its run command is removed before an acknowledgement.
+- Where a drive would run on after a fault, its run command is removed before an acknowledgement;
+  where it refuses that in a fault, by the very next frame.
 
 A drive that a file describes has the profile ``_declared/``, made from that file alone. It stays a
 description: what would need a condition in the file belongs in a family of its own.

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import classic_far_end
@@ -155,6 +156,17 @@ def test_what_acknowledges_is_sent_once(protocol: str) -> None:
             doubted += 1
         assert len(line.bench.wire.sent) == sent + 1
     assert doubted
+
+
+@pytest.mark.parametrize('once', [True, False])
+def test_what_acknowledges_is_sent_once_over_classic(once: bool) -> None:
+    bench = Classic(DROP)
+    begun = bench.wire.arrive(bench.wire.now, classic.encode(classic.Select(1, 0xB6, 5)))
+    bench.wire.arrive(begun + 0.05, classic_far_end.verdict(1, True))
+    doubted = pytest.raises(DamagedAnswer) if once else contextlib.nullcontext()
+    with doubted:
+        carry_out(bench.link, UNIT, interface.Read(Classic.A, once))
+    assert (len(bench.wire.sent) == 1) == once
 
 
 @pytest.mark.parametrize('before', [True, False], ids=['before', 'behind'])

@@ -228,6 +228,24 @@ def test_a_stream_that_may_wait_loses_nothing_for_it(queue: PublishQueue) -> Non
     assert done == [*range(30)]
 
 
+def test_a_stream_that_may_wait_does_so_while_there_is_room_for_more(
+    queue: PublishQueue, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # were it full, the next value would be the end of the oldest
+    monkeypatch.setattr(publish_queue, '_LONGEST_WAIT', 3600.0)
+    queue.put_every(3600.0, lambda: None)
+    done: list[int] = []
+    stream = queue.stream(done.append, lambda number: False)
+    room = publish_queue._MOST_OF_A_STREAM - 1
+    for count in range(room, 20 * room, room):
+        for number in range(room):
+            stream(number)
+        until = time.monotonic() + PATIENCE
+        while len(done) < count:
+            assert time.monotonic() < until, 'it waits until it is full'
+            time.sleep(0.001)
+
+
 def test_a_stream_that_never_ends_keeps_nothing_else_waiting(queue: PublishQueue) -> None:
     put, due = threading.Event(), threading.Semaphore(0)
     ended = False
