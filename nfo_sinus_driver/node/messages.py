@@ -162,8 +162,9 @@ def bus_statistics(statistics: Statistics, silent_drives: list[str], stamp: Time
 
 
 _RPM = 2 * math.pi / 60
-#: A pause between two polls that is longer says nothing about where the shaft went meanwhile, s.
-_LONGEST_STEP = 1.0
+#: A pause between two polls that is longer says nothing about where the shaft went meanwhile, s;
+#: many drives on a slow line, or a machine that stands still for a moment, make one of a second.
+_LONGEST_STEP = 5.0
 
 
 def control_mode(drive: Drive) -> str:
@@ -201,7 +202,7 @@ class Joint:
         self._ratio = ratio
         self._position = 0.0
         self._velocity = math.nan
-        self._at = -math.inf
+        self._at = 0.0
 
     @property
     def name(self) -> str:
@@ -209,12 +210,14 @@ class Joint:
         return self._name()
 
     def move(self, snapshot: Snapshot) -> None:
-        """Take the speed of a poll; the position is its integral since the start."""
-        self._velocity = snapshot.speed * _RPM / self._ratio()
-        step = snapshot.at - self._at
-        if 0 < step < _LONGEST_STEP and not math.isnan(self._velocity):
-            self._position += self._velocity * step
-        self._at = snapshot.at
+        """Take the speed of a poll; the position is its integral while the drive is connected."""
+        before, self._velocity = self._velocity, math.nan
+        if snapshot.connected:
+            self._velocity = snapshot.speed * _RPM / self._ratio()
+        step, self._at = snapshot.at - self._at, snapshot.at
+        way = (before + self._velocity) / 2 * step
+        if 0 < step < _LONGEST_STEP and not math.isnan(way):
+            self._position += way
 
     def state(self, stamp: Time, frame_id: str) -> JointState:
         """Return where it is and how fast it turns."""

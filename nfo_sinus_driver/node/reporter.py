@@ -154,8 +154,7 @@ class Reporter:
         heard = {publisher for publisher in of_each_poll if _is_heard(publisher)}
         self._heard = bool(heard)
         self._diagnose(snapshot)
-        if status is not None:
-            self._joint.move(snapshot)
+        self._joint.move(snapshot)
         inv_st = self._last_inv_st if status is None else (status.code, snapshot.kind)
         # a message costs as much as a transaction, heard or not; why it stopped goes out always
         stop_is_new = snapshot.stop is not self._stop

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 import threading
@@ -12,6 +13,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from bench import A_WHILE, Bench, Client, holds_for, wait_until
+from builtin_interfaces.msg import Time
 from connections import needs
 from nfo_sinus_msgs.msg import Setpoint
 import pytest
@@ -19,6 +21,7 @@ from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
+from nfo_sinus_driver.drive import Snapshot
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.node.messages import Joint, require_whole
 from nfo_sinus_driver.simulator.control import Client as Simulated
@@ -87,6 +90,34 @@ def test_joint_command_turns_the_shaft_and_its_state_says_so(bench: Bench, ratio
             lambda: way * (client.newest('joint_states').position[0] - before) > 1.0,
             'the shaft gets on',
         )
+
+
+@pytest.mark.parametrize('period', [0.02, 1.5, 4.0])
+def test_position_is_the_integral_of_the_speed_while_connected(period: float) -> None:
+    joint = Joint(lambda: 'belt', lambda: 2.0)
+    clock = itertools.count(1)
+
+    def polled(*speeds: float, connected: bool = True) -> float:
+        for rpm in speeds:
+            joint.move(Snapshot(next(clock) * period, connected, False, '', speed=rpm))
+        return float(joint.state(Time(), '').position[0] / _RADIANS)
+
+    # as where nothing was measured yet
+    assert polled(math.nan, 0.0) == 0
+    # from 0 to 240 rpm and back: half of that on the way
+    assert polled(240.0, 240.0, 0.0) == pytest.approx(240 / 60 / 2 * 2 * period)
+    before = polled(-240.0, -240.0)
+    # while it is not connected it may have turned, or not
+    assert polled(-240.0, connected=False) == before
+    assert polled(-240.0) == before
+    assert polled(-240.0) == pytest.approx(before - 240 / 60 / 2 * period)
+
+
+def test_after_a_long_pause_the_position_is_where_it_was() -> None:
+    joint = Joint(lambda: 'belt', lambda: 1.0)
+    for at in (1.0, 2.0, 62.0):
+        joint.move(Snapshot(at, True, False, '', speed=60.0))
+    assert joint.state(Time(), '').position[0] == pytest.approx(_RADIANS)
 
 
 def test_a_joint_command_without_our_joint_is_reported_once(bench: Bench) -> None:
