@@ -102,7 +102,9 @@ def test_the_motor_stops_although_the_system_reports_no_error(
 
 
 def test_an_end_connects_once_more_before_it_gives_up(bench: Bench, server: DeviceServer) -> None:
-    driver = bench.driver(*FULL_RATE, '-p', 'lost_after:=30.0')
+    driver = bench.driver(
+        *FULL_RATE, '-p', 'lost_after:=30.0', '-p', 'shutdown_timeout:=30.0'
+    )
     client = bench.client().connected()
     with client.run_at(_SPEED):
         server.mute = True
