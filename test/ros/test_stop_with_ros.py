@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
+import re
 import signal
 import time
 from types import SimpleNamespace
@@ -22,7 +23,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.node.other_lines import PERIOD, OtherLines
+from nfo_sinus_driver.node.other_lines import OtherLines
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _TWO = """
@@ -37,6 +38,9 @@ _SOON = 0.5
 #: What is said of a drive of another line that is not there, and of one that comes then.
 _MISSED = 'does not stop with it'
 _FOUND = 'is there now: it stops with this drive'
+#: A drive that is never there. A driver says last that it misses this one, so that by then it has
+#: looked for all: of a drive that is there from the beginning it says nothing.
+_NOBODY = '/vanished/drive'
 
 
 @needs('own')
@@ -131,13 +135,14 @@ class Line(NamedTuple):
         ]
 
 
-def wait_until_found(driver: Process, absent: int = 0) -> None:
-    """Wait until a driver that enables has found the drives of other lines, but for the absent."""
-    # nothing is said before it has looked
-    time.sleep(2 * PERIOD)
-    wait_until(
-        lambda: driver.text.count(_MISSED) == driver.text.count(_FOUND) + absent, 'it found them'
-    )
+def wait_until_found(driver: Process) -> None:
+    """Wait until a driver that enables has found the drives of other lines, all but one."""
+
+    def found() -> bool:
+        last = dict(re.findall(rf'(\S+) ({_MISSED}|{_FOUND})', driver.text))
+        return {name for name, what in last.items() if what == _MISSED} == {_NOBODY}
+
+    wait_until(found, 'it found them')
 
 
 @pytest.fixture
@@ -151,7 +156,7 @@ def lines(bench: Bench) -> Iterator[tuple[Line, Line]]:
 
 def _line(bench: Bench, namespace: str, other: str) -> Line:
     place = ('-r', f'__ns:={namespace or "/"}', '-r', '__node:=drive')
-    settings = ('-p', 'setpoint_timeout:=0.0', '-p', f'stop_with:=[{other}]')
+    settings = ('-p', 'setpoint_timeout:=0.0', '-p', f'stop_with:=[{other}, {_NOBODY}]')
     return Line(
         bench,
         bench.simulator(*bench.drives.ramps(1)),
@@ -210,20 +215,20 @@ def test_two_that_name_each_other_stop_once_and_can_be_enabled_again(
 @needs('own')
 def test_what_does_not_stop_with_it_is_said_and_keeps_no_stop(bench: Bench) -> None:
     bench.simulator()
-    driver = bench.driver('-p', 'stop_with:=[/missing/drive, /deaf/drive, /refusing/drive]')
+    driver = bench.driver('-p', f'stop_with:=[{_NOBODY}, /deaf/drive, /refusing/drive]')
     client = bench.client().connected()
     client.node.create_service(Trigger, '/refusing/drive/stop', _refuse)
     with deaf(bench.domain, '/deaf/drive/stop'):
         assert client.enable().success
         warned = (
-            '/missing/drive does not stop with it: nothing offers /missing/drive/stop; start its '
+            f'{_NOBODY} does not stop with it: nothing offers {_NOBODY}/stop; start its '
             'driver, or correct stop_with'
         )
         wait_until(lambda: warned in driver.text, 'a warning while it is enabled')
-        wait_until_found(driver, absent=1)
+        wait_until_found(driver)
         assert client.call('stop').success
         for said in (
-            '/missing/drive does NOT stop with it: nothing offers /missing/drive/stop; use its',
+            f'{_NOBODY} does NOT stop with it: nothing offers {_NOBODY}/stop; use its',
             '/refusing/drive does NOT stop with it: it cannot; use its enable input',
             '/deaf/drive does NOT stop with it: no answer of /deaf/drive/stop in 3 s; use its',
         ):
