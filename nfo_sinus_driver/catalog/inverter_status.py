@@ -26,6 +26,8 @@ NO_CODE = -1
 _DRIVEN = frozenset(
     (State.OPERATION_ENABLED, State.STOPPING, State.QUICK_STOP, State.FAULT_REACTION_ACTIVE)
 )
+#: What a drive is in when its ramp to a stop is over.
+_AFTER_RAMP = frozenset((State.READY_TO_SWITCH_ON, State.SWITCHED_ON))
 
 
 @dataclass(frozen=True)
@@ -249,7 +251,13 @@ class InverterStatus:
             return self.tuning or self.unknown or self._driven_by_code
         stands = self.by_frequency and self.frequency == 0
         turns = self._only_frequency and abs(self.frequency) > 0
-        return turns or (self.state in _DRIVEN and not stands)
+        return turns or self.ramp_hidden or (self.state in _DRIVEN and not stands)
+
+    @property
+    def ramp_hidden(self) -> bool:
+        """The frequency alone shows that the motor is driven, on its ramp to a stop."""
+        hides = self.model.profile.status_word.hides_ramp and self.state in _AFTER_RAMP
+        return hides and abs(self.frequency) > 0
 
     @property
     def _only_frequency(self) -> bool:

@@ -146,6 +146,8 @@ class StatusWord:
     :ivar shown: which bits of it are published.
     :ivar by_frequency: it goes on saying that the motor runs while that ramps to a stop, so that
         the frequency has to show; it is read with every status.
+    :ivar hides_ramp: it may say that the drive is only ready, or switched on, while the motor ramps
+        to a stop: its frequency shows that.
     :ivar only_frequency: it may say that the motor runs, or that it does not, while it does the
         other: whether it turns is for the frequency alone to show.
     :ivar frequency_beside: the frequency comes in the telegram of the status word, and is read with
@@ -164,6 +166,7 @@ class StatusWord:
     code: Callable[[int], int] | None = None
     shown: int = 0xFFFFFFFF
     by_frequency: bool = False
+    hides_ramp: bool = False
     only_frequency: bool = False
     frequency_beside: bool = False
     runs_by_turning: bool = False

@@ -38,6 +38,8 @@ from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
 
 #: How long a stop at the end of a release may take at least, s.
 _LEAST_PATIENCE = 1.0
+#: How long a motor that was released may be shown as driven still, by its voltage, s.
+_RELEASED_WITHIN = 0.1
 
 
 class Controller:
@@ -264,11 +266,19 @@ class Controller:
         if not status.driven:
             return self._state.report(Cause.COASTING if self._sequence.coasts else Cause.STOPPED)
         try:
-            coasts = await self._state.coasts_to_stop()
+            coasts = await self._coasts(status)
         except LinkError:
             # the stop is confirmed all the same
             return self._state.report(Cause.STOPPING)
         return Report(Cause.COASTING if coasts else Cause.RAMPING)
+
+    async def _coasts(self, status: InverterStatus) -> bool:
+        """Return whether a motor that is shown as driven after a stop is released all the same."""
+        coasts = await self._state.coasts_to_stop()
+        if coasts is not None or status.by_frequency:
+            return bool(coasts)
+        await self._bus.sleep(_RELEASED_WITHIN)
+        return not (await self._state.read_status(Priority.LOOK)).driven
 
     async def take_control(self, control_mode: str) -> None:
         """Put the drive under bus control for a procedure, with no run command active."""

@@ -641,14 +641,15 @@ class DriveState:
         except LinkError:
             return known
 
-    async def coasts_to_stop(self) -> bool:
-        """Return whether an ordinary stop releases the motor [C97], as far as is known."""
+    async def coasts_to_stop(self) -> bool | None:
+        """Return whether an ordinary stop releases the motor [C97]; ``None``: it is not known."""
         key = self.model.key(Role.STOP_MODE)
         if self.params.reaches(key):
             return await self.params.read(key, Priority.STOP) == self.model.profile.releases
         status = self.status
-        shown = status is not None and Fact.STOP_MODE_BRAKE in status.valid
-        return shown and status is not None and Fact.STOP_MODE_BRAKE not in status.facts
+        if status is None or Fact.STOP_MODE_BRAKE not in status.valid:
+            return None
+        return Fact.STOP_MODE_BRAKE not in status.facts
 
     async def read_start_delay(self) -> float:
         """Read how long the drive waits after a run command, s; if unknown, an hour."""

@@ -467,7 +467,7 @@ class StopSequence:
         """
         if status.runs_by_bus and await self._has_run_command(status):
             return self._state.report(Cause.RUN_COMMAND_STANDS)
-        if status.driven:
+        if status.driven and not status.ramp_hidden:
             # it is on its way
             return None
         self._measured = status = await self._state.measured_with(

@@ -21,6 +21,7 @@ import pytest
 from support.described import DescribedRig
 from support.rig import CONNECTIONS, Rig
 from support.said import said
+from support.variants import ramps
 from test_described_oddities import PLAIN, described
 from test_every_step_of_a_stop import QUICK, STOPS
 
@@ -103,6 +104,56 @@ def test_what_is_not_clear_is_reported_in_the_end_and_forbids_no_enable(connecti
         assert not rig.drive.stop_unconfirmed
         rig.enable()
         assert not rig.drive.stop_overdue
+
+
+# --- what the answer says of the way there --------------------------------------------------------
+
+#: The settings by which an ordinary stop releases the motor.
+_RELEASED: dict[str, dict[str, Any]] = {
+    'sinus_g2': {'control.st_mode': 'Release'},
+    'sinus_optimal': {'control.st_mode': 'Release'},
+    'sinus_h': {'adv.stop_mode': 'Free-Run'},
+}
+_AS_SET = [pytest.param(name, {}, id=f'{name}-as set') for name in CONNECTIONS] + [
+    pytest.param(name, _RELEASED[one.model], id=f'{name}-to release')
+    for name, one in CONNECTIONS.items() if one.model in _RELEASED
+]
+_WAYS = {
+    'stop': lambda drive: drive.stop(),
+    'quick stop': lambda drive: drive.quick_stop(),
+    'rapid stop': lambda drive: drive.rapid_stop(),
+    'release': lambda drive: drive.disconnect(1.0),
+}
+_SAYS_RAMPS = (Cause.RAMPING, Cause.RAPID_STOPPING)
+_SAYS_RELEASED = (
+    Cause.COASTING, Cause.QUICK_STOPPED, Cause.COASTED_FOR_TIMEOUT,
+    # a drive measures 0 while the motor is released
+    Cause.STOPPED,
+)
+
+
+@pytest.mark.parametrize('way', _WAYS)
+@pytest.mark.parametrize(('connection', 'set_to'), _AS_SET)
+def test_a_motor_ramps_or_is_released_as_the_answer_says(
+    connection: str, set_to: dict[str, Any], way: str
+) -> None:
+    one = CONNECTIONS[connection]
+    slow = ramps(one.model, 0.3, 6.0)
+    with Rig(connection, parameters={**slow, **one.parameters, **set_to}, line=QUICK) as rig:
+        rig.turn()
+        rig.send(None)
+        driven: set[bool] = set()
+
+        def look() -> None:
+            if abs(rig.far.motor.rotor) > 1.0:
+                driven.add(rig.far.motor.driven)
+
+        rig.looked = look
+        stop = _WAYS[way](rig.drive)
+        rig.answer(stop)
+        rig.wait_until(lambda: not rig.far.motor.turning, 30.0)
+        released = False in driven
+        assert cause_of(stop) in (_SAYS_RELEASED if released else _SAYS_RAMPS), said(stop.result())
 
 
 def test_a_motor_that_coasts_is_stopped_as_soon_as_its_speed_falls() -> None:

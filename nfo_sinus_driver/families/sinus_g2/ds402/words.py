@@ -93,6 +93,8 @@ STATUS_WORD = StatusWord(
     by_state={State.QUICK_STOP: Fact.QUICK_STOP_ACTIVE},
     # on the ramp to a stop it may say that operation is enabled
     by_frequency=True,
+    # or, as a machine of CiA 402 has no state for that ramp, what comes after it
+    hides_ramp=True,
 )
 
 #: What the first digit of Error_Code says, and by which class the rest is named [CiA 402].
