@@ -18,7 +18,7 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from nfo_sinus_driver.drive import Cause, DriveError, DriveSettings, ParameterChange, Report
+from nfo_sinus_driver.drive import Cause, DriveError, DriveSettings, Report
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.callers import Call
 from nfo_sinus_driver.node.commands import CommandServices, ErrorLogServices, TuningServices
@@ -158,17 +158,20 @@ class DriveNode(LifecycleNodeMixin, Node):
         if self._ending:
             return TransitionCallbackReturn.FAILURE
         try:
-            is_wanted = self.managed.connect(retry=self.lifecycle.by_operator)
+            self.managed.connect(retry=self.lifecycle.by_operator)
         except (DriveError, NodeError, ValueError) as error:
             # the bus node reports a lost port, for all its drives
             port_lost = self._bus_context.bus.port_error is not None
             self.lifecycle.complain(self.managed.wording.say(error), known=port_lost)
             return TransitionCallbackReturn.FAILURE
+        with self._drive_parameters.alone():
+            is_wanted = self.managed.keep()
+            if is_wanted:
+                self._drive_parameters.declare(self.managed.drive)
         if not is_wanted:
             self.get_logger().info('the settings were changed meanwhile: beginning again')
             self._stop_for('let go', self.managed.disconnect)
             return TransitionCallbackReturn.FAILURE
-        self._drive_parameters.declare(self.managed.drive)
         self._apply_desired_config()
         self.lifecycle.note_transition()
         return TransitionCallbackReturn.SUCCESS
@@ -296,9 +299,15 @@ class DriveNode(LifecycleNodeMixin, Node):
         try:
             self._settings_with(parameters)
             changes = self._drive_parameters.write(parameters)
-            for parameter in parameters:
-                if parameter.name == 'drive_timeout':
-                    self._try_drive_timeout(parameter.value, changes)
+            try:
+                # it may have been enabled while that was written
+                self._settings_with(parameters)
+                for parameter in parameters:
+                    if parameter.name == 'drive_timeout':
+                        self._try_drive_timeout(parameter.value)
+            except (ValueError, NodeError):
+                self._drive_parameters.put_back(changes)
+                raise
         except (ValueError, DriveError, NodeError) as error:
             reason = self.managed.wording.say(error)
             return SetParametersResult(successful=False, reason=reason)
@@ -339,14 +348,13 @@ class DriveNode(LifecycleNodeMixin, Node):
             if changed.get(name, now) != now and self.managed.drive.following:
                 raise ValueError(f'{name} can only be changed while the drive is not enabled')
 
-    def _try_drive_timeout(self, seconds: float, changes: Sequence[ParameterChange]) -> None:
-        """Set the drive's own time-out, or undo changes; without a drive configure does it."""
+    def _try_drive_timeout(self, seconds: float) -> None:
+        """Set the drive's own time-out, or raise why not; without a drive configure does it."""
         managed = self.managed
         if managed.state in ('inactive', 'active') and seconds != managed.settings.drive_timeout:
             try:
                 managed.drive.set_drive_timeout(seconds).result(_LONGEST_STOP)
             except (DriveError, FutureTimeoutError) as error:
-                self._drive_parameters.put_back(changes)
                 why = self.managed.wording.say(error) or 'not in time'
                 raise NodeError(f'drive_timeout: {why}') from None
 

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import TimeoutError as FutureTimeoutError
 import contextlib
 import threading
+import time
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
@@ -22,6 +23,8 @@ from nfo_sinus_driver.node.wording import NodeError
 
 #: How long a change may wait for the bus, s.
 _LONGEST_CHANGE = 30.0
+#: How often it is checked whether what a client sets has ended, s.
+_LOOK_PERIOD = 0.002
 
 _LATER = '; those of the drive are there once the node is configured'
 _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text'}
@@ -48,9 +51,23 @@ class DriveParameters:
 
     # --- from the drive -----------------------------------------------------------------------
 
+    @contextlib.contextmanager
+    def alone(self) -> Iterator[None]:
+        """Let what a client sets now end, and keep all parameter services waiting meanwhile."""
+        group = self._node.default_callback_group
+        while not group.beginning_execution(self._guard):
+            time.sleep(_LOOK_PERIOD)
+        try:
+            yield
+        finally:
+            group.ending_execution(self._guard)
+            if self._node.executor is not None:
+                # it did not wait for what could not run
+                self._node.executor.wake()
+
     def declare(self, drive: Drive) -> None:
-        """Declare the settings of the drive, with the values that it has."""
-        self.undeclare()
+        """Declare the settings of the drive, with the values that it has; within :meth:`alone`."""
+        self._undeclare()
         self._drive = drive
         for key, value in drive.parameters.values.items():
             self._node.declare_parameter(
@@ -62,6 +79,11 @@ class DriveParameters:
 
     def undeclare(self) -> None:
         """Undeclare them: what the drive has is not known any more."""
+        # what is being set would be stored after that, and no declaring could follow
+        with self.alone():
+            self._undeclare()
+
+    def _undeclare(self) -> None:
         self._drive = None
         while self._declared:
             key = self._declared.pop()

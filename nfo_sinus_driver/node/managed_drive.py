@@ -63,6 +63,8 @@ class ManagedDrive:
         #: What ``model: auto`` stands for, as far as it is known.
         self._found_model = DriveSettings().model
         self._drive = self._make_drive()
+        #: It is that of the node until :meth:`disconnect`.
+        self._kept = False
 
     @property
     def line_check(self) -> str:
@@ -99,7 +101,7 @@ class ManagedDrive:
     @property
     def may_be_another(self) -> bool:
         """No drive belongs to the node yet; one that is still looked for does not count."""
-        return self.state in ('unconfigured', 'configuring')
+        return self.state in ('unconfigured', 'configuring') and not self._kept
 
     @property
     def is_silent(self) -> bool:
@@ -117,12 +119,11 @@ class ManagedDrive:
             raise NodeError(self._lifecycle.why_not_active)
         return self._drive
 
-    def connect(self, *, retry: bool) -> bool:
+    def connect(self, *, retry: bool) -> None:
         """
         Connect to the drive of the settings, and poll it from then on.
 
         :param retry: repeat the first request when there is no response.
-        :returns: false if the settings mean another one by now.
         :raises DriveError: it does not respond, or may not be taken over.
         :raises NodeError: the one before has not stopped yet.
         :raises ValueError: the model that was found does not have all that is set.
@@ -139,13 +140,22 @@ class ManagedDrive:
                 self._drive.require_standing().result()
             self._drive = self._make_drive()
         self._drive.connect(retry=retry, parameters=True).result()
-        wanted = self._is_wanted
-        if wanted:
+
+    def keep(self) -> bool:
+        """
+        Keep the drive that was connected; false if the settings mean another one by now.
+
+        From then on they cannot, and each change is for this drive. No client may change them
+        meanwhile.
+        """
+        self._kept = self._is_wanted
+        if self._kept:
             self._drive.settings = self._concrete
-        return wanted
+        return self._kept
 
     def disconnect(self, why: Report) -> Future[Report]:
         """Stop the motor, release control and disconnect."""
+        self._kept = False
         return self._drive.disconnect(self._settings.shutdown_timeout, why)
 
     def _make_drive(self) -> Drive:
@@ -163,7 +173,12 @@ class ManagedDrive:
     @property
     def _is_wanted(self) -> bool:
         """The present drive is still the one of the settings."""
+        try:
+            wanted = self._concrete
+        except ValueError:
+            # no such drive can be: the next try says why
+            return False
         return all(
-            getattr(self._drive.settings, name) == getattr(self._concrete, name)
+            getattr(self._drive.settings, name) == getattr(wanted, name)
             for name in ONLY_UNCONFIGURED
         )

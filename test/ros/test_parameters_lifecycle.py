@@ -5,9 +5,16 @@
 
 from __future__ import annotations
 
-from bench import Bench, Client, wait_until
+from collections.abc import Callable, Iterator
+import contextlib
+import itertools
+import threading
+from typing import Any
+
+from bench import PATIENCE, Bench, Client, wait_until
 from connections import needs
 from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from parameter_bench import (
     QUIET,
     Wire,
@@ -19,6 +26,8 @@ from parameter_bench import (
     values,
     written,
 )
+import pytest
+from rcl_interfaces.srv import ListParameters
 
 pytestmark = needs('parameters')
 
@@ -195,3 +204,103 @@ def test_two_drives_have_parameters_of_their_own(bench: Bench) -> None:
     assert set_one(clients[0], 'control.accel', 8.0).successful
     refused(set_one(clients[1], 'control.accel', 8.0), 'control.accel', 'check the cable')
     left.inject('silence', 0.0, address=2)
+
+
+#: Many settings, so that to write them takes a while; on every way into a G2.
+_MANY = {
+    f'{group}.{name}{number}': value
+    for group, name, value in (
+        ('freque', 'f_fix', 11.0), ('speed', 'c_fix', 110.0), ('torque', 't_fix', 11.0)
+    )
+    for number in range(1, 8)
+}
+
+
+@pytest.fixture
+def calling(bench: Bench) -> Iterator[Callable[[Callable[[Client], Any]], None]]:
+    """Return what has a client call something over and over; each call has to be answered."""
+    with contextlib.ExitStack() as stack:
+
+        def call_on(call: Callable[[Client], Any]) -> None:
+            client, ended = bench.client(), threading.Event()
+            answered: list[bool] = []
+
+            def run() -> None:
+                while not ended.is_set():
+                    future = call(client)
+                    wait_until(future.done, 'a call is answered', period=0.002)
+                answered.append(True)
+
+            thread = threading.Thread(target=run, daemon=True)
+            thread.start()
+
+            def end() -> None:
+                ended.set()
+                thread.join()
+                assert answered, 'every call was answered'
+
+            stack.callback(end)
+
+        yield call_on
+
+
+def test_what_clients_set_and_list_meanwhile_hinders_no_transition(
+    bench: Bench, calling: Callable[[Callable[[Client], Any]], None]
+) -> None:
+    bench.simulator()
+    bench.driver(*QUIET, '-p', 'autostart:=false')
+    client = bench.client()
+    value = itertools.cycle((6.0, 7.0))
+    calling(lambda one: one.set_parameters_async(**{'control.accel': next(value)}))
+    calling(lambda one: one.call_async('list_parameters', ListParameters))
+    for _ in range(4):
+        assert client.change_state(Transition.TRANSITION_CONFIGURE)
+        assert 'control.accel' in client.parameter_names()
+        assert client.change_state(Transition.TRANSITION_CLEANUP)
+        assert 'control.accel' not in client.parameter_names()
+
+
+def test_a_setting_that_is_taken_while_the_node_is_configured_is_that_of_the_drive(
+    bench: Bench,
+) -> None:
+    drive = bench.simulator(*bench.drives.ramps(0.2))
+    wanted = [word for name, value in _MANY.items() for word in ('-p', f'{name}:={value}')]
+    driver = bench.driver(*wanted, '-p', 'autostart:=false', '-p', 'setpoint_timeout:=0.0')
+    client = bench.client()
+    client.state()
+    configuring = client.call_async(
+        'change_state', ChangeState, transition=Transition(id=Transition.TRANSITION_CONFIGURE)
+    )
+    wait_until(lambda: 'read in' in driver.text, 'its settings are read', period=0.002)
+    # from here on it belongs to that address
+    elsewhere = client.set_parameters(address=2)
+    taken = client.set_parameters(setpoint_timeout=0.3)
+    wait_until(configuring.done, 'configured')
+    assert configuring.result().success
+    assert not elsewhere.successful
+    assert client.parameter('address') == 1
+    assert taken.successful
+    assert client.change_state(Transition.TRANSITION_ACTIVATE)
+    with client.run_at(20.0):
+        pass
+    drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+
+
+def test_what_a_set_point_means_never_changes_while_enabled(bench: Bench) -> None:
+    drive = bench.simulator()
+    bench.driver(*QUIET)
+    client = bench.client().connected()
+    before = values(client, 'gear_ratio', *_MANY)
+    first, *_ = _MANY
+    changing = client.set_parameters_async(gear_ratio=-20.0, **_MANY)
+    drive.wait_for(lambda state: state['parameters'][first] == _MANY[first], timeout=PATIENCE)
+    enabled = client.enable()
+    wait_until(changing.done, 'the change is answered')
+    result = changing.result().result
+    # the one or the other
+    assert enabled.success != result.successful, (enabled.message, result.reason)
+    if enabled.success:
+        refused(result, 'gear_ratio', 'not enabled')
+        assert values(client, 'gear_ratio', *_MANY) == before
+        has = drive.state()['parameters']
+        assert {name: has[name] for name in _MANY} == {name: before[name] for name in _MANY}
