@@ -330,6 +330,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         for name in ONLY_UNCONFIGURED:
             self._require_same(name, changed.get(name, values[name]) == values[name])
         settings = self._drive_settings({**values, **changed})
+        self.managed.require_possible(settings)
         means_the_same = settings.telegram_speed == self.managed.settings.telegram_speed
         self._require_same('expected_control_mode, by telegram 1,', means_the_same)
         return settings

@@ -82,6 +82,11 @@ class ManagedDrive:
         """The wanted settings; the drive has them once it is connected."""
         return self._settings
 
+    def require_possible(self, settings: DriveSettings) -> None:
+        """Make sure that the drive can have these settings, or raise a ValueError."""
+        if not self.may_be_another:
+            self._of_found(settings)
+
     def change_settings(self, settings: DriveSettings) -> None:
         """Change the wanted settings; a drive that is connected takes them at once."""
         self._settings = settings
@@ -166,9 +171,12 @@ class ManagedDrive:
     @property
     def _concrete(self) -> DriveSettings:
         """The settings with a concrete model; a ValueError if it does not have all that is set."""
-        if self._settings.model != AUTO:
-            return self._settings
-        return dataclasses.replace(self._settings, model=self._found_model)
+        return self._of_found(self._settings)
+
+    def _of_found(self, settings: DriveSettings) -> DriveSettings:
+        if settings.model != AUTO:
+            return settings
+        return dataclasses.replace(settings, model=self._found_model)
 
     @property
     def _is_wanted(self) -> bool:

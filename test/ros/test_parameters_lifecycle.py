@@ -304,3 +304,20 @@ def test_what_a_set_point_means_never_changes_while_enabled(bench: Bench) -> Non
         assert values(client, 'gear_ratio', *_MANY) == before
         has = drive.state()['parameters']
         assert {name: has[name] for name in _MANY} == {name: before[name] for name in _MANY}
+
+
+@pytest.mark.parametrize(
+    ('name', 'value'), [('measured', ['no.such']), ('drive_timeout', 30.0)]
+)
+def test_a_setting_that_the_model_found_cannot_have_is_refused(
+    bench: Bench, name: str, value: Any
+) -> None:
+    bench.simulator()
+    bench.driver(*QUIET, '-p', 'model:=auto', '-p', 'drive_timeout:=2.0')
+    client = bench.client().connected()
+    before = client.parameter(name)
+    result = client.set_parameters(**{name: value})
+    refused(result, name)
+    assert client.parameter(name) == before
+    assert client.set_parameters(frame_id='belt').successful
+    assert client.parameter('frame_id') == 'belt'
