@@ -82,7 +82,9 @@ class CommandServices:
         for service in (enable, stop, quick_stop, rapid_stop, acknowledge):
             publish_calls(node, service)
         self.offer(
-            '~/refresh_parameters', lambda drive, _: drive.parameters.refresh(), _LONGEST_REFRESH
+            '~/refresh_parameters',
+            lambda *_: managed.require_kept().parameters.refresh(),
+            _LONGEST_REFRESH,
         )
 
     def offer(self, name: str, command: _Command, timeout: float) -> Service:

@@ -59,8 +59,9 @@ def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str
         return DiagnosticStatus.ERROR, message
     if not snapshot.connected:
         if not managed.is_silent:
-            # a node that is not configured has nothing to report
-            return DiagnosticStatus.OK, 'not connected: the node is not configured'
+            # its drive is left alone
+            why = 'was shut down' if managed.state == 'finalized' else 'is not configured'
+            return DiagnosticStatus.OK, f'not connected: the node {why}'
         why = managed.why_silent or 'the log of the node says what to check'
         return DiagnosticStatus.ERROR, f'not connected: {why}'
     level = _LEVELS[snapshot.kind]

@@ -212,6 +212,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         if self.managed.drive.identity is not None:
             self._stop_for('shut down', self.managed.drive.stop)
             self._stop_for('shut down', self.managed.disconnect)
+        self._drive_parameters.undeclare()
         return TransitionCallbackReturn.SUCCESS
 
     @_guarded

@@ -49,20 +49,19 @@ class Lifecycle:
         """Its label, such as ``active``."""
         return state_label(self._node)
 
-    @property
-    def why_not_active(self) -> str:
-        """Why the node is not active, and what to do."""
+    def why_not(self, transition: str) -> str:
+        """Return why the node is not where a transition leads, and what to do."""
         if self.state == 'finalized':
             return 'the node was shut down: start the driver again'
         if self.complaint:
             return f'the drive has not answered yet: {self.complaint}'
-        return f'the node is {self.state}: activate it first'
+        return f'the node is {self.state}: {transition} it first'
 
     @property
     def wanted(self) -> bool:
         """A client has configured the node, or autostart is trying to."""
         trying = self._autostart.is_alive() and not self._over.is_set()
-        return self.state != 'unconfigured' or trying
+        return self.state not in ('unconfigured', 'finalized') or trying
 
     @property
     def by_operator(self) -> bool:

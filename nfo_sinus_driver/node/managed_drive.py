@@ -121,7 +121,13 @@ class ManagedDrive:
     def require_active(self) -> Drive:
         """Return the drive for a command that may turn the motor, or a NodeError why not."""
         if not self.active:
-            raise NodeError(self._lifecycle.why_not_active)
+            raise NodeError(self._lifecycle.why_not('activate'))
+        return self._drive
+
+    def require_kept(self) -> Drive:
+        """Return the drive for what only reads it, or a NodeError why it is left alone."""
+        if not self._kept:
+            raise NodeError(self._lifecycle.why_not('configure'))
         return self._drive
 
     def connect(self, *, retry: bool) -> None:

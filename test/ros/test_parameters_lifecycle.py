@@ -13,6 +13,7 @@ from typing import Any
 
 from bench import PATIENCE, Bench, Client, wait_until
 from connections import needs
+from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from parameter_bench import (
@@ -321,3 +322,29 @@ def test_a_setting_that_the_model_found_cannot_have_is_refused(
     assert client.parameter(name) == before
     assert client.set_parameters(frame_id='belt').successful
     assert client.parameter('frame_id') == 'belt'
+
+
+@pytest.mark.parametrize('ways', [
+    (Transition.TRANSITION_ACTIVE_SHUTDOWN,),
+    (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP),
+])
+def test_a_drive_that_is_let_go_is_left_alone(bench: Bench, ways: tuple[int, ...]) -> None:
+    bench.simulator()
+    bench.driver(*QUIET)
+    client = bench.client().connected()
+    own = client.parameter_names() - set(settings(bench.connection))
+    assert all(map(client.change_state, ways))
+    assert client.parameter_names() == own
+    requests = len(bench.requests())
+    refused(set_one(client, 'control.accel', 7.0), 'control.accel')
+    answer = client.call('refresh_parameters')
+    assert not answer.success
+    assert 'configure it first' in answer.message or 'was shut down' in answer.message
+    assert len(bench.requests()) == requests
+    # and nobody misses it
+    heard = len(client.messages['diagnostics'])
+    wait_until(lambda: len(client.messages['diagnostics']) > heard + 1, 'what is known now')
+    found = {one.name: one for one in client.messages['diagnostics'][-1].status}
+    assert {one.level for one in found.values()} == {DiagnosticStatus.OK}, found
+    assert 'not connected' in found['nfo_sinus: drive'].message
+    assert list(client.newest('statistics').silent_drives) == []
