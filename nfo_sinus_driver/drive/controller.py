@@ -192,7 +192,7 @@ class Controller:
         """
         self.require_newer(requested_at)
         if self._control.enabled:
-            return Report(Cause.ENABLED_ALREADY)
+            return await self._enabled_already()
         await self._require_enable()
         self._enabling = self._bus.current
         self._control.dispatch(ControlEvent.ENABLE)
@@ -205,6 +205,15 @@ class Controller:
             return Report(Cause.ENABLED)
         reference = self._state.settings.reference
         return Report(Cause.ENABLED_BY_OWN_REFERENCE, reference=reference)
+
+    async def _enabled_already(self) -> Report:
+        """Return that the motor is enabled; it may have stopped by itself since the last poll."""
+        status = await self._state.read_status(Priority.SERVICE)
+        self._state.require_fresh(status)
+        self.on_status(status)
+        if not self._control.enabled:
+            raise DriveError(self.stopped_for or Report(Cause.STOP_PENDING))
+        return Report(Cause.ENABLED_ALREADY)
 
     async def _check(self) -> tuple[str, Limits]:
         """

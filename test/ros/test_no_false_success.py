@@ -116,6 +116,27 @@ def test_a_time_of_reception_counts() -> None:
     assert abs(time.monotonic() - 600.0 - received) < PATIENCE
 
 
+@pytest.mark.each_kind
+@needs('run_input')
+def test_a_second_enable_of_a_drive_that_has_stopped_by_itself_is_no_success(
+    bench: Bench
+) -> None:
+    drive = bench.simulator(*bench.drives.ramps(0.2))
+    # the next poll comes much later than the call
+    bench.driver('-p', 'poll_rate:=1.0')
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        for _ in range(3):
+            drive.inject('run', False)
+            drive.wait_for(lambda state: not state['driven'], timeout=PATIENCE)
+            answer = client.enable()
+            assert not answer.success, answer.message
+            drive.inject('run', True)
+            wait_until(lambda: client.enable().success, 'it can be enabled', period=0.05)
+            again = client.enable()
+            assert again.success and 'already' in again.message
+
+
 def test_an_exit_before_the_first_answer_stops_a_motor_that_runs_by_the_bus(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(0.5), paced=True)
     first = bench.driver()
