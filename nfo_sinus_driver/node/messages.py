@@ -202,7 +202,8 @@ class Joint:
         self._ratio = ratio
         self._position = 0.0
         self._velocity = math.nan
-        self._at = 0.0
+        #: The speed that was measured last while the drive was connected without a break, and when.
+        self._known = math.nan, 0.0
 
     @property
     def name(self) -> str:
@@ -211,12 +212,15 @@ class Joint:
 
     def move(self, snapshot: Snapshot) -> None:
         """Take the speed of a poll; the position is its integral while the drive is connected."""
-        before, self._velocity = self._velocity, math.nan
+        self._velocity = math.nan
         if snapshot.connected:
             self._velocity = snapshot.speed * _RPM / self._ratio()
-        step, self._at = snapshot.at - self._at, snapshot.at
-        way = (before + self._velocity) / 2 * step
-        if 0 < step < _LONGEST_STEP and not math.isnan(way):
+            if math.isnan(self._velocity):
+                # one answer that was lost or impossible; the motor turns on
+                return
+        (before, at), self._known = self._known, (self._velocity, snapshot.at)
+        way = (before + self._velocity) / 2 * (snapshot.at - at)
+        if 0 < snapshot.at - at < _LONGEST_STEP and not math.isnan(way):
             self._position += way
 
     def state(self, stamp: Time, frame_id: str) -> JointState:

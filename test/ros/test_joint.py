@@ -113,6 +113,18 @@ def test_position_is_the_integral_of_the_speed_while_connected(period: float) ->
     assert polled(-240.0) == pytest.approx(before - 240 / 60 / 2 * period)
 
 
+@pytest.mark.parametrize('speeds', [
+    (60.0, 60.0, 60.0, 60.0), (60.0, math.nan, 60.0, 60.0), (60.0, math.nan, math.nan, 60.0)
+])
+def test_a_speed_that_was_not_measured_costs_no_way(speeds: tuple[float, ...]) -> None:
+    joint = Joint(lambda: 'belt', lambda: 1.0)
+    for at, rpm in enumerate(speeds, start=1):
+        joint.move(Snapshot(at, True, False, '', speed=rpm))
+        state = joint.state(Time(), '')
+        assert state.velocity[0] == pytest.approx(rpm / 60 * _RADIANS, nan_ok=True)
+    assert state.position[0] == pytest.approx(3 * _RADIANS)
+
+
 def test_after_a_long_pause_the_position_is_where_it_was() -> None:
     joint = Joint(lambda: 'belt', lambda: 1.0)
     for at in (1.0, 2.0, 62.0):
