@@ -68,12 +68,14 @@ class Exchange:
 
     :ivar require_wanted: called by the worker at the moment of sending; what it raises goes to the
         coroutine, and nothing is sent.
+    :ivar anew: it is read once more already, because what it read was old.
     """
 
     unit: int
     operation: Operation
     priority: Priority
     require_wanted: Callable[[], None] = lambda: None
+    anew: bool = False
 
     @property
     def writes(self) -> bool:
@@ -94,8 +96,8 @@ class Exchange:
         operation = self.operation
         if isinstance(operation, WriteAndRead):
             return reply._replace(data=b'')
-        if isinstance(operation, Read) and not operation.once:
-            self.operation = operation._replace(once=True)
+        if isinstance(operation, Read) and not (operation.once or self.anew):
+            self.anew = True
             raise InProgress(reply.arrived)
         return reply
 

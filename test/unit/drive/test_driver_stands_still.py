@@ -11,9 +11,12 @@ from __future__ import annotations
 
 from collections import Counter
 import itertools
+from typing import Any
 
 import pytest
 from support.rig import CONNECTIONS, Rig
+
+from nfo_sinus_driver.link import Reply
 
 #: For how long, s; and so short that no drive can be exchanged meanwhile.
 _STOOD, _SHORT = 5.0, 2.5
@@ -161,6 +164,23 @@ def test_no_later_fault_is_acknowledged_after_that(connection: str) -> None:
 
 def test_no_fault_behind_a_serial_one_is_acknowledged_after_that() -> None:
     stand_still_while_acknowledging('classic v5.0', _SIO_FAIL, 'fieldbus.sio_err')
+
+
+def test_what_is_read_anew_after_that_may_be_repeated_as_before() -> None:
+    # only what acknowledges is not, beside another master or where a gateway closes connections
+    with running('rtu') as rig:
+        asked: list[tuple[Any, ...]] = []
+        read = rig.link.read
+
+        def note(unit: int, *what: Any) -> Reply:
+            asked.append((unit, *what))
+            return read(unit, *what)
+
+        rig.link.read = note
+        for begins in _MOMENTS:
+            rig.line.stand_still(rig.clock.now + begins, _SHORT)
+            rig.pass_time(_SHORT + 0.5)
+        assert asked and not [one for one in asked if True in one[2:]]
 
 
 def test_a_drive_that_was_unplugged_is_found_as_soon_after_that() -> None:
