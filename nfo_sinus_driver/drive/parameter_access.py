@@ -101,9 +101,9 @@ class ParameterAccess:
         reads = model.profile.resync_reads.get(self.protocol, usual)
         ask = model.profile.why_refused
 
-        def why(read: Callable[[Address], int], before: int | None) -> tuple[int, str]:
+        def why(read: Callable[[Read], int], before: int | None) -> tuple[int, str]:
             assert ask is not None
-            return ask(lambda key: read(self.address(key)), before)
+            return ask(lambda key: read(Read(self.address(key), self._acknowledges(key))), before)
 
         bus.use_resync_reads(unit, tuple(map(self.address, reads)), ask and why)
 
@@ -191,6 +191,10 @@ class ParameterAccess:
                 lacking.add(key)
         self._lacking = frozenset(lacking)
 
+    def _acknowledges(self, key: str) -> bool:
+        """Return whether reading a parameter acknowledges."""
+        return self.model[key].access is Access.ACKNOWLEDGE
+
     def limits(self, key: str) -> tuple[float, float, float]:
         """Return the least value of a number, the greatest, and the step between two."""
         parameter = self._parameter(key)
@@ -257,7 +261,7 @@ class ParameterAccess:
 
     async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges, once: an operator has requested it."""
-        assert self.model[key].access is Access.ACKNOWLEDGE, key
+        assert self._acknowledges(key), key
         reply = await self._ask(Read(self.address(key), once=True), priority, retry=False)
         return self.value(key, reply.data)
 
@@ -267,7 +271,7 @@ class ParameterAccess:
 
         :raises LinkError: the write was not answered, or refused, whether or not the reading was.
         """
-        assert self.model[key].access is Access.ACKNOWLEDGE, key
+        assert self._acknowledges(key), key
         both = ReadThenWrite(self.address(key), *self.target(step))
         await self._ask(both, Priority.STOP, retry=False)
 
@@ -319,7 +323,13 @@ class ParameterAccess:
             return False
 
     async def read_reply(self, key: str, priority: Priority, *, retry: bool = True) -> Reply:
-        """Read the bytes of a parameter; an impossible value counts when it comes again."""
+        """
+        Read the bytes of a parameter; an impossible value counts when it comes again.
+
+        :raises ValueError: its reading acknowledges, and a motor might start by that.
+        """
+        if self._acknowledges(key):
+            raise ValueError(f'{key} is not just read: that acknowledges a fault')
         there = Read(self.address(key))
         try:
             reply = await self._ask(there, priority, retry)

@@ -24,6 +24,7 @@ from nfo_sinus_driver.link.foreign_traffic import Codec
 from nfo_sinus_driver.link.interface import (
     Address,
     Clock,
+    DamagedAnswer,
     LineSettings,
     LinkError,
     PortError,
@@ -298,7 +299,7 @@ class ClassicLink(CodecLink):
         assert address.sub_index is None
         if unit == BROADCAST:
             raise ValueError('a broadcast is not answered')
-        word, arrived = self._enquire(unit, address.index, once)
+        word, arrived = self._enquire(unit, address, once)
         return Reply(_WORD.pack(word), arrived)
 
     def write(self, unit: int, address: Address, data: bytes) -> Reply:
@@ -318,8 +319,9 @@ class ClassicLink(CodecLink):
             raise self._refusal(unit, began)
         return Reply(b'', arrived)
 
-    def _enquire(self, unit: int, number: int, once: bool = False) -> tuple[int, float]:
+    def _enquire(self, unit: int, address: Address, once: bool = False) -> tuple[int, float]:
         """Return the value of a parameter, and when it came."""
+        number = address.index
         answer, arrived = self._ask(Enquiry(unit, number), once)
         if isinstance(answer, Nak):
             text = f'the drive has no parameter E{number:04X} that can be read (NAK)'
@@ -353,7 +355,7 @@ class ClassicLink(CodecLink):
         if began - read_at >= _FRESH:
             before = None
         try:
-            return Refused(*why(lambda at: self._enquire(unit, at.index)[0], before))
+            return Refused(*why(lambda read: self._enquire(unit, *read)[0], before))
         except PortError:
             raise
         except LinkError as error:
@@ -383,10 +385,12 @@ class ClassicLink(CodecLink):
         if self._last is not None:
             self._late.expect(self._last[0], self._now())
 
-    def _ask_once(self, request: Any) -> tuple[Any, float]:
-        reply = super()._ask_once(request)
+    def _ask(self, request: Any, once: bool = False) -> tuple[Any, float]:
+        reply = super()._ask(request, once)
         if not self._again or not self._came_early(request):
             return reply
+        if once:
+            raise DamagedAnswer(f'unit {request.unit}: the answer before came twice')
         self._make_certain(request)
         return self._transact(request)
 

@@ -133,7 +133,7 @@ Operation = Read | Written | ReadThenWrite | Ask
 Plan = Generator[Operation, Reply | None, _Found]
 #: Finds out why a unit refused a write whose answer does not say it: by a call that reads a
 #: parameter, and its status just before, if that is known. Returns code and text of the refusal.
-Why = Callable[[Callable[[Address], int], int | None], tuple[int, str]] | None
+Why = Callable[[Callable[[Read], int], int | None], tuple[int, str]] | None
 
 
 class Supervision(Protocol):

@@ -10,7 +10,7 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Fact, Kind
+from nfo_sinus_driver.catalog import Access, Fact, Kind
 from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 from nfo_sinus_driver.simulator.classic import LineError
 from nfo_sinus_driver.simulator.memory import Reason, Refused
@@ -337,3 +337,18 @@ def test_a_fault_that_was_acknowledged_is_not_published_any_more(connection: str
             seen = rig.notes.snapshots
             assert any(one.enabled for one in seen)
             assert not any(one.status and one.status.faulted for one in seen), phase
+
+
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'optimal'])
+def test_a_parameter_that_is_only_read_acknowledges_nothing(connection: str) -> None:
+    with Rig(connection) as rig:
+        rig.connect()
+        acknowledging = [
+            key for key, one in rig.drive.model.items() if one.access is Access.ACKNOWLEDGE
+        ]
+        rig.far.trip(rig.a_fault)
+        rig.pass_time(0.5)
+        for key in acknowledging:
+            with pytest.raises(ValueError, match='acknowledges'):
+                rig.result(rig.drive.measure(key))
+        assert acknowledging and rig.far.faults.codes

@@ -16,9 +16,16 @@ import pytest
 from support.addresses import classic_id, packed, register, words_of
 from virtual_wire import AsciiWire, Asked, FarEnd, Fate, Wire
 
-from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog import Access, load_family
 from nfo_sinus_driver.link.classic import ClassicLink
-from nfo_sinus_driver.link.interface import Address, LineSettings, LinkError, Refused, Reply
+from nfo_sinus_driver.link.interface import (
+    Address,
+    LineSettings,
+    LinkError,
+    Read,
+    Refused,
+    Reply,
+)
 from nfo_sinus_driver.link.modbus_ascii import AsciiLink
 from nfo_sinus_driver.link.movitrac import MovitracLink
 from nfo_sinus_driver.link.request_link import RequestLink
@@ -270,8 +277,11 @@ class Classic(Bench):
         def at(key: str) -> Address:
             return Address(*model[key].at('classic').place)
 
-        def why(read: Callable[[Address], int], before: int | None) -> tuple[int, str]:
-            return ask(lambda key: read(at(key)), before)
+        def why(read: Callable[[Read], int], before: int | None) -> tuple[int, str]:
+            def once(key: str) -> bool:
+                return model[key].access is Access.ACKNOWLEDGE
+
+            return ask(lambda key: read(Read(at(key), once(key))), before)
 
         reads = [at(key) for key in model.profile.resync_reads['classic']]
         for unit in link.protocol.units:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import classic_far_end as far
 from classic_far_end import BROADCAST, INV_ST, SIO_ERR
 from hypothesis import given, strategies as st
@@ -13,8 +15,15 @@ import pytest
 from support.addresses import classic_id, packed
 from virtual_wire import DROP, REFUSE, Fate
 
-from nfo_sinus_driver.link.classic import ClassicLink
-from nfo_sinus_driver.link.interface import BAUD_RATES, DamagedAnswer, LineSettings, Refused
+from nfo_sinus_driver.link.classic import ClassicLink, Enquiry, encode
+from nfo_sinus_driver.link.interface import (
+    BAUD_RATES,
+    DamagedAnswer,
+    LineSettings,
+    Read,
+    Refused,
+    carry_out,
+)
 
 A, B, MODE = Classic.A, Classic.B, Classic.MODE
 TIMEOUT = Classic.settings.response_timeout
@@ -238,3 +247,24 @@ def test_what_was_known_of_a_drive_ends_with_the_connection() -> None:
 def test_a_reason_that_is_not_known() -> None:
     bench = Classic(REFUSE, DROP)
     refused(bench, Refused.DEVICE_FAILURE, 'why is not known')
+
+
+def test_the_flags_are_read_once_beside_another_master() -> None:
+    bench = own_fault_bench(38, 0.5, 1 << 10)
+    heard = far.reply(1, B.index, 5)
+    bench.wire.now = bench.wire.arrive(bench.wire.now, encode(Enquiry(1, B.index)) + heard) + 0.05
+    bench.drive.heal(REFUSE, Fate(), Fate(what='damage'))
+    refused(bench, Refused.DEVICE_FAILURE, 'why is not known')
+    # reading has cleared them: once more they would tell nothing, and clear what came since
+    assert bench.link.remarks.foreign_frames == 1
+    assert bench.asked.count(SIO_ERR) == 1
+
+
+@pytest.mark.parametrize('once', [True, False])
+def test_what_acknowledges_is_sent_once_behind_an_answer_that_comes_twice(once: bool) -> None:
+    bench = Classic(Fate(what='double', again=0.05))
+    bench.drive.values[A.index] = 5
+    bench.read(A)
+    with pytest.raises(DamagedAnswer) if once else contextlib.nullcontext():
+        carry_out(bench.link, 1, Read(A, once))
+    assert bench.asked.count(A.index) == (2 if once else 3)
