@@ -38,13 +38,15 @@ What a public call of :class:`Drive` guarantees when its future has a result:
                                this driver did not give is being removed.
 ``enable``                     Control, set-point 0 and a run command were written; the status
                                shows the run. The motor turns with the first set-point that comes
-                               from now on. On an error a stop has begun, if anything was written.
-``set_setpoint`` (no future)   Nothing was sent. The newest value goes out in its turn, limited,
+                               from now on; by a reference of the drive's own at once. On an error
+                               a stop has begun, if anything was written.
+``set_setpoint`` (no future)   It waits for nothing. The newest value goes out in its turn, limited,
                                while the motor is enabled; one from before never counts.
 ``stop``, ``rapid_stop``,      The run command is removed, and the status confirms that the drive
-``deactivate``,                stops; the motor may be on its ramp. On an error this was not
-``cancel_tuning``              confirmed in time: it is written until it is.
-``quick_stop``                 The same, and the motor is released: it coasts.
+``deactivate``,                stops; the motor may be on its ramp. Or a fault keeps it still, in
+``cancel_tuning``              which the drive refuses that: it follows when the fault is over. On
+                               an error it was not confirmed in time: it is written until it is.
+``quick_stop``                 The same, and the motor is released, where the drive can: it coasts.
 ``acknowledge``                The fault is over. What would run the motor by the bus was removed
                                before, as far as a drive takes that in a fault, or by the very
                                next frame: nothing turns by it.
@@ -58,7 +60,7 @@ What a public call of :class:`Drive` guarantees when its future has a result:
 those of ``parameters``
 ``erase_error_log``,           It is done, and checked. No motor turned by it.
 ``reset_energy``
-all others                     They read, and no motor turns by them.
+other futures                  They read, and no motor turns by them.
 =============================  ===================================================================
 
 Rejected: a retry of every request in one place (a stop and a set-point need other patience than a

@@ -407,13 +407,11 @@ class Drive:
     @on_bus
     async def erase_error_log(self) -> Report:
         """Erase the error log; the motor must be at standstill."""
-        self._require_open()
         return await self.log.erase_now()
 
     @on_bus
     async def reset_energy(self) -> Report:
         """Reset the kWh counter; the motor must be at standstill."""
-        self._require_open()
         return await self.log.reset_energy_now()
 
     @on_bus
@@ -460,11 +458,6 @@ class Drive:
         # checked on the bus, where no deactivation can come between
         if not self._poller.active:
             raise DriveError(Cause.NOT_ACTIVE)
-
-    def _require_open(self) -> None:
-        # a procedure would take control and could not give it back
-        if self.state.control.closed:
-            raise DriveError(Cause.ENDING)
 
     def _motor_stopped(self, why: Report) -> None:
         try:
