@@ -194,11 +194,6 @@ class Drive:
         return self._controller is not None and self._controller.stop_waits
 
     @property
-    def blocked_by_fault(self) -> bool:
-        """A fault keeps the motor still, and the drive refuses a stop until it is over."""
-        return self.state.control.blocked
-
-    @property
     def stop_overdue(self) -> bool:
         """A stop was not confirmed in time, or not at all, and no fault keeps the motor still."""
         return self._controller is not None and self._controller.stop_overdue

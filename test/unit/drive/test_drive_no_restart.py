@@ -22,7 +22,7 @@ def test_a_stop_that_a_fault_kept_from_the_drive_is_given_when_another_master_en
         rig.turn()
         rig.far.trip(OVERLOAD)
         # it refuses every command now, and its run command stands
-        rig.wait_until(lambda: rig.drive.blocked_by_fault)
+        rig.wait_until(lambda: rig.drive.state.control.blocked)
         rig.far.faults.acknowledge()
         rig.far.control_unit.settle()
         rig.wait_until(lambda: rig.far.control_unit.scmd == Scmd.STOP, 2.0)

@@ -183,7 +183,7 @@ def test_a_drive_that_refuses_every_command_is_stopped_as_soon_as_it_restarts() 
         rig.turn()
         rig.far.trip(OVERLOAD)
         rig.pass_time(0.5)
-        assert not rig.drive.following and rig.drive.blocked_by_fault
+        assert not rig.drive.following and rig.drive.state.control.blocked
         assert rig.far.control_unit.scmd == Scmd.FIELDBUS
         # its 2 s are over, and it runs again by itself
         rig.wait_until(lambda: rig.far.motor.driven, 3.0)

@@ -279,6 +279,15 @@ def test_refused_where_there_is_no_such_command() -> None:
     assert not wrong
 
 
+def test_none_is_begun_once_the_driver_ends() -> None:
+    with Rig().connect() as rig:
+        rig.result(rig.drive.stop_for_good(2.0))
+        rig.asked.clear()
+        for command in (rig.drive.reset_energy(), rig.drive.erase_error_log()):
+            assert Cause.ENDING in rig.answer(command).causes
+        assert all(data is None for _, _, data in rig.asked)
+
+
 # --- while it is being prepared -------------------------------------------------------------------
 
 STOPS: dict[str, Callable[[Drive], Future[Any]]] = {
