@@ -385,8 +385,8 @@ class ClassicLink(CodecLink):
         if self._last is not None:
             self._late.expect(self._last[0], self._now())
 
-    def _ask(self, request: Any, once: bool = False) -> tuple[Any, float]:
-        reply = super()._ask(request, once)
+    def _ask_once(self, request: Any, once: bool) -> tuple[Any, float]:
+        reply = super()._ask_once(request, once)
         if not self._again or not self._came_early(request):
             return reply
         if once:

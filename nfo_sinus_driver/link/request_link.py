@@ -249,14 +249,14 @@ class RequestLink(ABC, Generic[_Request]):
         """Return the answer to a read, and when it came; another master may cost some tries."""
         for tries_left in reversed(range(1 if once else TRIES)):
             try:
-                return self._ask_once(request)
+                return self._ask_once(request, once)
             except DamagedAnswer:
                 others = self._another.is_there(self._now())
                 if not (tries_left and others) or self.stop_waits():
                     raise
         raise AssertionError
 
-    def _ask_once(self, request: _Request) -> tuple[Any, float]:
+    def _ask_once(self, request: _Request, once: bool) -> tuple[Any, float]:
         self._await_gap(request)
         resynced = self._make_certain(request)
         try:

@@ -10,10 +10,12 @@ import time
 
 from bus_bench import UNIT, ask, hold, result, spawned
 from fake_link import Done, FakeLink, wait_until
+import pytest
 from support.addresses import packed, register
 
 from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Task
-from nfo_sinus_driver.link import NotReady, Read
+from nfo_sinus_driver.bus.tasks import Exchange
+from nfo_sinus_driver.link import InProgress, NotReady, Read, Reply
 
 
 def test_sleep_takes_its_time_and_keeps_no_other_waiting(bus: Bus, link: FakeLink) -> None:
@@ -235,3 +237,15 @@ def test_current_task(bus: Bus) -> None:
     bus.call(lambda: seen.append(bus.current))
     wait_until(lambda: seen)
     assert seen == [None]
+
+
+@pytest.mark.parametrize('once', [True, False])
+def test_what_is_read_again_after_a_pause_is_the_same_read(once: bool) -> None:
+    # the link repeats it where another master is, as before, unless it acknowledges
+    read, reply = Read(register(1), once), Reply(packed(1), 0.0)
+    exchange = Exchange(UNIT, read, Priority.POLL)
+    if not once:
+        with pytest.raises(InProgress):
+            exchange.without_old(reply)
+    assert exchange.without_old(reply) == reply
+    assert exchange.operation == read
