@@ -144,6 +144,11 @@ class Parameters:
         """What differs from the wanted settings, as wanted -> what the drive has."""
         return self._desired.drift
 
+    @property
+    def wanted(self) -> Mapping[str, Value]:
+        """The wanted settings, by key."""
+        return dict(self._desired.values)
+
     def describe(self, key: str, before: Value, data: bytes) -> ParameterChange:
         """Return the difference between a value and what bytes mean."""
         unit = self._state.model[key].unit
@@ -454,7 +459,7 @@ class DesiredConfig:
     def __init__(self, parameters: Parameters, state: DriveState) -> None:
         self._parameters = parameters
         self._state = state
-        self._values: dict[str, Value] = {}
+        self.values: dict[str, Value] = {}
 
     @property
     def drift(self) -> tuple[ParameterChange, ...]:
@@ -462,13 +467,13 @@ class DesiredConfig:
         data, values = self._parameters.data, self._parameters.values
         return tuple(
             self._parameters.describe(key, wanted, data[key])
-            for key, wanted in self._values.items()
+            for key, wanted in self.values.items()
             if key in data and values.get(key) != wanted
         )
 
     def follow(self, changed: Mapping[str, Value]) -> None:
         """Take later changes by clients into the wanted settings, where those have the key."""
-        self._values.update((key, changed[key]) for key in changed if key in self._values)
+        self.values.update((key, changed[key]) for key in changed if key in self.values)
 
     def report_drift(self, key: str) -> bool:
         """Report that a parameter is not as wanted; false if it is."""
@@ -486,7 +491,7 @@ class DesiredConfig:
         """
         state = self._state
         here = {key: value for key, value in wanted.items() if key in self._parameters.data}
-        self._values = {key: self._parameters.coerce(key, value) for key, value in here.items()}
+        self.values = {key: self._parameters.coerce(key, value) for key, value in here.items()}
         missing = [key for key in wanted if key not in here]
         if missing:
             state.notify(Severity.WARNING, Cause.WANTED_BUT_MISSING, keys=tuple(missing))

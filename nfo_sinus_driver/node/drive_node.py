@@ -18,12 +18,12 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from nfo_sinus_driver.drive import Cause, DriveError, DriveSettings, Report
+from nfo_sinus_driver.drive import Cause, Drive, DriveError, DriveSettings, Report
 from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.callers import Call
 from nfo_sinus_driver.node.commands import CommandServices, ErrorLogServices, TuningServices
 from nfo_sinus_driver.node.declaring import coerce, declare
-from nfo_sinus_driver.node.drive_parameters import DriveParameters, desired_config
+from nfo_sinus_driver.node.drive_parameters import DriveParameters, desired_config, possible_config
 from nfo_sinus_driver.node.factory_settings import with_factory_address
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
@@ -114,6 +114,8 @@ class DriveNode(LifecycleNodeMixin, Node):
             self._desired = desired_config(self, self.managed.drive)
         except DriveError as error:
             raise ValueError(wording.say(error)) from error
+        #: The drive that was last given the wanted settings.
+        self._applied_to: Drive | None = None
         self.add_on_set_parameters_callback(self._check_settings)
         self.add_post_set_parameters_callback(self._take_settings)
         self._setpoints = Setpoints(self, context, self.managed, joint)
@@ -225,10 +227,16 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _apply_desired_config(self) -> None:
         """Write the parameters of the parameter file to the drive, once in a process."""
-        wanted, self._desired = self._desired, {}
-        write = self.get_parameter('apply_parameters').value
+        before, drive = self._applied_to, self.managed.drive
+        if drive is before:
+            return
+        wanted, write = self._desired, self.get_parameter('apply_parameters').value
+        if before is not None:
+            # other settings make it another one, which is to have what clients have set since
+            wanted, write = possible_config(drive, before.parameters.wanted), False
+        self._applied_to = drive
         if wanted:
-            self.managed.drive.parameters.apply(wanted, write=write).result()
+            drive.parameters.apply(wanted, write=write).result()
 
     def _let_go(self, what: str) -> bool:
         """

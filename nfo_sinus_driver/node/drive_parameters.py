@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.catalog import Family, Parameter as CatalogParameter, Value
-from nfo_sinus_driver.drive import Drive, ParameterChange
+from nfo_sinus_driver.drive import Drive, DriveError, ParameterChange
 from nfo_sinus_driver.node.parameter_names import require_parameter
 from nfo_sinus_driver.node.rclpy_internals import overrides_of, writable
 from nfo_sinus_driver.node.wording import NodeError
@@ -211,6 +211,15 @@ def desired_config(node: Node, drive: Drive) -> dict[str, Value]:
                 drive.parameters.coerce(parameter.key, value) if reached else value
             )
     return wanted
+
+
+def possible_config(drive: Drive, wanted: Mapping[str, Value]) -> dict[str, Value]:
+    """Return which of the wanted settings of another drive this one can have, too."""
+    possible: dict[str, Value] = {}
+    for key, value in wanted.items():
+        with contextlib.suppress(DriveError):
+            possible[key] = drive.parameters.coerce(key, value)
+    return possible
 
 
 def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:

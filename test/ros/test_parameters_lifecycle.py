@@ -348,3 +348,27 @@ def test_a_drive_that_is_let_go_is_left_alone(bench: Bench, ways: tuple[int, ...
     assert {one.level for one in found.values()} == {DiagnosticStatus.OK}, found
     assert 'not connected' in found['nfo_sinus: drive'].message
     assert list(client.newest('statistics').silent_drives) == []
+
+
+@pytest.mark.parametrize('between', [{}, {'lost_after': 2.0}])
+def test_a_later_difference_from_the_parameter_file_is_reported_after_a_new_start(
+    bench: Bench, between: dict[str, float]
+) -> None:
+    drive = bench.simulator(*bench.drives.ramps(5.0))
+    bench.driver(*QUIET, '-p', 'control.accel:=6.0', '-p', 'control.retard:=6.0')
+    client = bench.client().connected()
+    assert drive.state()['parameters']['control.accel'] == 6.0
+    # what a client sets is wanted from then on
+    assert set_one(client, 'control.retard', 7.0).successful
+    for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
+        assert client.change_state(transition)
+    assert client.set_parameters(**between).successful
+    drive.inject('set', 'control.accel', 9.0)
+    assert client.change_state(Transition.TRANSITION_CONFIGURE)
+    client.wait_for(
+        'diagnostics',
+        lambda message: any('1 parameters differ' in one.message for one in message.status),
+        'it is reported',
+        timeout=20.0,
+    )
+    assert drive.state()['parameters']['control.accel'] == 9.0
