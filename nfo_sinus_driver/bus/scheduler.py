@@ -300,6 +300,9 @@ class Silences:
             return False
         if error is None or error.responded or isinstance(error, Refused):
             self._note_exchange(unit, now)
+            if now - self._any_frame_at >= _MISSING_AFTER:
+                # it was the line: the others may be back with this one, and have to be stopped
+                self._pause_ends = -math.inf
             pause = now - self._last_frame_at.get(unit, now)
             self._longest[unit] = max(self._longest.get(unit, 0.0), pause)
             self._last_frame_at[unit] = self._any_frame_at = now

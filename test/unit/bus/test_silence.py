@@ -53,6 +53,22 @@ def test_a_port_that_is_gone_says_nothing_of_who_is_behind_it() -> None:
     assert not silences.is_silent(1)
 
 
+def test_where_the_whole_line_was_silent_the_others_are_asked_at_once_when_one_answers() -> None:
+    silences = Silences()
+    for unit in (1, 2):
+        silences.note(unit, 10.0, None)
+    for tenths in range(102, 142, 4):
+        for unit in (1, 2):
+            silences.note(unit, tenths / 10, NoAnswer(), 0.2)
+    assert silences.is_missing(1, 14.2) and silences.is_missing(2, 14.2)
+    silences.note(2, 14.2, None)
+    # the line was cut: the stop of the other one need not wait
+    assert silences.missing_from <= 14.2
+    silences.note(1, 14.4, NoAnswer(), 0.2)
+    # it is missing for itself
+    assert silences.missing_from > 16.0
+
+
 def test_a_missing_unit_gets_few_requests_as_long_as_others_answer() -> None:
     silences = Silences()
     for unit in (1, 2, 3):
