@@ -1020,6 +1020,14 @@ LAWS = (
     ),
     Mutant(
         1,
+        'what has cleared the reason of a refusal is read again',
+        'nfo_sinus_driver/drive/parameter_access.py',
+        'Read(self.address(key), self._acknowledges(key))',
+        'Read(self.address(key))',
+        ('test/unit/drive/test_drive_commands.py', '-k', 'flags_alone'),
+    ),
+    Mutant(
+        1,
         'what acknowledges is read again where another master is',
         'nfo_sinus_driver/link/request_link.py',
         'range(1 if once else TRIES)',

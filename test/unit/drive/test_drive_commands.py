@@ -12,6 +12,7 @@ from support.rig import Rig
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Access, Fact, Kind
 from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
+from nfo_sinus_driver.link import Address, Read
 from nfo_sinus_driver.simulator.classic import LineError
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
@@ -352,3 +353,17 @@ def test_a_parameter_that_is_only_read_acknowledges_nothing(connection: str) -> 
             with pytest.raises(ValueError, match='acknowledges'):
                 rig.result(rig.drive.measure(key))
         assert acknowledging and rig.far.faults.codes
+
+
+def test_of_what_tells_why_it_refused_the_flags_alone_are_read_once() -> None:
+    with Rig('classic') as rig:
+        rig.connect()
+        asked: dict[Address, bool] = {}
+
+        def read(one: Read) -> int:
+            asked[one.address] = one.once
+            return SIO_FAIL
+
+        rig.link._why[1](read, 0)
+        places = map(rig.drive.params.address, ('fieldbus.inv_st', 'fieldbus.sio_err'))
+        assert asked == dict(zip(places, (False, True), strict=True))
