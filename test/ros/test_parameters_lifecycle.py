@@ -341,7 +341,7 @@ def test_a_drive_that_is_let_go_is_left_alone(bench: Bench, ways: tuple[int, ...
     assert not answer.success
     assert 'configure it first' in answer.message or 'was shut down' in answer.message
     assert len(bench.requests()) == requests
-    # and nobody misses it
+    # and it is not missed
     heard = len(client.messages['diagnostics'])
     wait_until(lambda: len(client.messages['diagnostics']) > heard + 1, 'what is known now')
     found = {one.name: one for one in client.messages['diagnostics'][-1].status}
