@@ -298,6 +298,28 @@ def test_what_a_unit_refuses_to_do_in_one_transaction_is_only_written() -> None:
     assert bench.functions == [23, 6, 6]
 
 
+def test_a_unit_that_is_busy_has_the_function() -> None:
+    bench = Rtu(REFUSE)
+    bench.drive.code = lambda number: Refused.BUSY
+    bench.expect(Refused, lambda: write_and_read(bench))
+    assert write_and_read(bench) == bench.answer_of()
+    assert bench.functions == [23, 23]
+
+
+def test_what_was_written_may_be_done_where_the_read_behind_it_is_refused() -> None:
+    bench = Rtu(REFUSE, Fate(), REFUSE, trusted=True)
+    bench.drive.code = lambda number: Refused.ILLEGAL_FUNCTION
+
+    def exchange(data: bytes) -> object:
+        return bench.link.exchange(UNIT, B.index, 1, A.index, data)
+
+    assert bench.expect(Refused, lambda: exchange(packed(7, 8))).maybe_done
+    assert bench.functions == [23, 16, 3]
+    bench.drive.heal(REFUSE)
+    bench.wire.now += 1
+    assert not bench.expect(Refused, lambda: exchange(b'')).maybe_done
+
+
 def test_a_write_and_read_whose_answer_would_be_in_doubt_is_a_write() -> None:
     bench = Rtu(Fate(), Fate(1.5))
     assert write_and_read(bench) == bench.answer_of()

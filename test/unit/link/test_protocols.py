@@ -58,6 +58,17 @@ def test_the_parts_of_every_parameter_are_the_whole_of_it(protocol: LineProtocol
         assert parts == (address,) or protocol.name == 'classic'
 
 
+@EVERY
+@given(st.integers(2, 32).map(lambda words: 2 * words))
+def test_a_value_whose_first_register_is_apart_is_read_whole(
+    protocol: LineProtocol, size: int
+) -> None:
+    address = Address('register', 7, 0x100, size)
+    parts = protocol.parts(address)
+    assert sum(part.size for part in parts) == size
+    assert [part.index for part in parts] == ([7, 0x100] if protocol.has_parts else [7])
+
+
 @given(st.sampled_from(list(PROTOCOLS.values())), st.integers(-1, 300))
 def test_addresses(protocol: LineProtocol, address: int) -> None:
     ends = {'classic': (0, 94), 'movitrac': (0, 63), 'canopen': (1, 127)}
