@@ -38,7 +38,7 @@ class Address(NamedTuple):
 
     :ivar space: the numbering of the protocol that ``index`` belongs to, such as ``register``.
     :ivar index: its number there; of several registers the first.
-    :ivar sub_index: which part of it; on Classic the id of the high word.
+    :ivar sub_index: which part of it; where a protocol has parts, the index of the second one.
     :ivar size: how many bytes it takes.
     :ivar signed: whether the number in them may be negative, for a line where the drive decides how
         many bytes it has; ``None``: it is no number, and the bytes count as they come.

@@ -39,6 +39,26 @@ def same(frame: bytes) -> bytes:
     return frame
 
 
+def tell_as_a_drive_does(link: Any, family: str) -> None:
+    """Tell a link what is safe to read of each drive, and why it refuses, by its family."""
+    model, protocol = load_family(family), link.protocol.addressing
+    ask = model.profile.why_refused
+
+    def at(key: str) -> Address:
+        return Address(*model[key].at(protocol).place)
+
+    def there(key: str) -> Read:
+        return Read(at(key), model[key].access is Access.ACKNOWLEDGE)
+
+    def why(read: Callable[[Read], int], before: int | None) -> tuple[int, str]:
+        assert ask is not None
+        return ask(lambda key: read(there(key)), before)
+
+    reads = [at(key) for key in model.profile.resync_reads[protocol]]
+    for unit in link.protocol.units:
+        link.use_resync_reads(unit, reads, ask and why)
+
+
 class Bench:
     """
     A link and its drives; everything done with it happens in virtual time.
@@ -270,22 +290,7 @@ class Classic(Bench):
 
     @staticmethod
     def tell(link: Any) -> None:
-        model = load_family('sinus_g2')
-        ask = model.profile.why_refused
-        assert ask is not None
-
-        def at(key: str) -> Address:
-            return Address(*model[key].at('classic').place)
-
-        def why(read: Callable[[Read], int], before: int | None) -> tuple[int, str]:
-            def once(key: str) -> bool:
-                return model[key].access is Access.ACKNOWLEDGE
-
-            return ask(lambda key: read(Read(at(key), once(key))), before)
-
-        reads = [at(key) for key in model.profile.resync_reads['classic']]
-        for unit in link.protocol.units:
-            link.use_resync_reads(unit, reads, why)
+        tell_as_a_drive_does(link, 'sinus_g2')
 
 
 def at(index: int, size: int = 4) -> Address:
@@ -308,8 +313,7 @@ class Movitrac(Bench):
 
     @staticmethod
     def tell(link: Any) -> None:
-        for unit in link.protocol.units:
-            link.use_resync_reads(unit, [at(index) for index in (206, 207, 0, 4)])
+        tell_as_a_drive_does(link, 'movitrac31')
 
     def __init__(self, *fates: Fate, settings: LineSettings | None = None) -> None:
         super().__init__(*fates, settings=settings)

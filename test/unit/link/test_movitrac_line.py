@@ -152,6 +152,13 @@ def test_a_dead_drive_costs_its_neighbours_no_time() -> None:
     assert bench.wire.now - began < (5 + 8 + 9 + 2 + 4 + 3) * CHAR
 
 
+def test_what_every_drive_has_is_enough_for_one_question_to_be_certain() -> None:
+    # however long it is waited for: then a lost one is in doubt for as long as three more take
+    bench = Movitrac(*[DROP] * 30, settings=replace(Movitrac.settings, response_timeout=2.0))
+    for address in (A, at(207), at(206)) * 10:
+        bench.expect(NoAnswer, lambda address=address: bench.read(address))
+
+
 @pytest.mark.parametrize('written', [False, True])
 def test_late_answer_of_another_drive_is_not_taken(written: bool) -> None:
     bench = Movitrac()
