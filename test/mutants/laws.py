@@ -1120,7 +1120,7 @@ LAWS = (
         'nfo_sinus_driver/families/sinus_g2/ds402/words.py',
         'hides_ramp=True',
         'hides_ramp=False',
-        (STOPPED_IS_TRUE, '-k', 'as_the_answer_says and ds402'),
+        (STOPPED_IS_TRUE, '-k', 'as_the_answer_says and release'),
     ),
     Mutant(
         7,
