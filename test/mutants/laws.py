@@ -1116,11 +1116,11 @@ LAWS = (
     ),
     Mutant(
         3,
-        'a motor on its ramp is said to coast where its drive says that it is ready',
+        'a motor on its ramp is let go of where its drive says that it is ready',
         'nfo_sinus_driver/families/sinus_g2/ds402/words.py',
         'hides_ramp=True',
         'hides_ramp=False',
-        (STOPPED_IS_TRUE, '-k', 'as_the_answer_says and alone'),
+        (STOPPED_IS_TRUE, '-k', 'waits_for_the_ramp'),
     ),
     Mutant(
         7,

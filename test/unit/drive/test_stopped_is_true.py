@@ -156,6 +156,30 @@ def test_a_motor_ramps_or_is_released_as_the_answer_says(
         assert cause_of(stop) in (_SAYS_RELEASED if released else _SAYS_RAMPS), said(stop.result())
 
 
+#: Without its run command this one releases the motor.
+_HAS_NO_RAMP = 'made up'
+
+
+@pytest.mark.parametrize('connection', [one for one in CONNECTIONS if one != _HAS_NO_RAMP])
+def test_the_end_waits_for_the_ramp(connection: str) -> None:
+    one = CONNECTIONS[connection]
+    slow = ramps(one.model, 0.3, 3.0)
+    with Rig(connection, parameters={**slow, **one.parameters}, line=QUICK) as rig:
+        rig.turn()
+        rig.send(None)
+        coasted: list[float] = []
+
+        def look() -> None:
+            if abs(rig.far.motor.rotor) > 1.0 and not rig.far.motor.driven:
+                coasted.append(rig.clock.now)
+
+        rig.looked = look
+        rig.result(rig.drive.disconnect(20.0))
+        rig.pass_time(1.0)
+        assert not coasted
+        assert not rig.far.motor.turning
+
+
 def test_a_motor_that_coasts_is_stopped_as_soon_as_its_speed_falls() -> None:
     def encoder(motor: Motor) -> float:
         return motor.rotor
