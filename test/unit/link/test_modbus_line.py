@@ -409,6 +409,15 @@ def test_second_answer_is_not_taken_for_the_next_one(
             assert bench.read(address).data in answers(bench, address, before)
 
 
+@pytest.mark.parametrize('lump', [False, True])
+@of_modbus
+def test_after_a_second_answer_another_question_goes_first(way: Way, lump: bool) -> None:
+    bench = way(Fate(what='double', lump=lump), trusted=True)
+    assert bench.read(A).data == bench.answer_of()
+    assert bench.read(B).data == bench.answer_of()
+    assert bench.asked == [A.index, TWO.index, B.index]
+
+
 @of_modbus
 def test_second_answer_is_said(way: Way) -> None:
     bench = way(Fate(what='double', again=0.2))
@@ -602,8 +611,9 @@ def test_answer_sent_twice_is_not_taken_for_the_next(again: float) -> None:
     assert bench.read(B).data == bench.answer_of() != first
 
 
-def test_line_with_an_answer_sent_twice_is_not_trusted_for_a_while() -> None:
-    bench = Rtu(Fate(what='double'), trusted=True)
+@pytest.mark.parametrize('lump', [False, True])
+def test_line_with_an_answer_sent_twice_is_not_trusted_for_a_while(lump: bool) -> None:
+    bench = Rtu(Fate(what='double', lump=lump), trusted=True)
     bench.read(A)
     bench.wire.now += 0.01
     bench.read(D)
