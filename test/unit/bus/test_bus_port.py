@@ -153,7 +153,7 @@ def test_mute_port_that_cannot_be_opened_again_is_lost(bus: Bus, link: FakeLink)
     link.opening = raiser(PortError('another has it'))
     while bus.port_error is None:
         failure(ask(bus, 1, Priority.POLL))
-    assert str(failure(ask(bus, 1, Priority.STOP))) == 'another has it' and link.closed == 1
+    assert str(failure(ask(bus, 1, Priority.STOP))) == 'another has it' and link.closed
     link.answer = lambda done: packed(done.number)
     link.opening = lambda: None
     wait_until(lambda: bus.port_error is None)
