@@ -32,8 +32,8 @@ class ByAddress:
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
-        #: When another access may begin, s.
-        self._free_at = -math.inf
+        #: When another access may begin, s; an earlier driver's may still be at work.
+        self._free_at = bus.now() + _TIME
 
     async def access(self, address: int, data: int | None, ask: Ask) -> Reply:
         """

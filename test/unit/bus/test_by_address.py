@@ -119,12 +119,31 @@ def test_what_does_not_end_is_given_up(
     drive: Drive, by_address: ByAddress, word: int | None
 ) -> None:
     drive.says = 0
+    drive.time += 1.0
     began = drive.now()
     with pytest.raises(MailboxSilent if word is None else Unconfirmed, match='did not end'):
         asked(by_address, drive, word)
     assert 1.0 <= drive.now() - began < 1.5
     drive.says = 1
     assert asked(by_address, drive, word) == (b'\0\x32' if word is None else b'')
+
+
+def test_what_an_earlier_driver_began_ends_before_the_first_access(drive: Drive) -> None:
+    drive.takes = 0.5
+    before = ByAddress(drive)  # type: ignore[arg-type]
+
+    async def cut_short() -> None:
+        task = asyncio.ensure_future(before.access(ACC_TIME, 7, drive.ask))
+        while (1002, 1) not in drive.done:
+            await asyncio.sleep(0)
+        task.cancel()
+
+    asyncio.run(cut_short())
+    drive.values[OTHER] = 9
+    here = ByAddress(drive)  # type: ignore[arg-type]
+    reply = asyncio.run(here.access(OTHER, None, drive.ask))
+    assert reply.data == b'\0\x09'
+    assert drive.values[ACC_TIME] == 7
 
 
 def test_another_access_waits(drive: Drive, by_address: ByAddress) -> None:
