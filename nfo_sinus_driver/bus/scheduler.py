@@ -69,9 +69,9 @@ class Scheduler:
 
     A unit that does not answer keeps the line for a time-out with every poll, and with every
     set-point but an urgent one. All of them together have no more than their share of the time as
-    long as any other waits. A stop that a unit does
-    not answer is repeated at once, and after each of them another unit has a turn, too: the most
-    urgent, whatever the others are owed.
+    long as any other waits. A stop that a unit does not answer is repeated at once, and after each
+    of them another unit has a turn, too: the most urgent, whatever the others are owed, and none
+    whose stop was in vain as well.
 
     Units that have been silent for long are missing. Reads from them, set-points, and stops that
     did not reach them, wait until :meth:`take` may give them out, and then go ahead of other polls.
@@ -149,21 +149,33 @@ class Scheduler:
             self.add(entry)
 
     def _first(self, rank: _Rank) -> LatestValue | Waiting | None:
-        """Return what goes next of one rank; what is for a unit that is missing by now waits."""
+        """Return what goes next of one rank; what is for a unit that is silent by now is behind."""
         queue = self._queues[rank]
         while True:
             others = queue if self._unanswered is None else itertools.filterfalse(
-                self._is_unanswered, queue
+                self._gives_way, queue
             )
             entry = next(iter(others), None)
-            if entry is None or rank == _MISSING or self._rank(entry) != _MISSING:
+            if entry is None or rank == _MISSING:
+                return entry
+            behind = self._rank(entry)
+            if behind == rank or behind not in (_RETRY, _MISSING):
+                return entry
+            if behind == _RETRY and rank in _BACKGROUND:
+                # that is the end of the order
                 return entry
             del queue[entry]
-            self._queues[_MISSING][entry] = None
+            self._queues[behind][entry] = None
 
-    def _is_unanswered(self, entry: LatestValue | Waiting) -> bool:
-        """Return whether it is for the unit that has just not answered a stop."""
-        return isinstance(entry, Waiting) and entry.exchange.unit == self._unanswered
+    def _gives_way(self, entry: LatestValue | Waiting) -> bool:
+        """Return whether it is for the unit that left a stop unanswered, or for one that would."""
+        if isinstance(entry, LatestValue):
+            return False
+        exchange = entry.exchange
+        if exchange.unit == self._unanswered:
+            return True
+        # else two of them would take turns, and no other had one
+        return self._is_silent(exchange.unit) and self._is_repeated(exchange)
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
@@ -283,6 +295,8 @@ class Silences:
         #: When the last valid frame of any unit came.
         self._any_frame_at = -math.inf
         self._pause_ends = -math.inf
+        #: When the last silence of the whole line ended.
+        self._back_at = -math.inf
         self.heard = False
         #: Since when every request has failed, and how often the port was opened since the last
         #: that did not.
@@ -302,7 +316,7 @@ class Silences:
             self._note_exchange(unit, now)
             if now - self._any_frame_at >= _MISSING_AFTER:
                 # it was the line: the others may be back with this one, and have to be stopped
-                self._pause_ends = -math.inf
+                self._back_at = now
             pause = now - self._last_frame_at.get(unit, now)
             self._longest[unit] = max(self._longest.get(unit, 0.0), pause)
             self._last_frame_at[unit] = self._any_frame_at = now
@@ -382,7 +396,7 @@ class Silences:
 
     def is_missing(self, unit: int, now: float) -> bool:
         """Return whether a unit has been silent for so long that it gets few requests."""
-        return self.lasts(unit, now) >= _MISSING_AFTER
+        return min(self.lasts(unit, now), now - self._back_at) >= _MISSING_AFTER
 
     @property
     def missing_from(self) -> float:

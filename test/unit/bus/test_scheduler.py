@@ -312,6 +312,33 @@ def test_between_two_stops_without_an_answer_the_most_urgent_has_its_turn(
         scheduler.took(_READ)
 
 
+def test_stops_of_several_units_that_do_not_answer_leave_every_other_turn_to_the_others() -> None:
+    silent = {2, 3, 4}
+    scheduler = Scheduler(silent.__contains__)
+    stops, poll = [stop_of(unit) for unit in silent], entry(Priority.POLL)
+    for waiting in (poll, *stops):
+        scheduler.add(waiting)
+    # the first of each goes at once
+    went = []
+    for _ in range(13):
+        taken = scheduler.take()
+        assert isinstance(taken, Waiting)
+        went.append(taken)
+        scheduler.took(_READ if taken is poll else 0.2)
+        scheduler.add(taken)
+    assert went == [*stops, *[one for stop in 2 * stops for one in (poll, stop)][:10]]
+
+
+def test_what_waits_for_a_unit_that_falls_silent_is_ranked_again() -> None:
+    silent: set[int] = set()
+    scheduler = Scheduler(silent.__contains__)
+    falls_silent, other = poll_of(7), poll_of(1)
+    for waiting in (falls_silent, other):
+        scheduler.add(waiting)
+    silent.add(7)
+    assert [scheduler.take() for _ in range(3)] == [other, falls_silent, None]
+
+
 def test_a_stop_that_is_answered_gives_way_to_none() -> None:
     scheduler = Scheduler(lambda unit: False)
     stops = [stop_of(2), stop_of(2)]

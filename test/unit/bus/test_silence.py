@@ -62,11 +62,13 @@ def test_where_the_whole_line_was_silent_the_others_are_asked_at_once_when_one_a
             silences.note(unit, tenths / 10, NoAnswer(), 0.2)
     assert silences.is_missing(1, 14.2) and silences.is_missing(2, 14.2)
     silences.note(2, 14.2, None)
-    # the line was cut: the stop of the other one need not wait
-    assert silences.missing_from <= 14.2
+    # the line was cut: the stop of the other one need not wait, nor one more that a bounce loses
     silences.note(1, 14.4, NoAnswer(), 0.2)
+    assert not silences.is_missing(1, 16.1)
     # it is missing for itself
-    assert silences.missing_from > 16.0
+    silences.note(2, 16.1, None)
+    silences.note(1, 16.2, NoAnswer(), 0.2)
+    assert silences.is_missing(1, 16.2) and silences.missing_from > 18.0
 
 
 def test_a_missing_unit_gets_few_requests_as_long_as_others_answer() -> None:
@@ -78,7 +80,8 @@ def test_a_missing_unit_gets_few_requests_as_long_as_others_answer() -> None:
     assert silences.is_missing(1, 13.0)
     # one lost answer, or one after a short silence, costs no pause
     assert silences.missing_from <= 11.0
-    silences.note(2, 13.0, None)
+    for now in (11.9, 13.0):
+        silences.note(2, now, None)
     silences.note(1, 13.2, NoAnswer(), 0.2)
     assert silences.is_missing(1, 13.2)
     # the others keep nine tenths of the time at least

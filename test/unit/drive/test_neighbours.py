@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections import Counter
 from concurrent.futures import Future
+from itertools import pairwise
 import sys
 from types import FrameType
 from typing import Any
 
 import pytest
-from support.rig import SLICE, Rig
+from support.rig import CONNECTIONS, SLICE, Rig
 
 #: What the neighbours keep of the rate that they would have alone on the line.
 _KEPT = 0.9
@@ -21,6 +22,8 @@ _SETTLED = 5.0
 #: How much longer than its reads alone the start of many drives may take.
 _START = 1.2
 _SLOW = {'baud': 19200}
+#: Those on which the rig has several drives.
+SEVERAL = [name for name, connection in CONNECTIONS.items() if connection.protocol != 'telegram1']
 
 
 def made(drives: int, connection: str = 'rtu', *, line: Any = _SLOW, **settings: Any) -> Rig:
@@ -130,6 +133,53 @@ def test_a_stop_of_a_drive_that_is_lost_goes_out_at_once() -> None:
         # first is one more, and another drive has a turn after it
         assert looks[0] - requested_at < 0.3 and stops[0] - requested_at < 0.6
         assert 'NOT confirmed' in rig.answer(stop)
+
+
+@pytest.mark.parametrize('connection', SEVERAL)
+def test_stops_of_drives_that_are_cut_off_keep_no_neighbour_from_the_line(connection: str) -> None:
+    with Rig(connection, drives=4) as rig:
+        rig.turn()
+        asked_at = [rig.clock.now]
+
+        def meet(key: str, data: bytes | None) -> None:
+            if rig.asked[-1][0] == 4:
+                asked_at.append(rig.clock.now)
+
+        rig.meet = meet
+        for address in (1, 2, 3):
+            rig.fars[address].silence(3600.0)
+            rig.drives[address].stop()
+        rig.pass_time(5.0)
+        asked_at.append(rig.clock.now)
+        # the first stop of each goes at once; and a drive that stops by itself unless it is asked
+        # every 2 s, has to be asked in half of that
+        assert max(after - before for before, after in pairwise(asked_at)) < 1.0
+        assert rig.drives[4].following
+
+
+@pytest.mark.parametrize('cut', [9.0, 10.3, 11.7])
+@pytest.mark.parametrize('connection', SEVERAL)
+def test_when_a_cut_line_is_back_no_drive_that_is_off_delays_the_stops_of_the_others(
+    connection: str, cut: float
+) -> None:
+    with Rig(connection, drives=4) as rig:
+        rig.turn()
+        rig.fars[1].silence(3600.0)
+        rig.pass_time(6.0)
+        for address in (2, 3, 4):
+            rig.fars[address].silence(cut)
+        rig.pass_time(cut)
+        back_at = rig.clock.now
+        stopped: dict[int, float] = {}
+
+        def meet(key: str, data: bytes | None) -> None:
+            if data is not None:
+                stopped.setdefault(rig.asked[-1][0], rig.clock.now - back_at)
+
+        rig.meet = meet
+        rig.pass_time(5.0)
+        # each is tried every second, and the one that is off may come before it
+        assert all(stopped[address] < 2.5 for address in (2, 3, 4)), stopped
 
 
 def test_a_drive_alone_on_its_line_is_asked_every_four_seconds_when_it_is_gone() -> None:
