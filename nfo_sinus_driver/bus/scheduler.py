@@ -94,6 +94,7 @@ class Scheduler:
         #: How much time those that have a share are owed, s; they owe if that is negative.
         self._owed = dict.fromkeys(_SHARES, 0.0)
         self._given: _Rank = _SLOT
+        self._given_unit: int | None = None
         self._slot_went = False
         #: The stop, or its read, that was given out just now, and the unit that did not answer one.
         self._given_stop: Exchange | None = None
@@ -130,8 +131,11 @@ class Scheduler:
             if entry is not None:
                 del self._queues[rank][entry]
                 self._given = rank
-                exchange = None if isinstance(entry, LatestValue) else entry.exchange
-                self._given_stop = exchange if rank in _STOPS else None
+                wanted = entry if isinstance(entry, LatestValue) else entry.exchange
+                self._given_unit = wanted.unit
+                self._given_stop = (
+                    wanted if isinstance(wanted, Exchange) and rank in _STOPS else None
+                )
                 return entry
         if self._unanswered is None:
             return None
@@ -161,9 +165,6 @@ class Scheduler:
             behind = self._rank(entry)
             if behind == rank or behind not in (_RETRY, _MISSING):
                 return entry
-            if behind == _RETRY and rank in _BACKGROUND:
-                # that is the end of the order
-                return entry
             del queue[entry]
             self._queues[behind][entry] = None
 
@@ -185,11 +186,14 @@ class Scheduler:
         if self._unanswered is not None and stop is not None:
             # each by itself: the stop behind a read that was not answered goes out at once
             self._unanswered_stops.add((stop.unit, stop.writes))
+        unit = self._given_unit
+        in_vain = stop is None and unit is not None and self._is_silent(unit)
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
                 continue
             owed = self._owed[rank] + seconds * share
-            if rank == self._given:
+            if rank == self._given or (in_vain and rank == _RETRY):
+                # the request with which a unit falls silent is of that share, too;
                 # no debt beyond this transaction: what is sent on an idle line delays none
                 self._owed[rank] = max(owed - seconds, -seconds)
             else:
@@ -233,6 +237,8 @@ class Scheduler:
             yield _RETRY
         yield from (Priority.POLL, _SLOT, _RETRY)
         yield from background
+        # what was found there that is for a unit that is silent by now
+        yield _RETRY
 
     def _rank(self, entry: LatestValue | Waiting) -> _Rank:
         if isinstance(entry, LatestValue):

@@ -156,6 +156,20 @@ def test_polls_of_units_that_do_not_answer_have_half_the_time() -> None:
     assert max(gaps) == pytest.approx(timeout)
 
 
+def test_the_request_with_which_a_unit_falls_silent_is_of_that_half_too() -> None:
+    silent: set[int] = set()
+    scheduler = Scheduler(silent.__contains__)
+    for unit in (7, 8, 1):
+        scheduler.add(poll_of(unit))
+    for unit in (7, 8):
+        taken = scheduler.take()
+        assert isinstance(taken, Waiting) and taken.exchange.unit == unit
+        silent.add(unit)
+        scheduler.took(0.2)
+        scheduler.add(taken)
+    assert cast(Waiting, scheduler.take()).exchange.unit == 1
+
+
 def test_units_that_do_not_answer_do_not_wait_when_no_other_waits() -> None:
     scheduler = Scheduler(lambda unit: True)
     for _ in range(10):
@@ -329,10 +343,12 @@ def test_stops_of_several_units_that_do_not_answer_leave_every_other_turn_to_the
     assert went == [*stops, *[one for stop in 2 * stops for one in (poll, stop)][:10]]
 
 
-def test_what_waits_for_a_unit_that_falls_silent_is_ranked_again() -> None:
+@pytest.mark.parametrize('kind', [Priority.POLL, *_BACKGROUND])
+def test_what_waits_for_a_unit_that_falls_silent_is_ranked_again(kind: Priority) -> None:
     silent: set[int] = set()
     scheduler = Scheduler(silent.__contains__)
-    falls_silent, other = poll_of(7), poll_of(1)
+    falls_silent = Waiting(cast(Task, 'asks'), Exchange(7, Read(register(1)), kind))
+    other = Waiting(cast(Task, 'asks'), Exchange(1, Read(register(1)), kind))
     for waiting in (falls_silent, other):
         scheduler.add(waiting)
     silent.add(7)
