@@ -296,6 +296,8 @@ class Silences:
     def __init__(self) -> None:
         self._last_frame_at: dict[int, float] = {}
         self._since: dict[int, float] = {}
+        #: The same, with the time in which the worker did not run: a drive can be exchanged in it.
+        self._gone_since: dict[int, float] = {}
         #: The longest time from one valid frame to the next.
         self._longest: dict[int, float] = {}
         #: When the last valid frame of any unit came.
@@ -327,10 +329,12 @@ class Silences:
             self._longest[unit] = max(self._longest.get(unit, 0.0), pause)
             self._last_frame_at[unit] = self._any_frame_at = now
             self._since.pop(unit, None)
+            self._gone_since.pop(unit, None)
         elif self.is_missing(unit, now):
             self._pause_ends = now + seconds * (1 / _MISSING_SHARE - 1)
         if error is not None and not isinstance(error, (PortError, Refused)):
             self._since.setdefault(unit, now)
+            self._gone_since.setdefault(unit, now)
         if error is None or error.responded or error.heard:
             self.heard, self._opened, self._mute_since = True, 0, math.inf
             return True
@@ -372,7 +376,7 @@ class Silences:
 
     def _note_exchange(self, unit: int, now: float) -> None:
         """Note that a silence ends in which a unit, or any, may have been exchanged."""
-        if self.lasts(unit, now) > EXCHANGE:
+        if now - self._gone_since.get(unit, now) > EXCHANGE:
             self._unit_since[unit] = now
         if now - self._any_frame_at > EXCHANGE:
             # this end may have stood still
@@ -380,7 +384,7 @@ class Silences:
 
     def there_since(self, unit: int, now: float) -> float:
         """Return since when a unit cannot have been exchanged; infinity if it may be by now."""
-        if max(self.lasts(unit, now), now - self._any_frame_at) > EXCHANGE:
+        if now - min(self._gone_since.get(unit, now), self._any_frame_at) > EXCHANGE:
             return math.inf
         return max(self._line_since, self._unit_since.get(unit, -math.inf))
 

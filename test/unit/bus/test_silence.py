@@ -92,3 +92,19 @@ def test_a_missing_unit_gets_few_requests_as_long_as_others_answer() -> None:
     assert silences.missing_from <= 15.0
     silences.note(1, 16.0, None)
     assert not silences.is_missing(1, 16.0)
+
+
+def test_a_unit_may_be_exchanged_while_the_worker_does_not_run() -> None:
+    silences = Silences()
+    for unit in (1, 2):
+        silences.note(unit, 10.0, None)
+    silences.note(1, 10.2, NoAnswer(), 0.2)
+    for now in (12.2, 13.4):
+        silences.paused(1.2)
+        silences.note(2, now, None)
+    # it was not asked in that time, so it is not lost
+    assert silences.lasts(1, 13.4) == pytest.approx(0.8)
+    assert silences.there_since(1, 13.4) == math.inf
+    assert silences.there_since(2, 13.4) < 13.4
+    silences.note(1, 13.5, None)
+    assert silences.there_since(1, 13.6) == 13.5

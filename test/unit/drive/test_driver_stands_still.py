@@ -217,3 +217,25 @@ def test_a_stop_is_on_the_wire_at_once_while_a_drive_is_known_as_slow(connection
             rig.pass_time(slow)
             took.append(time_to_wire(rig, rig.clock.now + 0.1 + moment))
     assert max(took) <= _AT_ONCE, [round(one, 3) for one in took]
+
+
+# behind a PLC it is not this line that is silent
+@pytest.mark.parametrize(
+    'connection', [name for name, one in CONNECTIONS.items() if one.protocol != 'telegram1']
+)
+def test_a_drive_that_was_silent_meanwhile_is_recognised_before_it_is_written_to(
+    connection: str,
+) -> None:
+    # it is another matter that this is no silence for which a drive is lost
+    with Rig(connection, drives=2, setpoint_timeout=0.0, lost_after=3.0) as rig:
+        rig.turn()
+        rig.far.silence(4.6)
+        rig.pass_time(0.6)
+        for _ in range(3):
+            # shorter than what tells that this end was away, and the other drive answers between
+            rig.line.stand_still(rig.clock.now + 0.01, 1.3)
+            rig.pass_time(1.4)
+        rig.drive.stop()
+        rig.pass_time(3.0)
+        assert not rig.turns
+        # whether it was recognised first, the rig judges
