@@ -180,9 +180,12 @@ class Scheduler:
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
-        self._slot_went = self._given == _SLOT
         stop = self._given_stop
         self._unanswered = stop.unit if stop is not None and self._is_silent(stop.unit) else None
+        # a stop in vain is nobody's turn: else the next one were that of a set-point again
+        self._slot_went = self._given == _SLOT or (
+            self._slot_went and self._unanswered is not None
+        )
         if self._unanswered is not None and stop is not None:
             # each by itself: the stop behind a read that was not answered goes out at once
             self._unanswered_stops.add((stop.unit, stop.writes))

@@ -326,6 +326,23 @@ def test_between_two_stops_without_an_answer_the_most_urgent_has_its_turn(
         scheduler.took(_READ)
 
 
+@pytest.mark.parametrize('kind', [Priority.POLL, Priority.SERVICE])
+def test_set_points_without_end_leave_turns_between_stops_without_an_answer(
+    kind: Priority,
+) -> None:
+    scheduler = Scheduler(lambda unit: unit == 2)
+    for waiting in (stop_of(2), entry(_SLOT), entry(kind)):
+        scheduler.add(waiting)
+    went = []
+    for _ in range(9):
+        taken = scheduler.take()
+        assert taken is not None
+        went.append(kind_of(taken))
+        scheduler.took(0.2 if went[-1] == Priority.STOP else _READ)
+        scheduler.add(taken)
+    assert went == [*[Priority.STOP, _SLOT, Priority.STOP, kind] * 2, Priority.STOP]
+
+
 def test_stops_of_several_units_that_do_not_answer_leave_every_other_turn_to_the_others() -> None:
     silent = {2, 3, 4}
     scheduler = Scheduler(silent.__contains__)

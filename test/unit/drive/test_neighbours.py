@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from concurrent.futures import Future
-from itertools import pairwise
+import itertools
 import sys
 from types import FrameType
 from typing import Any
@@ -153,8 +153,30 @@ def test_stops_of_drives_that_are_cut_off_keep_no_neighbour_from_the_line(connec
         asked_at.append(rig.clock.now)
         # the first stop of each goes at once; and a drive that stops by itself unless it is asked
         # every 2 s, has to be asked in half of that
-        assert max(after - before for before, after in pairwise(asked_at)) < 1.0
+        pauses = [after - before for before, after in itertools.pairwise(asked_at)]
+        assert max(pauses) < 1.0
         assert rig.drives[4].following
+
+
+# one of these has the status with every set-point
+@pytest.mark.parametrize('connection', ['rtu', 'ascii', 'classic', 'tcp', 'movitrac', 'canopen'])
+def test_a_fault_is_noticed_while_another_drive_is_stopped_in_vain(connection: str) -> None:
+    with Rig(connection, drives=5) as rig:
+        rig.turn()
+        frequencies = itertools.cycle(20.0 + number for number in range(7))
+
+        def give() -> None:
+            # all that set-points leave between two stops
+            for address in (2, 3, 4, 5):
+                rig.drives[address].set_setpoint(rig.connection.hertz * next(frequencies))
+
+        rig.keep(give)
+        rig.pass_time(0.5)
+        rig.far.silence(3600.0)
+        rig.drive.stop()
+        rig.pass_time(0.3)
+        rig.fars[5].trip(rig.a_fault)
+        rig.wait_until(lambda: not rig.drives[5].following, 1.9)
 
 
 @pytest.mark.parametrize('cut', [9.0, 10.3, 11.7])
