@@ -219,6 +219,7 @@ class ErrorLogServices:
             GetErrorLog,
             '~/get_error_log',
             self._on_get,
+            qos_profile=COMMANDS,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
         commands.offer('~/erase_error_log', lambda drive, _: drive.erase_error_log(), _LONGEST)
@@ -278,8 +279,9 @@ class TuningServices:
         # reentrant, so that a second one is refused at once and a cancel need not wait
         group = ReentrantCallbackGroup()
         for name, procedure in _SERVICES.items():
+            answer = self._service_of(name, procedure)
             node.create_service(
-                Trigger, name, self._service_of(name, procedure), callback_group=group
+                Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
             )
         self._server = ActionServer(
             node,
@@ -290,6 +292,9 @@ class TuningServices:
             goal_callback=self._on_goal,
             handle_accepted_callback=self._on_accepted,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
+            goal_service_qos_profile=COMMANDS,
+            result_service_qos_profile=COMMANDS,
+            cancel_service_qos_profile=COMMANDS,
         )
 
     def _service_of(

@@ -8,12 +8,16 @@ from __future__ import annotations
 from typing import Any
 
 from bench import PATIENCE, Bench, wait_until
+from nfo_sinus_msgs.action import Tune
+from nfo_sinus_msgs.srv import GetErrorLog
 import pytest
+from rclpy.action import ActionClient
 from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool, Trigger
 
 #: The answers must not be lost where they arrive, either.
 _QUALITY = QoSProfile(depth=1000)
+_TYPES = SetBool, Trigger, GetErrorLog
 
 
 @pytest.mark.parametrize(
@@ -24,8 +28,10 @@ _QUALITY = QoSProfile(depth=1000)
         ('/nfo_sinus/enable', SetBool.Request(data=False), 100),
         ('/nfo_sinus/fault_ack', Trigger.Request(), 100),
         ('/nfo_sinus_bus/stop_all', Trigger.Request(), 100),
+        ('/nfo_sinus/tune_full', Trigger.Request(), 40),
+        ('/nfo_sinus/get_error_log', GetErrorLog.Request(max_entries=1), 40),
     ],
-    ids=['stop', 'quick_stop', 'enable_false', 'fault_ack', 'stop_all'],
+    ids=['stop', 'quick_stop', 'enable_false', 'fault_ack', 'stop_all', 'tune', 'error_log'],
 )
 def test_many_calls_at_once_are_all_answered(
     bench: Bench, service: str, request_: Any, calls: int
@@ -33,7 +39,7 @@ def test_many_calls_at_once_are_all_answered(
     drive = bench.simulator(*bench.drives.ramps(1))
     bench.driver()
     client = bench.client().connected()
-    type_ = SetBool if isinstance(request_, SetBool.Request) else Trigger
+    type_ = next(one for one in _TYPES if isinstance(request_, one.Request))
     many = client.node.create_client(type_, service, qos_profile=_QUALITY)
     wait_until(many.service_is_ready, 'there is a service')
     with client.run_at(20.0):
@@ -42,3 +48,20 @@ def test_many_calls_at_once_are_all_answered(
     assert all(answer.result().message for answer in answers)
     if service.endswith('stop'):
         drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+
+
+def test_many_goals_at_once_are_all_answered(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver()
+    client = bench.client().connected()
+    tune = ActionClient(
+        client.node, Tune, '/nfo_sinus/tune',
+        goal_service_qos_profile=_QUALITY, result_service_qos_profile=_QUALITY,
+    )
+    wait_until(tune.server_is_ready, 'there is an action')
+    goals = [tune.send_goal_async(Tune.Goal(procedure=Tune.Goal.FULL)) for _ in range(40)]
+    wait_until(lambda: all(goal.done() for goal in goals), 'all are answered')
+    results = [goal.result().get_result_async() for goal in goals]
+    assert client.call('stop').message
+    wait_until(lambda: all(result.done() for result in results), 'all have an end')
+    assert all(result.result().result.message for result in results)
