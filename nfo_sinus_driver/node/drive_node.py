@@ -17,6 +17,8 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.subscription import Subscription
+from rosgraph_msgs.msg import Clock
 
 from nfo_sinus_driver.drive import Cause, Drive, DriveError, DriveSettings, Report
 from nfo_sinus_driver.node.bus_context import BusContext
@@ -124,6 +126,14 @@ class DriveNode(LifecycleNodeMixin, Node):
         TuningServices(self, self.managed, reporter.stamp)
         context.add(self.managed)
         context.diagnose.append(reporter.diagnosis)
+
+    def create_subscription(
+        self, msg_type: type, *arguments: Any, **options: Any
+    ) -> Subscription:
+        """Create one; simulated time does not wait for parameters that are being set."""
+        if msg_type is Clock:
+            options['callback_group'] = MutuallyExclusiveCallbackGroup()
+        return super().create_subscription(msg_type, *arguments, **options)
 
     def stop_for_good(self, patience: float, why: str) -> Future[Report | None]:
         """Stop the motor within ``patience`` s; no client can start it again."""
