@@ -122,7 +122,7 @@ class AllDrives:
             except DriveError as error:
                 failed.append(f'{name}: {say(error)}')
             except FutureTimeoutError:
-                failed.append(f'{name}: the bus did not get to it in time')
+                failed.append(f'{name}: the bus did not get to it in time, but may do it yet')
             else:
                 done.append(f'{name}: {say(answer)}')
         return failed, done

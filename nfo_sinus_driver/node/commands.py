@@ -123,7 +123,7 @@ class CommandServices:
         except (DriveError, NodeError) as error:
             response.message = self._managed.wording.say(error)
         except FutureTimeoutError:
-            response.message = f'the bus did not get to it within {timeout:g} s'
+            response.message = f'the bus did not get to it within {timeout:g} s, but may do it yet'
         except Exception as error:
             # an exception that leaves a service callback would end the executor
             _log.exception('error in a service of %s', self._node.get_fully_qualified_name())

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, TimeoutError as FutureTimeoutError
+from concurrent.futures import Future
 import dataclasses
 import functools
 import logging
@@ -25,7 +25,12 @@ from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.callers import Call
 from nfo_sinus_driver.node.commands import CommandServices, ErrorLogServices, TuningServices
 from nfo_sinus_driver.node.declaring import coerce, declare
-from nfo_sinus_driver.node.drive_parameters import DriveParameters, desired_config, possible_config
+from nfo_sinus_driver.node.drive_parameters import (
+    DriveParameters,
+    desired_config,
+    in_time,
+    possible_config,
+)
 from nfo_sinus_driver.node.factory_settings import with_factory_address
 from nfo_sinus_driver.node.lifecycle import Lifecycle
 from nfo_sinus_driver.node.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
@@ -265,8 +270,9 @@ class DriveNode(LifecycleNodeMixin, Node):
         try:
             stopping = command(Report(Cause.TRANSITION_REQUESTED, by=call))
             call.find()
-            answer = stopping.result(_LONGEST_STOP + self.managed.settings.shutdown_timeout)
-        except (DriveError, FutureTimeoutError) as error:
+            longest = _LONGEST_STOP + self.managed.settings.shutdown_timeout
+            answer = in_time(stopping, longest, 'the stop')
+        except (DriveError, NodeError) as error:
             self.get_logger().error(f'{what}, but: {say(error)}')
             return False
         self.get_logger().info(f'{what}: {say(answer)}' if answer else what)
@@ -362,21 +368,32 @@ class DriveNode(LifecycleNodeMixin, Node):
             )
 
     def _require_same_scale(self, changed: Mapping[str, object]) -> None:
-        # the set-points that go on arriving would mean another speed
-        for name in (one.name for one in DRIVE_SETTINGS.values() if one.change == DISABLED):
+        disabled = (one.name for one in DRIVE_SETTINGS.values() if one.change == DISABLED)
+        for name in disabled:
             now = self.get_parameter(name).value
-            if changed.get(name, now) != now and self.managed.drive.following:
+            if changed.get(name, now) == now:
+                continue
+            # the set-points that go on arriving would mean another speed
+            if self.managed.drive.following:
                 raise ValueError(f'{name} can only be changed while the drive is not enabled')
+            # it could be enabled while that is written, which is not always put back
+            if self._writes_drive_timeout(changed):
+                raise ValueError(f'{name} and drive_timeout: set one after the other')
 
     def _try_drive_timeout(self, seconds: float) -> None:
         """Set the drive's own time-out, or raise why not; without a drive configure does it."""
         managed = self.managed
-        if managed.state in ('inactive', 'active') and seconds != managed.settings.drive_timeout:
+        if self._writes_drive_timeout({'drive_timeout': seconds}):
             try:
-                managed.drive.set_drive_timeout(seconds).result(_LONGEST_STOP)
-            except (DriveError, FutureTimeoutError) as error:
-                why = self.managed.wording.say(error) or 'not in time'
-                raise NodeError(f'drive_timeout: {why}') from None
+                in_time(managed.drive.set_drive_timeout(seconds), _LONGEST_STOP, 'drive_timeout')
+            except DriveError as error:
+                raise NodeError(f'drive_timeout: {managed.wording.say(error)}') from None
+
+    def _writes_drive_timeout(self, changed: Mapping[str, object]) -> bool:
+        """Return whether a change of settings is one of the drive's time-out, too."""
+        now = self.managed.settings.drive_timeout
+        there = self.managed.state in ('inactive', 'active')
+        return there and changed.get('drive_timeout', now) != now
 
     def _take_settings(self, parameters: list[Parameter]) -> None:
         self.managed.change_settings(self._settings_with(parameters))

@@ -6,10 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import TimeoutError as FutureTimeoutError
+from concurrent.futures import Future, TimeoutError as FutureTimeoutError
 import contextlib
 import threading
 import time
+from typing import TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
@@ -28,6 +29,7 @@ _LOOK_PERIOD = 0.002
 
 _LATER = '; those of the drive are there once the node is configured'
 _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text'}
+_T = TypeVar('_T')
 
 
 class DriveParameters:
@@ -170,13 +172,17 @@ class DriveParameters:
 
     @staticmethod
     def _change(drive: Drive, wanted: Mapping[str, Value]) -> tuple[ParameterChange, ...]:
-        try:
-            return drive.parameters.change(wanted).result(_LONGEST_CHANGE)
-        except FutureTimeoutError:
-            raise NodeError(
-                f'{", ".join(wanted)}: the bus did not get to it within {_LONGEST_CHANGE:g} s, but '
-                'may do it yet'
-            ) from None
+        return in_time(drive.parameters.change(wanted), _LONGEST_CHANGE, ', '.join(wanted))
+
+
+def in_time(future: Future[_T], seconds: float, what: str) -> _T:
+    """Return what the bus answers within some time; a NodeError says that it may do it yet."""
+    try:
+        return future.result(seconds)
+    except FutureTimeoutError:
+        raise NodeError(
+            f'{what}: the bus did not get to it within {seconds:g} s, but may do it yet'
+        ) from None
 
 
 def coerce(parameter: CatalogParameter, given: object) -> Value:

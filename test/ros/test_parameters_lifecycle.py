@@ -287,6 +287,20 @@ def test_a_setting_that_is_taken_while_the_node_is_configured_is_that_of_the_dri
     drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
 
 
+@needs('sio_tot')
+def test_what_a_set_point_means_never_changes_with_the_time_out_of_the_drive(bench: Bench) -> None:
+    drive = bench.simulator()
+    bench.driver(*QUIET)
+    client = bench.client().connected()
+    result = client.set_parameters(scale=0.5, drive_timeout=3.0)
+    refused(result, 'scale', 'drive_timeout', 'one after the other')
+    assert (client.parameter('scale'), client.parameter('drive_timeout')) == (1.0, -1.0)
+    assert drive.state()['parameters']['serial.sio_tot'] == 0.0
+    # what stays as it is does not count: a dump can be loaded
+    assert client.set_parameters(scale=1.0, drive_timeout=3.0).successful
+    assert client.set_parameters(scale=0.5, drive_timeout=3.0).successful
+
+
 def test_what_a_set_point_means_never_changes_while_enabled(bench: Bench) -> None:
     drive = bench.simulator()
     bench.driver(*QUIET)

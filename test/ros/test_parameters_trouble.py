@@ -34,6 +34,8 @@ pytestmark = needs('parameters')
 _STOP = Write(1, 0x0298, (0,))
 #: How soon one says that a drive does not answer, s: not a time-out for each of a hundred settings.
 _SOON = PATIENCE
+#: How long a drive takes for an answer here, so that the driver does not wait for all of them, s.
+_LONG = 6.0
 
 
 def _agree(client: Client, drive: Stubborn) -> None:
@@ -105,6 +107,24 @@ def test_drive_timeout_that_is_refused_takes_the_parameters_back(
     assert stubborn.parameters() == before
     assert values(client, *stubborn.names) == before
     assert client.parameter('drive_timeout') == -1.0
+
+
+@needs('sio_tot')
+def test_a_drive_timeout_that_may_be_written_later_is_said_to_be(bench: Bench) -> None:
+    stubborn = bench.enter_context(Stubborn(bench))
+    bench.driver(*QUIET, '-p', 'response_timeout:=10.0', '-p', 'lost_after:=60.0')
+    client = bench.client().connected()
+    slow = True
+
+    def happens(what: str, key: str) -> None:
+        if slow and key.startswith('serial.'):
+            time.sleep(_LONG)
+
+    stubborn.before_requests(happens)
+    refused(client.set_parameters(lost_after=1.0, drive_timeout=3.0), 'drive_timeout', 'may do it')
+    slow = False
+    assert client.parameter('drive_timeout') == -1.0
+    wait_until(lambda: stubborn.parameters()['serial.sio_tot'] == 3.0, 'it does it')
 
 
 def test_what_cannot_be_put_back_is_named_and_shown(stubborn: Stubborn, client: Client) -> None:

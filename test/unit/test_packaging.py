@@ -41,7 +41,7 @@ ON_NOBLE = {
     'action_msgs', 'ament_cmake', 'ament_cmake_pytest', 'ament_index_python',
     'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros',
     'lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'ros2launch', 'rosbag2_py',
-    'rosbag2_storage_mcap', 'rosidl_default_generators', 'rosidl_default_runtime',
+    'rosbag2_storage_mcap', 'rosgraph_msgs', 'rosidl_default_generators', 'rosidl_default_runtime',
     'rosidl_parser', 'sensor_msgs', 'std_msgs', 'std_srvs',
 }
 #: What is left out where it is not installed: apt has none of them, or none that is new enough.
