@@ -182,7 +182,7 @@ class Scheduler:
         """Account for the time, s, for which what was taken out last has kept the line."""
         stop = self._given_stop
         self._unanswered = stop.unit if stop is not None and self._is_silent(stop.unit) else None
-        # a stop in vain is nobody's turn: else the next one were that of a set-point again
+        # a stop in vain takes no turn: else the next one were that of a set-point again
         self._slot_went = self._given == _SLOT or (
             self._slot_went and self._unanswered is not None
         )
