@@ -13,6 +13,7 @@ import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import difflib
+import math
 from typing import Any, NoReturn
 
 from nfo_sinus_driver.catalog import Family, Value
@@ -113,8 +114,23 @@ def _press(at: Target, given: argparse.Namespace) -> None:
     at.unit.press(given.key)
 
 
+def finite(text: str) -> float:
+    """Read a number; what is none, or has no end, happens to nothing."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f'{text} is not possible: a finite number')
+    return value
+
+
+def _seconds(text: str) -> float:
+    value = finite(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f'{text} is not possible: 0 or more seconds')
+    return value
+
+
 SWITCH = argument('state', 'on or off', choices=('on', 'off'))
-_SECONDS = argument('seconds', 'for how many seconds', type=float)
+_SECONDS = argument('seconds', 'for how many seconds', type=_seconds)
 _TIMES = argument('times', 'how many answers', type=int, default=1)
 
 INJECTIONS: Mapping[str, Injection] = {
@@ -139,11 +155,11 @@ INJECTIONS: Mapping[str, Injection] = {
         lambda at, given: at.drive.factory_reset()),
     'load': Injection('change the load of the motor',
         lambda at, given: assign(at.drive.motor, load=given.share),
-        argument('share', 'torque at nominal speed, 1 is the nominal torque', type=float)),
+        argument('share', 'torque at nominal speed, 1 is the nominal torque', type=finite)),
     'power-cycle': Injection('take the mains away and give them back',
         lambda at, given: at.drive.power_cycle(given.seconds),
         argument('seconds', 'how long it is silent (default: its boot time)',
-            type=float, default=None)),
+            type=_seconds, default=None)),
     'silence': Injection('let the drive neither hear nor answer',
         lambda at, given: at.drive.silence(given.seconds), _SECONDS),
     # ---- to the line ----
@@ -152,27 +168,27 @@ INJECTIONS: Mapping[str, Injection] = {
     'hangup': Injection(
         'let the port disappear and come back, like a USB adapter that is pulled out',
         lambda at, given: at.line.hang_up(at.now + given.seconds),
-        argument('seconds', 'for how many seconds (default: 1)', type=float, default=1.0)),
+        argument('seconds', 'for how many seconds (default: 1)', type=_seconds, default=1.0)),
     'noise': Injection('put noise before the next answers', _spoil, _TIMES),
     'damage': Injection('flip a bit in the next answers', _spoil, _TIMES),
     'drop': Injection('lose the next answers; the requests are carried out', _spoil, _TIMES),
     'double': Injection('send the next answers twice', _spoil, _TIMES),
     'delay': Injection('send the next answers late', _spoil, _TIMES,
-        argument('seconds', 'how late (default: 0.5)', type=float, default=0.5)),
+        argument('seconds', 'how late (default: 0.5)', type=_seconds, default=0.5)),
     'noise-rate': Injection('spoil a share of all answers by chance, until heal',
         lambda at, given: at.line.faults.set_rate(
             given.what, given.share, given.seed, given.seconds),
         argument('what', 'what happens to them', choices=ANSWER_FAULTS),
-        argument('share', 'of all answers, such as 0.03; 0 ends it', type=float),
+        argument('share', 'of all answers, such as 0.03; 0 ends it', type=finite),
         argument('seed', 'a number, for the same answers in every run', type=int, default=None),
-        argument('seconds', 'how late they come, for delay', type=float, default=0.5)),
+        argument('seconds', 'how late they come, for delay', type=_seconds, default=0.5)),
     'burst': Injection('let the line carry nothing for a while again and again, until heal',
         lambda at, given: at.line.faults.set_bursts(given.seconds, given.period, at.now),
-        argument('seconds', 'how long; 0 ends it', type=float),
-        argument('period', 'from one to the next (s, default: 5)', type=float, default=5.0)),
+        argument('seconds', 'how long; 0 ends it', type=finite),
+        argument('period', 'from one to the next (s, default: 5)', type=finite, default=5.0)),
     'traffic': Injection('on a CAN bus: let others send frames that no node here takes',
         lambda at, given: at.line.set_traffic(given.rate, at.now),
-        argument('rate', 'how many a second, such as 1000; 0 ends it', type=float)),
+        argument('rate', 'how many a second, such as 1000; 0 ends it', type=finite)),
     'heal': Injection('end all faults of the line', lambda at, given: at.line.faults.heal()),
     # ---- to a PLC, and the fieldbus behind it ----
     'fieldbus-cut': Injection('let no telegram pass between the PLC and the drive',

@@ -291,17 +291,23 @@ def inject(argv: Sequence[str]) -> int:
     except ControlError as error:
         print(f'simulator inject: {error}', file=sys.stderr)
         return 1
+    except OSError as error:
+        why = f'the output cannot be written: {error.strerror}'
+        print(f'simulator inject: {why}', file=sys.stderr)
+        return 1
     return 0
 
 
 def _put(text: str) -> None:
-    """Print a text, as far as there is a reader."""
+    """Print a text, as far as there is a reader (OSError: it cannot be written)."""
     try:
         print(text, flush=True)
-    except BrokenPipeError:
+    except OSError as error:
         # Python would complain once more at the end
         with open(os.devnull, 'w', encoding='utf-8') as nowhere:
             os.dup2(nowhere.fileno(), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            raise
 
 
 def _state(client: Client, addresses: Sequence[int]) -> Mapping[Any, Any]:

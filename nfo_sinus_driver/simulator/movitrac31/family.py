@@ -18,7 +18,7 @@ from nfo_sinus_driver.catalog.codec import BitField, SignedBcd, codec_of
 from nfo_sinus_driver.simulator import movitrac
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.family import SimulatedFamily
-from nfo_sinus_driver.simulator.injections import Injection, argument, assign
+from nfo_sinus_driver.simulator.injections import Injection, argument, assign, finite
 from nfo_sinus_driver.simulator.movitrac import Nack, ReturnCode
 from nfo_sinus_driver.simulator.movitrac31.commands import FUNCTION_BITS, SETPOINT
 from nfo_sinus_driver.simulator.movitrac31.control_unit import MovitracControlUnit
@@ -191,7 +191,7 @@ _INJECTIONS = {
         argument('state', 'closed or open', choices=('closed', 'open'))),
     'ambient': Injection('change the temperature around the drive',
         lambda at, given: assign(at.unit, ambient=given.temperature),
-        argument('temperature', 'in °C, such as -15', type=float)),
+        argument('temperature', 'in °C, such as -15', type=finite)),
 }
 
 FAMILY = SimulatedFamily(

@@ -206,6 +206,31 @@ def test_a_reader_that_has_gone_is_no_error(link):
         assert (done.returncode, done.stderr) == (0, b'')
 
 
+def test_output_that_cannot_be_written_is_said(link):
+    with Simulator((1,), link=link, control=''), open('/dev/full', 'w') as out:
+        command = [*COMMAND, 'inject', '--link', link, 'state']
+        done = subprocess.run(
+            command, cwd=ROOT, stdout=out, stderr=subprocess.PIPE, timeout=PATIENCE, text=True
+        )
+    why = 'the output cannot be written: No space left on device'
+    assert (done.returncode, done.stderr) == (1, f'simulator inject: {why}\n')
+
+
+@pytest.mark.parametrize(
+    'words',
+    [
+        ('load', 'nan'), ('load', 'inf'), ('silence', '-1'), ('silence', 'nan'),
+        ('power-cycle', 'inf'), ('line-dead', '-0.1'), ('hangup', 'nan'), ('delay', '1', 'nan'),
+        ('noise-rate', 'delay', '0.1', '1', 'nan'), ('burst', 'nan'), ('traffic', 'inf'),
+    ],
+)
+def test_a_number_that_is_none_is_refused(link, inject, words):
+    with Simulator((1,), link=link, control=''):
+        with pytest.raises(SystemExit) as left:
+            inject('--link', link, *words)
+        assert left.value.code == 2
+
+
 def test_inject_does_what_is_typed_and_says_what_is_wrong(link, inject):
     with Simulator((1, 2), link=link, control=''):
 
