@@ -29,7 +29,7 @@ _log = logging.getLogger(__name__)
 
 #: The type of the resource, and the group of the entry points.
 GROUP = 'nfo_sinus_driver.families'
-_PACKAGE = 'package://'
+PACKAGE = 'package://'
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def find(text: str) -> str:
 
     :raises ValueError: there is none; the message says where was looked.
     """
-    if text.startswith(_PACKAGE):
+    if text.startswith(PACKAGE):
         return _file(_in_package(text), text)
     if is_described(text) or os.sep in text:
         return _file(Path(text).expanduser().absolute(), text)
@@ -126,7 +126,7 @@ def _prefixes() -> Iterator[Path]:
 
 
 def _in_package(text: str) -> Path:
-    package, _, rest = text.removeprefix(_PACKAGE).partition('/')
+    package, _, rest = text.removeprefix(PACKAGE).partition('/')
     for prefix in _prefixes():
         if (prefix / 'share' / 'ament_index' / 'resource_index' / 'packages' / package).exists():
             return prefix / 'share' / package / rest

@@ -10,10 +10,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import copy
 from datetime import datetime
 import json
-from pathlib import Path
+import os
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Role, load_family, load_parameter
+from nfo_sinus_driver.catalog import Role, load_family, load_parameter, load_profile
+from nfo_sinus_driver.catalog.finding import PACKAGE
 from nfo_sinus_driver.cli.console import (
     CliError,
     UsageError,
@@ -72,7 +73,7 @@ class Scan(Verb):
 
     def main(self, options: argparse.Namespace) -> int:
         """Find out who answers on the line."""
-        if options.params:
+        if options.params is not None:
             _require_new(options.params, force=options.force)
         # a parameter file on the standard output is alone there
         show = remark if options.params == STANDARD else put
@@ -93,7 +94,7 @@ class Scan(Verb):
                 ' (--all-settings tries all that the protocol can have), A and B of the wires'
             )
             raise CliError(f'no response: check in this order: {protocol.check}{others}')
-        if options.params:
+        if options.params is not None:
             _write_params(options, found, lines_of)
         return 0
 
@@ -130,8 +131,8 @@ def _write_params(
     """Write what the driver needs to start with the drives found, if they speak alike."""
     if len(set(lines.values())) > 1:
         found_at = [f'{address}: {facts["line"]}' for address, facts in sorted(found.items())]
-        keys = {load_family(facts['model']).key(Role.BAUD_RATE) for facts in found.values()}
-        how = ', '.join(f'nfo-sinus set {key}=...' for key in sorted(keys - {''}))
+        key = load_family(options.model).key(Role.BAUD_RATE)
+        how = f'nfo-sinus set {key}=...' if key else ''
         raise CliError(
             listed(
                 'no parameter file was written: one line has one baud rate and format, and the '
@@ -248,7 +249,6 @@ _DRIVE = """
 /**/{name}:
   ros__parameters:
     address: {address}
-    model: {model}
 """
 _TIMEOUT = """\
     # The drive stops the motor by itself when it has heard nothing for this long, s. The driver
@@ -257,11 +257,13 @@ _TIMEOUT = """\
 """
 #: What is written only if it is not what the driver takes by itself.
 _IF_OTHER = ('response_timeout', 'retries')
+#: What of a drive is written only if it was given.
+_OF_A_DRIVE = ('control_method', 'block_address', 'telegram_words')
 
 
 def _require_new(name: str, *, force: bool) -> None:
     """Ensure that no file is replaced that may have been edited since."""
-    if name != STANDARD and not force and Path(name).exists():
+    if name != STANDARD and not force and os.path.lexists(name):
         raise CliError(f'{name} exists already: choose another name, or say --force to replace it')
 
 
@@ -288,21 +290,37 @@ def _driver_params(
     # what JSON has is YAML, too
     settings = [f'    {name}: {json.dumps(value)}\n' for name, value in line.items()]
     drives = [
-        _DRIVE.format(
-            named=_named(facts), name=names[address], address=address, model=facts['model']
-        )
-        + _timeout(facts['model'])
+        _DRIVE.format(named=_named(facts), name=names[address], address=address)
+        + _how_it_is_reached(options, facts['model'])
+        + _timeout(options, facts['model'])
         for address, facts in sorted(found.items())
     ]
     return ''.join((_HEAD.format(count=count, date=date), *settings, *drives))
 
 
-def _timeout(model: str) -> str:
+def _how_it_is_reached(options: argparse.Namespace, model: str) -> str:
+    """Return the settings by which the scan has found a drive, without which it is not found."""
+    settings = {'model': model}
+    if options.family and model != AUTO:
+        # a path counts from the folder in which it was typed
+        typed = options.family
+        is_path = typed.endswith('.yaml') or os.sep in typed
+        named = typed.startswith(PACKAGE) or not is_path
+        settings = {'family': typed if named else options.model}
+    given = {name: getattr(options, name) for name in _OF_A_DRIVE}
+    settings |= {name: value for name, value in given.items() if value != DEFAULTS[name]}
+    return ''.join(f'    {name}: {json.dumps(value)}\n' for name, value in settings.items())
+
+
+def _timeout(options: argparse.Namespace, model: str) -> str:
     """Return what the file says of the time-out of the drive itself, where a model has one."""
-    timeout = None if model == AUTO else load_parameter(model, Role.COMMUNICATION_TIMEOUT)
-    if timeout is None:
+    methods = load_profile(options.model).methods
+    method = methods.get(options.control_method) or next(iter(methods.values()))
+    timeout = load_parameter(options.model, Role.COMMUNICATION_TIMEOUT)
+    if model == AUTO or timeout is None or method.addressing in PROTOCOLS[options.protocol].carries:
+        # behind a PLC it is not used
         return ''
-    family = load_family(model)
+    family = load_family(options.model)
     names = [timeout.name, *(family[key].name for key in family.profile.timeout_conditions)]
     return _TIMEOUT.format(written=' and '.join(names))
 

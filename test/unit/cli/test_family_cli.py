@@ -13,9 +13,12 @@ from cli_bench import MakeBench
 import pytest
 from support.described import SHIPPED
 from support.recognition import other_make
+import yaml
 
+from nfo_sinus_driver.catalog.finding import find
 from nfo_sinus_driver.cli import families
 from nfo_sinus_driver.cli.main import main, parse
+from nfo_sinus_driver.drive import DriveSettings
 from nfo_sinus_driver.simulator import main as simulator
 
 V20 = str(SHIPPED['siemens_v20'])
@@ -78,6 +81,26 @@ def test_a_drive_of_another_make_is_only_read(
     said = capsys.readouterr()
     assert 'another model' in said.err and 'is confirmed' not in said.err
     assert bench.writes() == [] and not bench.state()['run_command']
+
+
+@pytest.mark.parametrize('typed', ['yaskawa_v1000', 'siemens_v20', './mine.vfd.yaml'])
+def test_the_file_of_a_scan_names_the_family_from_wherever_the_driver_is_started(
+    make_bench: MakeBench,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    typed: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(V20, 'mine.vfd.yaml')
+    model = find(typed)
+    bench = make_bench(model=model, serial_numbers=[])
+    line = ('--port', bench.simulator.port, '--family', typed, '--retries', '1')
+    assert main([*line, 'scan', '--addresses', '1-2', '--params', '-']) == 0
+    written = yaml.safe_load(capsys.readouterr().out)
+    monkeypatch.chdir('/')
+    given = written['/**/drive_2']['ros__parameters']
+    assert given['address'] == 2 and DriveSettings(**given).model == model
 
 
 def test_families_are_listed(

@@ -13,10 +13,13 @@ from typing import Any
 
 from cli_bench import Bench, Done, MakeBench
 import pytest
+import yaml
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import session
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.link import PROTOCOLS
 from nfo_sinus_driver.simulator.plc import PlcSetting
 
 Nfo = Callable[..., Done]
@@ -60,6 +63,20 @@ def test_settings_are_listed_read_set_dumped_and_loaded(
     assert done.status == 0 and 'one parameter' not in done.out, done.err
     assert bench.value('control.accel') == 7.5
     assert nfo('diff', path).status == 0
+
+
+def test_by_the_file_of_a_scan_a_driver_reaches_what_the_scan_has_reached(
+    nfo: Nfo, bench: Bench
+) -> None:
+    done = nfo('scan', '--addresses', '1-2', '--params', '-', '--retries', 1)
+    assert done.status == 0, done.err
+    written = yaml.safe_load(done.out)
+    for address in (1, 2):
+        given = written[f'/**/drive_{address}']['ros__parameters']
+        assert given == {
+            'address': address, 'model': 'sinus_g2', 'control_method': 'telegram1'
+        }
+        DriveSettings(**given).require_line(PROTOCOLS['modbus_tcp'])
 
 
 def test_a_fault_is_named_and_the_error_log_is_shown(nfo: Nfo, bench: Bench) -> None:
