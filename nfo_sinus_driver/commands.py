@@ -28,10 +28,11 @@ COMMANDS = {
 #: What is no part of ROS; the names of the packages for apt are made of these.
 _LIBRARIES = ('argcomplete', 'pymodbus', 'serial', 'tqdm', 'yaml')
 _NOT_STARTED = 2
+_INTERRUPTED = 130
 
 
 def start(name: str) -> int | None:
-    """Run a command; return its exit status, 2 where something that it needs is missing."""
+    """Run a command; return its exit status: 2 if what it needs is missing, 130 after Ctrl-C."""
     module, function = COMMANDS[name]
     try:
         status: int | None = getattr(importlib.import_module(module), function)()
@@ -41,6 +42,9 @@ def start(name: str) -> int | None:
             raise
         print(f'{name}: {_why_not(name, missing)}', file=sys.stderr)
         return _NOT_STARTED
+    except KeyboardInterrupt:
+        # while it was loaded: what drives a motor holds its signals
+        return _INTERRUPTED
     return status
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import contextlib
 import json
 import math
+import os
 import signal
 import sys
 import threading
@@ -52,14 +53,30 @@ def progress(what: str, total: int) -> Iterator[Callable[[], None]]:
 
 def remark(text: str) -> None:
     """Say something to the operator, above the bar if there is one."""
-    tqdm.write(f'nfo-sinus: {text}', file=sys.stderr)
-    sys.stderr.flush()
+    if sys.stderr is None:
+        return
+    # what nobody can be told must not end what is under way: settings are put back, too
+    with contextlib.suppress(OSError):
+        tqdm.write(f'nfo-sinus: {text}', file=sys.stderr)
+        sys.stderr.flush()
 
 
 def put(text: str) -> None:
-    """Print a line of output, above the bar if there is one."""
-    tqdm.write(text, file=sys.stdout)
-    sys.stdout.flush()
+    """
+    Print a line of output, above the bar if there is one.
+
+    :raises OutputLost: it cannot be written.
+    """
+    if sys.stdout is None:
+        raise OutputLost('it is closed')
+    try:
+        tqdm.write(text, file=sys.stdout)
+        sys.stdout.flush()
+    except OSError as error:
+        # what is left would be written at the end once more, in vain
+        with open(os.devnull, 'w', encoding='utf-8') as nowhere:
+            os.dup2(nowhere.fileno(), sys.stdout.fileno())
+        raise OutputLost(error.strerror or '') from error
 
 
 def as_json(facts: Any, indent: int | None = None) -> str:
@@ -94,8 +111,23 @@ def signals_handled(handler: Callable[[int, Any], Any]) -> Iterator[None]:
             signal.signal(number, former)
 
 
+@contextlib.contextmanager
+def signals_noted() -> Iterator[Callable[[], bool]]:
+    """Let signals that end the program wait; what it yields says whether one came."""
+    came = threading.Event()
+    with signals_handled(lambda *_: came.set()):
+        yield came.is_set
+
+
 class CliError(Exception):
     """It was not done; the message says why and what to do."""
+
+
+class OutputLost(CliError):
+    """What was to be shown cannot be written."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f'the output cannot be written: {why}')
 
 
 class UsageError(Exception):
@@ -114,11 +146,16 @@ def listed(head: str, lines: Iterable[str]) -> str:
     return '\n  '.join((head, *lines))
 
 
+def can_ask() -> bool:
+    """Return whether there is a terminal to ask and to answer."""
+    return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
+
+
 def require_yes(options: argparse.Namespace, question: str) -> None:
     """Ensure that the operator wants it, by asking or by ``--yes``; else an error."""
     if options.yes:
         return
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+    if not can_ask():
         raise UsageError(f'{question} There is no terminal to answer: say so with --yes')
     print(f'{question} [y/N] ', end='', file=sys.stderr, flush=True)
     answer = sys.stdin.readline()

@@ -10,7 +10,7 @@ import sys
 
 from nfo_sinus_driver import catalog
 from nfo_sinus_driver.catalog.finding import every, find
-from nfo_sinus_driver.cli.console import put, put_columns
+from nfo_sinus_driver.cli.console import OutputLost, UsageError, put, put_columns, remark
 from nfo_sinus_driver.cli.options import Verb
 
 #: What many manuals print for the register that is sent as 0.
@@ -32,6 +32,8 @@ class Family(Verb):
 
     def main(self, options: argparse.Namespace) -> int:
         """Do it; check fails where a file is wrong."""
+        if bool(options.files) != (options.action == 'check'):
+            raise UsageError('family check takes one file or more, family list takes none')
         if options.action == 'list':
             put_families()
             return 0
@@ -115,5 +117,10 @@ def main() -> int:
     if sys.argv[1:2] and sys.argv[1] != '--ros-args':
         put('usage: families lists the families of drives that are found, and where')
         return 0 if sys.argv[1] in ('-h', '--help') else 2
-    put_families()
+    try:
+        put_families()
+    except OutputLost as error:
+        if not isinstance(error.__cause__, BrokenPipeError):
+            remark(str(error))
+        return 1
     return 0

@@ -13,7 +13,15 @@ import os
 import signal
 import sys
 
-from nfo_sinus_driver.cli.console import CliError, UsageError, put, remark, say, signals_handled
+from nfo_sinus_driver.cli.console import (
+    CliError,
+    OutputLost,
+    UsageError,
+    put,
+    remark,
+    say,
+    signals_handled,
+)
 from nfo_sinus_driver.cli.families import Family
 from nfo_sinus_driver.cli.monitor import Monitor
 from nfo_sinus_driver.cli.options import (
@@ -89,13 +97,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except UsageError as error:
         remark(str(error))
         return _USAGE
+    except OutputLost as error:
+        if not isinstance(error.__cause__, BrokenPipeError):
+            remark(str(error))
+        return verb.failed
     except (CliError, DriveError) as error:
         remark(say(error))
-        return verb.failed
-    except BrokenPipeError:
-        # the reader of the output has gone, and Python would complain once more at the end
-        with open(os.devnull, 'w', encoding='utf-8') as nowhere:
-            os.dup2(nowhere.fileno(), sys.stdout.fileno())
         return verb.failed
     except KeyboardInterrupt:
         return _INTERRUPTED

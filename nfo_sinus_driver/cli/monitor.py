@@ -23,7 +23,7 @@ from typing import Any
 from nfo_sinus_driver.bus import Priority, Statistics
 from nfo_sinus_driver.catalog import Kind, Role, State
 from nfo_sinus_driver.cli.console import UsageError, as_json, columns, put, remark, say
-from nfo_sinus_driver.cli.options import Verb, add_flag, addresses, period
+from nfo_sinus_driver.cli.options import Verb, add_flag, addresses, period, times
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, InverterStatus
 from nfo_sinus_driver.link import PortError, Refused
@@ -69,7 +69,7 @@ class Monitor(Verb):
             '--period', type=period, default=0.5, metavar='SECONDS',
             help='from one line to the next (default: 0.5)',
         )
-        parser.add_argument('--count', type=int, metavar='TIMES', help='end after so many')
+        parser.add_argument('--count', type=times, metavar='TIMES', help='end after so many')
         add_flag(
             parser, '--lines',
             'a line each time, where a terminal would show the view; so does --count',

@@ -149,6 +149,7 @@ def number(
 
 address = number(int, lambda value: 0 <= value <= 247, 'not possible: 1 to 247')
 count = number(int, lambda value: value >= 0, 'not possible: 0 or more')
+times = number(int, lambda value: value >= 1, 'not possible: 1 or more')
 period = number(float, lambda value: 0.01 <= value <= 3600, 'not possible: 0.01 s at least')
 duration = number(float, lambda value: 0 < value < math.inf, 'not possible: more than 0 s')
 setpoint = number(float, math.isfinite, 'no set-point')
@@ -158,8 +159,8 @@ def addresses(text: str) -> tuple[int, ...]:
     """Read a list of addresses, such as ``1-10,20``."""
     found: set[int] = set()
     for part in text.split(','):
-        first, _, last = part.partition('-')
-        span = range(address(first), address(last or first) + 1)
+        first, dash, last = part.partition('-')
+        span = range(address(first), address(last if dash else first) + 1)
         if not span:
             raise argparse.ArgumentTypeError(f'{text} is no list of addresses, such as 1-10,20')
         found.update(span)

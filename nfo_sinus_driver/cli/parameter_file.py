@@ -16,6 +16,7 @@ import contextlib
 from dataclasses import dataclass, field
 from decimal import Decimal
 import difflib
+import errno
 import os
 from pathlib import Path
 import re
@@ -25,7 +26,7 @@ from typing import Any
 import yaml
 
 from nfo_sinus_driver.catalog import Family, Parameter, Value
-from nfo_sinus_driver.cli.console import CliError, listed
+from nfo_sinus_driver.cli.console import CliError, listed, put
 from nfo_sinus_driver.drive.parameter_writer import show
 
 #: What the header says, in this order.
@@ -74,12 +75,14 @@ def format_file(header: Mapping[str, str], values: Mapping[str, Value], model: F
 def write_file(name: str, text: str) -> None:
     """Write a parameter file; ``-`` is the standard output (CliError: it cannot be written)."""
     if name == STANDARD:
-        sys.stdout.write(text)
-        sys.stdout.flush()
+        put(text.removesuffix('\n'))
         return
     path = Path(name)
-    partial = path.with_name(f'{path.name}.{os.urandom(8).hex()}.part')
     try:
+        if not path.name:
+            # of such a path none beside it can be made
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        partial = path.with_name(f'{path.name}.{os.urandom(8).hex()}.part')
         if not path.exists() or path.is_file():
             # an older file is replaced by a whole one, or not at all
             with contextlib.ExitStack() as undo:
@@ -91,7 +94,7 @@ def write_file(name: str, text: str) -> None:
         else:
             path.write_text(text, encoding='utf-8')
     except OSError as error:
-        raise CliError(f'{name} cannot be written: {error.strerror}') from error
+        raise CliError(f"{name or repr('')} cannot be written: {error.strerror}") from error
 
 
 def read_file(name: str) -> ParameterFile:
@@ -100,10 +103,12 @@ def read_file(name: str) -> ParameterFile:
 
     :raises CliError: it cannot be read, or is none.
     """
+    if name == STANDARD and sys.stdin is None:
+        raise CliError('the standard input cannot be read: it is closed')
     try:
         text = sys.stdin.read() if name == STANDARD else Path(name).read_text(encoding='utf-8')
     except OSError as error:
-        raise CliError(f'{name} cannot be read: {error.strerror}') from error
+        raise CliError(f"{name or repr('')} cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise CliError(f'{name} is no text in UTF-8: is it a parameter file?') from error
     return parse_file(text, 'the standard input' if name == STANDARD else name)
@@ -111,6 +116,15 @@ def read_file(name: str) -> ParameterFile:
 
 def parse_file(text: str, name: str) -> ParameterFile:
     """Return what a parameter file says, or a CliError."""
+    try:
+        # behind the mark of some editors its header would be none
+        return _parse(text.removeprefix('\ufeff'), name)
+    except RecursionError as error:
+        why = 'one thing stands in the other, too deep'
+        raise CliError(f'{name} is no parameter file: {why}') from error
+
+
+def _parse(text: str, name: str) -> ParameterFile:
     try:
         tree = yaml.load(text, _Loader)
     except (yaml.YAMLError, ValueError) as error:

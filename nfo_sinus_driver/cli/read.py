@@ -13,6 +13,7 @@ import math
 from nfo_sinus_driver.catalog import Parameter, Role, Value, example_setting
 from nfo_sinus_driver.cli.console import (
     CliError,
+    OutputLost,
     UsageError,
     as_json,
     columns,
@@ -22,6 +23,7 @@ from nfo_sinus_driver.cli.console import (
     put_columns,
     require_yes,
     say,
+    signals_noted,
 )
 from nfo_sinus_driver.cli.control_session import control_session
 from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, change, count
@@ -321,15 +323,21 @@ class Set(Verb):
                         wrong.append(say(error))
             if wrong:
                 raise CliError(listed('nothing was written:', wrong))
-            changes = drive.parameters.change(wanted).result()
+            # what is half-way is not all or none: a signal waits until it is done
+            with signals_noted():
+                changes = drive.parameters.change(wanted).result()
             values = drive.parameters.values
-        if options.json:
-            _put_values({name: settings[name] for name in wanted}, values)
-            return 0
-        changed = {one.key: one for one in changes}
-        for name in wanted:
-            as_it_was = f'{name}: {shown(values[name], settings[name].unit)}, as it was'
-            put(str(changed.get(name, as_it_was)))
+        try:
+            if options.json:
+                _put_values({name: settings[name] for name in wanted}, values)
+                return 0
+            changed = {one.key: one for one in changes}
+            for name in wanted:
+                as_it_was = f'{name}: {shown(values[name], settings[name].unit)}, as it was'
+                put(str(changed.get(name, as_it_was)))
+        except OutputLost as error:
+            # that it failed would be taken for "nothing was written"
+            raise CliError(listed(f'{error}; written are:', map(str, changes))) from error
         return 0
 
 

@@ -123,6 +123,8 @@ class _Run:
             status, why, signal = end.status, str(end), end.signal
             if signal and self._drive.identity is not None:
                 self._control.screen.say(f'{end.key}: stopping the motor')
+            elif self._control.screen.gone:
+                self._control.screen.say(why)
         except DriveError as error:
             why = say(error)
             self._control.screen.say(why)
@@ -217,7 +219,7 @@ class _Run:
             if not drive.following:
                 raise Ended(self._why_disabled(), _FAILED)
             if self._control.screen.gone:
-                raise Ended('the output has no reader any more', _FAILED)
+                raise Ended('the output has no reader any more, or no room', _FAILED)
             if self._left <= 0:
                 raise Ended(f'{options.seconds:g} s are over', 0)
 

@@ -136,7 +136,7 @@ class Session:
             ).open()
             self._bus = Bus(link, link.protocol.most_requests)
             self._memory = StateFolder(options.port)
-            self._settings(options.address)
+            self._settings(options.address).require_line(link.protocol)
         except ValueError as error:
             raise UsageError(str(error)) from None
         if not options.may_take_control:

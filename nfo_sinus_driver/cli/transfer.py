@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping
-import contextlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from importlib import metadata
+import signal
 import sys
-import threading
 
 from nfo_sinus_driver.catalog import Family, Role, Value, load_family
 from nfo_sinus_driver.cli.console import (
@@ -20,6 +19,7 @@ from nfo_sinus_driver.cli.console import (
     Interrupted,
     UsageError,
     as_json,
+    can_ask,
     listed,
     progress,
     put,
@@ -27,6 +27,7 @@ from nfo_sinus_driver.cli.console import (
     remark,
     say,
     signals_handled,
+    signals_noted,
 )
 from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, address, command_line
 from nfo_sinus_driver.cli.parameter_file import (
@@ -217,6 +218,11 @@ class Loading:
 
     def run(self) -> None:
         """Write all of it; if that fails, say what was written and what not, or put it back."""
+        # a second Ctrl-C does not keep the first from being answered
+        with signals_noted():
+            self._run()
+
+    def _run(self) -> None:
         try:
             self._write('writing', self._data, self._written)
         except (DriveError, Interrupted) as error:
@@ -229,7 +235,7 @@ class Loading:
         self, what: str, data: Mapping[str, bytes], written: dict[str, ParameterChange]
     ) -> None:
         """Write, and keep account of it; a signal ends it after the parameter on its way."""
-        with _signals_noted() as came, progress(f'{what} {self._drive}', len(data)) as step:
+        with signals_noted() as came, progress(f'{what} {self._drive}', len(data)) as step:
 
             def wrote(change: ParameterChange) -> None:
                 written[change.key] = change
@@ -273,11 +279,12 @@ class Loading:
         return f'not loaded: all that was written is put back ({len(back)}), the drive is as it was'
 
     def _wants_it_back(self) -> bool:
-        if self._options.keep or not (sys.stdin.isatty() and sys.stderr.isatty()):
+        if self._options.keep or not can_ask():
             return False
         print('Put back what was written? [Y/n] ', end='', file=sys.stderr, flush=True)
         try:
-            answer = sys.stdin.readline()
+            with signals_handled(signal.default_int_handler):
+                answer = sys.stdin.readline()
         except KeyboardInterrupt:
             answer = ''
         # the end of the input is no answer
@@ -295,14 +302,6 @@ class Loading:
         if not self._drive.model.communication.isdisjoint(self._written):
             words.insert(0, '--allow-communication-changes')
         return command_line(self._options, 'set', *words)
-
-
-@contextlib.contextmanager
-def _signals_noted() -> Iterator[Callable[[], bool]]:
-    """Let signals that end the program wait; what it yields says whether one came."""
-    came = threading.Event()
-    with signals_handled(lambda *_: came.set()):
-        yield came.is_set
 
 
 _ABSENT = 'absent'

@@ -315,6 +315,14 @@ class DriveSettings:
                 f'control_method {self.method} of {self.model} needs another line: '
                 f'set protocol to {able} (it is {protocol.name})'
             )
+        family = load_family(self.model)
+        places = family[family.key_of_status].addresses
+        if not needed and protocol.addressing not in places:
+            able = ' or '.join(one.name for one in PROTOCOLS.values() if one.addressing in places)
+            raise ValueError(
+                f'no {self.model} is on a line of {protocol.name}: set protocol to {able}, or '
+                'another model'
+            )
         if self.block_address and needed not in protocol.carries:
             raise ValueError(
                 f'block_address {self.block_address}: it is for control_method telegram1 alone'

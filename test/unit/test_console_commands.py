@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import ast
+from pathlib import Path
 import re
 import subprocess
 import sys
@@ -53,6 +54,15 @@ def test_a_command_says_in_a_sentence_what_is_not_installed(name: str) -> None:
     else:
         assert re.match(rf'{name}: needs the library \w+ \(apt install python3-', sentence)
         assert f"pip install '.[{'simulator' if name == 'simulator' else 'cli'}]'" in sentence
+
+
+def test_ctrl_c_while_a_command_is_loaded_ends_it_in_silence(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / 'slow_to_load.py').write_text('raise KeyboardInterrupt', encoding='utf-8')
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(commands.COMMANDS, 'nfo-sinus', ('slow_to_load', 'main'))
+    assert commands.nfo_sinus() == 130
 
 
 def test_what_is_wrong_in_the_driver_itself_is_no_missing_library(

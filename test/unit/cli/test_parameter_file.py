@@ -160,6 +160,9 @@ def test_sections_as_ros_takes_them(text: str) -> None:
         ('a: b: c', 'no parameter file'),
         ('\x00', 'no parameter file'),
         ('? [a]\n: 1', 'no parameter file'),
+        ('[' * 10_000, 'no parameter file'),
+        ('&a {b: *a}', 'no parameter file'),
+        ('/**: {ros__parameters: &a {b: *a}}', 'no parameter file'),
         ('!!python/object:os.system {}', 'no parameter file'),
         ('/**: {ros__parameters: {a.b: 1, a.b: 2}}', 'a.b stands twice'),
         ('/**: {ros__parameters: {a.b: 1, a: {b: 2}}}', 'a.b stands twice'),
@@ -174,6 +177,17 @@ def test_what_is_no_parameter_file_is_said(text: str, says: str) -> None:
     with pytest.raises(CliError) as error:
         parse_file(text, 'cell.yaml')
     assert says in str(error.value)
+
+
+def test_the_mark_in_front_that_an_editor_makes_hides_no_header() -> None:
+    text = '\ufeff# model: sinus_g2\n# address: 9\n/**: {ros__parameters: {a.b: 1}}\n'
+    assert parse_file(text, 'x').header == {'model': 'sinus_g2', 'address': '9'}
+
+
+@pytest.mark.parametrize('name', ['', '.', '/', '..', 'x' * 300])
+def test_a_name_that_no_file_can_have_is_said(name: str) -> None:
+    with pytest.raises(CliError, match='cannot be written'):
+        write_file(name, 'x')
 
 
 def test_a_comment_below_the_header_is_none_of_it() -> None:

@@ -13,11 +13,11 @@ from pathlib import Path
 import shlex
 import signal
 
-from cli_bench import Bench, Done, wait_until
+from cli_bench import PATIENCE, Bench, Done, wait_until
 import pytest
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli import transfer
+from nfo_sinus_driver.cli import read, transfer
 from nfo_sinus_driver.cli.parameter_file import parse_file
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 
@@ -397,7 +397,7 @@ def test_a_fault_half_way(nfo: Nfo, bench: Bench, some: Path) -> None:
 def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     """What sends one signal, the first time it is asked to, and waits until it was noted."""
     noted: list[Callable[[], bool]] = []
-    original = transfer._signals_noted
+    original = transfer.signals_noted
     sent: list[int] = []
 
     @contextlib.contextmanager
@@ -413,7 +413,8 @@ def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
             # the main thread may be late to note it: without this more would be written
             wait_until(noted[-1])
 
-    monkeypatch.setattr(transfer, '_signals_noted', seen)
+    for module in (transfer, read):
+        monkeypatch.setattr(module, 'signals_noted', seen)
     return send
 
 
@@ -430,6 +431,55 @@ def test_interrupted_half_way(
     assert 'freque.f_fix2' in done.err.split('not written:')[1]
     assert has(bench, BEFORE)
     assert bench.drive().writes['freque.f_fix2'] == 0
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_what_interrupts_a_set_leaves_all_or_none_and_it_is_said(
+    nfo: Nfo, bench: Bench, interrupt: Callable[[int], None], number: int
+) -> None:
+    bench.on_write('control.accel', lambda: interrupt(number))
+    done = nfo('set', 'control.accel=7.5', 'control.retard=8')
+    assert done.status == 0, done.err
+    assert done.out == 'control.accel: 5 -> 7.5 s\ncontrol.retard: 5 -> 8 s\n'
+    assert has(bench, {'control.accel': 7.5, 'control.retard': 8})
+
+
+def test_a_second_ctrl_c_keeps_nothing_from_being_put_back(
+    nfo: Nfo, bench: Bench, some: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.refuse('freque.f_fix2')
+    tell = transfer.remark
+
+    def impatient(text: str) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        tell(text)
+
+    monkeypatch.setattr(transfer, 'remark', impatient)
+    done = nfo('load', some, '--put-back')
+    assert (done.status, 'all that was written is put back' in done.err) == (1, True)
+    assert has(bench, BEFORE)
+
+
+def test_what_was_written_is_put_back_though_nobody_can_be_told(
+    bench: Bench, some: Path
+) -> None:
+    bench.refuse('freque.f_fix2')
+    full = ('sh', '-c', 'exec "$@" 2>/dev/full', 'sh')
+    process = bench.begin('load', some, '--put-back', through=full)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert has(bench, BEFORE)
+
+
+def test_what_was_set_is_said_though_the_output_is_lost(bench: Bench) -> None:
+    full = ('sh', '-c', 'exec "$@" >/dev/full', 'sh')
+    process = bench.begin('set', 'control.accel=7.5', 'control.retard=8', through=full)
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert err == (
+        'nfo-sinus: the output cannot be written: No space left on device; written are:\n'
+        '  control.accel: 5 -> 7.5 s\n  control.retard: 5 -> 8 s\n'
+    )
 
 
 def test_interrupted_at_the_very_end_it_is_done(

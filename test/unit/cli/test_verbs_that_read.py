@@ -14,7 +14,7 @@ from pathlib import Path
 import signal
 import sys
 
-from cli_bench import BACKGROUND, Bench, Done
+from cli_bench import BACKGROUND, PATIENCE, Bench, Done
 import pytest
 import yaml
 
@@ -180,6 +180,13 @@ def test_there_is_no_such_port(nfo: Nfo) -> None:
         (['diff', '--against', '1'], 'the same drive'),
         (['scan', '--addresses', '5-3'], 'list of addresses'),
         (['scan', '--addresses', '1,5-3'], 'list of addresses'),
+        (['scan', '--addresses', '1-'], '1-'),
+        (['monitor', '--count', '0'], '1 or more'),
+        (['family', 'check'], 'one file or more'),
+        (['family', 'list', 'a'], 'takes none'),
+        (['info', '--model', 'movitrac31'], 'no movitrac31 is on a line of modbus_rtu'),
+        (['info', '--model', 'sinus_h'], 'set protocol to modbus_tcp'),
+        (['get', 'control.accel', '--control-method', 'ds402'], 'set protocol to canopen'),
         (['scan', '--address', '1-32'], 'scan and monitor take --addresses 1-32'),
         (['load', 'a', '--put-back', '--keep'], 'not allowed with'),
     ],
@@ -308,16 +315,16 @@ def test_scan_writes_no_file_of_drives_that_make_no_line(
     assert done.status == 1 and not file.exists()
     found = {
         1: {'line': '19200 8E1', 'model': 'sinus_g2'},
-        2: {'line': '9600 8E1', 'model': 'sinus_g2'},
+        # one that answers, but not as this model does
+        2: {'line': '9600 8E1', 'model': 'auto'},
     }
-    options = argparse.Namespace(params=str(file))
+    options = argparse.Namespace(params=str(file), model='sinus_g2')
     with pytest.raises(CliError, match='several') as raised:
         scan._write_params(options, found, {1: (19200, '8E1'), 2: (9600, '8E1')})
     assert '2: 9600 8E1' in str(raised.value)
     assert '(nfo-sinus set serial.si_baud=...)' in str(raised.value)
     # it has none that is known
-    for facts in found.values():
-        facts['model'] = 'sinus_optimal'
+    options.model = 'sinus_optimal'
     with pytest.raises(CliError, match=r'set them alike \(at the keypad\)'):
         scan._write_params(options, found, {1: (19200, '8E1'), 2: (9600, '8E1')})
     assert not file.exists()
@@ -441,6 +448,27 @@ def test_output_without_a_reader(bench: Bench) -> None:
     assert process.wait(60) == 1
     assert process.stderr.read() == ''
     process.stderr.close()
+
+
+@pytest.mark.parametrize(
+    'verb',
+    [
+        ('info',), ('list', '--json'), ('get', 'control.accel'), ('dump',), ('errors',),
+        ('scan', '--addresses', '1', '--json'), ('scan', '--addresses', '1', '--params', '-'),
+        ('monitor', '--count', '1'), ('family', 'list'), ('completion',),
+    ],
+)
+@pytest.mark.parametrize(
+    ('how', 'why'), [('>/dev/full', 'No space left on device'), ('>&-', 'it is closed')]
+)
+def test_output_that_cannot_be_written(
+    bench: Bench, verb: tuple[str, ...], how: str, why: str
+) -> None:
+    process = bench.begin(*verb, through=('sh', '-c', f'exec "$@" {how}', 'sh'))
+    out, err = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, out) == (1, '')
+    assert f'nfo-sinus: the output cannot be written: {why}\n' in err
+    assert 'Error' not in err
 
 
 # --- another family -------------------------------------------------------------------------------
