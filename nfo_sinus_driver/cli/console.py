@@ -55,7 +55,7 @@ def remark(text: str) -> None:
     """Say something to the operator, above the bar if there is one."""
     if sys.stderr is None:
         return
-    # what nobody can be told must not end what is under way: settings are put back, too
+    # what cannot be said must not end what is under way: settings are put back, too
     with contextlib.suppress(OSError):
         tqdm.write(f'nfo-sinus: {text}', file=sys.stderr)
         sys.stderr.flush()
