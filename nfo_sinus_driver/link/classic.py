@@ -390,7 +390,7 @@ class ClassicLink(CodecLink):
         if not self._again or not self._came_early(request):
             return reply
         if once:
-            raise DamagedAnswer(f'unit {request.unit}: the answer before came twice')
+            raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
         self._make_certain(request)
         return self._transact(request)
 

@@ -1116,7 +1116,7 @@ LAWS = (
     ),
     Mutant(
         3,
-        'a motor on its ramp is let go of where its drive says that it is ready',
+        'a motor on its ramp is let go of where its drive is shown as ready',
         'nfo_sinus_driver/families/sinus_g2/ds402/words.py',
         'hides_ramp=True',
         'hides_ramp=False',

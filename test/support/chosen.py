@@ -43,7 +43,7 @@ NEEDED = {
     'test_a_stop_is_on_the_wire_at_once_while_a_drive_is_known_as_slow[rtu]':
         'a stop waits for a link that only listens',
     f'{_DRIVE}/test_stopped_is_true.py::test_the_end_waits_for_the_ramp[canopen, ds402 alone]':
-        'a motor on its ramp is let go of where its drive says that it is ready',
+        'a motor on its ramp is let go of where its drive is shown as ready',
 }
 
 #: A test: its name with that of its cell, and where it stands on each axis of the product.
