@@ -55,7 +55,8 @@ def require_parameter(node: Node, name: str, hint: str = '') -> None:
     :raises ValueError: it does not; rclpy refuses it too, but suggests no other name.
     """
     if not node.has_parameter(name):
-        near = did_you_mean(name, declared_names(node))
+        known = declared_names(node)
+        near = '' if name in known else did_you_mean(name, known)
         raise ValueError(f'{name}: there is no such parameter{hint}{near}')
 
 

@@ -84,7 +84,9 @@ def test_parameters_go_with_cleanup_and_come_back_as_they_are(bench: Bench) -> N
     assert client.parameter_names() == own
     wire = Wire(bench)
     wire.writes()
-    refused(set_one(client, 'control.accel', 7.0), 'control.accel', 'configured')
+    answer = set_one(client, 'control.accel', 7.0)
+    refused(answer, 'control.accel', 'configured')
+    assert 'did you mean' not in answer.reason
     drive.inject('set', 'control.retard', 8.0)
     assert client.change_state(Transition.TRANSITION_CONFIGURE)
     assert client.parameter_names() == everything
