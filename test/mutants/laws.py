@@ -904,15 +904,15 @@ LAWS = (
         11,
         'what is recognised stays so in a long silence',
         'nfo_sinus_driver/bus/scheduler.py',
-        '        if max(self.lasts(unit, now), now - self._any_frame_at) > EXCHANGE:',
-        '        if False:',
+        'if now - min(self._gone_since.get(unit, now), self._any_frame_at) > EXCHANGE:',
+        'if False:',
         (RECOGNITION, '-k', 'answers_alone'),
     ),
     Mutant(
         11,
         'a drive that answers after a long silence is taken for the same',
         'nfo_sinus_driver/bus/scheduler.py',
-        '        if self.lasts(unit, now) > EXCHANGE:\n            self._unit_since',
+        '        if now - self._gone_since.get(unit, now) > EXCHANGE:\n            self._unit_since',
         '        if False:\n            self._unit_since',
         (RECOGNITION, '-k', 'no_loss'),
         also=((
