@@ -912,8 +912,8 @@ LAWS = (
         11,
         'a drive that answers after a long silence is taken for the same',
         'nfo_sinus_driver/bus/scheduler.py',
-        '        if now - self._gone_since.get(unit, now) > EXCHANGE:\n            self._unit_since',
-        '        if False:\n            self._unit_since',
+        'if now - self._gone_since.get(unit, now) > EXCHANGE:\n            self._unit_since',
+        'if False:\n            self._unit_since',
         (RECOGNITION, '-k', 'no_loss'),
         also=((
             'nfo_sinus_driver/bus/scheduler.py',
