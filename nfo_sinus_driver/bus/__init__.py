@@ -22,8 +22,9 @@ so by ``require_wanted``, which is called at that moment, too.
   of the time.
 - A drive without power costs a whole time-out with each request, and would slow all others: those
   that do not answer have a share together, a small one after two seconds.
-- The stop of such a drive would keep the line from the stops of its neighbours: after each stop
-  without an answer another drive has a turn, and none whose stop was in vain as well.
+- The stop of such a drive would keep the line from the stops of its neighbours, and one that is
+  recognised and hardly answers from their polls: after each stop or service without an answer
+  another drive has a turn, and none for which as much was in vain.
 
 **Silence is no loss, and a mute port no silent drive.** :class:`~.scheduler.Silences` has for how
 long each unit has not answered, and since when another drive may be in its place (law 11). Where no

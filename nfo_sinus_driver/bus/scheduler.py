@@ -42,6 +42,8 @@ _MISSING: Literal['missing'] = 'missing'
 _SLOT: Literal['slot'] = 'slot'
 _Rank = Priority | Literal['slot', 'retry', 'missing']
 _STOPS = (Priority.STOP, Priority.LOOK)
+#: What goes on at once where it was not answered.
+_REPEATED = (*_STOPS, Priority.SERVICE)
 _SHARES: dict[_Rank, float] = {
     _RETRY: RETRY_SHARE,
     Priority.TELEMETRY: BACKGROUND_SHARE,
@@ -69,9 +71,9 @@ class Scheduler:
 
     A unit that does not answer keeps the line for a time-out with every poll, and with every
     set-point but an urgent one. All of them together have no more than their share of the time as
-    long as any other waits. A stop that a unit does not answer is repeated at once, and after each
-    of them another unit has a turn, too: the most urgent, whatever the others are owed, and none
-    whose stop was in vain as well.
+    long as any other waits. A stop or a service that a unit does not answer is repeated at once,
+    and after each of them another unit has a turn, too: the most urgent, whatever the others are
+    owed, and none for which as much was in vain.
 
     Units that have been silent for long are missing. Reads from them, set-points, and stops that
     did not reach them, wait until :meth:`take` may give them out, and then go ahead of other polls.
@@ -96,8 +98,9 @@ class Scheduler:
         self._given: _Rank = _SLOT
         self._given_unit: int | None = None
         self._slot_went = False
-        #: The stop, or its read, that was given out just now, and the unit that did not answer one.
-        self._given_stop: Exchange | None = None
+        #: The stop, its read, or the service that was given out just now, and the unit that did not
+        #: answer one.
+        self._given_first: Exchange | None = None
         self._unanswered: int | None = None
         #: What units have not answered since they last answered anything: a stop (true), its read.
         self._unanswered_stops: set[tuple[int, bool]] = set()
@@ -133,8 +136,8 @@ class Scheduler:
                 self._given = rank
                 wanted = entry if isinstance(entry, LatestValue) else entry.exchange
                 self._given_unit = wanted.unit
-                self._given_stop = (
-                    wanted if isinstance(wanted, Exchange) and rank in _STOPS else None
+                self._given_first = (
+                    wanted if isinstance(wanted, Exchange) and rank in _REPEATED else None
                 )
                 return entry
         if self._unanswered is None:
@@ -169,33 +172,35 @@ class Scheduler:
             self._queues[behind][entry] = None
 
     def _gives_way(self, entry: LatestValue | Waiting) -> bool:
-        """Return whether it is for the unit that left a stop unanswered, or for one that would."""
+        """Return whether it is for the unit that has just not answered, or for one like it."""
         if isinstance(entry, LatestValue):
             return False
         exchange = entry.exchange
         if exchange.unit == self._unanswered:
             return True
         # else two of them would take turns, and no other had one
-        return self._is_silent(exchange.unit) and self._is_repeated(exchange)
+        is_in_vain = exchange.priority == Priority.SERVICE or self._is_repeated(exchange)
+        return is_in_vain and self._is_silent(exchange.unit)
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
-        stop = self._given_stop
-        self._unanswered = stop.unit if stop is not None and self._is_silent(stop.unit) else None
-        # a stop in vain takes no turn: else the next one were that of a set-point again
+        first = self._given_first
+        in_vain = first is not None and self._is_silent(first.unit)
+        self._unanswered = first.unit if first is not None and in_vain else None
+        # what was in vain takes no turn: else the next one were that of a set-point again
         self._slot_went = self._given == _SLOT or (
             self._slot_went and self._unanswered is not None
         )
-        if self._unanswered is not None and stop is not None:
+        if first is not None and in_vain and first.priority in _STOPS:
             # each by itself: the stop behind a read that was not answered goes out at once
-            self._unanswered_stops.add((stop.unit, stop.writes))
+            self._unanswered_stops.add((first.unit, first.writes))
         unit = self._given_unit
-        in_vain = stop is None and unit is not None and self._is_silent(unit)
+        counts = self._given not in _STOPS and unit is not None and self._is_silent(unit)
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
                 continue
             owed = self._owed[rank] + seconds * share
-            if rank == self._given or (in_vain and rank == _RETRY):
+            if rank == self._given or (counts and rank == _RETRY):
                 # the request with which a unit falls silent is of that share, too;
                 # no debt beyond this transaction: what is sent on an idle line delays none
                 self._owed[rank] = max(owed - seconds, -seconds)
@@ -228,15 +233,15 @@ class Scheduler:
             yield _SLOT
         first, second = _BACKGROUND
         background = _BACKGROUND if self._owed[first] >= self._owed[second] else (second, first)
-        # one turn after a stop without an answer: it is for the most urgent of the others
-        between_stops = self._unanswered is not None
+        # one turn after what was in vain: it is for the most urgent of the others
+        between = self._unanswered is not None
         for priority in background:
-            if self._owed[priority] > 0 and not between_stops:
+            if self._owed[priority] > 0 and not between:
                 yield priority
         yield from (Priority.SETPOINT, Priority.SERVICE)
         if missing:
             yield _MISSING
-        if self._owed[_RETRY] > 0 and not between_stops:
+        if self._owed[_RETRY] > 0 and not between:
             yield _RETRY
         yield from (Priority.POLL, _SLOT, _RETRY)
         yield from background

@@ -1146,4 +1146,12 @@ LAWS = (
         '_LONGEST_STEP = 1.0',
         ('test/ros/test_joint.py', '-k', 'integral'),
     ),
+    Mutant(
+        9,
+        'a drive that hardly answers keeps the line from its neighbours',
+        'nfo_sinus_driver/bus/scheduler.py',
+        '_REPEATED = (*_STOPS, Priority.SERVICE)',
+        '_REPEATED = _STOPS',
+        ('test/unit/drive/test_neighbours.py', '-k', 'hardly'),
+    ),
 )

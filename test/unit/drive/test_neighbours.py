@@ -179,6 +179,28 @@ def test_a_fault_is_noticed_while_another_drive_is_stopped_in_vain(connection: s
         rig.wait_until(lambda: not rig.drives[5].following, 1.9)
 
 
+@pytest.mark.parametrize('connection', SEVERAL)
+def test_a_drive_that_hardly_answers_keeps_no_neighbour_from_the_line(connection: str) -> None:
+    with Rig(connection, drives=3) as rig:
+        rig.turn()
+        asked_at = [rig.clock.now]
+        count = itertools.count(1)
+
+        def meet(key: str, data: bytes | None) -> str | None:
+            if rig.asked[-1][0] == 1:
+                asked_at.append(rig.clock.now)
+            return 'drop' if rig.asked[-1][0] == 3 and next(count) % 3 else None
+
+        rig.meet = meet
+        for _ in range(3):
+            rig.drives[3].identify()
+        rig.pass_time(6.0)
+        asked_at.append(rig.clock.now)
+        pauses = [after - before for before, after in itertools.pairwise(asked_at)]
+        assert max(pauses) < 1.0
+        assert rig.drives[1].following
+
+
 @pytest.mark.parametrize('cut', [9.0, 10.3, 11.7])
 @pytest.mark.parametrize('connection', SEVERAL)
 def test_when_a_cut_line_is_back_no_drive_that_is_off_delays_the_stops_of_the_others(
