@@ -212,5 +212,6 @@ def test_a_drive_that_is_found_again_and_ignores_its_stop_is_soon_stopped_by_for
         rig.meet = meet
         rig.pass_time(away)
         rig.line.mend()
-        rig.pass_time(3.0)
+        # when it is found depends on when it was asked last: 1.6 to 3.2 s in all
+        rig.pass_time(4.0)
         assert rig.notes.said(Cause.STOP_FORCED) and not rig.turns
