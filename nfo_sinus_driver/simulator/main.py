@@ -13,6 +13,7 @@ import json
 import os
 import signal
 import sys
+import time
 from typing import Any
 
 from nfo_sinus_driver.catalog import CatalogError, Value, with_factory_line
@@ -81,9 +82,10 @@ def _serve(simulator: Simulator) -> int:
     )
     also = ''.join(f'; also {other}' for other in others)
     print(f'serving {first}, {drives} {addresses}; control {simulator.control}{also}', flush=True)
-    # the line has a thread of its own: this one waits for a signal, or for a failure there
-    while not simulator.finished.wait(_POLL_SIGNALS):
-        continue
+    # the line has a thread of its own: this one waits for a signal, or for a failure there; not by
+    # the event, whose lock stays taken where a signal ends the wait at the wrong moment
+    while not simulator.finished.is_set():
+        time.sleep(_POLL_SIGNALS)
     print(f'simulator: the line broke down: {simulator.failure!r}', file=sys.stderr)
     return 1
 
