@@ -95,12 +95,11 @@ class Scheduler:
         }
         #: How much time those that have a share are owed, s; they owe if that is negative.
         self._owed = dict.fromkeys(_SHARES, 0.0)
+        #: What was given out just now, and of which rank.
         self._given: _Rank = _SLOT
-        self._given_unit: int | None = None
+        self._wanted: LatestValue | Exchange | None = None
         self._slot_went = False
-        #: The stop, its read, or the service that was given out just now, and the unit that did not
-        #: answer one.
-        self._given_first: Exchange | None = None
+        #: The unit that has just not answered a stop, its read, or a service.
         self._unanswered: int | None = None
         #: What units have not answered since they last answered anything: a stop (true), its read.
         self._unanswered_stops: set[tuple[int, bool]] = set()
@@ -134,11 +133,7 @@ class Scheduler:
             if entry is not None:
                 del self._queues[rank][entry]
                 self._given = rank
-                wanted = entry if isinstance(entry, LatestValue) else entry.exchange
-                self._given_unit = wanted.unit
-                self._given_first = (
-                    wanted if isinstance(wanted, Exchange) and rank in _REPEATED else None
-                )
+                self._wanted = entry if isinstance(entry, LatestValue) else entry.exchange
                 return entry
         if self._unanswered is None:
             return None
@@ -176,7 +171,9 @@ class Scheduler:
         if isinstance(entry, LatestValue):
             return False
         exchange = entry.exchange
-        if exchange.unit == self._unanswered:
+        # a stop that is requested meanwhile is not held back by a service in vain
+        goes_ahead = exchange.priority in _STOPS and self._given not in _STOPS
+        if exchange.unit == self._unanswered and not goes_ahead:
             return True
         # else two of them would take turns, and no other had one
         is_in_vain = exchange.priority == Priority.SERVICE or self._is_repeated(exchange)
@@ -184,23 +181,22 @@ class Scheduler:
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
-        first = self._given_first
-        in_vain = first is not None and self._is_silent(first.unit)
-        self._unanswered = first.unit if first is not None and in_vain else None
+        wanted = self._wanted
+        in_vain = wanted is not None and self._is_silent(wanted.unit)
+        is_stop = self._given in _STOPS
+        self._unanswered = wanted.unit if wanted and in_vain and self._given in _REPEATED else None
         # what was in vain takes no turn: else the next one were that of a set-point again
         self._slot_went = self._given == _SLOT or (
             self._slot_went and self._unanswered is not None
         )
-        if first is not None and in_vain and first.priority in _STOPS:
+        if isinstance(wanted, Exchange) and in_vain and is_stop:
             # each by itself: the stop behind a read that was not answered goes out at once
-            self._unanswered_stops.add((first.unit, first.writes))
-        unit = self._given_unit
-        counts = self._given not in _STOPS and unit is not None and self._is_silent(unit)
+            self._unanswered_stops.add((wanted.unit, wanted.writes))
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
                 continue
             owed = self._owed[rank] + seconds * share
-            if rank == self._given or (counts and rank == _RETRY):
+            if rank == self._given or (rank == _RETRY and in_vain and not is_stop):
                 # the request with which a unit falls silent is of that share, too;
                 # no debt beyond this transaction: what is sent on an idle line delays none
                 self._owed[rank] = max(owed - seconds, -seconds)

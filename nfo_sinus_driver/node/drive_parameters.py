@@ -24,7 +24,8 @@ from nfo_sinus_driver.node.wording import NodeError
 
 #: How long a change may wait for the bus, s.
 _LONGEST_CHANGE = 30.0
-#: How often it is checked whether what a client sets has ended, s.
+#: How often it is checked whether what a client sets has ended, s: a group of rclpy can be asked
+#: that, not waited for.
 _LOOK_PERIOD = 0.002
 
 _LATER = '; those of the drive are there once the node is configured'

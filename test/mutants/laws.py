@@ -1154,4 +1154,12 @@ LAWS = (
         '_REPEATED = _STOPS',
         ('test/unit/drive/test_neighbours.py', '-k', 'hardly'),
     ),
+    Mutant(
+        3,
+        'a stop waits for a turn of another drive behind a service in vain',
+        'nfo_sinus_driver/bus/scheduler.py',
+        'if exchange.unit == self._unanswered and not goes_ahead:',
+        'if exchange.unit == self._unanswered:',
+        ('test/unit/bus/test_scheduler.py', '-k', 'not_held_back'),
+    ),
 )

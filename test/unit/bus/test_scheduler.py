@@ -372,6 +372,19 @@ def test_what_waits_for_a_unit_that_falls_silent_is_ranked_again(kind: Priority)
     assert [scheduler.take() for _ in range(3)] == [other, falls_silent, None]
 
 
+def test_the_first_stop_of_a_unit_is_not_held_back_by_its_service_that_was_in_vain() -> None:
+    scheduler = Scheduler({2}.__contains__)
+    stop, poll = stop_of(2), entry(Priority.POLL)
+    service = Waiting(cast(Task, 'service'), Exchange(2, Read(register(1)), Priority.SERVICE))
+    for waiting in (service, poll):
+        scheduler.add(waiting)
+    assert scheduler.take() is service
+    scheduler.took(0.2)
+    for waiting in (service, stop):
+        scheduler.add(waiting)
+    assert [scheduler.take() for _ in range(2)] == [stop, poll]
+
+
 def test_a_stop_that_is_answered_gives_way_to_none() -> None:
     scheduler = Scheduler(lambda unit: False)
     stops = [stop_of(2), stop_of(2)]
