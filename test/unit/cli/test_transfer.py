@@ -401,7 +401,7 @@ def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     sent: list[int] = []
 
     @contextlib.contextmanager
-    def ended_twice() -> Iterator[Callable[[], bool]]:
+    def noting() -> Iterator[Callable[[], bool]]:
         with original() as came:
             noted.append(came)
             yield came
@@ -414,7 +414,7 @@ def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
             wait_until(noted[-1])
 
     for module in (transfer, read):
-        monkeypatch.setattr(module, 'signals_noted', ended_twice)
+        monkeypatch.setattr(module, 'signals_noted', noting)
     return send
 
 
