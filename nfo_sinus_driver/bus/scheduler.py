@@ -99,8 +99,8 @@ class Scheduler:
         self._given: _Rank = _SLOT
         self._wanted: LatestValue | Exchange | None = None
         self._slot_went = False
-        #: The unit that has just not answered a stop, its read, or a service.
-        self._unanswered: int | None = None
+        #: The stop, its read, or the service that has just not been answered.
+        self._unanswered: Exchange | None = None
         #: What units have not answered since they last answered anything: a stop (true), its read.
         self._unanswered_stops: set[tuple[int, bool]] = set()
 
@@ -171,12 +171,13 @@ class Scheduler:
         if isinstance(entry, LatestValue):
             return False
         exchange = entry.exchange
-        # a stop that is requested meanwhile is not held back by a service in vain
-        goes_ahead = exchange.priority in _STOPS and self._given not in _STOPS
-        if exchange.unit == self._unanswered and not goes_ahead:
-            return True
+        before = self._unanswered
+        is_repeated = self._is_repeated(exchange)
+        if before is not None and exchange.unit == before.unit:
+            # the first stop that is requested is not held back by a service in vain
+            return is_repeated or exchange.priority not in _STOPS or before.priority in _STOPS
         # else two of them would take turns, and no other had one
-        is_in_vain = exchange.priority == Priority.SERVICE or self._is_repeated(exchange)
+        is_in_vain = is_repeated or exchange.priority == Priority.SERVICE
         return is_in_vain and self._is_silent(exchange.unit)
 
     def took(self, seconds: float) -> None:
@@ -184,14 +185,15 @@ class Scheduler:
         wanted = self._wanted
         in_vain = wanted is not None and self._is_silent(wanted.unit)
         is_stop = self._given in _STOPS
-        self._unanswered = wanted.unit if wanted and in_vain and self._given in _REPEATED else None
+        is_unanswered = in_vain and self._given in _REPEATED
+        self._unanswered = wanted if isinstance(wanted, Exchange) and is_unanswered else None
         # what was in vain takes no turn: else the next one were that of a set-point again
         self._slot_went = self._given == _SLOT or (
             self._slot_went and self._unanswered is not None
         )
-        if isinstance(wanted, Exchange) and in_vain and is_stop:
+        if self._unanswered is not None and is_stop:
             # each by itself: the stop behind a read that was not answered goes out at once
-            self._unanswered_stops.add((wanted.unit, wanted.writes))
+            self._unanswered_stops.add((self._unanswered.unit, self._unanswered.writes))
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
                 continue
