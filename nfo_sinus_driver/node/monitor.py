@@ -53,6 +53,8 @@ _DISCOVERY_PERIOD = 1.0
 _GONE_AFTER = 3.5
 #: The longest period of telemetry that is assumed, s.
 _LONGEST_TELEMETRY = 30.0
+#: How long the service of a stop that was requested may take to be discovered, s.
+_FOUND_WITHIN = 3.0
 #: After how long without an answer a stop is reported as not confirmed, s.
 _ANSWER_TIME = 5.0
 #: How long an answer may take before it is shown as missing, s.
@@ -180,6 +182,8 @@ class GraphSource:
         self._rosout = _Topics(self._node)
         self._rosout.add(Log, '/rosout', ROSOUT)
         self._log_lines: list[tuple[float, Log]] = []
+        #: The stops that were requested and wait for their service, and since when.
+        self._unsent: list[tuple[_DriverNode, float]] = []
         self._calls: list[_Call] = []
         #: Why the last stop of a node is not confirmed, by its name.
         self._failed: dict[str, str] = {}
@@ -216,6 +220,7 @@ class GraphSource:
             for message in node.topics.take():
                 self._take(node, message, now)
         self._read_log(now)
+        self._send_stops(now)
         self._look_after_calls(now)
         notes, self._notes = self._notes, []
         nodes = self._driver_nodes.values()
@@ -326,12 +331,23 @@ class GraphSource:
     # --- what goes out ------------------------------------------------------------------------
 
     def _call(self, node: _DriverNode) -> None:
-        client = node.stop
-        if client is None or not client.service_is_ready():
-            self._fail(node.name, 'NOT stopped: it offers no such service. Has its driver ended?')
-            return
-        future = client.call_async(Trigger.Request())
-        self._calls.append(_Call(node.name, client.srv_name, future, time.monotonic()))
+        now = time.monotonic()
+        self._unsent.append((node, now))
+        self._send_stops(now)
+
+    def _send_stops(self, now: float) -> None:
+        waiting: list[tuple[_DriverNode, float]] = []
+        for node, requested_at in self._unsent:
+            client = node.stop
+            if client is not None and client.service_is_ready():
+                future = client.call_async(Trigger.Request())
+                self._calls.append(_Call(node.name, client.srv_name, future, requested_at))
+            elif now - requested_at < _FOUND_WITHIN and not _is_gone(node, now):
+                waiting.append((node, requested_at))
+            else:
+                why = 'NOT stopped: it offers no such service. Has its driver ended?'
+                self._fail(node.name, why)
+        self._unsent = waiting
 
     def _look_after_calls(self, now: float) -> None:
         waiting: list[_Call] = []

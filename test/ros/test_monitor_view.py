@@ -13,6 +13,8 @@ from bench import PATIENCE, Bench, wait_until
 from connections import needs
 import pytest
 
+from nfo_sinus_driver.node.monitor import GraphSource
+
 _TWO = """
 /**/nfo_sinus_bus: {ros__parameters: {drives: [drive_2, drive_10]}}
 /**/drive_2: {ros__parameters: {address: 1}}
@@ -68,6 +70,24 @@ def test_a_fault_a_lost_line_and_stops_by_keys(bench: Bench, columns: int) -> No
     view.press('q')
     assert view.wait() == 0
     assert view.settings == view.before, 'the terminal is as it was'
+
+
+def test_a_stop_waits_until_its_service_is_discovered(bench: Bench) -> None:
+    simulator = bench.simulator(*bench.drives.ramps(1))
+    bench.driver()
+    client = bench.client().connected()
+    source = GraphSource(client.node.context)
+    try:
+        wait_until(lambda: source.look().drives, 'the drive is found', period=0.25)
+        with client.run_at(20.0):
+            # as on a busy machine, where its topics come before its services
+            source._driver_nodes['/nfo_sinus'].stop = None
+            source.stop('/nfo_sinus')
+            wait_until(
+                lambda: source.look() and not simulator.state()['turning'], 'it stands', period=0.25
+            )
+    finally:
+        source.close()
 
 
 @pytest.mark.each_kind
