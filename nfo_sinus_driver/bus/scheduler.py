@@ -354,8 +354,6 @@ class Silences:
             self.opened_at = self._line_since = now
         self._opened += 1
         self._mute_since = math.inf
-        # those that are missing may only have been cut off
-        self._pause_ends = -math.inf
 
     def hurry(self) -> None:
         """Have a port that is mute opened again soon, however often that was in vain."""

@@ -848,14 +848,6 @@ LAWS = (
         (MUTE_PORT, '-k', 'end'),
     ),
     Mutant(
-        3,
-        'drives that a mute port has cut off wait behind each other',
-        SILENCES,
-        '        self._pause_ends = -math.inf\n\n    def hurry',
-        '\n    def hurry',
-        (MUTE_PORT, '-k', 'longest'),
-    ),
-    Mutant(
         11,
         'a fault is acknowledged at a drive that is not recognised',
         'nfo_sinus_driver/drive/parameter_access.py',

@@ -10,12 +10,13 @@ import math
 from typing import Any, ClassVar
 
 from any_order_history import POLL_RATE, SETPOINT_TIMEOUT, SHUTDOWN_TIMEOUT
-from any_order_laws import Laws
+from any_order_laws import Broken, Laws
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 import pytest
 from support.rig import Connection, Rig
 
+from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.simulator.memory import Refused as Refusal
 
 #: How long it takes until the next thing happens, s: within one transaction, a poll, a ramp.
@@ -122,8 +123,11 @@ class AnyOrder(RuleBasedStateMachine):
     def connect(self, wait: float = 0.1) -> None:
         future = self.rig.drive.connect(retry=False)
         self.rig.answer(future)
-        if future.exception() is None:
+        error = future.exception()
+        if error is None:
             self.laws.connected()
+        elif not isinstance(error, DriveError):
+            raise Broken(f'connect raised {error!r}')
         self.let(wait)
 
     @DRIVEN
