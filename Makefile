@@ -31,10 +31,15 @@ demo: setup ## a short run of a simulated drive, from enable to stop, recorded a
 run: setup ## driver and simulated drive, up until Ctrl-C, for ros2 topic pub
 	@tools/run python -m nfo_sinus_driver.demo.run
 
-test: setup ## lint, types, unit, ros, until the first one fails
-	@for stage in lint types unit ros; do \
+# Tests that wait leave a third of the processors idle: those that compute have that, and no more.
+test: setup ## lint, types, unit and ros, the last two at once
+	@for stage in lint types; do \
 		$(MAKE) --no-print-directory $$stage || exit; \
 	done
+	@$(MAKE) --no-print-directory -j2 NICE='nice -n 19' computing waiting-then-ros
+ifdef FULL
+	@$(MAKE) --no-print-directory other-libraries
+endif
 
 all: ## all that says whether it is right: test, docs, mutants, campaign, exhaustive (hours)
 	@for stage in test docs mutants campaign exhaustive; do \
@@ -50,31 +55,41 @@ types: setup ## mypy, on all that is not ROS
 	@echo '== types: mypy --strict'
 	@.venv/bin/mypy
 
-# Those that compute have a worker for each processor; beside them those that wait have more, and
-# are heard when they have ended. Each group collects its own tests alone.
+# Those that compute have a worker for each processor, and are heard when they have ended; beside
+# them those that wait have more. Each group collects its own tests alone.
 COMPUTING = test/unit/drive test/unit/link test/unit/bus test/unit/catalog test/unit/families
 unit: setup ## tests without ROS; of products a share (FULL=1: all, and with every library)
-	@echo '== unit: without rclpy, with the oldest pymodbus'
-	@# so that the workers have it compiled already
-	@.venv/without-ros/bin/python -m compileall -q nfo_sinus_driver test
 	@$(MAKE) --no-print-directory -j2 computing waiting
 ifdef FULL
+	@$(MAKE) --no-print-directory other-libraries
+endif
+
+.PHONY: computing waiting waiting-then-ros compiled other-libraries
+computing: compiled
+	@FULL=$(FULL) $(WITHOUT_ROS) $(NICE) .venv/without-ros/bin/python $(PYTEST) -n auto \
+		$(COMPUTING) > .venv/log/computing 2>&1; \
+	status=$$?; echo '== unit: those that compute'; cat .venv/log/computing; exit $$status
+
+waiting: compiled
+	@echo '== unit: without rclpy, with the oldest pymodbus'
+	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 6 \
+		$(addprefix --ignore=,$(COMPUTING)) test/unit
+
+waiting-then-ros: compiled
+	@$(MAKE) --no-print-directory waiting
+	@$(MAKE) --no-print-directory ros
+
+# so that the workers have it compiled already
+compiled: setup
+	@.venv/without-ros/bin/python -m compileall -q nfo_sinus_driver test
+
+other-libraries: setup
 	@echo '== unit again, what uses pymodbus: the current one'
 	@FULL=1 $(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 9 test/unit/link test/unit/simulator
 	@if [ -d .venv/noble ]; then \
 		echo '== unit again: the libraries of Ubuntu 24.04, Python 3.12'; \
 		FULL=1 $(WITHOUT_ROS) .venv/noble/bin/python $(PYTEST) -n 9 test/unit; \
 	fi
-endif
-
-.PHONY: computing waiting
-computing:
-	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n auto $(COMPUTING)
-
-waiting:
-	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 6 \
-		$(addprefix --ignore=,$(COMPUTING)) test/unit > .venv/log/waiting 2>&1; \
-	status=$$?; cat .venv/log/waiting; exit $$status
 
 ros: setup ## end-to-end tests with rclpy (CONNECTION=classic_v2: over another one; CONNECTION=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
