@@ -55,9 +55,14 @@ types: setup ## mypy, on all that is not ROS
 	@echo '== types: mypy --strict'
 	@.venv/bin/mypy
 
-# Those that compute have a worker for each processor, and are heard when they have ended; beside
-# them those that wait have more. Each group collects its own tests alone.
-COMPUTING = test/unit/drive test/unit/link test/unit/bus test/unit/catalog test/unit/families
+# Those that compute, in virtual time, have a worker for each processor, and are heard when they
+# have ended; beside them those that wait, in real time, have more. Each group collects its own.
+COMPUTING = test/unit/drive test/unit/link test/unit/catalog test/unit/families
+REAL = $(addprefix test/unit/,drive/test_slave_by_hand.py drive/test_threads.py \
+	$(addprefix link/test_,can_ports.py line_ports.py link_ports.py tcp_link.py))
+WAITING = $(REAL) $(filter-out $(COMPUTING:=/) %__pycache__/, \
+	$(wildcard test/unit/*/ test/unit/test_*.py))
+
 unit: setup ## tests without ROS; of products a share (FULL=1: all, and with every library)
 	@$(MAKE) --no-print-directory -j2 computing waiting
 ifdef FULL
@@ -67,13 +72,12 @@ endif
 .PHONY: computing waiting waiting-then-ros compiled other-libraries
 computing: compiled
 	@FULL=$(FULL) $(WITHOUT_ROS) $(NICE) .venv/without-ros/bin/python $(PYTEST) -n auto \
-		$(COMPUTING) > .venv/log/computing 2>&1; \
+		$(addprefix --ignore=,$(REAL)) $(COMPUTING) > .venv/log/computing 2>&1; \
 	status=$$?; echo '== unit: those that compute'; cat .venv/log/computing; exit $$status
 
 waiting: compiled
 	@echo '== unit: without rclpy, with the oldest pymodbus'
-	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 6 \
-		$(addprefix --ignore=,$(COMPUTING)) test/unit
+	@FULL=$(FULL) $(WITHOUT_ROS) .venv/without-ros/bin/python $(PYTEST) -n 6 $(WAITING)
 
 waiting-then-ros: compiled
 	@$(MAKE) --no-print-directory waiting
