@@ -109,6 +109,14 @@ def test_no_run_command_outlives_a_fault(name: str) -> None:
         assert not rig.turns and not rig.drive.following
 
 
+def test_a_drive_whose_set_point_0_is_a_frequency_is_not_run() -> None:
+    # in between 3-02 and 3-03 its set-points are scaled: Design Guide of the FC 101, 7.11.3
+    with DescribedRig(SHIPPED['danfoss_fc101'], parameters={'reference.minimum': 10.0}) as rig:
+        rig.connect()
+        answer = rig.answer(rig.drive.enable())
+        assert '3-02' in answer and not rig.turns, answer
+
+
 @pytest.mark.parametrize('name', SHIPPED)
 def test_a_local_drive_is_not_run(name: str) -> None:
     with DescribedRig(SHIPPED[name]) as rig:
@@ -119,8 +127,10 @@ def test_a_local_drive_is_not_run(name: str) -> None:
             answer = rig.answer(rig.drive.enable())
             assert 'enabled' not in answer or 'not' in answer, answer
         for one in rig.file.requires:
-            labels = rig.far.memory.model[one.key].labels.values()
+            labels = tuple(rig.far.memory.model[one.key].labels.values())
             other = next((label for label in labels if label != one.value), None)
+            if not labels and isinstance(one.value, int | float):
+                other = one.value + 1
             if other is not None and not one.write:
                 rig.far.set_from_keypad(one.key, other)
                 answer = rig.answer(rig.drive.enable())
