@@ -554,6 +554,13 @@ def test_shipped_files_are_short_and_say_where_from() -> None:
         assert read(path).source
 
 
+def test_a_shipped_file_without_a_time_out_says_where_the_drive_has_it() -> None:
+    without = [one for one in map(read, SHIPPED.values()) if one.timeout is None]
+    assert without
+    for one in without:
+        assert 'time-out' in one.line.check, one.title
+
+
 def test_the_schema_is_one_that_editors_understand() -> None:
     found = json.loads(schema.PATH.read_text(encoding='utf-8'))
     assert found['$schema'].endswith('2020-12/schema')
