@@ -87,7 +87,8 @@ def violations(
 
 def _wrong_gap(frames: list[Frame], number: int, frame_gap: float) -> Iterator[str]:
     gap = frames[number]['gap']
-    if number and gap < frame_gap and not _behind_a_late_answer(frames, number):
+    # one that is there before the answer goes out was waited for in vain: the far end stood still
+    if number and 0 <= gap < frame_gap and not _behind_a_late_answer(frames, number):
         yield f'came {1000 * gap:.3f} ms after the frame before, t3.5 is not kept'
 
 
