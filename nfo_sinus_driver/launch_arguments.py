@@ -33,9 +33,8 @@ def number(name: str, given: str, *, whole: bool = False) -> float:
     except ValueError:
         value = -1
     if not 0 <= value < float('inf'):
-        example = '19200' if whole else '15'
         kind = 'a whole number' if whole else 'a number'
-        raise ValueError(f'{name}:={given}: write {kind}, such as {example}')
+        raise ValueError(f'{name}:={given}: write {kind}')
     return value
 
 
@@ -67,9 +66,12 @@ def simulated_drives(given: str) -> Sections:
 
     :raises ValueError: it is not a number of drives; the message names the argument.
     """
-    count = int(number('drives', given, whole=True))
+    try:
+        count = int(number('drives', given, whole=True))
+    except ValueError:
+        count = 0
     if not 1 <= count <= MOST_DRIVES:
-        raise ValueError(f'drives:={given}: write a number from 1 to {MOST_DRIVES}')
+        raise ValueError(f'drives:={given}: write a whole number from 1 to {MOST_DRIVES}')
     if count == 1:
         return {}
     names = {f'drive_{address}': address for address in range(1, count + 1)}

@@ -372,6 +372,27 @@ def test_lifecycle_by_hand(bench: Bench) -> None:
     assert client.state() == 'finalized'
 
 
+@needs('own')
+def test_a_refused_enable_names_the_transitions_that_lead_to_it(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver('-p', 'autostart:=false')
+    client = bench.client()
+    transitions = {
+        'configure': Transition.TRANSITION_CONFIGURE,
+        'activate': Transition.TRANSITION_ACTIVATE,
+    }
+    for state in ('unconfigured', 'inactive'):
+        while client.state() != state:
+            assert client.change_state(transitions['configure'])
+        refused = client.enable()
+        assert not refused.success
+        named = re.findall('configure|activate', refused.message.partition(': ')[2])
+        assert all(client.change_state(transitions[name]) for name in named), refused.message
+        assert client.state() == 'active', refused.message
+        assert client.change_state(Transition.TRANSITION_DEACTIVATE)
+        assert client.change_state(Transition.TRANSITION_CLEANUP)
+
+
 @needs('modbus', 'scmd')
 def test_another_control_method_waits_until_the_motor_stands(bench: Bench) -> None:
     drive = bench.simulator('--set', 'control.accel=0.5', '--set', 'control.retard=30', paced=True)
