@@ -133,7 +133,7 @@ class DriveParameters:
         return drive is not None and name in self._declared and not drive.model[name].is_setting
 
     def _coerced(self, parameter: Parameter) -> Parameter:
-        require_parameter(self._node, parameter.name, _LATER)
+        require_parameter(self._node, parameter.name, '' if self._drive else _LATER)
         drive = self._drive
         unset = parameter.type_ is Parameter.Type.NOT_SET
         if drive is None or unset or parameter.name not in self._declared:

@@ -164,7 +164,9 @@ def test_what_cannot_be_meant_is_refused_and_nothing_moves(rig: Rig) -> None:
     ['control.acel', pytest.param(ANY_BUS, marks=needs('modbus')), 'status.frq_act', 'accel'],
 )
 def test_a_name_that_is_none_is_refused(rig: Rig, name: str) -> None:
-    refused(set_one(rig.client, name, 1.0), f'{name}: there is no such parameter')
+    answer = set_one(rig.client, name, 1.0)
+    refused(answer, f'{name}: there is no such parameter')
+    assert 'configured' not in answer.reason, 'the node is configured already'
     assert rig.wire.writes() == []
 
 
