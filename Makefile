@@ -31,12 +31,12 @@ demo: setup ## a short run of a simulated drive, from enable to stop, recorded a
 run: setup ## driver and simulated drive, up until Ctrl-C, for ros2 topic pub
 	@tools/run python -m nfo_sinus_driver.demo.run
 
-# Tests that wait leave a third of the processors idle: those that compute have that, and no more.
+# Tests that wait leave a third of two processors idle: one worker that computes has that.
 test: setup ## lint, types, unit and ros, the last two at once
 	@for stage in lint types; do \
 		$(MAKE) --no-print-directory $$stage || exit; \
 	done
-	@$(MAKE) --no-print-directory -j2 NICE='nice -n 19' computing waiting-then-ros
+	@$(MAKE) --no-print-directory -j2 BESIDE=1 computing waiting-then-ros
 ifdef FULL
 	@$(MAKE) --no-print-directory other-libraries
 endif
@@ -71,7 +71,8 @@ endif
 
 .PHONY: computing waiting waiting-then-ros compiled other-libraries
 computing: compiled
-	@FULL=$(FULL) $(WITHOUT_ROS) $(NICE) .venv/without-ros/bin/python $(PYTEST) -n auto \
+	@FULL=$(FULL) $(WITHOUT_ROS) $(if $(BESIDE),nice -n 19) \
+		.venv/without-ros/bin/python $(PYTEST) -n $(or $(BESIDE),auto) \
 		$(addprefix --ignore=,$(REAL)) $(COMPUTING) > .venv/log/computing 2>&1; \
 	status=$$?; echo '== unit: those that compute'; cat .venv/log/computing; exit $$status
 

@@ -329,7 +329,9 @@ class Bench(contextlib.ExitStack):
                 )
             ]
         gap = LineSettings(connection.baud_rate).frame_gap
-        return trace_laws.violations(frames, gap, connection.model, connection.protocol)
+        return trace_laws.violations(
+            frames, gap, connection.model, connection.protocol, may_stand_still=True
+        )
 
     def requests(self) -> list[str]:
         """Return what Modbus requests arrived so far: unit and PDU in hexadecimal."""

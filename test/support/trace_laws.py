@@ -62,11 +62,15 @@ def violations(
     model: str = 'sinus_g2',
     protocol: str = 'modbus_rtu',
     method: str = '',
+    *,
+    may_stand_still: bool = False,
 ) -> list[str]:
     """
     Return what breaks the laws of the house in a trace; nothing is as it should be.
 
     :param frame_gap: the least silence before a request, t3.5, s; counts for Modbus RTU alone.
+    :param may_stand_still: the far end may have; it then has two requests at once, or a request
+        before it answers the one before.
     """
     by_terminals = method == 'remote_setpoint'
     judge = (
@@ -74,12 +78,16 @@ def violations(
         if protocol == 'movitrac'
         else _Judge(model, protocol)
     )
+
+    def has_gap(frame: Frame) -> bool:
+        return protocol in WITH_GAP and not (may_stand_still and (frame['gap'] or 0.0) <= 0.0)
+
     return [
         f'frame {number}: {complaint} ({frame["hex"]})'
         for number, frame in enumerate(frames)
         if frame['direction'] == 'request'
         for complaint in (
-            *(_wrong_gap(frames, number, frame_gap) if protocol in WITH_GAP else ()),
+            *(_wrong_gap(frames, number, frame_gap) if has_gap(frame) else ()),
             *judge.complaints(bytes.fromhex(frame['hex'])),
         )
     ]
@@ -87,8 +95,7 @@ def violations(
 
 def _wrong_gap(frames: list[Frame], number: int, frame_gap: float) -> Iterator[str]:
     gap = frames[number]['gap']
-    # one that is there before the answer goes out was waited for in vain: the far end stood still
-    if number and 0 <= gap < frame_gap and not _behind_a_late_answer(frames, number):
+    if number and gap < frame_gap and not _behind_a_late_answer(frames, number):
         yield f'came {1000 * gap:.3f} ms after the frame before, t3.5 is not kept'
 
 
