@@ -224,7 +224,8 @@ class ControlSession(Listener):
 
     def on_event(self, event: Event) -> None:
         """Report what an operator has to know."""
-        if event.severity is Severity.INFO or event.cause in self._mute:
+        told = event.severity is not Severity.INFO or event.cause is Cause.CHANGED_FOR_TIMEOUT
+        if not told or event.cause in self._mute:
             return
         self.reported.append(event.report)
         self.screen.say(say(event.report))

@@ -225,8 +225,8 @@ def _released(node: DriveNode, future: Future[Any]) -> bool:
     """
     Log the outcome of a release; false if the motor may run.
 
-    Its stop was confirmed before. What is not put back in time leaves no motor running, unless the
-    stop has to be written again.
+    Its stop was confirmed before, if there was one to stop. What is not put back in time leaves no
+    motor running, unless the stop has to be written again.
     """
     if _succeeded(future) or node.managed.drive.stop_waits:
         return _confirmed(node, future)
@@ -236,7 +236,7 @@ def _released(node: DriveNode, future: Future[Any]) -> bool:
         known = isinstance(error, DriveError)
         why = node.managed.wording.say(error) if known else f'error in the driver: {error!r}'
     node.get_logger().warning(
-        'the stop is confirmed, but control of the drive is not released, and what was set for '
+        'nothing is left to stop, but control of the drive is not released, and what was set for '
         f'this run (drive_timeout) may not be put back: {why}; if time was short, raise '
         'shutdown_timeout'
     )

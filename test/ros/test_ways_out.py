@@ -376,5 +376,17 @@ def test_an_exit_that_cannot_release_a_drive_whose_stop_is_confirmed_says_only_t
         wait_until(lambda: 'stopping: ' in driver.text, 'it ramps down')
         drive.inject('silence', 60.0)
         assert driver.wait() == 0, driver.text
-    assert 'the stop is confirmed, but control of the drive is not released' in driver.text
+    assert 'nothing is left to stop, but control of the drive is not released' in driver.text
     assert 'WITHOUT a confirmed stop' not in driver.text
+
+
+def test_an_exit_claims_no_stop_of_a_drive_that_is_lost_and_was_not_enabled(bench: Bench) -> None:
+    drive = bench.simulator()
+    driver = bench.driver('-p', 'shutdown_timeout:=1.0')
+    client = bench.client().connected()
+    drive.inject('silence', 60.0)
+    client.wait_for('status', lambda status: not status.connected, 'it is lost')
+    driver.signal(signal.SIGTERM)
+    assert driver.wait() == 0, driver.text
+    assert 'control of the drive is not released' in driver.text
+    assert 'is confirmed' not in driver.text

@@ -118,6 +118,8 @@ def test_the_set_point_stays_fresh(bench: Bench) -> None:
         out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, err
     assert 'no set-point' not in err and 'time-out' not in err
+    # both stay so
+    assert 'serial.sio_tot' in err and 'serial.auto_stop' in err and '(--drive-timeout)' in err
     lines = [line for line in out.splitlines() if 'Bus Run' in line]
     # on a busy machine the last line may be an old one, but later than both
     assert '10.0 Hz' in lines[-1] and re.search(' [0-5] s left', lines[-1])
