@@ -36,7 +36,7 @@ test: setup ## lint, types, unit and ros, the last two at once
 	@for stage in lint types; do \
 		$(MAKE) --no-print-directory $$stage || exit; \
 	done
-	@$(MAKE) --no-print-directory -j2 BESIDE=1 computing waiting-then-ros
+	@$(MAKE) --no-print-directory -j2 BESIDE=$(if $(FULL),auto,1) computing waiting-then-ros
 ifdef FULL
 	@$(MAKE) --no-print-directory other-libraries
 endif
