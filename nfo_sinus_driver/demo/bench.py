@@ -99,11 +99,15 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 #: All that DDS has ports for on every system; 0 is that of everything else.
 _DOMAINS = range(1, 102)
+#: The first port of a domain, and that of its first participant; each next one has two more.
+_PORT, _PORTS_OF_DOMAIN, _FIRST = 7400, 250, 10
+#: As many participants find each other on one machine.
+_PARTICIPANTS = 32
 
 
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
-    """Have a ROS domain that no other caller has, and that is not that of the user."""
+    """Have a ROS domain that no other caller and no other program here has, nor the user."""
     users = os.environ.get('ROS_DOMAIN_ID', '')
     for number in random.sample(_DOMAINS, len(_DOMAINS)):
         if str(number) == users:
@@ -114,6 +118,20 @@ def own_domain() -> Iterator[int]:
                 claim.bind(f'\0nfo_sinus_driver/domain/{number}')
             except OSError:
                 continue
+            if _is_used(number):
+                continue
             yield number
             return
     raise RuntimeError('no ROS domain is free')
+
+
+def _is_used(domain: int) -> bool:
+    """Return whether a program on this machine is in a domain: its drives may have our names."""
+    first = _PORT + _PORTS_OF_DOMAIN * domain
+    for port in (first, *range(first + _FIRST, first + _FIRST + 2 * _PARTICIPANTS, 2)):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(('', port))
+            except OSError:
+                return True
+    return False

@@ -15,6 +15,10 @@ import sys
 from bench import Bench, Process, _executable, wait_until
 from connections import needs
 import pytest
+import rclpy
+from rclpy.node import Node
+
+from nfo_sinus_driver.demo.bench import own_domain
 
 _DEMO_TIME = 300.0
 #: As a shell starts its background jobs.
@@ -98,3 +102,21 @@ def test_make_run_prints_only_lines_that_work_here(bench: Bench, installed: bool
         for first, program, *rest in lines:
             assert (root / first).is_file()
             assert program in scripts or (root / rest[0]).is_file(), program
+
+
+def test_a_domain_in_which_another_program_is_is_not_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with own_domain() as number:
+        pass
+    # it may have drives of the same names
+    monkeypatch.setattr('nfo_sinus_driver.demo.bench._DOMAINS', (number,))
+    context = rclpy.context.Context()
+    rclpy.init(context=context, domain_id=number)
+    try:
+        another = Node('another', context=context)
+        with pytest.raises(RuntimeError, match='no ROS domain is free'), own_domain():
+            pass
+        another.destroy_node()
+    finally:
+        rclpy.shutdown(context=context)
