@@ -276,7 +276,7 @@ class Controller:
             return self._state.report(Cause.COASTING if self._sequence.coasts else Cause.STOPPED)
         try:
             coasts = await self._coasts(status)
-        except LinkError:
+        except (LinkError, DriveError):
             # the stop is confirmed all the same
             return self._state.report(Cause.STOPPING)
         return Report(Cause.COASTING if coasts else Cause.RAMPING)

@@ -638,7 +638,7 @@ class DriveState:
             return str(await self.params.read(key, priority, retry=False))
         except PortError:
             raise
-        except LinkError:
+        except (LinkError, DriveError):
             return known
 
     async def coasts_to_stop(self) -> bool | None:

@@ -10,6 +10,7 @@ import math
 from nfo_sinus_driver.bus import Priority, Task
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.drive_state import DriveState
+from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.link import LinkError
 
 #: How often to check whether there is one without a name, s.
@@ -56,8 +57,8 @@ class FaultNamer:
             return
         try:
             code = await state.read_fault_code(Priority.POLL)
-        except LinkError:
-            # the poll reports it if the drive is lost
+        except (LinkError, DriveError):
+            # the poll reports it if the drive is lost, or has to be recognised anew
             return
         if state.unresolved_code == unresolved:
             state.resolve_fault(unresolved, code)

@@ -24,7 +24,7 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 from nfo_sinus_driver.bus import Bus, Priority, Task
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.events import Cause, Report, Severity
+from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.parameter_writer import (
     ParameterChange,
     ParameterError,
@@ -269,8 +269,8 @@ class Parameters:
                     await self._read(key, retry=False)
                 except Refused:
                     pass
-                except LinkError:
-                    # the poll reports it if the drive is lost
+                except (LinkError, DriveError):
+                    # the poll reports it if the drive is lost, or has to be recognised anew
                     state.missed()
             # with many drives on a line a round takes longer, to leave time for other requests
             pace = _ROUND * sharers() / len(due)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive.drive_state import DriveState
+from nfo_sinus_driver.drive.events import DriveError
 from nfo_sinus_driver.drive.snapshot import NAN, Telemetry
 from nfo_sinus_driver.link import LinkError, Refused
 
@@ -91,8 +92,8 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
                 by_key = {key: values[key] for key in named}
                 state.note_measured(by_key)
                 state.listener.on_telemetry(Telemetry(state.bus.now(), by_role, by_key))
-            except LinkError:
-                # the poll reports it if the drive is lost
+            except (LinkError, DriveError):
+                # the poll reports it if the drive is lost, or has to be recognised anew
                 state.missed()
                 values.update(dict.fromkeys((*map(key_of, FAST), *state.measured_keys), NAN))
         period = 1 / rate if rate else _OFF_PERIOD

@@ -33,6 +33,7 @@ sys.path[:0] = [str(_TEST.parent), str(_TEST), str(_TEST / 'unit' / 'drive'),
 
 from any_order_machine import AnyOrder  # noqa: E402, the tests are no package
 from machines import EVERY_MACHINE  # noqa: E402
+from support.unexpected_errors import unexpected_errors  # noqa: E402
 
 #: At which request what goes wrong; the first is 0.
 Case = tuple[tuple[int, str], ...]
@@ -171,12 +172,13 @@ class Run:
 
 def complaint_of(run: Run) -> str:
     """Return what is wrong with a run, ``''`` if nothing."""
-    try:
-        run.run()
-    except Exception as error:
-        # a mistake in the driver or in a law must not end the others
-        return f'{type(error).__name__}: {error}'.splitlines()[0]
-    return ''
+    with unexpected_errors() as found:
+        try:
+            run.run()
+        except Exception as error:
+            # a mistake in the driver or in a law must not end the others
+            return f'{type(error).__name__}: {error}'.splitlines()[0]
+    return found[0].splitlines()[-1] if found else ''
 
 
 class Given:

@@ -29,12 +29,14 @@ def test_coroutine_that_raises(bus: Bus, error: BaseException) -> None:
     assert future.exception() is error
 
 
+@pytest.mark.provokes
 @RAISED
 def test_call_that_raises(bus: Bus, error: BaseException) -> None:
     bus.call(raiser(error))
     assert result(ask(bus, 1, Priority.POLL)) == packed(1)
 
 
+@pytest.mark.provokes
 @RAISED
 def test_call_that_raises_keeps_no_other_out(
     bus: Bus, link: FakeLink, error: BaseException
@@ -46,6 +48,7 @@ def test_call_that_raises_keeps_no_other_out(
     assert result(future) == packed(1)
 
 
+@pytest.mark.provokes
 @RAISED
 @pytest.mark.parametrize('which', ['make', 'done'])
 def test_slot_that_raises(bus: Bus, link: FakeLink, error: BaseException, which: str) -> None:
@@ -60,6 +63,7 @@ def test_slot_that_raises(bus: Bus, link: FakeLink, error: BaseException, which:
     assert writer.outcomes[-1] == (packed(2), None)
 
 
+@pytest.mark.provokes
 @RAISED
 def test_link_that_raises(bus: Bus, link: FakeLink, error: BaseException) -> None:
     link.answer = raiser(error)
@@ -73,6 +77,7 @@ def test_link_that_raises(bus: Bus, link: FakeLink, error: BaseException) -> Non
     assert result(ask(bus, 2, Priority.POLL)) == packed(2)
 
 
+@pytest.mark.provokes
 @RAISED
 def test_link_that_raises_when_it_is_opened(
     link: FakeLink, monkeypatch: pytest.MonkeyPatch, error: BaseException
@@ -101,6 +106,7 @@ def test_link_that_raises_when_it_is_opened(
     bus.close()
 
 
+@pytest.mark.provokes
 @RAISED
 def test_link_that_raises_when_it_is_closed(
     bus: Bus, link: FakeLink, error: BaseException
@@ -115,6 +121,7 @@ def test_link_that_raises_when_it_is_closed(
     assert not bus.alive
 
 
+@pytest.mark.provokes
 def test_resync_reads_that_raise(bus: Bus, link: FakeLink, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link, 'use_resync_reads', raiser(RuntimeError()))
     bus.use_resync_reads(1, ())

@@ -96,6 +96,7 @@ def test_port_that_is_absent_at_first(link: FakeLink, monkeypatch: pytest.Monkey
     bus.close()
 
 
+@pytest.mark.provokes
 def test_slot_that_raises_while_the_port_is_lost(bus: Bus, link: FakeLink) -> None:
     link.opening = raiser(PortError('gone'))
     link.answer = raiser(PortError('gone'))
@@ -126,6 +127,7 @@ def test_sleepers_are_not_troubled_by_a_lost_port(bus: Bus, link: FakeLink) -> N
     assert result(bus.run(sleeper())) == 'slept'
 
 
+@pytest.mark.provokes
 def test_mute_port_that_cannot_be_reported_is_opened_again(bus: Bus, link: FakeLink) -> None:
     reports: list[float] = []
 

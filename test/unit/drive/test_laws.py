@@ -225,7 +225,8 @@ LOSSES = {
 @pytest.mark.parametrize(
     ('connection', 'loss'),
     [
-        (connection, loss) for connection, loss in itertools.product(CONNECTIONS, LOSSES)
+        pytest.param(connection, loss, marks=[pytest.mark.provokes] * (loss == 'listener'))
+        for connection, loss in itertools.product(CONNECTIONS, LOSSES)
         # there the PLC, or the bit of the bus, enables in place of an input
         if loss != 'run input' or not connection.startswith(('telegram1 sinus_h', 'movitrac'))
     ],

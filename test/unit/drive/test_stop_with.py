@@ -89,6 +89,7 @@ def test_without_set_points_a_drive_stays_enabled_and_nothing_stops_with_it() ->
         assert rig.drives[2].following
 
 
+@pytest.mark.provokes
 def test_what_goes_wrong_with_the_others_keeps_no_stop() -> None:
     def fail(why: Report) -> None:
         raise ZeroDivisionError

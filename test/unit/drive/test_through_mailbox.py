@@ -388,6 +388,33 @@ def test_an_access_that_one_drive_has_begun_is_not_ended_in_another(at: int) -> 
         assert goes_on < math.inf and written[:1] in ([], [1000])
 
 
+@pytest.mark.parametrize(('connection', 'key', 'settings'), [
+    (G2, ACCEL, {}), (SINUS_H, 'drv.acc_time', {'drive_addresses': OWN}),
+])
+def test_what_is_watched_is_watched_again_after_the_driver_stood_still(
+    connection: str, key: str, settings: dict[str, Any]
+) -> None:
+    with Rig(connection, telemetry_rate=2.0, lost_after=20.0, **settings) as rig:
+        rig.connect(parameters=True)
+        rig.drive.activate()
+        requests = itertools.count(1)
+
+        def plan(frame: bytes) -> None:
+            # whatever is read just then
+            if next(requests) % 11 == 0:
+                rig.line.stand_still(rig.clock.now, 5.0)
+
+        rig.line.plan = plan
+        rig.pass_time(200.0)
+        rig.line.plan = lambda frame: None
+        assert next(requests) > 200
+        before = len(rig.notes.telemetry)
+        rig.far.set_from_keypad(key, 9.0)
+        rig.pass_time(60.0)
+        assert len(rig.notes.telemetry) > before + 60
+        assert rig.drive.parameters.values[key] == 9.0
+
+
 def test_an_address_that_the_drive_lacks_is_reported() -> None:
     with Rig(SINUS_H, drive_addresses=(*OWN, 'drv.none=1')) as rig:
         rig.connect(parameters=True)
