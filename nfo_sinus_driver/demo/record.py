@@ -29,6 +29,7 @@ from rclpy.node import Node
 import rclpy.utilities
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
+from nfo_sinus_driver.cli.console import OutputLost, put
 from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.bench import handle_signals
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
@@ -90,7 +91,11 @@ def plot(args: Sequence[str] | None = None) -> int:
     drives = [options.drive] if options.drive else []
     if options.explain:
         return _explain(bag, drives)
-    return _draw('plot', bag, drives, options.output or bag.with_name(f'{bag.name}.png'))
+    picture: Path = options.output or bag.with_name(f'{bag.name}.png')
+    if not picture.suffix:
+        # Matplotlib would add it, too, and not say so
+        picture = picture.with_name(f'{picture.name}.png')
+    return _draw('plot', bag, drives, picture)
 
 
 def why_no_picture() -> str:
@@ -135,10 +140,16 @@ def _explain(bag: Path, drives: Sequence[str]) -> int:
     from nfo_sinus_driver.demo.recorded import drives_in, read
 
     try:
-        for run in read(bag, drives or drives_in(bag)):
-            print('\n'.join(explanation(run)), end='\n\n')
+        runs = read(bag, drives or drives_in(bag))
     except (OSError, ValueError) as error:
         print(f'plot: cannot read {bag}: {error}', file=sys.stderr)
+        return 1
+    try:
+        for run in runs:
+            put('\n'.join([*explanation(run), '']))
+    except OutputLost as error:
+        if not isinstance(error.__cause__, BrokenPipeError):
+            print(f'plot: {error}', file=sys.stderr)
         return 1
     return 0
 

@@ -149,8 +149,11 @@ def read(folder: Path, drives: Sequence[str]) -> list[Recording]:
     """
     Read the runs of drives, all from the same moment; one that was never connected has none.
 
-    :raises ValueError: none of them was ever connected.
+    :raises ValueError: one is not in the bag, or none of them was ever connected.
     """
+    there = drives_in(folder)
+    if missing := sorted({*drives} - {*there}):
+        raise ValueError(f'there is no drive {", ".join(missing)} in it, only {", ".join(there)}')
     messages: dict[str, list[tuple[int, Any]]] = {}
     for topic, stamp, message in bags.read(folder, lambda topic: _is_of(drives, topic)):
         messages.setdefault(topic, []).append((stamp, message))

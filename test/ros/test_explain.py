@@ -117,6 +117,43 @@ def test_each_line_has_a_picture_with_its_stops(bag: Path) -> None:
     assert first.began == second.began
 
 
+def test_a_picture_is_where_it_is_said_to_be(
+    bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for output in ('infeed', 'infeed.png', str(bag)):
+        assert plot([str(bag), '--drive', _DRIVE, '--output', str(bag.parent / output)]) == 0
+        said = capsys.readouterr().out.removeprefix('plot: the picture is ').strip()
+        assert Path(said).is_file(), said
+
+
+def test_a_name_that_is_not_in_the_bag_is_answered_by_those_that_are(
+    bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for how in ('--explain', f'--output={bag.parent / "a.png"}'):
+        assert plot([str(bag), '--drive', '/line1/Infeed', how]) == 1
+        said = capsys.readouterr().err
+        assert f'no drive /line1/Infeed in it, only {_DRIVE}, /line2/outfeed' in said
+
+
+def test_what_cannot_be_written_was_read_all_the_same(
+    bag: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # its end flushes once more, unless what is left was given up
+    with open('/dev/full', 'w', encoding='utf-8') as full:
+        monkeypatch.setattr('sys.stdout', full)
+        assert plot([str(bag), '--explain']) == 1
+    said = capsys.readouterr().err
+    assert 'output cannot be written' in said and 'cannot read' not in said
+
+
+def test_a_drive_that_never_answered_has_nothing_to_explain(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path / 'run', [(f'{_DRIVE}/status', 0.0, lost(0.0))])
+    assert plot([str(tmp_path / 'run'), '--explain']) == 1
+    assert f'{_DRIVE} was never connected' in capsys.readouterr().err
+
+
 def test_a_bag_that_begins_after_a_stop_explains_none(tmp_path: Path) -> None:
     messages = [
         (f'{_DRIVE}/status', at, status(at, DriveStatus.REASON_FAULT, 'fault 5'))
@@ -199,13 +236,6 @@ def test_each_event_is_told_once(tmp_path: Path, capsys: pytest.CaptureFixture[s
     ]
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'why'),
-    [(['--explain'], 'it is no bag'), (['--explain', '--drive', 'other'], 'never connected')],
-)
-def test_what_cannot_be_explained_is_refused(
-    bag: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], why: str
-) -> None:
-    where = bag / 'none' if 'no bag' in why else bag
-    assert plot([str(where), *arguments]) == 1
-    assert why in capsys.readouterr().err
+def test_what_is_no_bag_is_refused(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert plot([str(bag / 'none'), '--explain']) == 1
+    assert 'it is no bag' in capsys.readouterr().err
