@@ -32,7 +32,7 @@ from nfo_sinus_driver.node.drive_node import DriveNode
 from nfo_sinus_driver.node.executor import NodeExecutor, end_all
 from nfo_sinus_driver.node.log_limit import limit_errors
 from nfo_sinus_driver.node.nonblocking_stdio import NonblockingStdio
-from nfo_sinus_driver.node.parameter_names import unknown_nodes, unknown_parameters
+from nfo_sinus_driver.node.parameter_names import require_files, unknown_nodes, unknown_parameters
 from nfo_sinus_driver.node.single_name import bus_overrides, take_out_node_name
 from nfo_sinus_driver.node.start import init_ros
 from nfo_sinus_driver.signals import ENDING, HeldSignals, OtherProcess, signal_name
@@ -309,6 +309,8 @@ def _run(
     single_name: str | None,
 ) -> int:
     try:
+        # before ROS reads them
+        require_files(arguments)
         starters = [one for one in (parent, process_to_end_with(arguments)) if one is not None]
         init_ros(arguments)
         process = DriverProcess(arguments, single_name)

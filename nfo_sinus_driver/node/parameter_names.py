@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Misspelt names: of parameters that no node has, and of nodes that are not here."""
+"""Misspelt names: of parameters, of nodes, and of the files that have them."""
 
 from __future__ import annotations
 
@@ -60,23 +60,40 @@ def require_parameter(node: Node, name: str, hint: str = '') -> None:
         raise ValueError(f'{name}: there is no such parameter{hint}{near}')
 
 
+def require_files(arguments: list[str]) -> None:
+    """
+    Make sure that each parameter file is there.
+
+    :raises ValueError: one is not; what ROS says of it names a line of its own source.
+    """
+    for path in _files(arguments):
+        if not Path(path).exists():
+            raise ValueError(f'--params-file {path}: there is no such file')
+        if Path(path).is_dir():
+            raise ValueError(f'--params-file {path}: it is a folder, name a file in it')
+
+
 def unknown_nodes(arguments: list[str], names: Iterable[str]) -> Iterator[str]:
     """Return a warning for each section of a parameter file that is of no node here."""
     names = set(names)
-    for flag, path in itertools.pairwise(arguments):
-        if flag == _PARAMS_FILE:
-            for section in _sections(_load(path)):
-                name = section.rsplit('/', 1)[-1]
-                if '*' not in name and name not in names:
-                    yield (
-                        f'{path} has parameters for {section}, but the nodes here are '
-                        f'{", ".join(sorted(names))}{did_you_mean(name, names)}'
-                    )
+    for path in _files(arguments):
+        for section in _sections(_load(path)):
+            name = section.rsplit('/', 1)[-1]
+            if '*' not in name and name not in names:
+                yield (
+                    f'{path} has parameters for {section}, but the nodes here are '
+                    f'{", ".join(sorted(names))}{did_you_mean(name, names)}'
+                )
+
+
+def _files(arguments: list[str]) -> Iterator[str]:
+    return (path for flag, path in itertools.pairwise(arguments) if flag == _PARAMS_FILE)
 
 
 def _load(path: str) -> Any:
     try:
-        return yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+        # bytes: YAML may be UTF-16, and ROS reads that, too
+        return yaml.safe_load(Path(path).read_bytes())
     except (OSError, yaml.YAMLError):
         # ROS has reported it by now
         return None

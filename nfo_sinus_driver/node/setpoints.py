@@ -154,7 +154,8 @@ class Setpoints:
             return
         if self._managed.drive.following:
             self._logged_idle = False
-        elif not self._logged_idle:
+        elif not self._logged_idle and self._managed.drive.snapshot.connected:
+            # before that an enable would be refused
             self._logged_idle = True
             enable = self._managed.wording.enable
             self._log.info(

@@ -181,6 +181,21 @@ def test_a_setpoint_that_is_no_number_is_ignored_with_one_warning(
     assert driver.text.count('not a finite number') == 1
 
 
+@needs('own')
+def test_an_enable_is_advised_once_it_can_be_done(bench: Bench) -> None:
+    simulated = bench.simulator()
+    driver = bench.driver('-p', 'lost_after:=0.5')
+    client = bench.client().connected()
+    assert client.enable().success
+    advice = 'set-points arrive, but the drive is not enabled: call /nfo_sinus/enable'
+    with client.setpoints(5.0):
+        simulated.inject('silence', 3.0)
+        _says(driver, 'lost: ')
+        holds_for(A_WHILE, lambda: advice not in driver.text, 'no advice that is refused')
+        _says(driver, advice)
+    assert driver.text.rindex('connected: ') < driver.text.index(advice)
+
+
 @needs('direct', 'reverse')
 def test_a_setpoint_beyond_the_limit_is_clamped_with_one_warning(bench: Bench) -> None:
     drive = bench.simulator(*bench.drives.ramps(1))
@@ -373,6 +388,23 @@ def test_unknown_names_in_a_parameter_file_are_warned_about(bench: Bench) -> Non
     _says(driver, 'nfo_sinsu', 'did you mean', 'nfo_sinus')
     assert 'port was given' not in driver.text, 'what the command line gives to all is no mistake'
     assert client.parameter('setpoint_timeout') == 2.5
+
+
+@needs('own')
+def test_a_parameter_file_in_any_encoding_that_ros_reads_is_taken(bench: Bench) -> None:
+    parameters = bench.folder / 'wide.yaml'
+    parameters.write_text('nfo_sinus: {ros__parameters: {setpoint_timeout: 1.25}}', 'utf-16')
+    bench.simulator()
+    bench.driver('--params-file', str(parameters))
+    assert bench.client().connected().parameter('setpoint_timeout') == 1.25
+
+
+@needs('own')
+def test_what_is_no_parameter_file_is_named(bench: Bench) -> None:
+    for path, why in ((bench.folder, 'it is a folder'), (bench.folder / 'none', 'is no such file')):
+        driver = bench.driver('--params-file', str(path))
+        assert driver.wait() == _CANNOT_START
+        assert f'cannot start: --params-file {path}: ' in driver.text and why in driver.text
 
 
 def test_a_name_for_the_whole_process_becomes_the_name_of_the_single_drive(bench: Bench) -> None:
