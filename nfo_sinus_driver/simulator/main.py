@@ -68,7 +68,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _serve(simulator)
     except (ValueError, CatalogError) as error:
         parser.exit(2, f'simulator: error: {error}\n')
-    except (PortError, ControlError, OSError) as error:
+    except OSError as error:
+        where = f'{error.filename}: ' if error.filename else ''
+        print(f'simulator: {where}{error.strerror or error}', file=sys.stderr)
+        return 1
+    except (PortError, ControlError) as error:
         print(f'simulator: {error}', file=sys.stderr)
         return 1
 
