@@ -135,14 +135,17 @@ class Recording:
 
 def drives_in(folder: Path) -> list[str]:
     """Return the names of the drives in a bag, in order; a ValueError if there is none."""
-    drives = sorted(
+    if drives := _drives_in(folder):
+        return drives
+    raise ValueError('it has no drive: no topic ~/status was recorded')
+
+
+def _drives_in(folder: Path) -> list[str]:
+    return sorted(
         topic.removesuffix('/status')
         for topic, type_ in bags.topics(folder)
         if type_ == _STATUS and topic.endswith('/status')
     )
-    if not drives:
-        raise ValueError('it has no drive: no topic ~/status was recorded')
-    return drives
 
 
 def read(folder: Path, drives: Sequence[str]) -> list[Recording]:
@@ -151,8 +154,8 @@ def read(folder: Path, drives: Sequence[str]) -> list[Recording]:
 
     :raises ValueError: one is not in the bag, or none of them was ever connected.
     """
-    there = drives_in(folder)
-    if missing := sorted({*drives} - {*there}):
+    there = _drives_in(folder)
+    if there and (missing := sorted({*drives} - {*there})):
         raise ValueError(f'there is no drive {", ".join(missing)} in it, only {", ".join(there)}')
     messages: dict[str, list[tuple[int, Any]]] = {}
     for topic, stamp, message in bags.read(folder, lambda topic: _is_of(drives, topic)):

@@ -150,8 +150,11 @@ def test_a_drive_that_never_answered_has_nothing_to_explain(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write(tmp_path / 'run', [(f'{_DRIVE}/status', 0.0, lost(0.0))])
-    assert plot([str(tmp_path / 'run'), '--explain']) == 1
-    assert f'{_DRIVE} was never connected' in capsys.readouterr().err
+    # such as of a name that was misspelt when it was recorded
+    write(tmp_path / 'others', [('/setpoint', 0.0, Float32())])
+    for bag in ('run', 'others'):
+        assert plot([str(tmp_path / bag), '--drive', _DRIVE, '--explain']) == 1
+        assert f'{_DRIVE} was never connected' in capsys.readouterr().err
 
 
 def test_a_bag_that_begins_after_a_stop_explains_none(tmp_path: Path) -> None:
