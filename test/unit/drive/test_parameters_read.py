@@ -238,6 +238,7 @@ def test_refresh_passes_over_what_is_refused(rig: Rig, parameters: Parameters) -
     assert not texts(rig, Cause.SETTING_UNREADABLE)
 
 
+@pytest.mark.provokes
 def test_a_listener_that_fails_does_not_end_the_watch(
     rig: Rig, parameters: Parameters, caplog: pytest.LogCaptureFixture
 ) -> None:

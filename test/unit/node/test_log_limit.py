@@ -75,6 +75,7 @@ def test_each_kind_is_logged_once_in_a_period_and_says_how_many_were_not() -> No
     ]
 
 
+@pytest.mark.provokes
 def test_an_error_with_every_message_is_logged_once_in_ten_seconds(
     now: list[float], output: io.StringIO
 ) -> None:
@@ -95,6 +96,7 @@ def test_what_is_no_error_is_not_limited(output: io.StringIO) -> None:
     assert output.getvalue().splitlines() == [f'answer {n} was dropped' for n in range(5)]
 
 
+@pytest.mark.provokes
 def test_what_ends_a_thread_is_logged_the_same_way(
     output: io.StringIO, ends_thread: Callable[..., object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -107,6 +109,7 @@ def test_what_ends_a_thread_is_logged_the_same_way(
     assert 'error in a thread' in output.getvalue()
 
 
+@pytest.mark.provokes
 def test_messages_that_cannot_be_sent_are_logged_once_and_silence_no_other(
     output: io.StringIO,
 ) -> None:

@@ -94,6 +94,7 @@ def test_the_queue_does_both_what_is_put_in_and_what_is_due(queue: PublishQueue)
     assert put.wait(PATIENCE)
 
 
+@pytest.mark.provokes
 def test_what_raises_keeps_nothing_back(
     queue: PublishQueue, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -268,6 +269,7 @@ def test_a_stream_that_never_ends_keeps_nothing_else_waiting(queue: PublishQueue
         ended = True
 
 
+@pytest.mark.provokes
 def test_a_value_that_cannot_be_published_loses_no_other(caplog: pytest.LogCaptureFixture) -> None:
     done: list[float] = []
     queue = PublishQueue()
