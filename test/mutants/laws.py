@@ -849,6 +849,14 @@ LAWS = (
     ),
     Mutant(
         11,
+        'what is watched by a mailbox ends where the drive is not recognised',
+        'nfo_sinus_driver/drive/parameters.py',
+        'except (LinkError, DriveError):',
+        'except LinkError:',
+        ('test/unit/drive/test_through_mailbox.py', '-k', 'watched_again'),
+    ),
+    Mutant(
+        11,
         'a fault is acknowledged at a drive that is not recognised',
         'nfo_sinus_driver/drive/parameter_access.py',
         'not isinstance(operation, Read) or operation.once',
