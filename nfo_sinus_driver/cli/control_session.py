@@ -224,8 +224,9 @@ class ControlSession(Listener):
 
     def on_event(self, event: Event) -> None:
         """Report what an operator has to know."""
-        told = event.severity is not Severity.INFO or event.cause is Cause.CHANGED_FOR_TIMEOUT
-        if not told or event.cause in self._mute:
+        # what is changed in the drive stays so
+        matters = event.severity is not Severity.INFO or event.cause is Cause.CHANGED_FOR_TIMEOUT
+        if not matters or event.cause in self._mute:
             return
         self.reported.append(event.report)
         self.screen.say(say(event.report))

@@ -55,8 +55,9 @@ class Lifecycle:
             return 'the node was shut down: start the driver again'
         if self.complaint:
             return f'the drive has not answered yet: {self.complaint}'
-        both = transition == 'activate' and self.state == 'unconfigured'
-        return f'the node is {self.state}: {"configure and " * both}{transition} it first'
+        if transition == 'activate' and self.state == 'unconfigured':
+            transition = 'configure and activate'
+        return f'the node is {self.state}: {transition} it first'
 
     @property
     def wanted(self) -> bool:

@@ -59,6 +59,7 @@ def test_many_goals_at_once_are_all_answered(bench: Bench) -> None:
         goal_service_qos_profile=_QUALITY, result_service_qos_profile=_QUALITY,
     )
     wait_until(tune.server_is_ready, 'there is an action')
+
     def goal() -> Any:
         # rclpy drops an answer that another thread takes before the call has kept its number
         return client.where_it_spins(
