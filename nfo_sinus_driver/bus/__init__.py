@@ -26,7 +26,7 @@ so by ``require_wanted``, which is called at that moment, too.
   recognised and hardly answers from their polls: after each stop or service without an answer
   another drive has a turn, and none for which as much was in vain.
 
-**Silence is no loss, and a mute port no silent drive.** :class:`~.scheduler.Silences` has for how
+**Silence is no loss, and a mute port no silent drive.** :class:`~.silences.Silences` has for how
 long each unit has not answered, and since when another drive may be in its place (law 11). Where no
 unit answers, the port is opened again: some adapters pass nothing until then and report no error.
 
@@ -51,11 +51,13 @@ in one place of the worker (it hides how often a status was missed, which drive 
 """
 
 from nfo_sinus_driver.bus.by_address import ByAddress
+from nfo_sinus_driver.bus.silences import EXCHANGE
 from nfo_sinus_driver.bus.statistics import Statistics
 from nfo_sinus_driver.bus.tasks import Cancelled, Exchange, LatestValue, Priority, Task
 from nfo_sinus_driver.bus.worker import Bus
 
 __all__ = [
+    'EXCHANGE',
     'Bus',
     'ByAddress',
     'Cancelled',

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What is sent next on one line, and which units do not answer.
+What is sent next on one line.
 
 No thread, no clock and nothing sent: :class:`nfo_sinus_driver.bus.Bus` takes what is next, sends
 it, and reports how long that kept the line.
@@ -12,13 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import itertools
-import math
 from typing import Literal, NamedTuple
 
 from nfo_sinus_driver.bus.tasks import Exchange, LatestValue, Priority, Task
-from nfo_sinus_driver.link import LinkError, NotSent, PortError, Refused
 
-__all__ = ['BACKGROUND_SHARE', 'EXCHANGE', 'Scheduler', 'Waiting']
+__all__ = ['BACKGROUND_SHARE', 'Scheduler', 'Waiting']
 
 #: The share of the time that TELEMETRY and REFRESH get, each of them, when everything above wants
 #: more; of the time that set-points leave, for else these would take nearly all from the polls.
@@ -42,6 +40,8 @@ _MISSING: Literal['missing'] = 'missing'
 _SLOT: Literal['slot'] = 'slot'
 _Rank = Priority | Literal['slot', 'retry', 'missing']
 _STOPS = (Priority.STOP, Priority.LOOK)
+#: How often all stops are sent where no unit answers, before anything else that may be in vain.
+_ROUNDS = 2
 #: What goes on at once where it was not answered.
 _REPEATED = (*_STOPS, Priority.SERVICE)
 _SHARES: dict[_Rank, float] = {
@@ -73,22 +73,28 @@ class Scheduler:
     set-point but an urgent one. All of them together have no more than their share of the time as
     long as any other waits. A stop or a service that a unit does not answer is repeated at once,
     and after each of them another unit has a turn, too: the most urgent, whatever the others are
-    owed, and none for which as much was in vain.
+    owed, and none for which as much was in vain. Where no unit of the line answers, all stops go
+    once, one after the other, ahead of everything else, which may be in vain as well; their answers
+    are waited for briefly (:meth:`is_brief`). Then they go once more, ahead of all but requests to
+    units that may answer.
 
     Units that have been silent for long are missing. Reads from them, set-points, and stops that
     did not reach them, wait until :meth:`take` may give them out, and then go ahead of other polls.
 
     :param is_silent: whether a unit has not answered the last request.
     :param is_missing: whether it has been silent for long.
+    :param is_line_silent: whether no unit of the line answers.
     """
 
     def __init__(
         self,
         is_silent: Callable[[int], bool] = lambda unit: False,
         is_missing: Callable[[int], bool] = lambda unit: False,
+        is_line_silent: Callable[[], bool] = lambda: False,
     ) -> None:
         self._is_silent = is_silent
         self._is_missing = is_missing
+        self._is_line_silent = is_line_silent
         #: In order; the values are not used.
         self._queues: dict[_Rank, dict[LatestValue | Waiting, None]] = {
             rank: {} for rank in (*Priority, _SLOT, _RETRY, _MISSING)
@@ -101,8 +107,9 @@ class Scheduler:
         self._slot_went = False
         #: The stop, its read, or the service that has just not been answered.
         self._unanswered: Exchange | None = None
-        #: What units have not answered since they last answered anything: a stop (true), its read.
-        self._unanswered_stops: set[tuple[int, bool]] = set()
+        #: What units have not answered since they last answered anything: a stop (true), its read;
+        #: and how often.
+        self._unanswered_stops: dict[tuple[int, bool], int] = {}
 
     def add(self, entry: LatestValue | Waiting) -> None:
         """Queue a slot or a transaction, behind its equals."""
@@ -166,11 +173,31 @@ class Scheduler:
             del queue[entry]
             self._queues[behind][entry] = None
 
+    def is_brief(self, exchange: Exchange) -> bool:
+        """
+        Return whether its answer is waited for no longer than the unit has ever taken.
+
+        That is so of every other stop, where others wait for it or may be in vain as well, and of
+        every other look at a unit that answers no stop.
+        """
+        tries = self._unanswered_stops
+        is_look = exchange.priority is Priority.LOOK and (exchange.unit, True) in tries
+        if exchange.priority is not Priority.STOP and not is_look:
+            return False
+        if tries.get((exchange.unit, exchange.writes), 0) % 2:
+            return False
+        return self._is_silent(exchange.unit) or any(
+            isinstance(entry, Waiting) and entry.exchange.unit != exchange.unit
+            for entry in self._queues[Priority.STOP]
+        )
+
     def _gives_way(self, entry: LatestValue | Waiting) -> bool:
         """Return whether it is for the unit that has just not answered, or for one like it."""
         if isinstance(entry, LatestValue):
-            return False
+            return not entry.urgent() and self._waits_for_stops(entry.unit)
         exchange = entry.exchange
+        if exchange.priority not in _STOPS and self._waits_for_stops(exchange.unit):
+            return True
         before = self._unanswered
         is_repeated = self._is_repeated(exchange)
         if before is not None and exchange.unit == before.unit:
@@ -179,6 +206,17 @@ class Scheduler:
         # else two of them would take turns, and no other had one
         is_in_vain = is_repeated or exchange.priority == Priority.SERVICE
         return is_in_vain and self._is_silent(exchange.unit)
+
+    def _waits_for_stops(self, unit: int) -> bool:
+        """Return whether what is no stop has to wait until all stops were sent, on a dead line."""
+        if not self._is_line_silent():
+            return False
+        rounds = _ROUNDS if self._is_silent(unit) else 1
+        return any(
+            isinstance(entry, Waiting)
+            and self._unanswered_stops.get((entry.exchange.unit, entry.exchange.writes), 0) < rounds
+            for entry in self._queues[Priority.STOP]
+        )
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
@@ -193,7 +231,8 @@ class Scheduler:
         )
         if self._unanswered is not None and is_stop:
             # each by itself: the stop behind a read that was not answered goes out at once
-            self._unanswered_stops.add((self._unanswered.unit, self._unanswered.writes))
+            stop = self._unanswered.unit, self._unanswered.writes
+            self._unanswered_stops[stop] = 1 + self._unanswered_stops.get(stop, 0)
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
                 continue
@@ -254,165 +293,15 @@ class Scheduler:
         exchange = entry.exchange
         if not self._is_silent(exchange.unit):
             if self._unanswered_stops:
-                self._unanswered_stops -= {(exchange.unit, False), (exchange.unit, True)}
+                self._unanswered_stops.pop((exchange.unit, False), None)
+                self._unanswered_stops.pop((exchange.unit, True), None)
         elif exchange.priority in _READS:
             return _MISSING if self._is_missing(exchange.unit) else _RETRY
         elif self._is_repeated(exchange) and self._is_missing(exchange.unit):
-            return _MISSING
+            # of others that answer it takes no more than their share
+            return exchange.priority if self._is_line_silent() else _MISSING
         return exchange.priority
 
     def _is_repeated(self, exchange: Exchange) -> bool:
         before = (exchange.unit, exchange.writes)
         return exchange.priority <= Priority.LOOK and before in self._unanswered_stops
-
-
-#: A unit that has been silent for so long counts as missing, s: short enough to spare the others,
-#: longer than a burst of noise.
-_MISSING_AFTER = 2.0
-#: The share of the time that all missing units may take together while others answer.
-_MISSING_SHARE = 1 / 20
-#: How much longer than before a port is mute, s, until it is opened again, each time in vain; and
-#: the longest: less than the command line repeats a stop before it gives up.
-_MUTE_STEP = 2.0
-_MUTE_LONGEST = 6.0
-#: The same where nothing was ever heard: opening it was in vain already, s.
-_MUTE_FROM_THE_START = 30.0
-#: In a longer silence another unit may have been put in the place of one, s: that is how long it
-#: takes to move the plug of the line from a drive to a spare one beside it that has power.
-EXCHANGE = 3.0
-
-
-class Silences:
-    """
-    How long each unit has not answered its requests; all times are of one clock, s.
-
-    Silence begins when the first answer has failed to come, however long the wait was: a unit
-    without requests is not silent, and one lost answer is no silence yet. Any valid frame ends it.
-
-    Each request to a unit that is missing costs the others a whole time-out, so there is a pause
-    behind it, in which none of the missing units gets one.
-
-    Where no unit answers any more, the port itself may be mute: what carries the bytes may pass
-    none until it is opened again, and report no error. Units that are switched off look the same,
-    so it is opened again more and more seldom. An address that never answered shows nothing.
-
-    :ivar heard: something valid has ever come.
-    """
-
-    def __init__(self) -> None:
-        self._last_frame_at: dict[int, float] = {}
-        self._since: dict[int, float] = {}
-        #: The same, with the time in which the worker did not run: a drive can be exchanged in it.
-        self._gone_since: dict[int, float] = {}
-        #: The longest time from one valid frame to the next.
-        self._longest: dict[int, float] = {}
-        #: When the last valid frame of any unit came.
-        self._any_frame_at = -math.inf
-        self._pause_ends = -math.inf
-        #: When the last silence of the whole line ended.
-        self._back_at = -math.inf
-        self.heard = False
-        #: Since when every request has failed, and how often the port was opened since the last
-        #: that did not.
-        self._mute_since = math.inf
-        self._opened = 0
-        #: When the port was opened that had been lost, s.
-        self.opened_at = -math.inf
-        #: When a silence ended that was long enough for an exchange: of the line, and of each unit.
-        self._line_since = -math.inf
-        self._unit_since: dict[int, float] = {}
-
-    def note(self, unit: int, now: float, error: LinkError | None, seconds: float = 0.0) -> bool:
-        """Note the outcome of a request that took ``seconds``; return whether the port carries."""
-        if isinstance(error, NotSent):
-            return False
-        if error is None or error.responded or isinstance(error, Refused):
-            self._note_exchange(unit, now)
-            if now - self._any_frame_at >= _MISSING_AFTER:
-                # it was the line: the others may be back with this one, and have to be stopped
-                self._back_at = now
-            pause = now - self._last_frame_at.get(unit, now)
-            self._longest[unit] = max(self._longest.get(unit, 0.0), pause)
-            self._last_frame_at[unit] = self._any_frame_at = now
-            self._since.pop(unit, None)
-            self._gone_since.pop(unit, None)
-        elif self.is_missing(unit, now):
-            self._pause_ends = now + seconds * (1 / _MISSING_SHARE - 1)
-        if error is not None and not isinstance(error, (PortError, Refused)):
-            self._since.setdefault(unit, now)
-            self._gone_since.setdefault(unit, now)
-        if error is None or error.responded or error.heard:
-            self.heard, self._opened, self._mute_since = True, 0, math.inf
-            return True
-        if not isinstance(error, PortError) and (not self.heard or unit in self._last_frame_at):
-            self._mute_since = min(self._mute_since, now)
-        return False
-
-    def opened(self, now: float, *, lost: bool) -> None:
-        """Note that the port was opened; after it was lost, other units may be behind it."""
-        if lost:
-            self.opened_at = self._line_since = now
-        self._opened += 1
-        self._mute_since = math.inf
-
-    def hurry(self) -> None:
-        """Have a port that is mute opened again soon, however often that was in vain."""
-        self._opened = 0
-
-    def mute_for(self, now: float) -> float:
-        """Return for how long nothing has come, s, although units were asked; 0: not at all."""
-        return max(0.0, now - self._mute_since)
-
-    def is_mute(self, now: float, lost_after: float) -> bool:
-        """
-        Return whether the port is to be opened again.
-
-        :param lost_after: how long every unit of the line may be silent, s.
-        """
-        longest = min(_MUTE_STEP * self._opened, _MUTE_LONGEST)
-        least = longest if self.heard else _MUTE_FROM_THE_START
-        return now - self._mute_since >= max(lost_after, least)
-
-    def paused(self, seconds: float) -> None:
-        """Note that nothing was sent for so long, s, for the worker did not run."""
-        self._since = {unit: since + seconds for unit, since in self._since.items()}
-        self._mute_since += seconds
-
-    def _note_exchange(self, unit: int, now: float) -> None:
-        """Note that a silence ends in which a unit, or any, may have been exchanged."""
-        if now - self._gone_since.get(unit, now) > EXCHANGE:
-            self._unit_since[unit] = now
-        if now - self._any_frame_at > EXCHANGE:
-            # this end may have stood still
-            self._line_since = now
-
-    def there_since(self, unit: int, now: float) -> float:
-        """Return since when a unit cannot have been exchanged; infinity if it may be by now."""
-        if now - min(self._gone_since.get(unit, now), self._any_frame_at) > EXCHANGE:
-            return math.inf
-        return max(self._line_since, self._unit_since.get(unit, -math.inf))
-
-    def is_silent(self, unit: int) -> bool:
-        """Return whether a unit has not answered the last request to it."""
-        return unit in self._since
-
-    def last_frame_at(self, unit: int) -> float:
-        """Return when the last valid frame of a unit came."""
-        return self._last_frame_at.get(unit, -math.inf)
-
-    def take_longest(self, unit: int) -> float:
-        """Return the longest time between two valid frames of a unit since the last call."""
-        return self._longest.pop(unit, 0.0)
-
-    def lasts(self, unit: int, now: float) -> float:
-        """Return for how long a unit has been silent; 0 if it answers."""
-        return now - self._since.get(unit, now)
-
-    def is_missing(self, unit: int, now: float) -> bool:
-        """Return whether a unit has been silent for so long that it gets few requests."""
-        return min(self.lasts(unit, now), now - self._back_at) >= _MISSING_AFTER
-
-    @property
-    def missing_from(self) -> float:
-        """From when on a missing unit may get a request; at any time while no unit responds."""
-        return min(self._pause_ends, self._any_frame_at + _MISSING_AFTER)

@@ -26,7 +26,8 @@ import threading
 import time
 from typing import Any, TypeVar
 
-from nfo_sinus_driver.bus.scheduler import Scheduler, Silences, Waiting
+from nfo_sinus_driver.bus.scheduler import Scheduler, Waiting
+from nfo_sinus_driver.bus.silences import Silences
 from nfo_sinus_driver.bus.statistics import Recorder, Statistics
 from nfo_sinus_driver.bus.tasks import (
     Cancelled,
@@ -97,7 +98,9 @@ class Bus:
         #: Which units do not answer, for coroutines on the worker.
         self.silences = Silences()
         self._scheduler = Scheduler(
-            self.silences.is_silent, lambda unit: self.silences.is_missing(unit, self.now())
+            self.silences.is_silent,
+            lambda unit: self.silences.is_missing(unit, self.now()),
+            lambda: self.silences.is_line_silent,
         )
         self._sleepers = Sleepers()
         self._stopping = False
@@ -111,8 +114,12 @@ class Bus:
         self._being_read_first: set[int] = set()
         self._read_before: set[int] = set()
         self._current: Task | None = None
-        #: How long each unit may be silent, s.
+        #: How long each unit may be silent, s, until the port counts as mute.
         self._lost_after: dict[int, float] = {}
+        #: What looks whether the drive at a unit is lost, and whether its motor may run.
+        self._watches: dict[int, tuple[Callable[[], float], Callable[[], bool]]] = {}
+        #: Until when each unit is left alone, s.
+        self._quiet_until: dict[int, float] = {}
         #: Called when the port is found mute, and when it is not any more.
         self._on_mute: Callable[[float], None] = lambda seconds: None
         self._is_mute = False
@@ -207,7 +214,23 @@ class Bus:
 
     def require_sign_of_life(self, unit: int, seconds: float) -> None:
         """Open the port again when no unit has answered for ``seconds``, the longest of all."""
-        self.call(lambda: self._lost_after.update({unit: seconds}))
+
+        def require() -> None:
+            self._lost_after[unit] = seconds
+            self.silences.watch(unit, seconds)
+
+        self.call(require)
+
+    def on_silence(
+        self, unit: int, look: Callable[[], float], may_run: Callable[[], bool]
+    ) -> None:
+        """
+        Call a function, on the worker, before each request while a unit does not answer.
+
+        :param look: returns when it has to be called again at the latest, s; or infinity.
+        :param may_run: returns whether the driver may have run the motor of the unit.
+        """
+        self.call(lambda: self._watches.update({unit: (look, may_run)}))
 
     def on_mute(self, call: Callable[[float], None]) -> None:
         """
@@ -244,6 +267,24 @@ class Bus:
         """Open a port that is mute within ``seconds``, however often that was in vain."""
         self._lost_after[unit] = min(seconds, self._lost_after.get(unit, seconds))
         self.silences.hurry()
+
+    def keep_quiet(self, unit: int, until: float) -> None:
+        """
+        Leave the whole line alone, stops aside, while each drive that may run is left alone.
+
+        A drive may take any message on the line for a sign that the driver is there [C127].
+
+        :param until: until when this one is, s of the steady clock.
+        """
+        self._quiet_until[unit] = until
+
+    @property
+    def is_any_controlled(self) -> bool:
+        """A drive of the line that may run is not left alone."""
+        return any(
+            may_run() and self.now() >= self._quiet_until.get(unit, -math.inf)
+            for unit, (_, may_run) in self._watches.items()
+        )
 
     def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
         """Give a task a reading that came with another answer; false if it waits for no such."""
@@ -381,16 +422,42 @@ class Bus:
         self._take_in()
         self._ring_timers()
         self._open_when_due()
-        supervised_at = self._supervise() if self._port.is_open else math.inf
+        lost_at = self._look_for_losses()
+        quiet_until = self._line_quiet_until()
+        supervised_at = math.inf
+        if self._port.is_open and not quiet_until:
+            supervised_at = self._supervise()
         if not self._port.is_open:
             self._fail_all(self._port.error)
             return self._clock.until(min(self._sleepers.next_moment, self._port.reopen_at))
-        if self._send_next():
+        if self._send_next(only_stops=bool(quiet_until)):
             return -math.inf
         paced_until = self._paced_until if self._scheduler.waits else math.inf
         missing_from = self.silences.missing_from if self._scheduler.missing_wait else math.inf
-        until = min(self._sleepers.next_moment, paced_until, missing_from, supervised_at)
-        return self._clock.until(until)
+        until = min(paced_until, missing_from, supervised_at)
+        if quiet_until:
+            until = quiet_until
+        return self._clock.until(min(self._sleepers.next_moment, lost_at, until))
+
+    def _look_for_losses(self) -> float:
+        """Have the drives looked at that do not answer; return when again, s."""
+        if not self.silences.any_silent:
+            return math.inf
+        again_at = math.inf
+        for unit, (look, _) in self._watches.items():
+            if self.silences.is_silent(unit) or self.silences.is_line_silent:
+                again_at = min(again_at, look())
+        return again_at
+
+    def _line_quiet_until(self) -> float:
+        """Return until when only stops are sent, s: all that may run are left alone; 0: not so."""
+        if not self._quiet_until:
+            return 0.0
+        now = self.now()
+        self._quiet_until = {unit: at for unit, at in self._quiet_until.items() if at > now}
+        if not self._quiet_until or self.is_any_controlled:
+            return 0.0
+        return min(self._quiet_until.values())
 
     @property
     def paused(self) -> float:
@@ -469,10 +536,11 @@ class Bus:
         else:
             self._sleepers.add(task, awaited.until)
 
-    def _send_next(self) -> bool:
+    def _send_next(self, *, only_stops: bool) -> bool:
         now = self.now()
         entry = self._scheduler.take(
-            missing=now >= self.silences.missing_from, only_stops=now < self._paced_until
+            missing=now >= self.silences.missing_from,
+            only_stops=only_stops or now < self._paced_until,
         )
         if isinstance(entry, LatestValue):
             self._write_slot(entry)
@@ -526,6 +594,7 @@ class Bus:
         started = self._clock()
         paced_until = self._paced_until
         self._paced_until = started + self._request_period
+        self._link.is_brief = self._scheduler.is_brief(exchange)
         try:
             reply = carry_out(self._link, exchange.unit, exchange.operation)
             if self._clock.resumed_at > started:
@@ -576,7 +645,8 @@ class Bus:
         self._port.open(now + REOPEN_PERIOD)
         if self._port.is_open:
             self.recorder.opened()
-            self.silences.opened(self.now(), lost=lost)
+            # where it is open already, it is the same port
+            self.silences.opened(self.now(), lost=lost, same_place=False)
 
     def _report_mute(self, seconds: float) -> None:
         """Report on change for how long no unit has answered, s; 0: one does."""

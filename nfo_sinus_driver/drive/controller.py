@@ -94,6 +94,11 @@ class Controller:
         return unclear or self._sequence.overdue
 
     @property
+    def waits_to_look(self) -> bool:
+        """The drive gets no other request than its look, after which it is stopped."""
+        return self._sequence.waits_to_look
+
+    @property
     def control_retained(self) -> str:
         """Why control may stay with the bus when it is released; ``''`` where it does not."""
         return self.method.control_retained or self._state.held_by_line
@@ -333,8 +338,10 @@ class Controller:
                 may_run = may_run or await self.in_control(Priority.STOP)
                 may_run = may_run or (await self._state.read_status(Priority.LOOK)).tuning
                 if may_run:
+                    await self._sequence.find()
                     steps = self.method.quick_stop(self._state.control_mode)
-                    await carry_out(self._state, steps, Priority.STOP)
+                    permit = self._sequence.require_same
+                    await carry_out(self._state, steps, Priority.STOP, permit=permit)
                     await self._await_quick_stop(self._bus.now())
             except Exception as error:
                 # even after an error in the driver the motor is stopped
@@ -365,8 +372,10 @@ class Controller:
         await self._require_recognised()
         with self._sequence.external_stop(why):
             with contextlib.suppress(LinkError, DriveError):
+                await self._sequence.find()
                 steps = self.method.rapid_stop(self._state.control_mode)
-                await carry_out(self._state, steps, Priority.STOP)
+                permit = self._sequence.require_same
+                await carry_out(self._state, steps, Priority.STOP, permit=permit)
             stopped = await self.stop(why)
         status = self._state.status
         if status is None or not status.driven or status.faulted:

@@ -275,6 +275,13 @@ class Cause(enum.Enum):
     # --- It does not stop
     CANNOT_STOP = f'CANNOT STOP THE MOTOR: {{why}}; retrying. {_EMERGENCY}'
     """Retried until confirmed. Use the enable input or the emergency stop; then remove the cause"""
+    MAY_RUN_ON = (
+        'the drive is left alone, so that its own time-out of {seconds:g} s stops the motor, but '
+        'other drives of the line are still asked: if it counts their messages, too, its motor runs '
+        'on. Use its {enable_input} or the emergency stop'
+    )
+    """A drive that is lost may not be written to any more, and no manual says whether messages to
+    others keep its time-out from striking. Repair the line"""
     CANNOT_STOP_BUT_STANDS = (
         'the stop is NOT confirmed: {why}; retrying. The drive shows that the motor stands still '
         '({status}); the {enable_input} or the emergency stop keeps it so'

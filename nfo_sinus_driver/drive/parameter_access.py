@@ -280,14 +280,25 @@ class ParameterAccess:
         step: profile.Write,
         priority: Priority,
         require_wanted: Callable[[], None] = lambda: None,
+        permit: Callable[[], None] | None = None,
     ) -> None:
-        """Write as a profile says, unless ``require_wanted`` raises when its turn has come."""
+        """
+        Write as a profile says, unless ``require_wanted`` raises when its turn has come.
+
+        :param permit: raises likewise where it is not known what is there, in place of the usual
+            recognition: of a stop.
+        """
         address, data = self.target(step)
         priority = Priority.STOP if step.head else priority
         self._own[step.key] = data
         try:
             await self._ask(
-                Write(address, data), priority, step.retry, require_wanted, patient=step.head
+                Write(address, data),
+                priority,
+                step.retry,
+                require_wanted,
+                permit,
+                patient=step.head,
             )
         except Refused as error:
             self._own.pop(step.key, None)
@@ -371,34 +382,43 @@ class ParameterAccess:
         priority: Priority,
         retry: bool,
         require_wanted: Callable[[], None] = lambda: None,
+        permit: Callable[[], None] | None = None,
         *,
         patient: bool = False,
     ) -> Reply:
         there = operation.address
         if there.space == _OWN:
-            await self.require_recognised()
+            if permit is None:
+                await self.require_recognised()
             began = self.now()
 
             def require_same() -> None:
-                # what was written before may be in another drive
-                self.recognition.require(began)
+                if permit is None:
+                    # what was written before may be in another drive
+                    self.recognition.require(began)
+                else:
+                    permit()
                 require_wanted()
 
             def ask(pnu: int, word: int | None) -> Awaitable[Reply]:
                 at = Address(MAILBOX, pnu, None, 2, False, there.block)
                 step = Read(at) if word is None else Write(at, word.to_bytes(2, 'big'))
                 # the PLC does nothing twice, so what is lost of it may be repeated
-                return self._ask(step, priority, True, require_same)
+                return self._ask(step, priority, True, require_same, permit)
 
             word = None if isinstance(operation, Read) else int.from_bytes(operation.data, 'big')
             return await self._by_address.access(there.index, word, ask)
         has_effect = not isinstance(operation, Read) or operation.once
         # a mailbox is asked by a write to the registers of the PLC
         if has_effect or (self.in_block and there.space in _BY_MAILBOX):
-            await self.require_recognised()
+            if permit is None:
+                await self.require_recognised()
 
             def require() -> None:
-                self.recognition.require()
+                if permit is None:
+                    self.recognition.require()
+                else:
+                    permit()
                 require_wanted()
         else:
             require = require_wanted

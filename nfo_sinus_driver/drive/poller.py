@@ -31,6 +31,7 @@ from nfo_sinus_driver.link import (
     PortError,
     Refused,
     Reply,
+    silent,
 )
 
 _log = logging.getLogger(__name__)
@@ -159,6 +160,7 @@ class Poller:
         self._received: Reply | None = None
         self._reported_fault = 0
         self._conditions = Conditions(state)
+        self._bus.on_silence(self._unit, self._look_for_loss, lambda: state.control.stop_owed)
 
     @property
     def begun(self) -> bool:
@@ -265,12 +267,13 @@ class Poller:
             due = started >= polled_at + self._period
             try:
                 if not self._state.connected:
-                    await self._connect()
+                    if not self._waits_to_look:
+                        await self._connect()
                 elif due:
                     await self._poll()
                 else:
                     await self._read_status()
-                if not self._params.recognition.holds:
+                if self._state.connected and not self._params.recognition.holds:
                     # it was silent for long, or this driver stood still: is it still the same?
                     await self._recogniser.recognise(retry=False)
                 self._failures.end(_POLL)
@@ -310,6 +313,9 @@ class Poller:
     def _pause(self, polled_at: float) -> float:
         """Return how long to wait until the next poll, s."""
         state = self._state
+        if self._waits_to_look:
+            # as soon as it was seen the rest is read
+            return _WATCH_PERIOD
         if not state.connected:
             # a drive that stays silent costs its neighbours less and less
             pause = min(_RECONNECT_PERIOD * self._failed_reconnects, _SLOWEST_RECONNECT)
@@ -326,6 +332,12 @@ class Poller:
             return min(pause, _RESTART_WATCH_PERIOD)
         watched = state.control.stopping or self._setpoint.following
         return min(pause, _WATCH_PERIOD) if watched else pause
+
+    @property
+    def _waits_to_look(self) -> bool:
+        """It is lost, and gets no request but that of its stop."""
+        waits = self._controller is not None and self._controller.waits_to_look
+        return waits and not self._behind_plc
 
     @property
     def _may_restart(self) -> bool:
@@ -596,6 +608,19 @@ class Poller:
         # it has begun before the request that was in vain just now
         if self._controller is not None and silences.lasts(self._unit, asked_at) >= 0:
             self._controller.silent(now - silences.last_frame_at(self._unit))
+
+    def _look_for_loss(self) -> float:
+        """Treat the drive as lost once it is silent for too long; return by when it may be, s."""
+        state, now = self._state, self._bus.now()
+        if not state.connected or self._task is None:
+            return math.inf
+        # a motor that may run is watched all the time
+        since = self._bus.silences.silent_since(self._unit, is_watched=state.control.stop_owed)
+        lost_at = since + state.settings.lost_after
+        if now < lost_at:
+            return lost_at
+        self._begin_anew(silent(self._unit))
+        return math.inf
 
     def _on_poll_failed(self, error: LinkError | DriveError) -> None:
         state = self._state

@@ -5,6 +5,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+import contextlib
+import math
+
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import InverterStatus, Role, Value
 from nfo_sinus_driver.drive.diagnosis import explain_failure
@@ -13,7 +17,7 @@ from nfo_sinus_driver.drive.events import Cause, DriveError, Report
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.parameter_access import NONE_SUCH
 from nfo_sinus_driver.drive.steps import carry_out
-from nfo_sinus_driver.link import LinkError, Refused
+from nfo_sinus_driver.link import LinkError, PortError, Refused
 
 #: An inverter status has one byte; firmware that is newer than the manual may have more of them.
 _LAST_CODE = 0xFF
@@ -28,6 +32,8 @@ class Recogniser:
         self._state = state
         self._params = state.params
         self._profile = state.model.profile
+        #: What the parameter that identifies the family was when all was read.
+        self._identified_as: Value | None = None
 
     async def recognise(self, *, retry: bool = True) -> bool:
         """
@@ -46,6 +52,7 @@ class Recogniser:
         try:
             await state.nameplate.identify(retry=retry)
             self._require_fitted()
+            await self._read_what_identifies()
             if named:
                 await self.read_nameplate()
             await state.nameplate.read_scales()
@@ -71,22 +78,72 @@ class Recogniser:
 
     async def look(self) -> None:
         """
-        Read once what only a drive of this family answers, before one that was lost is stopped.
+        See once that the drive is there, before one that was recognised here is stopped.
+
+        What tells it: the value by which its file identifies it, its firmware, or the parameter
+        that identifies its family. Where that is not answered, or there is nothing such, a status
+        that still shows a run: what was put in its place stands, and may wait until all is read.
 
         :raises LinkError: it does not answer.
         :raises DriveError: another one does.
         """
-        key = next(iter(self._profile.identify), self._state.model.key_of_status)
+        recognition, state = self._params.recognition, self._state
+        if not recognition.was_here:
+            await self.recognise(retry=False)
+            return
+        if self._params.in_block:
+            # the PLC shows the layout of its block with each answer
+            await self._params.read(state.model.key_of_status, Priority.LOOK, retry=False)
+            recognition.look_again()
+            return
+        key, values = self._identifying
+        if key and await self._is_same(key, values):
+            recognition.look_again()
+            return
+        status = await state.read_status(Priority.LOOK, retry=False)
+        if status.driven or status.runs_by_bus:
+            recognition.look_again()
+        else:
+            await self.recognise(retry=False)
+
+    async def _is_same(self, key: str, values: Sequence[Value]) -> bool:
+        """Return whether what identifies the drive is as before; false: it is not told any more."""
         try:
             value = await self._params.read(key, Priority.LOOK, retry=False)
-        except Refused as error:
-            raise self._meant(error) from error
-        self._require_identity(key, value)
+        except PortError:
+            raise
+        except LinkError as error:
+            if not self._params.recognition.since_port_opened:
+                raise (self._meant(error) if isinstance(error, Refused) else error) from error
+            return False
+        self._require_identity(key, value, values)
+        return True
+
+    async def _read_what_identifies(self) -> None:
+        """Read what :meth:`look` will compare, where nothing else has it."""
+        key = self._profile.identified_by
+        self._identified_as = None
+        if self._profile.product is not None and key and self._state.nameplate.has(key):
+            with contextlib.suppress(Refused):
+                self._identified_as = await self._params.read(key, Priority.SERVICE)
+
+    @property
+    def _identifying(self) -> tuple[str, Sequence[Value]]:
+        """The parameter that shows that a drive is the one from before, and what it is; or none."""
+        state, params = self._state, self._params
+        identity, firmware = state.nameplate.identity, state.model.key(Role.FIRMWARE)
+        for key, values in self._profile.identify.items():
+            return key, values
+        if self._identified_as is not None:
+            return self._profile.identified_by, (self._identified_as,)
+        if identity is not None and not math.isnan(identity.firmware) and params.reaches(firmware):
+            return firmware, (identity.firmware,)
+        return '', ()
 
     async def read_nameplate(self) -> Identity:
         """Read who it says that it is (DriveError: it is another one)."""
-        for key in self._profile.identify:
-            self._require_identity(key, await self._params.read(key, Priority.SERVICE))
+        for key, values in self._profile.identify.items():
+            self._require_identity(key, await self._params.read(key, Priority.SERVICE), values)
         nameplate, product = self._state.nameplate, self._profile.product
         if product is None:
             identity = await nameplate.read_more()
@@ -113,9 +170,8 @@ class Recogniser:
                 Cause.METHOD_NEEDS, names=names, method=settings.method, others=others
             )
 
-    def _require_identity(self, key: str, value: Value) -> None:
-        values = self._profile.identify.get(key, (value,))
-        if value not in values:
+    def _require_identity(self, key: str, value: Value, values: Sequence[Value]) -> None:
+        if values and value not in values:
             name, shown = self._state.model[key].name, ' or '.join(map(str, values))
             why = Report(Cause.IS_NOT, name=name, value=value, values=shown)
             raise self._another(why)

@@ -33,6 +33,8 @@ async def carry_out(
     reached: Reached | None = None,
     *,
     onward: bool = False,
+    permit: Callable[[], None] | None = None,
+    is_blind: bool = False,
 ) -> _T:
     """
     Carry out a sequence of a profile on the bus.
@@ -41,6 +43,9 @@ async def carry_out(
         :data:`~.drive_state.TIMEOUT`.
     :param onward: go on after a step without an answer, as if it had been refused, unless it is
         a write that reading shows to have been carried out.
+    :param permit: as for :meth:`ParameterAccess.write`.
+    :param is_blind: nothing answers, but the drive may hear. A read is tried once, and where it has
+        no answer the sequence goes on as if it had been refused.
     :raises DriveError: it cannot be carried out.
     :raises LinkError: the drive does not answer, so that the outcome is unknown; or it refuses,
         and the sequence ends by that.
@@ -70,11 +75,12 @@ async def carry_out(
         try:
             if isinstance(step, profile.Read):
                 params.require_fitted(step.key)
-                brought = await params.read(step.key, priority, retry=step.retry)
+                retry = step.retry and not is_blind
+                brought = await params.read(step.key, priority, retry=retry)
             elif isinstance(step, profile.Write) and step.stored:
                 await _store(state, step, priority)
             elif isinstance(step, profile.Write):
-                await params.write(step, priority)
+                await params.write(step, priority, permit=permit)
             elif isinstance(step, profile.Acknowledge):
                 brought = await params.acknowledge(step.key, priority)
             elif isinstance(step, profile.AcknowledgeThenWrite):
@@ -86,7 +92,8 @@ async def carry_out(
             else:
                 await reached(after_write(step.condition))
         except (Refused, NoAnswer, DamagedAnswer) as error:
-            if not (onward or isinstance(error, Refused)):
+            goes_on = onward or (is_blind and isinstance(step, profile.Read))
+            if not (goes_on or isinstance(error, Refused)):
                 raise
             if not await _was_written(step, state, priority, error):
                 named = error.naming() if isinstance(error, Refused) else error

@@ -10,7 +10,7 @@ import contextlib
 import enum
 import math
 
-from nfo_sinus_driver.bus import Priority, Task
+from nfo_sinus_driver.bus import EXCHANGE, Priority, Task
 from nfo_sinus_driver.catalog import ControlMethod, InverterStatus, Removal, State
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.control_state import ControlEvent
@@ -18,12 +18,24 @@ from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.steps import carry_out
-from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, PortError, Refused
 
 #: How often a stop that was answered and is not confirmed is written again, s.
 _RETRY_PERIOD = 0.2
 #: How often one to a lost drive is, to spare its neighbours, s.
-_LOST_RETRY_PERIOD = 1.0
+_LOST_RETRY_PERIOD = 0.5
+#: How often it is looked whether a lost drive is there that may not be written to any more, s.
+_LOOK_AGAIN_PERIOD = 1.0
+#: How often a stop is written that nothing answers, from when it became due, whether another drive
+#: may be there by then or not.
+_BLIND_STOPS = 2
+#: After how long without an answer of any drive a stop is written that would be read for first, s:
+#: in a shorter one what is in the drive may yet be read, and left as it is.
+_BLIND_AFTER = 0.4
+#: How often one is tried while the port is gone, s: nothing is sent by that.
+_PORT_RETRY_PERIOD = 0.1
+#: How much longer than its own time-out a drive is left alone, s.
+_LEFT_ALONE_LONGER = 0.5
 #: How often an unconfirmed stop is reported, s.
 _COMPLAINT_PERIOD = 5.0
 #: The interval grows each time, up to this, s.
@@ -95,6 +107,14 @@ class StopSequence:
         self._tried_at = -math.inf
         #: How often there was a new reason; an earlier attempt does not confirm it.
         self._reasons = 0
+        #: When it became due to a drive that was known, and for how long the driver had paused by
+        #: then, s; and how often it may be written since although nothing answers.
+        self._due_at, self._paused = -math.inf, 0.0
+        self._blind_left = 0
+        #: What has ended the last attempt; ``None``: it was answered.
+        self._failure: Exception | None = None
+        #: Its own time-out has had the time to stop the drive.
+        self._was_left_alone = False
         #: Why it has not been confirmed yet.
         self._unconfirmed = _NO_ANSWER_YET
         #: When the stop for the present reasons had been sent.
@@ -138,6 +158,7 @@ class StopSequence:
     def external_stop(self, why: Report) -> Iterator[None]:
         """Keep the state of a stop while an operation stops the motor by other means."""
         self._external += 1
+        self._note_due()
         self._control.dispatch(ControlEvent.STOP, why)
         try:
             yield
@@ -158,6 +179,9 @@ class StopSequence:
         if self._control.blocked and self._bus.now() > self._tried_at + _RETRY_PERIOD:
             self.restart()
         if self._task is None:
+            self._blind_left = 0
+            self._note_due()
+            self._was_left_alone, self._failure = False, None
             self._begun_at = self._bus.now()
             self._tried_at = -math.inf
             self._unconfirmed = _NO_ANSWER_YET
@@ -168,12 +192,16 @@ class StopSequence:
             self._due = self._bus.now() + drive_state.TIMEOUT
             task = self._bus.spawn(self._keep_trying())
             self._task = None if task.future.done() else task
+        elif self.waits_to_look and self._bus.now() > self._tried_at + _LOOK_AGAIN_PERIOD:
+            # one that is called for looks at once
+            self._bus.wake(self._task)
 
     def restart(self, why: Report | None = None) -> None:
         """Start, or try again at once: an attempt that has begun no longer counts."""
         if self._task is None:
             self.start(why)
         else:
+            self._note_due()
             self._tried_at = -math.inf
             self._begun_at = self._bus.now()
             self._sent_at = self._forced_at = math.inf
@@ -181,6 +209,12 @@ class StopSequence:
             self._reasons += 1
             self._control.dispatch(ControlEvent.FAULT_OVER)
             self._bus.wake(self._task)
+
+    def _note_due(self) -> None:
+        """Judge what may be written of a stop that becomes due now."""
+        if self._state.params.recognition.allows_stop:
+            self._due_at, self._paused = self._bus.now(), self._bus.paused
+            self._blind_left = _BLIND_STOPS
 
     async def wait_confirmed(self, patience: float | None = None) -> None:
         """
@@ -275,10 +309,13 @@ class StopSequence:
 
     async def _rest(self, outcome: _Outcome) -> None:
         """Let some time pass before the next attempt, but none after one without an answer."""
-        if outcome is _Outcome.IGNORED:
+        unanswered = isinstance(self._failure, LinkError) and not isinstance(
+            self._failure, (Refused, PortError)
+        )
+        if outcome is _Outcome.IGNORED or (unanswered and self._blind_left):
             return
         if not self._state.connected:
-            await self._bus.sleep(_LOST_RETRY_PERIOD)
+            await self._leave_alone()
         elif self._is_lost or self._bus.now() >= self._due:
             # tries that have not helped so far must not keep the line from all others
             await self._bus.sleep(_RETRY_PERIOD)
@@ -286,6 +323,76 @@ class StopSequence:
             await self._bus.sleep(drive_state.LOOK_PERIOD)
         elif outcome is not _Outcome.UNANSWERED:
             await self._bus.sleep(_RETRY_PERIOD)
+
+    async def _leave_alone(self) -> None:
+        """
+        Let some time pass before a drive that is lost gets a request again.
+
+        While it may not be written to, its own time-out has to stop it, if it has one that does:
+        for so long it gets no request at all, and where no drive is reached that may run, nothing
+        is sent on the line.
+        """
+        timeout, now = self._state.timeout, self._bus.now()
+        own = timeout.shortest if timeout.stops_motor else 0.0
+        if isinstance(self._failure, PortError):
+            # it goes out as soon as the port is there
+            await self._bus.sleep(_PORT_RETRY_PERIOD)
+            return
+        if not own or self._may_write:
+            pause = _LOST_RETRY_PERIOD if self._may_write else _LOOK_AGAIN_PERIOD
+            if isinstance(self._failure, DamagedAnswer):
+                # that comes from something
+                pause = _RETRY_PERIOD
+            await self._bus.sleep(pause)
+            return
+        unit = self._state.settings.address
+        silences = self._bus.silences
+        asked_at = silences.asked_at(unit if self._was_left_alone else None)
+        until = max(asked_at + own + _LEFT_ALONE_LONGER, now + _RETRY_PERIOD)
+        if not self._was_left_alone:
+            self._bus.keep_quiet(unit, until)
+            if self._bus.is_any_controlled:
+                named = self._state.report(Cause.MAY_RUN_ON, seconds=own)
+                self._state.notify(Severity.WARNING, named)
+        await self._bus.sleep(until - now)
+        self._was_left_alone |= self._bus.now() >= until
+
+    @property
+    def waits_to_look(self) -> bool:
+        """The drive gets no other request than its look, after which it is stopped."""
+        return self._task is not None and not (self._state.connected or self._may_write)
+
+    @property
+    def _may_write(self) -> bool:
+        """A stop may be written: it is known what is there, or was when the stop became due."""
+        silences = self._bus.silences
+        if self._state.params.recognition.allows_stop:
+            return True
+        # where others answer, they may have kept back the second one until now
+        in_time = silences.is_line_silent or self._bus.now() <= self._due_at + EXCHANGE
+        in_time |= self._blind_left == _BLIND_STOPS
+        in_time &= self._bus.paused <= self._paused + EXCHANGE
+        return self._blind_left > 0 and in_time and self._due_at >= silences.moved_at
+
+    async def find(self) -> None:
+        """
+        Look for the drive before it is stopped, if it is not known what is there.
+
+        :raises LinkError: it does not answer.
+        :raises DriveError: another one is there.
+        """
+        if self._may_write:
+            return
+        self._ignored = 0
+        try:
+            await self._look()
+        except DriveError as error:
+            raise self._state.params.recognition.error(error.report) from error
+
+    def require_same(self) -> None:
+        """Make sure, at the moment of sending, that a stop may be written (DriveError: not)."""
+        if not self._may_write:
+            raise self._state.params.recognition.error(_NO_ANSWER_YET)
 
     @property
     def _is_lost(self) -> bool:
@@ -300,9 +407,13 @@ class StopSequence:
             outcome = await self._try_once(before)
         except (NoAnswer, DamagedAnswer) as error:
             outcome, self._unconfirmed = _Outcome.UNANSWERED, report_of(error)
+            self._failure = error
         except Exception as error:
             # even an error in the driver must not end the tries
             outcome, self._unconfirmed = _Outcome.UNCONFIRMED, report_of(error)
+            self._failure = error
+        else:
+            self._failure = None
         if self._reasons > reasons:
             outcome, self._unconfirmed = _Outcome.UNANSWERED, _NO_ANSWER_YET
             self._sent_at = math.inf
@@ -320,10 +431,15 @@ class StopSequence:
         reasons = self._reasons
         faulted = self._state.status is not None and self._state.status.faulted
         failure: LinkError | None = None
-        if not self._state.connected:
-            await self._find()
+        await self.find()
         try:
-            await carry_out(self._state, self._method.stop(control_mode), Priority.STOP)
+            await carry_out(
+                self._state,
+                self._method.stop(control_mode),
+                Priority.STOP,
+                permit=self.require_same,
+                is_blind=self._is_blind,
+            )
             self._sent_at = min(self._sent_at, self._bus.now())
             self._refusals = self._unanswered = self._ignored = 0
         except Refused as error:
@@ -333,7 +449,12 @@ class StopSequence:
                 return _Outcome.BUSY
             failure = error
             self._refusals += 1
-        except (NoAnswer, DamagedAnswer) as error:
+        except PortError:
+            raise
+        except LinkError as error:
+            self._blind_left -= self._blind_left > 0
+            if not isinstance(error, (NoAnswer, DamagedAnswer)):
+                raise
             self._unanswered += 1
             # among late answers a refusal is not believed until another request was answered
             if isinstance(error, DamagedAnswer) and before is _Outcome.UNANSWERED:
@@ -349,8 +470,13 @@ class StopSequence:
             status = await self._newer(status, reasons, self._sent_at)
         if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
             # ahead of all else, too: the fault may end by itself, and the motor run on
-            steps = self._method.remove(control_mode)
-            removed = await carry_out(self._state, steps, Priority.STOP) is Removal.COMMAND
+            removal = await carry_out(
+                self._state,
+                self._method.remove(control_mode),
+                Priority.STOP,
+                permit=self.require_same,
+            )
+            removed = removal is Removal.COMMAND
             removed_at = self._bus.now()
             # some faults end as control is released
             status = await self._state.read_status(Priority.LOOK, retry=False)
@@ -374,22 +500,12 @@ class StopSequence:
             return _Outcome.IGNORED
         return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED
 
-    async def _find(self) -> None:
-        """
-        Find out whether a drive that was lost is there, before it is stopped.
-
-        Where nothing answers, its answers alone may be lost. So it is stopped all the same, as long
-        as no other can be in its place.
-
-        :raises LinkError: it does not answer, and another may be there.
-        :raises DriveError: another one is there.
-        """
-        try:
-            await self._look()
-        except (NoAnswer, DamagedAnswer):
-            self._ignored = 0
-            if not self._state.params.recognition.holds:
-                raise
+    @property
+    def _is_blind(self) -> bool:
+        """Nothing answers, and the bus had control of the drive when something did."""
+        status, silent_for = self._state.status, self._bus.silences.line_lasts(self._bus.now())
+        silent = not self._state.connected or silent_for >= _BLIND_AFTER
+        return silent and status is not None and status.from_bus
 
     def _needs_force(self, status: InverterStatus, failure: LinkError | None) -> bool:
         """Return whether an ordinary stop does not do: refused again, ignored or in vain."""
@@ -411,7 +527,9 @@ class StopSequence:
     async def _force(self, control_mode: str, reasons: int, why: Report) -> Report | None:
         """Stop by every means left [C126]; return why that is not confirmed."""
         steps = self._method.force_stop(control_mode)
-        obeyed = await carry_out(self._state, steps, Priority.STOP, onward=True)
+        obeyed = await carry_out(
+            self._state, steps, Priority.STOP, onward=True, permit=self.require_same
+        )
         sent_at = self._bus.now()
         status = await self._state.read_status(Priority.LOOK, retry=False)
         if not obeyed:

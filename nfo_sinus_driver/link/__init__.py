@@ -86,6 +86,7 @@ from nfo_sinus_driver.link.interface import (
     WriteAndRead,
     Written,
     carry_out,
+    silent,
 )
 from nfo_sinus_driver.link.protocols import ADDRESSES, BIT_RATES, PROTOCOLS, BusSettings, open_link
 from nfo_sinus_driver.link.reconnect import Reconnect
@@ -134,4 +135,5 @@ __all__ = [
     'Written',
     'carry_out',
     'open_link',
+    'silent',
 ]

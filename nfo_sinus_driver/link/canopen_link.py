@@ -192,6 +192,7 @@ class CanopenLink:
 
     #: Node ids and bit rates (CiA 301). No manual says with which the drive leaves the factory.
     protocol = CANOPEN
+    is_brief = False
 
     def __init__(
         self, port: CanPort, settings: LineSettings, now: Clock = time.monotonic
@@ -455,7 +456,8 @@ class CanopenLink:
     def _receive(self, transfer: Transfer, sent: float) -> float:
         """Take the answer to the present request, sent just now; return when it came."""
         unit = transfer.unit
-        deadline = sent + self._settings.response_timeout
+        patience, ever = self._settings.response_timeout, self._late.longest_ever(unit)
+        deadline = sent + (min(patience, ever) if self.is_brief and ever else patience)
         other = 0
         while True:
             until = min(deadline, self.supervision.sign_due)

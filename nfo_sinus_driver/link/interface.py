@@ -276,11 +276,15 @@ class Link(Protocol):
     :ivar protocol: that of the line.
     :ivar remarks: what it has noticed.
     :ivar clock: the clock of that thread, for what else it waits for, too.
+    :ivar is_brief: the next answers are waited for no longer than the unit has ever taken: where
+        many units have to get something, and may all be silent. One that took longer than ever is
+        a late answer.
     """
 
     protocol: LineProtocol
     remarks: Remarks
     clock: ThreadClock
+    is_brief: bool
 
     def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
         """
@@ -394,6 +398,11 @@ class NoAnswer(LinkError):
     """No answer in time."""
 
     maybe_done = True
+
+
+def silent(unit: int) -> NoAnswer:
+    """Return the error of a unit that has not answered."""
+    return NoAnswer(f'unit {unit} did not answer')
 
 
 class GatewaySilent(NoAnswer):

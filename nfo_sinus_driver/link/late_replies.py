@@ -94,8 +94,9 @@ class LateReplies(Generic[_Request, _Kind]):
         #: Until when a reply is likely to come twice.
         self._suspect_until = 0.0
         self._longest = longest or response_timeout
-        #: How long a unit has taken at most to reply, s.
+        #: How long a unit has taken at most to reply, s: recently, and ever.
         self._slowest: dict[int, float] = {}
+        self._longest_ever: dict[int, float] = {}
 
     # --- late ---------------------------------------------------------------------------------
 
@@ -196,7 +197,12 @@ class LateReplies(Generic[_Request, _Kind]):
         """Note how long a unit took to reply; a slow reply is remembered for some dozens."""
         slowest = max(seconds, _DECAY * self._slowest.get(unit, 0.0))
         self._slowest[unit] = min(slowest, self._longest)
+        self._longest_ever[unit] = max(seconds, self._longest_ever.get(unit, 0.0))
 
     def longest(self, unit: int) -> float:
         """Return how long a unit may take to reply, by its recent replies, s."""
         return min(_LATER * self._slowest.get(unit, 0.0), self._longest)
+
+    def longest_ever(self, unit: int) -> float:
+        """Return how long a unit has ever taken to reply, s; 0: it has not yet."""
+        return self._longest_ever.get(unit, 0.0)

@@ -45,6 +45,7 @@ class ModbusLink(ABC):
     protocol: LineProtocol
     remarks: Remarks
     supervision = None
+    is_brief = False
     clock: ThreadClock
 
     @cached_property

@@ -142,6 +142,8 @@ class TcpLink(ModbusLink):
         self._begun_until = 0.0
         self._reader = FrameReader()
         self._number = 0
+        #: How long the gateway has ever taken to answer for a unit, s.
+        self._longest_ever: dict[int, float] = {}
         #: The requests on this connection without an answer, and how many answers came.
         self._given_up: deque[int] = deque(maxlen=_GIVEN_UP)
         self._answers = 0
@@ -334,7 +336,9 @@ class TcpLink(ModbusLink):
         self._number = self._number % 0xFFFF + 1
         self._unanswered = True
         connection.write(encode(request, self._number))
-        deadline = self._now() + self._response_timeout
+        sent_at, ever = self._now(), self._longest_ever.get(request.unit, 0.0)
+        patience = self._response_timeout
+        deadline = sent_at + (min(patience, ever) if self.is_brief and ever else patience)
         others: list[int] = []
         while True:
             data = connection.read(self._now.until(deadline))
@@ -342,6 +346,8 @@ class TcpLink(ModbusLink):
             for number, message in self._reader.feed(data):
                 if number == self._number:
                     self._note_answer()
+                    if self._now.resumed_at <= sent_at:
+                        self._longest_ever[request.unit] = max(ever, now - sent_at)
                     return self._understood(request, message), now
                 others.append(number)
             if self._reader.out_of_step:

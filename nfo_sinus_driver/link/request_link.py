@@ -40,6 +40,7 @@ from nfo_sinus_driver.link.interface import (
     Remarks,
     Reply,
     Why,
+    silent,
 )
 from nfo_sinus_driver.link.late_replies import LISTENING_STEP, LateReplies
 from nfo_sinus_driver.link.port import Port, port_of
@@ -140,6 +141,7 @@ class RequestLink(ABC, Generic[_Request]):
     """
 
     supervision = None
+    is_brief = False
     protocol: LineProtocol
     _another: ForeignTraffic
     _late: LateReplies[Any, Any]
@@ -231,6 +233,19 @@ class RequestLink(ABC, Generic[_Request]):
     @abstractmethod
     def _take_late(self, request: _Request, now: float) -> None:
         """Quarantine the late answers to requests of another master."""
+
+    def _patience(self, unit: int, length: int) -> float:
+        """
+        Return how long the first byte of an answer may take, s.
+
+        One that comes and is not heard has left the line after a brief one, too.
+
+        :param length: of the answer, in characters.
+        """
+        whole, ever = self._settings.response_timeout, self._late.longest_ever(unit)
+        if not (self.is_brief and ever):
+            return whole
+        return min(whole, ever + length * self._settings.char_time + self._gap)
 
     def _gap_before(self, request: _Request) -> float:
         """Return how long the line is silent before a request if nothing unrequested comes, s."""
@@ -562,6 +577,9 @@ class CodecLink(RequestLink[Any]):
         quarantined = self._late.quarantined(unit, self._now())
         longest = codec.longest_answer * self._settings.char_time + codec.inter_byte_timeout
         deadline = due + self._settings.response_timeout
+        if self.is_brief:
+            patience = self._patience(unit, codec.longest_answer)
+            deadline = min(deadline, self._sent_at + patience)
         # one answer, and as much noise again, however long the line is not silent
         last_chance = deadline + 2 * longest
         reader = codec.reader()
@@ -609,7 +627,7 @@ class CodecLink(RequestLink[Any]):
         came += len(self._echo.before) + len(self._echo.held)
         if came:
             raise DamagedAnswer(f'unit {unit}: {came} bytes came that are no answer')
-        raise NoAnswer(f'unit {unit} did not answer')
+        raise silent(unit)
 
     def _took(self, unit: int, seconds: float) -> None:
         """Note how long a unit took to answer."""

@@ -22,6 +22,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Reply,
     Why,
+    silent,
 )
 from nfo_sinus_driver.link.late_replies import STOP_WAITS, Doubt, LateReplies
 from nfo_sinus_driver.link.modbus_link import SPECIFIC, ModbusLink, ReadDevice, ReportSlaveId
@@ -308,9 +309,9 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         # an exception names neither register nor length: it may belong to the earlier request
         quarantined = self._late.quarantined(request.unit, self._now())
         believe_refusal = refusal_head(request) not in quarantined
-        first = deadline = self._line_end + self._settings.response_timeout
         # one answer, and as much noise again, however long bytes keep coming
         length = self._frame_length(request.answer_length)
+        first = deadline = self._line_end + self._patience(request.unit, length)
         last_chance = first + 2 * length * char_time
         came = 0
         last = longest = 0.0
@@ -364,7 +365,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             raise DamagedAnswer(
                 f'unit {request.unit}: {came + len(held)} bytes came that are no answer'
             )
-        raise NoAnswer(f'unit {request.unit} did not answer')
+        raise silent(request.unit)
 
 
     def _learn_pause(self, longest: float) -> None:

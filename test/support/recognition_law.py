@@ -6,12 +6,13 @@ Judges that a driver writes to no drive that it has not recognised, by what its 
 
 It knows nothing of how the driver recognises a drive, only that this takes answers: to some reads
 since the driver began, since the port was opened, and since a silence in which another drive may
-have been put in its place.
+have been put in its place. One that has answered enough of them before needs one more.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping
 
 from nfo_sinus_driver.link import (
     MAILBOX,
@@ -25,8 +26,11 @@ from nfo_sinus_driver.link import (
 
 #: So long a silence lets one drive be exchanged for another, s, and how late the driver may see it.
 _EXCHANGE, _LATE = 3.0, 0.5
-#: How many reads a drive answers at least before it is written to, and a PLC.
-_LEAST, _LEAST_OF_PLC = 2, 1
+#: How many reads a drive answers at least before it is written to, and a PLC; and one that is seen
+#: again.
+_LEAST, _LEAST_OF_PLC, _LEAST_OF_KNOWN = 2, 1, 1
+#: How much longer than a loss takes a stop may be written although nothing answers, s.
+_BLIND = 0.5
 
 
 class RecognitionLaw:
@@ -34,10 +38,13 @@ class RecognitionLaw:
     The requests of one driver, as they come.
 
     :param complaints: gets what breaks the law.
+    :param lost_after: after which silence the drive of each unit is lost, s.
     """
 
-    def __init__(self, complaints: list[str]) -> None:
+    def __init__(self, complaints: list[str], lost_after: Mapping[int, float]) -> None:
         self._complaints = complaints
+        self._longest = {unit: max(_EXCHANGE, at + _BLIND) for unit, at in lost_after.items()}
+        self._known: set[int] = set()
         self._answers: dict[int, int] = defaultdict(int)
         self._silent_since: dict[int, float] = {}
 
@@ -51,8 +58,9 @@ class RecognitionLaw:
         if not writes and (address.block is None or address.space != MAILBOX):
             return
         least = _LEAST if address.block is None else _LEAST_OF_PLC
+        least = _LEAST_OF_KNOWN if unit in self._known else least
         answers, silent = self._answers[unit], now - self._silent_since.get(unit, now)
-        if answers < least or silent > _EXCHANGE + _LATE:
+        if answers < least or silent > self._longest[unit] + _LATE:
             self._complaints.append(
                 f'{now:.3f} s: {address} of unit {unit} is written, which has answered {answers} '
                 f'reads and is silent for {silent:.1f} s'
@@ -67,4 +75,7 @@ class RecognitionLaw:
             return
         if now - self._silent_since.pop(unit, now) > _EXCHANGE:
             self._answers[unit] = 0
-        self._answers[unit] += reads and error is None
+        # to what is known one stop may be written that nothing answers, and that may be answered
+        self._answers[unit] += error is None and (reads or unit in self._known)
+        if self._answers[unit] >= _LEAST:
+            self._known.add(unit)

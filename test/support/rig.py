@@ -278,7 +278,10 @@ class Rig:
         self.link = self.line.link()
         self.notes_of = {address: Notes(self.clock) for address in self.fars}
         self.bus = Bus(self.link, now=self.clock.monotonic)
-        self.law = law = RecognitionLaw(self.unrecognised)
+        self.law = law = RecognitionLaw(
+            self.unrecognised,
+            {address: settings.lost_after for address, settings in self._settings.items()},
+        )
         lose = self.bus._port.mark_lost
 
         def lost(*why: Any) -> None:

@@ -10,7 +10,8 @@ import re
 from nfo_sinus_driver.catalog.parameter import Value
 from nfo_sinus_driver.catalog.profile import NotPossible, Product, Read, Refusal, Steps
 
-_TYPE = 'status.inverter_type'
+#: What other drives of this protocol have, too, with another value.
+TYPE = 'status.inverter_type'
 _OUTPUT_STAGE = 'status.output_stage'
 _SOFTWARE = 'special.software_system'
 _FIELDBUS = 'special.eprom_fieldbus'
@@ -37,7 +38,7 @@ def read_product() -> Steps[Product]:
 
     :raises NotPossible: it is a drive of another type.
     """
-    type_ = yield from read_if_there(_TYPE)
+    type_ = yield from read_if_there(TYPE)
     if type_ in _OTHERS:
         raise NotPossible(
             f'this drive identifies itself as a {type_} (index 271), whose parameters are '

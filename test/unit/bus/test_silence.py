@@ -9,7 +9,7 @@ import math
 
 import pytest
 
-from nfo_sinus_driver.bus.scheduler import Silences
+from nfo_sinus_driver.bus.silences import Silences
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, PortError, Refused
 
 
@@ -76,8 +76,8 @@ def test_a_missing_unit_gets_few_requests_as_long_as_others_answer() -> None:
     for unit in (1, 2, 3):
         silences.note(unit, 10.0, None)
     silences.note(1, 11.0, NoAnswer(), 0.2)
-    assert not silences.is_missing(1, 12.9)
-    assert silences.is_missing(1, 13.0)
+    assert not silences.is_missing(1, 12.8)
+    assert silences.is_missing(1, 12.9)
     # one lost answer, or one after a short silence, costs no pause
     assert silences.missing_from <= 11.0
     for now in (11.9, 13.0):
@@ -103,7 +103,7 @@ def test_a_unit_may_be_exchanged_while_the_worker_does_not_run() -> None:
         silences.paused(1.2)
         silences.note(2, now, None)
     # it was not asked in that time, so it is not lost
-    assert silences.lasts(1, 13.4) == pytest.approx(0.8)
+    assert silences.lasts(1, 13.4) == pytest.approx(0.9)
     assert silences.there_since(1, 13.4) == math.inf
     assert silences.there_since(2, 13.4) < 13.4
     silences.note(1, 13.5, None)

@@ -309,7 +309,7 @@ def test_a_file_tells_its_drive_from_one_that_has_all_its_registers(tmp_path: Pa
     with Rig(Connection('modbus_rtu', known, 'custom')) as rig:
         rig.turn()
         rig.line.state = 'silent'
-        rig.pass_time(1.5)
+        rig.pass_time(5.0)
         rig.asked.clear()
         rig.line.mend()
         rig.wait_until(lambda: not rig.turns, _SOON)

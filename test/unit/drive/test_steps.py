@@ -42,7 +42,7 @@ class Noted:
     async def read(self, key: str, priority: Priority, *, retry: bool) -> Any:
         return self._next('read', key, priority, retry)
 
-    async def write(self, step: Write, priority: Priority) -> None:
+    async def write(self, step: Write, priority: Priority, *, permit: None) -> None:
         self._next('write', step, priority)
 
     async def acknowledge(self, key: str, priority: Priority) -> Any:
