@@ -277,7 +277,7 @@ class Cause(enum.Enum):
     """Retried until confirmed. Use the enable input or the emergency stop; then remove the cause"""
     MAY_RUN_ON = (
         'the drive is left alone, so that its own time-out of {seconds:g} s stops the motor, but '
-        'other drives of the line are still asked: if it counts their messages, too, its motor runs '
+        'other drives of the line are still asked: if it counts their messages, its motor runs '
         'on. Use its {enable_input} or the emergency stop'
     )
     """A drive that is lost may not be written to any more, and no manual says whether messages to
