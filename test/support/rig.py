@@ -136,6 +136,25 @@ CONNECTIONS: Mapping[str, Connection] = {
 }
 
 
+class Asked(NamedTuple):
+    """
+    A request as the link was given it, and what became of it.
+
+    :ivar unit: to whom; one that no drive has is a broadcast.
+    :ivar key: the parameter; :ivar data: what was written, ``None``: it was read.
+    :ivar sent: when the port took it; minus infinity: it did not.
+    :ivar ended: when that was over.
+    :ivar answered: a valid frame of the unit came, be it a refusal.
+    """
+
+    unit: int
+    key: str
+    data: bytes | None
+    sent: float
+    ended: float
+    answered: bool
+
+
 class Noted(NamedTuple):
     """An event, and when it was reported."""
 
@@ -206,6 +225,7 @@ class Rig:
         ``drop`` (carried out, not answered), ``damage``, ``double``, ``delay``, or ``ignored``.
     :ivar asked: every request, as ``meet`` has it, and its drive; what is read before a write in
         one piece stands as two.
+    :ivar told: called with each request when it is over.
     :ivar acknowledged: how often the test itself has a fault acknowledged.
     :ivar excused: words of the complaints that may come as often as it does.
     :ivar memory: what the driver that begins after one that was killed finds.
@@ -264,6 +284,7 @@ class Rig:
         self.looked: Callable[[], None] = lambda: None
         self.meet: Callable[[str, bytes | None], str | None] = lambda key, data: None
         self.asked: list[tuple[int, str, bytes | None]] = []
+        self.told: Callable[[Asked], None] = lambda asked: None
         self.acknowledged = 0
         self.excused = ['that acknowledges']
         self.memory: Memory = ProcessMemory()
@@ -527,18 +548,30 @@ class Rig:
         law = self.law
 
         def meet(unit: int, address: Address, *data: Any) -> Reply:
-            key = self._keys.get(unit, {}).get(address[:3], '')
+            # what all obey is a parameter of each
+            keys = self._keys.get(unit, self._keys[min(self._keys)])
+            key = keys.get(address[:3], '')
             written = data[0] if name in ('write', 'write_and_read') else None
             self.asked.append((unit, key, written))
             if unit in self.fars:
                 law.asked(unit, address, writes=name != 'read', now=self.clock.now)
+            begun = self.clock.now
             try:
                 reply = send(unit, address, key, written, *data)
             except LinkError as error:
                 law.ended(unit, error, reads=False, now=self.clock.now)
+                tell(begun, unit, key, written, error.responded or isinstance(error, Refused))
                 raise
             law.ended(unit, None, reads=name == 'read', now=self.clock.now)
+            tell(begun, unit, key, written, answered=unit in self.fars)
             return reply
+
+        def tell(
+            begun: float, unit: int, key: str, written: bytes | None, answered: bool
+        ) -> None:
+            at = self.line.sent_at
+            sent = at if at >= begun else -math.inf
+            self.told(Asked(unit, key, written, sent, self.clock.now, answered))
 
         def send(
             unit: int, address: Address, key: str, written: bytes | None, *data: Any

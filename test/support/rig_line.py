@@ -77,6 +77,7 @@ class Line:
         ``mute_for`` more times; ``bus_off``: the CAN adapter refuses frames until it was off the
         bus.
     :ivar opened: when the port was opened.
+    :ivar sent_at: when the port took a frame last.
     :ivar losses: how many answers are still lost; :ivar unheard: how many requests are;
         :ivar doubled: how many answers come twice.
     :ivar plan: called with each request; what it returns goes wrong with it: one of
@@ -137,6 +138,7 @@ class Line:
         self.passed: Callable[[], None] = lambda: None
         self.plan: Callable[[bytes], str | None] = lambda frame: None
         self.opened: list[float] = []
+        self.sent_at = -_NEVER
         self.mute_for = 1
         self.sessions: list[Session] = []
         self.refuses = self.lost = self.closes = False
@@ -284,6 +286,7 @@ class Line:
 
     def write(self, data: bytes) -> None:
         self._require_port()
+        self.sent_at = self.clock.now
         if self.state == 'mute':
             return
         if self.state == 'bus_off' and self._bus_off(data):

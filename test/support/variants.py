@@ -63,3 +63,8 @@ def stopping_at_timeout(model: str, method: str) -> dict[str, Any]:
     """Return the settings of a drive by which its own time-out stops the motor."""
     conditions = load_family(model, method).profile.timeout_conditions
     return {key: values[0] for key, values in conditions.items()}
+
+
+def stop_registers(model: str) -> frozenset[tuple[str, int]]:
+    """Return what the stop of a file writes, by the keys of the parameters."""
+    return frozenset((step.key, int(step.value)) for step in _file(model).stop)
