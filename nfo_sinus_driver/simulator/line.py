@@ -58,6 +58,9 @@ class Line(Wire):
     :param echo: whatever comes in goes out again, as from a half-duplex adapter.
     :param always_heard: the drives hear it whatever protocol, speed and format they are set to.
     :param clock: for the stamps of bytes that go out (s); everything else is given the time.
+
+    :ivar any_counts: any whole message on the line counts for the own time-out of each drive, and
+        not only one to it; no manual says [C127].
     """
 
     def __init__(
@@ -81,6 +84,7 @@ class Line(Wire):
         self.speed = f'{timing.baud} {timing.char_format}'
         self._clock = clock
         self._trace = trace
+        self.any_counts = False
         self._echo = echo
         self._always_heard = always_heard
         character = timing.character if paced else 0.0
@@ -128,6 +132,10 @@ class Line(Wire):
         there = answered = False
         for station in self.stations:
             if not self.protocol.concerns(station, request):
+                if self.any_counts and request.whole:
+                    station.advance_to(arrived.last)
+                    if self._hears(station):
+                        station.heard()
                 continue
             there = True
             station.advance_to(arrived.last)

@@ -71,6 +71,7 @@ class Line:
         are among them.
     :param plc: how the PLC is programmed.
     :param echo: the adapter returns what is sent.
+    :param any_counts: any message on the line counts for the own time-out of each drive [C127].
     :ivar state: ``whole``; ``silent``: nothing is heard; ``deaf``: what is asked is carried out,
         but no answer comes; ``noise``: the answer is damaged; ``late``: it comes after the
         time-out; ``gone``: the port is; ``mute``: nothing passes until it was opened again
@@ -82,6 +83,8 @@ class Line:
         :ivar doubled: how many answers come twice.
     :ivar plan: called with each request; what it returns goes wrong with it: one of
         :data:`~nfo_sinus_driver.simulator.line_faults.ANSWER_FAULTS` or ``unheard``.
+    :ivar boots_for: nothing passes for so long after the port was opened, s: a board that restarts
+        with it.
     :ivar passed: called whenever the clock went on.
     :ivar frames: every frame, as :class:`~nfo_sinus_driver.simulator.line.Trace` writes them.
     :ivar drives: the simulated ones, by address.
@@ -105,6 +108,7 @@ class Line:
         echo: bool = False,
         paced: bool = True,
         plc: Mapping[str, Any] | None = None,
+        any_counts: bool = False,
     ) -> None:
         self._end = end = Endpoint(protocol, baud=baud or {'modbus_rtu': 57600}.get(protocol))
         self.clock = clock
@@ -125,6 +129,8 @@ class Line:
             clock.monotonic, gateway_timeout=gateway_timeout, paced=paced, turnaround=turnaround,
             echo=echo, always_heard=False, trace=self._trace,
         )
+        if any_counts:
+            self.wire.any_counts = True
         self._stations = list(getattr(self.wire, 'stations', ()))
         self._protocol = protocol_of('modbus_tcp' if end.through_plc else protocol)
         self.settings = BusSettings(
@@ -171,7 +177,7 @@ class Line:
         """End all that is wrong with the line."""
         self.state = 'whole'
         self.losses = self.unheard = self.doubled = 0
-        self.noise = 0.0
+        self.noise = self.byte_noise = self.boots_for = 0.0
         self._random = Random(0)
         self._next.clear()
         self.wire.faults.heal()
@@ -181,14 +187,39 @@ class Line:
         self.noise = share
         self._random = Random(seed)
 
+    def damage_bytes(self, share: float, seed: int = 0) -> None:
+        """Damage this share of all bytes from now on, both ways."""
+        self.byte_noise = share
+        self._random = Random(seed)
+
     @property
     def whole(self) -> bool:
-        return self.passes and not self.noise
+        return self.passes and not (self.noise or self.byte_noise)
 
     @property
     def passes(self) -> bool:
         """Whether requests are carried out and answers come, but for some by chance."""
-        return self.state == 'whole' and not (self.losses or self.unheard or self.doubled)
+        broken = self.losses or self.unheard or self.doubled or self.boots
+        return self.state == 'whole' and not broken
+
+    @property
+    def boots(self) -> bool:
+        """Nothing passes yet, for the port was opened just before."""
+        return bool(self.opened) and self.clock.now < self.opened[-1] + self.boots_for
+
+    def unit_of(self, frame: bytes) -> int:
+        """Return for whom a request is; -1: it is for the adapter."""
+        match self._protocol.name:
+            case 'canopen':
+                return int(frame[1:4], 16) & 0x7F if frame[:2] in _ANSWERED else -1
+            case 'classic':
+                return frame[1] - 0x20
+            case 'movitrac':
+                return frame[1]
+            case 'modbus_tcp':
+                return frame[6]
+            case _:
+                return frame[0]
 
     def spoil(self, what: str) -> None:
         """Have the next request go wrong; see ``plan``."""
@@ -225,6 +256,9 @@ class Line:
         if self.doubled:
             self.doubled -= 1
             return 'double'
+        # a frame with a damaged byte is none
+        if self.byte_noise and self._random.random() > (1 - self.byte_noise) ** len(frame):
+            return 'unheard'
         if self.noise and self._random.random() < self.noise:
             return self._damage if self._random.random() < 0.5 else 'drop'
         return {'noise': self._damage, 'late': 'delay'}.get(self.state)
@@ -275,6 +309,10 @@ class Line:
     def open(self) -> None:
         self._require_port()
         self._come = b''
+        self.note_opening()
+
+    def note_opening(self) -> None:
+        """Note that the port is opened, or a connection: a mute one may end by that."""
         self.opened.append(self.clock.now)
         if self.state == 'mute':
             self.mute_for -= 1
@@ -287,7 +325,7 @@ class Line:
     def write(self, data: bytes) -> None:
         self._require_port()
         self.sent_at = self.clock.now
-        if self.state == 'mute':
+        if self.state == 'mute' or self.boots:
             return
         if self.state == 'bus_off' and self._bus_off(data):
             return
@@ -338,12 +376,20 @@ class Line:
         return b''
 
     def send(self, data: bytes) -> None:
-        if self.state == 'mute':
+        if self.state == 'mute' or self.boots:
             return
+        if self.byte_noise:
+            data = bytes(map(self._damaged, data))
         if self._asking is None:
             self._come += data
         else:
             self._asking.take(data)
+
+    def _damaged(self, byte: int) -> int:
+        if self._random.random() >= self.byte_noise:
+            return byte
+        # a Classic line has seven bits
+        return byte ^ 1 << self._random.randrange(7)
 
     def hang_up(self) -> None:
         self.state = 'gone'
@@ -409,6 +455,7 @@ class Session:
     def open(self) -> None:
         if self._line.refuses or self._line.state == 'gone':
             raise ConnectionRefusedError(111, 'Connection refused')
+        self._line.note_opening()
 
     def connected(self, until: float) -> bool:
         accepted = not self._line.lost

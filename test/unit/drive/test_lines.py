@@ -1,56 +1,54 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lines of several drives that stop answering: each motor stops; see ``support/line_laws.py``."""
+"""
+Lines of several drives to which something happens: each motor stops, and what is told is true.
+
+``support/line_laws.py`` has the laws, ``support/line_runs.py`` what happens and what is called for;
+``make exhaustive`` has it happen at each request.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from concurrent.futures import Future
-from typing import Any
+from zlib import crc32
 
 import pytest
 from support.line_laws import LineLaws
+from support.line_runs import CALLS, HAPPENS, KINDS, LineRun
 from support.own_timeout import by_default
-from support.rig import Rig
-
-#: How long after the first lost answer all motors have stopped, s: they are lost, a stop goes to
-#: each; or each is left in peace until its own time-out of 2 s strikes.
-_ALL_STAND = 6.0
 
 
-def _stop(rig: Rig, laws: LineLaws) -> list[Future[Any]]:
-    laws.called()
-    return [drive.stop() for drive in rig.drives.values()]
-
-
-def _end(rig: Rig, laws: LineLaws) -> list[Future[Any]]:
-    laws.called()
-    return [drive.stop_for_good(4.0) for drive in rig.drives.values()]
-
-
-#: What is called for 0.3 s after the first lost answer.
-_CALLS: Mapping[str, Callable[[Rig, LineLaws], object]] = {
-    'nothing': lambda rig, laws: None,
-    'stop_all': _stop,
-    'end': _end,
-}
-
-
-@pytest.mark.parametrize('call', _CALLS)
-@pytest.mark.parametrize('drives', [1, 2, 3, 8, 16])
+@pytest.mark.parametrize('calls', ['no stop', 'stop all soon', 'end soon'])
+@pytest.mark.parametrize('kind', ['rtu 1', 'rtu 2', 'rtu 3', 'rtu 8', 'rtu 16'])
 @pytest.mark.parametrize('at', [0, 1, 2, 5])
-def test_all_answers_are_lost_from_one_request_on(drives: int, call: str, at: int) -> None:
-    with by_default(
-        'rtu', drives=drives, line={'baud': 19200}, poll_rate=50.0, telemetry_rate=2.0
-    ) as rig:
+def test_all_answers_are_lost_from_one_request_on(kind: str, calls: str, at: int) -> None:
+    broken_by(LineRun(KINDS[kind], at), 'all answers lost', calls)
+
+
+@pytest.mark.parametrize('happens', HAPPENS)
+@pytest.mark.parametrize('kind', KINDS)
+def test_whatever_happens_to_a_line(kind: str, happens: str) -> None:
+    # another call for each, and each with many
+    calls = list(CALLS)[crc32(f'{kind}, {happens}'.encode()) % len(CALLS)]
+    broken_by(LineRun(KINDS[kind]), happens, calls)
+
+
+def broken_by(run: LineRun, happens: str, calls: str) -> None:
+    """Go through a run (AssertionError: a law is broken)."""
+    run.run(happens, calls)
+    run.rig.kill()
+    assert not run.laws.broken
+
+
+@pytest.mark.parametrize('any_counts', [False, True])
+def test_a_drive_counts_any_message_or_those_to_it(any_counts: bool) -> None:
+    with by_default('rtu', drives=2, line={'any_counts': any_counts}) as rig:
         rig.turn()
-        laws = LineLaws(rig)
-        rig.pass_time(0.5)
-        asked = len(rig.asked)
-        rig.wait_until(lambda: len(rig.asked) >= asked + at)
-        rig.line.state = 'deaf'
-        rig.pass_time(0.3)
-        _CALLS[call](rig, laws)
-        rig.pass_time(_ALL_STAND - 0.3)
-        assert (laws.broken, laws.still_turning()) == ([], [])
+        rig.kill()
+        read_of_the_second = next(
+            one['hex'] for one in rig.line.frames if one['hex'].startswith('0203')
+        )
+        for _ in range(4):
+            rig.line.another_sends(bytes.fromhex(read_of_the_second), rig.clock.now)
+            rig.line.go_to(rig.clock.now + 1.0)
+        assert LineLaws(rig).still_turning() == ([1, 2] if any_counts else [2])

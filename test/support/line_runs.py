@@ -1,0 +1,277 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Runs of several drives on one line: what happens to the line, and what is called for then.
+
+All motors turn at 20 Hz, and a program goes on with set-points, which are 10 Hz from the moment on
+at which something happens. ``line_laws.py`` says what has to hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+import functools
+import math
+from typing import Any
+
+from nfo_sinus_driver.drive import Cause, Report
+from support.line_laws import LineLaws
+from support.own_timeout import by_default
+from support.rig import CONNECTIONS, Rig
+
+#: What a program gives before something happens, and from then on, Hz.
+_BEFORE, _AFTER = 20.0, 10.0
+#: How long an exit waits for a stop, s.
+_PATIENCE = 4.0
+#: How long all motors have turned before, s.
+_STEADY = 0.5
+#: For how long a run goes on when all that happens has happened, s, and after the driver has ended:
+#: longer than the time-out of any drive.
+_GOES_ON = 8.0
+_OUTLASTS = 4.0
+_TIMES_AWAY = (0.3, 2.0, 4.0)
+_TIMES_DEAF = (0.0, 3.0, 8.0, 20.0)
+_TIMES_STILL = (1.0, 2.5, 3.5, 10.0)
+_SHARES = (0.02, 0.05, 0.1, 0.2)
+#: What a drive may refuse to tell, or not answer, by its model: none of it identifies it.
+_UNTOLD: Mapping[str, tuple[str, ...]] = {
+    'sinus_g2': (
+        'control.mode', 'fieldbus.spd_scl_numerator', 'serial.sio_tot', 'serial.auto_stop',
+    ),
+    'sinus_optimal': ('fieldbus.mode',),
+    'movitrac31': ('special.software_system', 'serial.pc_timeout', 'serial.control_mode'),
+    CONNECTIONS['described'].model: ('serial.timeout', 'serial.fault'),
+}
+#: On these lines a damaged frame is none, or is sent again: what noise costs there are answers, as
+#: if so many bytes had to be whole.
+_CHECKED = ('canopen', 'modbus_tcp', 'telegram1')
+_BYTES_BEHIND = 16
+
+
+@dataclass(frozen=True)
+class Kind:
+    """
+    A line, and what is on it.
+
+    :ivar connection: of all its drives, one of :data:`support.rig.CONNECTIONS`.
+    :ivar line: how it is.
+    :ivar stops_itself: the driver sets the time-out of each drive, where it has one.
+    """
+
+    connection: str
+    drives: int
+    line: Mapping[str, Any] = field(default_factory=dict)
+    stops_itself: bool = True
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """The parameters that do not identify a drive, which it may refuse to tell."""
+        connection = CONNECTIONS[self.connection]
+        return () if connection.protocol == 'telegram1' else _UNTOLD[connection.model]
+
+
+_SLOW_BUT_USUAL = {'baud': 19200}
+#: Any message counts for the time-out of each drive [C127].
+_ANY_COUNTS = {**_SLOW_BUT_USUAL, 'any_counts': True}
+KINDS: Mapping[str, Kind] = {
+    **{f'rtu {number}': Kind('rtu', number, _SLOW_BUT_USUAL) for number in (1, 2, 3, 8, 16)},
+    'rtu 3, any counts': Kind('rtu', 3, _ANY_COUNTS),
+    'rtu 8, any counts': Kind('rtu', 8, _ANY_COUNTS),
+    'rtu 3, no time-out': Kind('rtu', 3, _SLOW_BUT_USUAL, stops_itself=False),
+    'tcp 4': Kind('tcp', 4),
+    'canopen 4': Kind('canopen', 4),
+    'classic 4': Kind('classic', 4),
+    'movitrac 4': Kind('movitrac', 4),
+    'described 4': Kind('described', 4),
+    'optimal 4': Kind('optimal', 4),
+    'plc 2': Kind('telegram1 g2', 2),
+}
+
+
+class LineRun:
+    """
+    One run.
+
+    :param at: with how many requests after all motors turn something happens.
+    :ivar ends_after: how long what happens takes, s; infinite: it never ends.
+    """
+
+    def __init__(self, kind: Kind, at: int = 0) -> None:
+        self.kind = kind
+        make = by_default if kind.stops_itself else Rig
+        self.rig = rig = make(
+            kind.connection,
+            drives=kind.drives,
+            line=kind.line,
+            poll_rate=50.0,
+            telemetry_rate=2.0,
+            setpoint_timeout=2.5,
+        )
+        self.laws = LineLaws(rig)
+        self._at = at
+        self.ends_after = math.inf
+        #: The stops of an end, while what is stopped has not been released.
+        self._stops: dict[int, Future[Any]] = {}
+
+    def run(self, happens: str, calls: str) -> None:
+        """
+        Go through it; ``laws.broken`` says what was wrong.
+
+        :param happens: one of :data:`HAPPENS`; :param calls: one of :data:`CALLS`.
+        """
+        rig = self.rig
+        rig.turn(_BEFORE)
+        rig.pass_time(_STEADY)
+        asked = len(rig.asked)
+        rig.wait_until(lambda: len(rig.asked) >= asked + self._at)
+        self.laws.begin()
+        HAPPENS[happens](self)
+        self.give(_AFTER)
+        delay, call = CALLS[calls]
+        rig.pass_time(delay)
+        call(self)
+        longest = 0.0 if self.ends_after == math.inf else self.ends_after
+        rig.pass_time(longest + _GOES_ON)
+        if self._stops:
+            # what is not confirmed by now is not waited for any more
+            rig.kill()
+            self.laws.ended()
+            rig.line.go_to(rig.clock.now + _OUTLASTS)
+
+    def give(self, hertz: float | None) -> None:
+        """Have the program give another set-point, or none any more."""
+        self.rig.send(hertz)
+        self.laws.gave(hertz)
+
+    # --- what happens to the line ---------------------------------------------------------------
+
+    def answers_of_one_lost(self) -> None:
+        """Lose all answers of the second drive, or of the only one."""
+        line, one = self.rig.line, min(2, self.kind.drives)
+        line.plan = lambda frame: 'drop' if line.unit_of(frame) == one else None
+
+    def away(self, seconds: float) -> None:
+        """Take the port away, and give it back."""
+        line = self.rig.line
+        line.state = 'gone'
+        self._later(seconds, lambda: setattr(line, 'state', 'whole'))
+
+    def mute_and_deaf(self, seconds: float) -> None:
+        """Let nothing pass until the port is opened again, and then for so long after each."""
+        line = self.rig.line
+        line.state, line.boots_for = 'mute', seconds
+        self.ends_after = 2.0 + seconds
+
+    def stand_still(self, seconds: float) -> None:
+        """Let the program stand still."""
+        # in the middle of a request
+        self._at_once(lambda: self.laws.stands_still(seconds))
+        self.ends_after = seconds
+
+    def writes_unheard(self) -> None:
+        """Let no write arrive from now on."""
+        self.rig.meet = lambda key, data: None if data is None else 'unheard'
+        self.laws.heard = False
+
+    def damage(self, share: float) -> None:
+        """Damage a share of all bytes from now on."""
+        line = self.rig.line
+        self.laws.noise = share
+        if self.rig.connection.protocol in _CHECKED:
+            line.make_noise(1 - (1 - share) ** _BYTES_BEHIND)
+        else:
+            line.damage_bytes(share)
+
+    def fail_reads(self, what: str, seconds: float) -> None:
+        """Let every read fail that identifies no drive, and the port be away for a while."""
+        keys = self.kind.untold
+        self.rig.meet = lambda key, data: what if key in keys and data is None else None
+        self.away(seconds)
+
+    def _at_once(self, do: Callable[[], None]) -> None:
+        self.rig.line.later(self.rig.clock.now + 0.001, do)
+
+    def _later(self, seconds: float, do: Callable[[], None]) -> None:
+        self.ends_after = seconds
+        self.rig.line.later(self.rig.clock.now + seconds, do)
+
+    # --- what is called for ---------------------------------------------------------------------
+
+    def stop(self, *units: int) -> None:
+        """Stop some drives, or all."""
+        for unit in units or self.rig.drives:
+            self.laws.called(unit, self.rig.drives[unit].stop())
+
+    def stop_with(self) -> None:
+        """Stop the last drive; all others stop with it."""
+        *others, last = self.rig.drives
+
+        def stop_others(why: Report) -> None:
+            why = Report(Cause.STOPPED_WITH, drive='the last', why=why)
+            for unit in others:
+                self.rig.drives[unit].stop_beside(why)
+
+        self.rig.drives[last].on_stop(stop_others)
+        for unit in others:
+            self.laws.called(unit)
+        self.stop(last)
+
+    def end(self) -> None:
+        """End the driver as a signal does: stop all, and release each as soon as it is stopped."""
+        self.give(None)
+        self._stops = {
+            unit: drive.stop_for_good(_PATIENCE) for unit, drive in self.rig.drives.items()
+        }
+        for unit, stop in self._stops.items():
+            self.laws.called(unit, stop)
+        released: set[int] = set()
+
+        def release() -> None:
+            for unit, stop in self._stops.items():
+                if unit not in released and stop.done() and stop.exception() is None:
+                    released.add(unit)
+                    self.rig.drives[unit].disconnect(1.0)
+
+        self.rig.keep(release)
+
+
+def _set(state: str) -> Callable[[LineRun], None]:
+    return lambda run: setattr(run.rig.line, 'state', state)
+
+
+_PARTIAL = functools.partial
+#: What happens to a line.
+HAPPENS: Mapping[str, Callable[[LineRun], None]] = {
+    'nothing': lambda run: None,
+    'all answers lost': _set('deaf'),
+    'answers of one lost': LineRun.answers_of_one_lost,
+    'requests lost': _set('silent'),
+    **{f'away for {time:g} s': _PARTIAL(LineRun.away, seconds=time) for time in _TIMES_AWAY},
+    **{f'mute, then deaf for {time:g} s': _PARTIAL(LineRun.mute_and_deaf, seconds=time)
+       for time in _TIMES_DEAF},
+    **{f'stood still for {time:g} s': _PARTIAL(LineRun.stand_still, seconds=time)
+       for time in _TIMES_STILL},
+    'writes unheard': LineRun.writes_unheard,
+    **{f'reads {what}, away for 2 s': _PARTIAL(LineRun.fail_reads, what=what, seconds=2.0)
+       for what in ('refused', 'unheard')},
+    **{f'{share:.0%} of bytes damaged': _PARTIAL(LineRun.damage, share=share)
+       for share in _SHARES},
+}
+
+#: What is called for, and how long after something happened, s.
+CALLS: Mapping[str, tuple[float, Callable[[LineRun], None]]] = {
+    'no stop': (0.0, lambda run: None),
+    'stop': (0.0, lambda run: run.stop(1)),
+    'stop later': (2.0, lambda run: run.stop(1)),
+    'stop all': (0.0, LineRun.stop),
+    'stop all soon': (0.3, LineRun.stop),
+    'stop all later': (2.0, LineRun.stop),
+    'no set-points': (0.0, lambda run: run.give(None)),
+    'stop with': (0.3, LineRun.stop_with),
+    'end': (0.0, LineRun.end),
+    'end soon': (0.3, LineRun.end),
+    'end later': (2.0, LineRun.end),
+}
