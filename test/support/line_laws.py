@@ -15,7 +15,8 @@ each of which waits as long as the drive has ever taken to answer.
 
 S3: or the motor is stopped by the time-out of the drive: whatever the driver still sends does not
 keep it from striking. A drive without one is looked for once a second, and stopped with its first
-answer.
+answer. A port that needs a while after it was opened is opened more and more seldom, until it
+passes something.
 
 S4: no more goes to a drive before a stop that is due than a short look: what tells whether it is
 there, and the same.
@@ -107,12 +108,14 @@ class LineLaws:
     :ivar broken: what breaks a law, in sentences.
     :ivar heard: what a drive is told reaches it as soon as the line is whole; false: writes do not.
     :ivar noise: this share of the bytes is damaged.
+    :ivar heard_again_by: by then something is heard of the line again.
+    :ivar began: when something happened first.
     """
 
     def __init__(self, rig: Rig) -> None:
         self._rig, self._clock, self._line = rig, rig.clock, rig.line
         self._units = {unit: _Unit() for unit in rig.drives}
-        self._began = math.inf
+        self.began = math.inf
         self._looked_at = rig.clock.now
         #: When the first request in vain was sent since the last valid frame of any drive, when
         #: that frame came, and whom it was in vain for since.
@@ -128,6 +131,7 @@ class LineLaws:
         self._has_ended = False
         self.broken: list[str] = []
         self.heard, self.noise = True, 0.0
+        self.heard_again_by = math.inf
         rig.told = self._take
         rig.looked = self._look
 
@@ -135,7 +139,7 @@ class LineLaws:
 
     def begin(self) -> None:
         """Judge from now on: all motors turn."""
-        self._began = self._clock.now
+        self.began = self._clock.now
         for number, notes in self._rig.notes_of.items():
             self._events[number] = len(notes.events)
 
@@ -224,13 +228,17 @@ class LineLaws:
         if now - self._looked_at < _LOOKS or self._stands:
             return
         self._looked_at = now
+        if now > self.heard_again_by and not self._has_ended:
+            self.heard_again_by = math.inf
+            if self._frame_at < self.began + _LOOKED_FOR:
+                self.broken.append('S3: nothing is heard of the line any more')
         for number, unit in self._units.items():
             snapshot = self._rig.notes_of[number].snapshot
             # one that was stopped and not enabled again does not run by this driver
             told = snapshot if snapshot is not unit.stopped_with else None
             enabled = told is not None and told.enabled
             unit.running = unit.running or (enabled and self._turns(number))
-            if self._began == math.inf:
+            if self.began == math.inf:
                 continue
             if self._has_ended:
                 self._judge_standstill(number, unit)
@@ -382,8 +390,8 @@ class LineLaws:
         unit.broken.add(law)
         now = self._clock.now
         self.broken.append(
-            f'{law}: drive {number} {what} {since - self._began:.2f} s, and it is '
-            f'{now - self._began:.2f} s'
+            f'{law}: drive {number} {what} {since - self.began:.2f} s, and it is '
+            f'{now - self.began:.2f} s'
         )
 
     def still_turning(self) -> list[int]:

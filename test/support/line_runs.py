@@ -14,20 +14,24 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 import functools
-import math
 from typing import Any
 
 from nfo_sinus_driver.drive import Cause, Report
 from support.line_laws import LineLaws
 from support.own_timeout import by_default
-from support.rig import CONNECTIONS, Rig
+from support.rig import CONNECTIONS, SLICE, Rig
 
 #: What a program gives before something happens, and from then on, Hz.
 _BEFORE, _AFTER = 20.0, 10.0
 #: How long an exit waits for a stop, s.
 _PATIENCE = 4.0
-#: How long all motors have turned before, s.
-_STEADY = 0.5
+#: How long all motors have turned before, and within what time something happens, s.
+_STEADY, _REQUESTS_FOR = 0.5, 1.0
+#: What comes in the middle of a request comes so long after its beginning, s; within what time all
+#: has been called for.
+_AT_ONCE, _CALLED_BY = 0.001, 2.1
+#: By when a port is opened again that is mute, s, besides three times what it needs after that.
+_OPENED_AGAIN = 10.0
 #: For how long a run goes on when all that happens has happened, s, and after the driver has ended:
 #: longer than the time-out of any drive.
 _GOES_ON = 8.0
@@ -95,11 +99,15 @@ class LineRun:
     """
     One run.
 
-    :param at: with how many requests after all motors turn something happens.
-    :ivar ends_after: how long what happens takes, s; infinite: it never ends.
+    :param happens: called with each request once all motors turn, as the parameter, and whether it
+        is written; returns one of :data:`HAPPENS` and one of :data:`CALLS`, the first time that
+        something happens, else ``None``.
+    :ivar lasts: how long what happens takes, s; 0: it does not end, or has ended at once.
     """
 
-    def __init__(self, kind: Kind, at: int = 0) -> None:
+    def __init__(
+        self, kind: Kind, happens: Callable[[str, bool], tuple[str, str] | None]
+    ) -> None:
         self.kind = kind
         make = by_default if kind.stops_itself else Rig
         self.rig = rig = make(
@@ -111,35 +119,57 @@ class LineRun:
             setpoint_timeout=2.5,
         )
         self.laws = LineLaws(rig)
-        self._at = at
-        self.ends_after = math.inf
+        self._happens, self._has_happened = happens, False
+        self.lasts = 0.0
         #: The stops of an end, while what is stopped has not been released.
         self._stops: dict[int, Future[Any]] = {}
 
-    def run(self, happens: str, calls: str) -> None:
-        """
-        Go through it; ``laws.broken`` says what was wrong.
-
-        :param happens: one of :data:`HAPPENS`; :param calls: one of :data:`CALLS`.
-        """
+    def run(self) -> None:
+        """Go through it (AssertionError: a law is broken)."""
         rig = self.rig
-        rig.turn(_BEFORE)
-        rig.pass_time(_STEADY)
-        asked = len(rig.asked)
-        rig.wait_until(lambda: len(rig.asked) >= asked + self._at)
-        self.laws.begin()
-        HAPPENS[happens](self)
-        self.give(_AFTER)
-        delay, call = CALLS[calls]
-        rig.pass_time(delay)
-        call(self)
-        longest = 0.0 if self.ends_after == math.inf else self.ends_after
-        rig.pass_time(longest + _GOES_ON)
+        try:
+            rig.turn(_BEFORE)
+            rig.pass_time(_STEADY)
+            rig.meet = self._meet
+            self._go_on()
+        except BaseException:
+            # what its end would complain of comes from that
+            rig.kill()
+            raise
+        rig.close()
+        assert not self.laws.broken, '; '.join(self.laws.broken)
+
+    def _meet(self, key: str, data: bytes | None) -> str | None:
+        case = self._happens(key, data is not None)
+        if case is not None:
+            happens, calls = case
+            self.rig.meet = lambda key, data: None
+            self.laws.begin()
+            self.give(_AFTER)
+            HAPPENS[happens](self)
+            delay, call = CALLS[calls]
+            # in the middle of a request
+            self._later(max(delay, _AT_ONCE), lambda: call(self))
+            self._has_happened = True
+        return None
+
+    def _go_on(self) -> None:
+        rig = self.rig
+        until = rig.clock.now + _REQUESTS_FOR
+        while not self._has_happened and rig.clock.now < until:
+            rig.pass_time(SLICE)
+        rig.pass_time(_CALLED_BY)
         if self._stops:
-            # what is not confirmed by now is not waited for any more
+            # what is not confirmed by then is not waited for any more
+            rig.pass_time(2 * _PATIENCE)
             rig.kill()
             self.laws.ended()
             rig.line.go_to(rig.clock.now + _OUTLASTS)
+        elif self._has_happened:
+            rig.pass_time(self.lasts + _GOES_ON)
+
+    def _later(self, seconds: float, do: Callable[[], None]) -> None:
+        self.rig.line.later(self.rig.clock.now + seconds, do)
 
     def give(self, hertz: float | None) -> None:
         """Have the program give another set-point, or none any more."""
@@ -148,28 +178,30 @@ class LineRun:
 
     # --- what happens to the line ---------------------------------------------------------------
 
-    def answers_of_one_lost(self) -> None:
-        """Lose all answers of the second drive, or of the only one."""
-        line, one = self.rig.line, min(2, self.kind.drives)
-        line.plan = lambda frame: 'drop' if line.unit_of(frame) == one else None
+    def lose_answers_of(self, *units: int) -> None:
+        """Lose all answers of some drives."""
+        line = self.rig.line
+        line.plan = lambda frame: 'drop' if line.unit_of(frame) in units else None
 
     def away(self, seconds: float) -> None:
         """Take the port away, and give it back."""
         line = self.rig.line
         line.state = 'gone'
         self._later(seconds, lambda: setattr(line, 'state', 'whole'))
+        self.lasts = seconds
 
     def mute_and_deaf(self, seconds: float) -> None:
         """Let nothing pass until the port is opened again, and then for so long after each."""
         line = self.rig.line
         line.state, line.boots_for = 'mute', seconds
-        self.ends_after = 2.0 + seconds
+        # each pause before it is opened again is longer than the one before
+        self.lasts = _OPENED_AGAIN + 3 * seconds
+        self.laws.heard_again_by = self.rig.clock.now + self.lasts
 
     def stand_still(self, seconds: float) -> None:
         """Let the program stand still."""
-        # in the middle of a request
-        self._at_once(lambda: self.laws.stands_still(seconds))
-        self.ends_after = seconds
+        self._later(_AT_ONCE, lambda: self.laws.stands_still(seconds))
+        self.lasts = seconds
 
     def writes_unheard(self) -> None:
         """Let no write arrive from now on."""
@@ -190,13 +222,6 @@ class LineRun:
         keys = self.kind.untold
         self.rig.meet = lambda key, data: what if key in keys and data is None else None
         self.away(seconds)
-
-    def _at_once(self, do: Callable[[], None]) -> None:
-        self.rig.line.later(self.rig.clock.now + 0.001, do)
-
-    def _later(self, seconds: float, do: Callable[[], None]) -> None:
-        self.ends_after = seconds
-        self.rig.line.later(self.rig.clock.now + seconds, do)
 
     # --- what is called for ---------------------------------------------------------------------
 
@@ -247,7 +272,9 @@ _PARTIAL = functools.partial
 HAPPENS: Mapping[str, Callable[[LineRun], None]] = {
     'nothing': lambda run: None,
     'all answers lost': _set('deaf'),
-    'answers of one lost': LineRun.answers_of_one_lost,
+    # the second, or the only one; and each second one
+    'answers of one lost': lambda run: run.lose_answers_of(min(2, run.kind.drives)),
+    'answers of half lost': lambda run: run.lose_answers_of(*range(1, run.kind.drives + 1, 2)),
     'requests lost': _set('silent'),
     **{f'away for {time:g} s': _PARTIAL(LineRun.away, seconds=time) for time in _TIMES_AWAY},
     **{f'mute, then deaf for {time:g} s': _PARTIAL(LineRun.mute_and_deaf, seconds=time)
