@@ -32,11 +32,15 @@ sys.path[:0] = [str(_TEST.parent), str(_TEST), str(_TEST / 'unit' / 'drive'),
                 str(_TEST / 'exhaustive')]
 
 from any_order_machine import AnyOrder  # noqa: E402, the tests are no package
+from lines import LINES, LineMachine  # noqa: E402
 from machines import EVERY_MACHINE  # noqa: E402
+from support.line_runs import HAPPENS, LineRun  # noqa: E402
 from support.unexpected_errors import unexpected_errors  # noqa: E402
 
 #: At which request what goes wrong; the first is 0.
 Case = tuple[tuple[int, str], ...]
+#: What a run is of: a drive, or a line of several.
+Machine = type[AnyOrder] | LineMachine
 #: The steps that begin with all put right again, connected or not.
 _CONNECTS = ('forward', 'forward again', 'fault', 'last run')
 #: Of the requests of a step that are the same, as in polls, so many are spoiled.
@@ -73,8 +77,11 @@ FAULTS: Mapping[str, Callable[[AnyOrder], object]] = {
 REFUSALS = ('refused', 'busy', 'carried out, refused')
 
 
-def faults_of(machine: type[AnyOrder]) -> Iterator[str]:
-    """Yield the names of all that can go wrong on a drive of one kind."""
+def faults_of(machine: Machine) -> Iterator[str]:
+    """Yield the names of all that can go wrong on a drive of one kind, or a line."""
+    if isinstance(machine, LineMachine):
+        yield from HAPPENS
+        return
     yield from FAULTS
     yield from REFUSALS
     yield from (event for event in dict.fromkeys(machine.enders) if event != 'stop_unheard')
@@ -170,7 +177,12 @@ class Run:
         return usual
 
 
-def complaint_of(run: Run) -> str:
+def run_of(machine: Machine, wrong: Callable[[str, str, bool], str]) -> Run | LineRun:
+    """Return a run on a drive of one kind, or a line; ``wrong`` is that of :class:`Run`."""
+    return machine.begin(wrong) if isinstance(machine, LineMachine) else Run(machine, wrong)
+
+
+def complaint_of(run: Run | LineRun) -> str:
     """Return what is wrong with a run, ``''`` if nothing."""
     with unexpected_errors() as found:
         try:
@@ -205,7 +217,7 @@ class Tree:
 
     def __init__(
         self,
-        machine: type[AnyOrder],
+        machine: Machine,
         faults: Iterable[str],
         parts: Sequence[tuple[int, int]],
         jobs: int,
@@ -223,7 +235,7 @@ class Tree:
     def run(self) -> None:
         """Try all."""
         gc.freeze()
-        complaint = complaint_of(Run(self._machine, self))
+        complaint = complaint_of(run_of(self._machine, self))
         while self._running:
             self._wait()
         self._report(self._case, complaint)
@@ -277,7 +289,8 @@ class Tree:
 def main() -> int:
     """Try all cases of this part; return 1 where one breaks a law."""
     parser = argparse.ArgumentParser(description=__doc__)
-    machines = {machine.__name__: machine for machine in EVERY_MACHINE}
+    every: tuple[Machine, ...] = (*EVERY_MACHINE, *LINES)
+    machines = {machine.__name__: machine for machine in every}
     parser.add_argument('--machine', action='append', choices=machines, help='default: all')
     parser.add_argument('--part', default='1/1', metavar='I/N', help='every Nth case only')
     parser.add_argument('--fault', action='append', metavar='FAULT', help='this one alone')
@@ -287,10 +300,13 @@ def main() -> int:
     options = parser.parse_args()
     failures = 0
     for name in options.machine or machines:
+        if options.pairs and isinstance(machines[name], LineMachine):
+            # a call is the second thing there
+            continue
         if options.case:
             split = (one.partition(':') for one in options.case)
             case = tuple((int(at), fault) for at, _, fault in split)
-            complaint = complaint_of(Run(machines[name], Given(case)))
+            complaint = complaint_of(run_of(machines[name], Given(case)))
             print(f'{name}: {complaint or "nothing is wrong"}')
             failures += bool(complaint)
         else:
@@ -309,7 +325,7 @@ def _parts_of(options: argparse.Namespace) -> list[tuple[int, int]]:
     return [(side, part // side % side), (side, part % side)]
 
 
-def _try_all(machine: type[AnyOrder], options: argparse.Namespace) -> int:
+def _try_all(machine: Machine, options: argparse.Namespace) -> int:
     with tempfile.TemporaryFile() as done:
         faults = [one for one in faults_of(machine) if one in (options.fault or [one])]
         Tree(machine, faults, _parts_of(options), options.jobs, done.fileno()).run()

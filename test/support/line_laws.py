@@ -168,8 +168,11 @@ class LineLaws:
         self._asked_at += seconds
         for unit in self._units.values():
             unit.asked_at += seconds
-            unit.due_since += seconds
-            unit.to_stand_since += seconds
+            # what was called for meanwhile is due from now on
+            unit.due_since = min(unit.due_since + seconds, max(unit.due_since, self._clock.now))
+            unit.to_stand_since = min(
+                unit.to_stand_since + seconds, max(unit.to_stand_since, self._clock.now)
+            )
             unit.strays_since = unit.claims_since = math.inf
 
     def _take(self, asked: Asked) -> None:
