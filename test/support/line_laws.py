@@ -142,6 +142,7 @@ class LineLaws:
         self.began = self._clock.now
         for number, notes in self._rig.notes_of.items():
             self._events[number] = len(notes.events)
+            self._units[number].running = self._turns(number)
 
     def gave(self, hertz: float | None) -> None:
         """Note what the program gives from now on."""

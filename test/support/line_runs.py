@@ -129,7 +129,7 @@ class LineRun:
         rig = self.rig
         try:
             rig.turn(_BEFORE)
-            rig.pass_time(_STEADY)
+            self._until_told()
             rig.meet = self._meet
             self._go_on()
         except BaseException:
@@ -160,16 +160,60 @@ class LineRun:
             rig.pass_time(SLICE)
         rig.pass_time(_CALLED_BY)
         if self._stops:
-            # what is not confirmed by then is not waited for any more
-            rig.pass_time(2 * _PATIENCE)
-            rig.kill()
-            self.laws.ended()
-            rig.line.go_to(rig.clock.now + _OUTLASTS)
+            self.outlast_driver()
         elif self._has_happened:
             rig.pass_time(self.lasts + _GOES_ON)
 
     def _later(self, seconds: float, do: Callable[[], None]) -> None:
         self.rig.line.later(self.rig.clock.now + seconds, do)
+
+    def outlast_driver(self) -> None:
+        """Let a driver end that was told to, and then the time-outs of the drives strike."""
+        # what is not confirmed by then is not waited for any more
+        self.rig.pass_time(2 * _PATIENCE)
+        self.rig.kill()
+        self.laws.ended()
+        self.rig.line.go_to(self.rig.clock.now + _OUTLASTS)
+
+    def begin_again(self) -> None:
+        """Put all right, have all motors turn, and judge anew (AssertionError: they do not)."""
+        rig, line = self.rig, self.rig.line
+        rig.send(None)
+        line.mend()
+        line.plan = lambda frame: None
+        rig.meet = lambda key, data: None
+        drives = rig.drives.values()
+        for drive in drives:
+            drive.on_stop(lambda why: None)
+        # what was called for just now comes first
+        rig.pass_time(_STEADY)
+        rig.wait_until(
+            lambda: all(one.snapshot.connected and not one.stop_unconfirmed for one in drives)
+        )
+        for unit, far in rig.fars.items():
+            if far.faults:
+                rig.answer(rig.drives[unit].acknowledge())
+        rig.enable()
+        self.give(_BEFORE)
+        for far in rig.fars.values():
+            rig.wait_until(lambda far=far: far.motor.frequency > 0.9 * _BEFORE, 5.0)
+        self._until_told()
+        self.laws = LineLaws(rig)
+        self.laws.gave(_BEFORE)
+        self.laws.begin()
+        self._stops = {}
+
+    def _until_told(self) -> None:
+        """Let all motors turn for a while, and until each is told as enabled."""
+        self.rig.pass_time(_STEADY)
+        self.rig.wait_until(lambda: all(one.snapshot.enabled for one in self.rig.drives.values()))
+
+    def begin_with_another_driver(self) -> None:
+        """End the driver, if it has not ended, and begin with another one."""
+        self.rig.kill()
+        self.rig.begin()
+        self.rig.connect()
+        self.begin_again()
 
     def give(self, hertz: float | None) -> None:
         """Have the program give another set-point, or none any more."""

@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import os
 
+from any_order_lines import LINES, LineOrder
 from any_order_machine import AnyOrder
 from any_order_machines import MACHINES, G2DriveControl, G2ModeScmd, OptimalModeScmd
 from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis.stateful import run_state_machine_as_test
 import pytest
 from support.examples import FULL
+from support.line_runs import HAPPENS
 
 #: How many histories a campaign has in all, 0: a normal run; and where they come from.
 HISTORIES = int(os.environ.get('HISTORIES', '0'))
@@ -35,6 +37,10 @@ NORMAL = settings(
     suppress_health_check=list(HealthCheck),
     print_blob=False,
 )
+#: A step of a line takes as long as one of each of its drives.
+NORMAL_OF_LINES = settings(NORMAL, max_examples=20, stateful_step_count=12)
+#: A line runs again after one in so many of the things that can happen to it.
+_ONE_IN = 1 if FULL else 5
 #: What breaks a law is shortened.
 CAMPAIGN = settings(
     NORMAL,
@@ -71,6 +77,19 @@ def test_each_event_ends_a_run(machine: type[AnyOrder]) -> None:
         # the next driver finds the motor running
         state.kill(wait=1.0)
         state.let(2.5)
+    finally:
+        state.teardown()
+
+
+@pytest.mark.parametrize('machine', LINES if FULL else LINES[2::3])
+def test_a_line_runs_again_whatever_happened_to_it(machine: type[LineOrder]) -> None:
+    state = machine()
+    state.begin()
+    try:
+        for happens in list(HAPPENS)[LINES.index(machine) % _ONE_IN :: _ONE_IN]:
+            state.happen(happens)
+            state.put_right()
+        state.end()
     finally:
         state.teardown()
 
@@ -125,11 +144,19 @@ def test_any_order(machine: type[AnyOrder]) -> None:
     run_state_machine_as_test(machine, settings=NORMAL)
 
 
+@pytest.mark.skipif(not FULL or HISTORIES > 0, reason='with FULL=1, and in a campaign')
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize('machine', LINES)
+def test_any_order_on_a_line(machine: type[LineOrder]) -> None:
+    run_state_machine_as_test(machine, settings=NORMAL_OF_LINES)
+
+
 @pytest.mark.skipif(not HISTORIES, reason='only in a campaign')
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize('part', range(-(-HISTORIES // _SHARE)))
 def test_campaign(part: int) -> None:
     """Go through a share of the histories; each has a seed of its own, and a machine in turn."""
-    machine = MACHINES[part % len(MACHINES)]
+    machines = (*MACHINES, *LINES)
+    machine = machines[part % len(machines)]
     seeded = seed(f'{SEED} {part}')(type(machine.__name__, (machine,), {}))
     run_state_machine_as_test(seeded, settings=CAMPAIGN)
