@@ -15,6 +15,7 @@ import time
 from typing import NamedTuple, Protocol
 
 from nfo_sinus_driver.link.interface import PortError
+from nfo_sinus_driver.link.place import place_of_interface
 
 #: The most bytes that a frame carries.
 MOST_DATA = 8
@@ -43,6 +44,10 @@ CANNOT_SEND = 'frames do not leave: is any other node on the bus, with this bit 
 
 class CanPort(Protocol):
     """What carries frames."""
+
+    @property
+    def place(self) -> str:
+        """Where it is; see :attr:`.interface.Link.place`."""
 
     @property
     def trouble(self) -> str:
@@ -104,6 +109,7 @@ class SocketCan:
             _FILTER.pack(identifier, mask | _OTHER_FRAMES) for identifier, mask in filters
         )
         self._socket: socket.socket | None = None
+        self.place = ''
         #: The queue is full, for no node acknowledges.
         self._is_full = False
 
@@ -127,6 +133,7 @@ class SocketCan:
             raise self._lost(error) from error
         self._socket = bus
         self._is_full = False
+        self.place = place_of_interface(self._name)
 
     @property
     def trouble(self) -> str:

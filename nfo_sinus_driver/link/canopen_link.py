@@ -231,6 +231,11 @@ class CanopenLink:
         serial = port_of(port, replace(settings, baud_rate=_ADAPTER_RATE, char_format='8N1'))
         return cls(LawicelPort(serial, settings.baud_rate), settings)
 
+    @property
+    def place(self) -> str:
+        """Where the port is."""
+        return self._port.place
+
     def open(self) -> None:
         """Open the port."""
         self._port.open()

@@ -297,6 +297,17 @@ class Link(Protocol):
     def supervision(self) -> Supervision | None:
         """Its messages beside requests and answers; ``None``: it has none."""
 
+    @property
+    def place(self) -> str:
+        """
+        Where the port is that was opened last: the same words, the same place.
+
+        ``''``: that cannot be told. Of an adapter the socket that it is plugged into, its make and
+        its serial number; on the network host and port, whatever is behind them. A pseudo-terminal
+        has a program behind it: its name (``/dev/pts/5``) is given to the next that wants one, but
+        a link to it has a name that lasts, as host and port are.
+        """
+
     def open(self) -> None:
         """
         Open the port; where it is open, and nothing comes from it, open it again.

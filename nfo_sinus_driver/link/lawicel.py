@@ -172,6 +172,11 @@ class LawicelPort:
         self._reader = Reader()
         self.trouble = ''
 
+    @property
+    def place(self) -> str:
+        """Where the adapter is."""
+        return self._port.place
+
     def open(self) -> None:
         """
         Open the port, and take the adapter onto the bus.

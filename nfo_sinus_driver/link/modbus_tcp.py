@@ -133,7 +133,7 @@ class TcpLink(ModbusLink):
         self.stop_waits: Callable[[], bool] = lambda: False
         self._host = host
         self._port = port
-        self._name = f'[{host}]:{port}' if ':' in host else f'{host}:{port}'
+        self.place = self._name = f'[{host}]:{port}' if ':' in host else f'{host}:{port}'
         self._response_timeout = response_timeout
         self._make = connection
         self._connection: Connection | None = None

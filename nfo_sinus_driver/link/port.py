@@ -19,6 +19,10 @@ _HOST_AND_PORT = re.compile(r'[^/]+:\d+')
 class Port(Protocol):
     """A port that carries bytes."""
 
+    @property
+    def place(self) -> str:
+        """Where it is; see :attr:`.interface.Link.place`."""
+
     def open(self) -> None:
         """
         Open it; where it is open, close it before, and discard what has not left.

@@ -18,6 +18,7 @@ class Reconnect:
 
     :ivar is_open: the link is open.
     :ivar error: why it is not, or was closed last.
+    :ivar is_at_same_place: it was opened last where it was before; what was behind it may be still.
     :ivar reopen_at: when it may be tried again, s on the steady clock.
     """
 
@@ -26,6 +27,8 @@ class Reconnect:
         self.is_open = False
         self.error = PortError('the port is not open yet')
         self.reopen_at = 0.0
+        self.is_at_same_place = False
+        self._place = ''
 
     def open(self, reopen_at: float) -> None:
         """Try to open the link, or one that is open and mute again; the next at ``reopen_at``."""
@@ -41,6 +44,8 @@ class Reconnect:
             self.mark_lost(PortError(f'error in the link: {error!r}'), reopen_at)
         else:
             self.is_open = True
+            before, self._place = self._place, self._link.place
+            self.is_at_same_place = self._place != '' and self._place == before
 
     def mark_lost(self, error: PortError, reopen_at: float) -> None:
         """Close the link because of an error, until it may be tried again."""

@@ -169,6 +169,11 @@ class RequestLink(ABC, Generic[_Request]):
         """Return the link on a port; a ValueError says what is no port."""
         return cls(port_of(port, settings), settings)
 
+    @property
+    def place(self) -> str:
+        """Where the port is."""
+        return self._port.place
+
     def open(self) -> None:
         """Open the port."""
         self._port.open()

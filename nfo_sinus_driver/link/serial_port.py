@@ -18,6 +18,7 @@ import serial
 from serial.rs485 import RS485Settings
 
 from nfo_sinus_driver.link.interface import LineSettings, PortError
+from nfo_sinus_driver.link.place import place_of_tty
 
 #: Device numbers of pseudo-terminals, which have no parity and no seven bits.
 _PTY_MAJORS = range(136, 144)
@@ -50,6 +51,7 @@ class SerialPort:
         self._path = path
         self._settings = settings
         self._port: _Serial | None = None
+        self.place = ''
 
     def open(self) -> None:
         """
@@ -81,6 +83,7 @@ class SerialPort:
                 raise self._not_opened(error) from error
             raise
         self._port = port
+        self.place = self._place(port.fileno())
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
@@ -116,6 +119,12 @@ class SerialPort:
         if not data:
             raise self._lost(OSError(errno.EIO, 'end of file'))
         return data
+
+    def _place(self, fd: int) -> str:
+        device = os.fstat(fd).st_rdev
+        if os.major(device) in _PTY_MAJORS:
+            return self._path if os.path.islink(self._path) else ''
+        return place_of_tty(device)
 
     def _discard(self) -> None:
         """Discard what has not left: it must not leave later, and closing would wait for it."""

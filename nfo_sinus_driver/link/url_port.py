@@ -29,6 +29,8 @@ class UrlPort:
     def __init__(self, url: str, settings: LineSettings) -> None:
         _check(url)
         self._url = url
+        #: Other kinds of URL lead to any device.
+        self.place = url if _kind(url) in _SERVERS else ''
         self._settings = settings
         self._serial: serial.SerialBase | None = None
 
@@ -90,9 +92,13 @@ class UrlPort:
         return PortError(f'{self._url} was lost ({error}): {CLOSED_HINT}')
 
 
+def _kind(url: str) -> str:
+    return url.split('://')[0].lower()
+
+
 def _check(url: str) -> None:
     """Check a URL without connecting; a ValueError says what is wrong with it."""
-    kind = url.split('://')[0].lower()
+    kind = _kind(url)
     try:
         port: Any = serial.serial_for_url(url, do_not_open=True)
     except ValueError:

@@ -79,6 +79,7 @@ class Line:
         bus.
     :ivar opened: when the port was opened.
     :ivar sent_at: when the port took a frame last.
+    :ivar place: where it is; a test may plug it in somewhere else.
     :ivar losses: how many answers are still lost; :ivar unheard: how many requests are;
         :ivar doubled: how many answers come twice.
     :ivar plan: called with each request; what it returns goes wrong with it: one of
@@ -146,6 +147,7 @@ class Line:
         self.opened: list[float] = []
         self.sent_at = -_NEVER
         self.mute_for = 1
+        self.place = 'the first socket'
         self.sessions: list[Session] = []
         self.refuses = self.lost = self.closes = False
         self._asking: Session | None = None

@@ -55,6 +55,7 @@ class FakeLink:
     protocol = PROTOCOLS['modbus_rtu']
     remarks = Remarks()
     supervision: Supervision | None = None
+    place = ''
 
     def __init__(self) -> None:
         self.done: list[Done] = []

@@ -21,6 +21,7 @@ from nfo_sinus_driver.link import (
     NotReady,
     PortError,
     Read,
+    Reconnect,
     Refused,
 )
 
@@ -160,6 +161,31 @@ def test_mute_port_that_cannot_be_opened_again_is_lost(bus: Bus, link: FakeLink)
     link.opening = lambda: None
     wait_until(lambda: bus.port_error is None)
     assert result(ask(bus, 2, Priority.POLL)) == packed(2)
+
+
+def test_a_port_is_at_the_same_place_if_that_can_be_told(link: FakeLink) -> None:
+    port = Reconnect(link)
+    # where it was opened last, and whether that is where it was before
+    places = ['', '', '1-2', '1-2', '1-3', '1-3', '', '1-3']
+    same = []
+    for link.place in places:
+        port.mark_lost(PortError('gone'), 0.0)
+        port.open(0.0)
+        same.append(port.is_at_same_place)
+    assert same == [False, False, False, True, False, True, False, False]
+
+
+def test_tries_in_vain_do_not_count_for_the_place(link: FakeLink) -> None:
+    port = Reconnect(link)
+    link.place = '1-2'
+    port.open(0.0)
+    port.mark_lost(PortError('gone'), 0.0)
+    # it is there, but cannot be used
+    link.opening, link.place = raiser(PortError('in use')), '1-3'
+    port.open(0.0)
+    link.opening = lambda: None
+    port.open(0.0)
+    assert port.is_open and not port.is_at_same_place
 
 
 def test_reconnects_are_counted(bus: Bus, link: FakeLink) -> None:

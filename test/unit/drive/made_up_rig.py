@@ -35,6 +35,7 @@ class FarEnd:
     protocol = PROTOCOLS['modbus_rtu']
     remarks = Remarks()
     supervision = None
+    place = ''
     write_and_read = read_then_write = None
     rig: MadeUpRig
 
