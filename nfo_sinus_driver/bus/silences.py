@@ -21,12 +21,14 @@ __all__ = ['EXCHANGE', 'Silences']
 _MISSING_AFTER = 2.0
 #: The share of the time that all missing units may take together while others answer.
 _MISSING_SHARE = 1 / 20
-#: How much longer than before a port is mute, s, until it is opened again, each time in vain; and
-#: the longest: less than the command line repeats a stop before it gives up.
-_MUTE_STEP = 2.0
-_MUTE_LONGEST = 6.0
-#: The same where nothing was ever heard: opening it was in vain already, s.
-_MUTE_FROM_THE_START = 30.0
+#: How long a port that was opened is mute, s, until it is opened again, each time in vain: what is
+#: behind it may restart whenever it is opened, and takes so long.
+_MUTE_PAUSES = (2.0, 4.0, 8.0, 15.0, 30.0)
+#: The same while a stop waits; then from the first on again. The last one is for what takes so long
+#: to start, and would never be heard.
+_MUTE_PAUSES_OF_A_STOP = (2.0, 4.0, *[8.0] * 10, 30.0)
+#: The same where nothing was ever heard, or where bytes come, but nothing that is valid, s.
+_MUTE_LONGEST = _MUTE_PAUSES[-1]
 #: In a longer silence another unit may have been put in the place of one, s: that is how long it
 #: takes to move the plug of the line from a drive to a spare one beside it that has power.
 EXCHANGE = 3.0
@@ -56,7 +58,8 @@ class Silences:
 
     Where no unit answers any more, the port itself may be mute: what carries the bytes may pass
     none until it is opened again, and report no error. Units that are switched off look the same,
-    so it is opened again more and more seldom. An address that never answered shows nothing.
+    and so does what is starting, so it is opened again more and more seldom. A port from which any
+    byte comes is not mute. An address that never answered shows nothing.
 
     :ivar heard: something valid has ever come.
     :ivar opened_at: when the port was opened that had been lost.
@@ -84,10 +87,14 @@ class Silences:
         #: When the last silence of the whole line ended.
         self._back_at = -math.inf
         self.heard = False
-        #: Since when every request has failed, and how often the port was opened since the last
-        #: that did not.
+        #: Since when every request has failed, when the last of them did; how often the port was
+        #: opened since the last that did not, and when it was opened last.
         self._mute_since = math.inf
+        self._in_vain_at = -math.inf
         self._opened = 0
+        self._newly_at = -math.inf
+        #: Until when it is opened once more at the latest, s, and until when only once.
+        self._once_more = (math.inf, -math.inf)
         self.opened_at = self.moved_at = -math.inf
         #: When a silence ended that was long enough for an exchange: of the line, and of each unit.
         self._line_since = -math.inf
@@ -129,6 +136,7 @@ class Silences:
             return True
         if not isinstance(error, PortError) and (not self.heard or unit in self._last_frame_at):
             self._mute_since = min(self._mute_since, now)
+            self._in_vain_at = now
         return False
 
     def opened(self, now: float, *, lost: bool, same_place: bool = False) -> None:
@@ -145,24 +153,49 @@ class Silences:
                 self._line_since = now
         self._opened += 1
         self._mute_since = math.inf
+        self._newly_at = now
+        self._once_more = (math.inf, self._once_more[1])
 
-    def hurry(self) -> None:
-        """Have a port that is mute opened again soon, however often that was in vain."""
-        self._opened = 0
+    def hurry(self, at: float, end: float) -> None:
+        """Have a port that is mute opened once more, at this moment or before, until the end, s."""
+        first, last = self._once_more
+        self._once_more = (min(first, at), max(last, end))
 
     def mute_for(self, now: float) -> float:
         """Return for how long nothing has come, s, although units were asked; 0: not at all."""
         return max(0.0, now - self._mute_since)
 
-    def is_mute(self, now: float, lost_after: float) -> bool:
+    def reopen_at(self, last_byte_at: float, *, stop_waits: bool) -> float:
         """
-        Return whether the port is to be opened again.
+        Return when the port is to be opened again, for it is mute, s; infinity: it is not.
 
-        :param lost_after: how long every unit of the line may be silent, s.
+        :param last_byte_at: when the last byte came, be it of no use, s.
+        :param stop_waits: a motor is to be stopped.
         """
-        longest = min(_MUTE_STEP * self._opened, _MUTE_LONGEST)
-        least = longest if self.heard else _MUTE_FROM_THE_START
-        return now - self._mute_since >= max(lost_after, least)
+        since, opened = self._mute_since, self._opened
+        lost_after = max(self._lost_after.values(), default=math.inf)
+        at_last = since + max(lost_after, _MUTE_LONGEST)
+        if not self.heard or (opened and last_byte_at >= self._newly_at):
+            due = at_last
+        elif opened:
+            due = since + max(lost_after, _mute_pause(opened, stop_waits=stop_waits))
+        else:
+            due = min(max(since, last_byte_at) + lost_after, at_last)
+        at, end = self._once_more
+        if at == math.inf:
+            # it was opened once more, if that was wanted
+            return max(due, end)
+        return min(due, max(at, since + end - at))
+
+    def is_mute_at(self, moment: float, last_byte_at: float) -> bool:
+        """
+        Return whether it is known that the port is mute still at the moment when it is opened.
+
+        What takes just so long to start answers a request that is sent then; and where bytes came,
+        others may have come since if units had been asked.
+        """
+        is_doubtful = self._opened or last_byte_at > self._mute_since
+        return not is_doubtful or self._in_vain_at >= moment
 
     def paused(self, seconds: float) -> None:
         """Note that nothing was sent for so long, s, for the worker did not run."""
@@ -245,3 +278,10 @@ class Silences:
     def missing_from(self) -> float:
         """From when on a missing unit may get a request; at any time while no unit responds."""
         return min(self._pause_ends, self._any_frame_at + _MISSING_AFTER)
+
+
+def _mute_pause(opened: int, *, stop_waits: bool) -> float:
+    """Return how long a port is left alone that was opened so often in vain, s."""
+    if stop_waits:
+        return _MUTE_PAUSES_OF_A_STOP[(opened - 1) % len(_MUTE_PAUSES_OF_A_STOP)]
+    return _MUTE_PAUSES[min(opened, len(_MUTE_PAUSES)) - 1]

@@ -186,9 +186,14 @@ async def _follow(
 
 @dataclass(eq=False, slots=True)
 class Pause:
-    """A wait until a moment, or until the task is woken."""
+    """
+    A wait until a moment, or until the task is woken.
+
+    :ivar or_opening: it ends when the port is opened, too.
+    """
 
     until: float
+    or_opening: bool = False
 
     def __await__(self) -> Generator[Pause, None, None]:
         yield self
@@ -201,9 +206,13 @@ class Task:
         self,
         coroutine: Coroutine[Any, Any, Any],
         explain: Callable[[BaseException], BaseException] = lambda error: error,
+        *,
+        stops: bool = False,
     ) -> None:
         self._coroutine = coroutine
         self._explain = explain
+        #: It stops a motor.
+        self.stops = stops
         self.future: Future[Any] = Future()
         self.cancelled = False
         #: It is being stepped, so :class:`Cancelled` can only reach it where it awaits next.

@@ -114,8 +114,6 @@ class Bus:
         self._being_read_first: set[int] = set()
         self._read_before: set[int] = set()
         self._current: Task | None = None
-        #: How long each unit may be silent, s, until the port counts as mute.
-        self._lost_after: dict[int, float] = {}
         #: What looks whether the drive at a unit is lost, and whether its motor may run.
         self._watches: dict[int, tuple[Callable[[], float], Callable[[], bool]]] = {}
         #: Until when each unit is left alone, s.
@@ -160,7 +158,7 @@ class Bus:
             the coroutine has begun, where it cannot catch that itself.
         :param stops: it stops a motor, so what is on the line ends as soon as it can.
         """
-        task = Task(coroutine, explain)
+        task = Task(coroutine, explain, stops=stops)
         self._enter(task)
         if stops:
             # not before: the worker may be emptying its inbox
@@ -214,12 +212,7 @@ class Bus:
 
     def require_sign_of_life(self, unit: int, seconds: float) -> None:
         """Open the port again when no unit has answered for ``seconds``, the longest of all."""
-
-        def require() -> None:
-            self._lost_after[unit] = seconds
-            self.silences.watch(unit, seconds)
-
-        self.call(require)
+        self.call(lambda: self.silences.watch(unit, seconds))
 
     def on_silence(
         self, unit: int, look: Callable[[], float], may_run: Callable[[], bool]
@@ -263,10 +256,14 @@ class Bus:
             return consistent_read(unit, parts, priority)
         return Exchange(unit, operation, priority, require_wanted)
 
-    def last_tries(self, unit: int, seconds: float) -> None:
-        """Open a port that is mute within ``seconds``, however often that was in vain."""
-        self._lost_after[unit] = min(seconds, self._lost_after.get(unit, seconds))
-        self.silences.hurry()
+    def last_tries(self, seconds: float) -> None:
+        """
+        Open a port that is mute once more, in time for an end that takes ``seconds``.
+
+        After half of them at the latest, however often that was in vain; and not twice, for what is
+        behind it may restart each time.
+        """
+        self.silences.hurry(self.now() + seconds / 2, self.now() + seconds)
 
     def keep_quiet(self, unit: int, until: float) -> None:
         """
@@ -319,9 +316,9 @@ class Bus:
             unit, supervision.watch(unit, seconds), priority, tries, require_wanted
         )
 
-    def sleep(self, seconds: float) -> Pause:
-        """Let time pass (to be awaited)."""
-        return Pause(self.now() + seconds)
+    def sleep(self, seconds: float, *, or_opening: bool = False) -> Pause:
+        """Let time pass (to be awaited), or so much as is left until the port is opened."""
+        return Pause(self.now() + seconds, or_opening)
 
     @property
     def current(self) -> Task | None:
@@ -337,9 +334,13 @@ class Bus:
                 await self.sleep(timeout)
         return task.future.done()
 
-    def spawn(self, coroutine: Coroutine[Any, Any, Any]) -> Task:
-        """Start a coroutine in parallel; unexpected errors are logged."""
-        task = Task(coroutine)
+    def spawn(self, coroutine: Coroutine[Any, Any, Any], *, stops: bool = False) -> Task:
+        """
+        Start a coroutine in parallel; unexpected errors are logged.
+
+        :param stops: it stops a motor, so a port that is mute is not left alone for long.
+        """
+        task = Task(coroutine, stops=stops)
         task.future.add_done_callback(log_unexpected)
         self._advance(task, None, None)
         return task
@@ -421,7 +422,7 @@ class Bus:
         self._note_pause()
         self._take_in()
         self._ring_timers()
-        self._open_when_due()
+        reopen_at = self._open_when_due()
         lost_at = self._look_for_losses()
         quiet_until = self._line_quiet_until()
         supervised_at = math.inf
@@ -434,7 +435,7 @@ class Bus:
             return -math.inf
         paced_until = self._paced_until if self._scheduler.waits else math.inf
         missing_from = self.silences.missing_from if self._scheduler.missing_wait else math.inf
-        until = min(paced_until, missing_from, supervised_at)
+        until = min(paced_until, missing_from, supervised_at, reopen_at)
         if quiet_until:
             until = quiet_until
         return self._clock.until(min(self._sleepers.next_moment, lost_at, until))
@@ -629,24 +630,40 @@ class Bus:
         else:
             self.recorder.transaction(unit, now, seconds, error)
 
-    def _open_when_due(self) -> None:
-        """Open a port that is not open, or open and mute."""
+    def _open_when_due(self) -> float:
+        """Open a port that is not open, or open and mute; return when to call it again, s."""
         now, lost = self.now(), not self._port.is_open
+        due = self._port.reopen_at if lost else self._mute_until()
+        if now < due:
+            return due
+        # ahead of the request that shows whether it helps
         if not lost:
-            # ahead of the request that shows whether it helps
-            if not self.silences.mute_for(now):
-                return
-            if not self.silences.is_mute(now, max(self._lost_after.values(), default=math.inf)):
-                return
+            if not self.silences.is_mute_at(due, self._link.last_byte_at):
+                self._wake_for_port()
+                return math.inf
             if self.silences.heard:
                 self._report_mute(self.silences.mute_for(now))
-        elif now < self._port.reopen_at:
-            return
         self._port.open(now + REOPEN_PERIOD)
         if self._port.is_open:
             self.recorder.opened()
-            # where it is open already, it is the same port
-            self.silences.opened(self.now(), lost=lost, same_place=False)
+            at_same_place = self._port.is_at_same_place
+            self.silences.opened(self.now(), lost=lost, same_place=at_same_place)
+            self._wake_for_port()
+        return math.inf
+
+    def _mute_until(self) -> float:
+        """Return when a port that is open and mute is opened again, s; infinity: it is not."""
+        if not self.silences.mute_for(self.now()):
+            return math.inf
+        return self.silences.reopen_at(
+            self._link.last_byte_at, stop_waits=any(task.stops for task in self._tasks)
+        )
+
+    def _wake_for_port(self) -> None:
+        """End the pauses that last until the port is opened."""
+        for task in tuple(self._tasks):
+            if isinstance(task.awaited, Pause) and task.awaited.or_opening:
+                self.wake(task)
 
     def _report_mute(self, seconds: float) -> None:
         """Report on change for how long no unit has answered, s; 0: one does."""

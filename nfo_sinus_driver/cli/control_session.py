@@ -185,6 +185,7 @@ class ControlSession(Listener):
 
     def confirmed_late(self) -> bool:
         """Let a stop be retried for a while; true when the drive has confirmed it."""
+        self._session.last_tries(_LAST_TRIES)
         self._wait_while(lambda: self.drive.stop_unconfirmed, _LAST_TRIES)
         if self.drive.stop_unconfirmed or self.drive.stop_overdue:
             self.screen.say(

@@ -170,6 +170,10 @@ class Session:
         """Call a function, on the worker of the bus, as :meth:`Bus.on_mute`."""
         self._bus.on_mute(call)
 
+    def last_tries(self, seconds: float) -> None:
+        """Say that the line is used for so long yet, s, as :meth:`Bus.last_tries`."""
+        self._bus.call(lambda: self._bus.last_tries(seconds))
+
     def polled(self, address: int) -> None:
         """Record that one round of reading a drive is over."""
         now = time.monotonic()

@@ -326,7 +326,7 @@ class Drive:
             patience = min(patience, _FIRST_ANSWER)
         else:
             # time is left for the stop then
-            self._bus.last_tries(self._unit, patience / 2)
+            self._bus.last_tries(patience)
         until = self._bus.now() + patience
         answer = await self._deactivate(why, patience)
         if self._controller is not None and answer is not None:

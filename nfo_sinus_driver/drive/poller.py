@@ -286,7 +286,8 @@ class Poller:
                 if self._state.connected and self.active and polled_at > 0:
                     self._bus.recorder.cycle(self._unit, started - polled_at)
                 polled_at = started
-            await self._bus.sleep(self._pause(polled_at))
+            lost = not self._state.connected
+            await self._bus.sleep(self._pause(polled_at), or_opening=lost)
 
     async def _keep_alive(self) -> None:
         """

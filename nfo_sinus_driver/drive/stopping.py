@@ -32,8 +32,6 @@ _BLIND_STOPS = 2
 #: After how long without an answer of any drive a stop is written that would be read for first, s:
 #: in a shorter one what is in the drive may yet be read, and left as it is.
 _BLIND_AFTER = 0.4
-#: How often one is tried while the port is gone, s: nothing is sent by that.
-_PORT_RETRY_PERIOD = 0.1
 #: How much longer than its own time-out a drive is left alone, s.
 _LEFT_ALONE_LONGER = 0.5
 #: How often an unconfirmed stop is reported, s.
@@ -190,7 +188,7 @@ class StopSequence:
             self._refusals = self._unanswered = self._ignored = 0
             self.forced = False
             self._due = self._bus.now() + drive_state.TIMEOUT
-            task = self._bus.spawn(self._keep_trying())
+            task = self._bus.spawn(self._keep_trying(), stops=True)
             self._task = None if task.future.done() else task
         elif self.waits_to_look and self._bus.now() > self._tried_at + _LOOK_AGAIN_PERIOD:
             # one that is called for looks at once
@@ -334,16 +332,12 @@ class StopSequence:
         """
         timeout, now = self._state.timeout, self._bus.now()
         own = timeout.shortest if timeout.stops_motor else 0.0
-        if isinstance(self._failure, PortError):
-            # it goes out as soon as the port is there
-            await self._bus.sleep(_PORT_RETRY_PERIOD)
-            return
         if not own or self._may_write:
             pause = _LOST_RETRY_PERIOD if self._may_write else _LOOK_AGAIN_PERIOD
             if isinstance(self._failure, DamagedAnswer):
                 # that comes from something
                 pause = _RETRY_PERIOD
-            await self._bus.sleep(pause)
+            await self._bus.sleep(pause, or_opening=True)
             return
         unit = self._state.settings.address
         silences = self._bus.silences
@@ -354,7 +348,7 @@ class StopSequence:
             if self._bus.is_any_controlled:
                 named = self._state.report(Cause.MAY_RUN_ON, seconds=own)
                 self._state.notify(Severity.WARNING, named)
-        await self._bus.sleep(until - now)
+        await self._bus.sleep(until - now, or_opening=True)
         self._was_left_alone |= self._bus.now() >= until
 
     @property

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence, Set as AbstractSet
 import contextlib
 from dataclasses import replace
+import math
 import re
 import time
 
@@ -202,6 +203,7 @@ class CanopenLink:
         self._port = port
         self._settings = settings
         self.remarks = Remarks()
+        self.last_byte_at = -math.inf
         self._late: LateReplies[Transfer, Kind] = LateReplies(
             settings.response_timeout, lambda transfer: transfer.kinds
         )
@@ -450,6 +452,8 @@ class CanopenLink:
     def _note(self, frames: Sequence[Frame]) -> AbstractSet[int]:
         """Note the requests of others; return which nodes have restarted."""
         now = self._now()
+        if frames:
+            self.last_byte_at = now
         for frame in frames:
             kinds = self._another.hear(frame, now)
             if kinds:

@@ -275,6 +275,7 @@ class Link(Protocol):
 
     :ivar protocol: that of the line.
     :ivar remarks: what it has noticed.
+    :ivar last_byte_at: when the last byte has come, whatever it was, s; on CAN the last frame.
     :ivar clock: the clock of that thread, for what else it waits for, too.
     :ivar is_brief: the next answers are waited for no longer than the unit has ever taken: where
         many units have to get something, and may all be silent. One that took longer than ever is
@@ -283,6 +284,7 @@ class Link(Protocol):
 
     protocol: LineProtocol
     remarks: Remarks
+    last_byte_at: float
     clock: ThreadClock
     is_brief: bool
 

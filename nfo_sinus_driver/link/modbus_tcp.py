@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 import contextlib
+import math
 import struct
 import time
 from typing import Any, TypeVar
@@ -153,6 +154,7 @@ class TcpLink(ModbusLink):
         self._closings = 0
         self._blocks = telegram.Blocks(self.exchange, now)
         self.remarks = Remarks()
+        self.last_byte_at = -math.inf
 
     def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
         """Wait for no more than the answer to the request that was sent, where a stop waits."""
@@ -343,6 +345,8 @@ class TcpLink(ModbusLink):
         while True:
             data = connection.read(self._now.until(deadline))
             now = self._now()
+            if data:
+                self.last_byte_at = now
             for number, message in self._reader.feed(data):
                 if number == self._number:
                     self._note_answer()

@@ -18,6 +18,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 import contextlib
+import math
 import time
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -152,6 +153,7 @@ class RequestLink(ABC, Generic[_Request]):
         self._port = port
         self._settings = settings
         self.remarks = Remarks()
+        self.last_byte_at = -math.inf
         self._echo = Echo()
         #: When the last known byte was on the line.
         self._line_end = 0.0
@@ -375,7 +377,7 @@ class RequestLink(ABC, Generic[_Request]):
         give_up = max(self._line_end + gap, self._now()) + wait
         came = b''
         while True:
-            data = self._port.read(self._now.until(self._line_end + gap))
+            data = self._take(self._line_end + gap)
             now = self._now()
             if data:
                 came += data
@@ -395,10 +397,17 @@ class RequestLink(ABC, Generic[_Request]):
         self._port.write(frame)
         return self._sent_at
 
+    def _take(self, until: float) -> bytes:
+        """Return what has come, as the port does."""
+        data = self._port.read(self._now.until(until))
+        if data:
+            self.last_byte_at = self._now()
+        return data
+
     def _listen(self, until: float) -> bytes:
         """Return the next bytes on the line until a moment, or none once a stop waits."""
         while (now := self._now()) < until and not self.stop_waits():
-            data = self._port.read(self._now.until(min(until, now + LISTENING_STEP)))
+            data = self._take(min(until, now + LISTENING_STEP))
             if data:
                 self._line_end = max(self._line_end, self._now())
                 return data
@@ -407,7 +416,7 @@ class RequestLink(ABC, Generic[_Request]):
     def _read_line(self, until: float) -> bytes:
         """Return the next bytes on the line until a moment; empty: it has passed."""
         while True:
-            data = self._port.read(self._now.until(until))
+            data = self._take(until)
             now = self._now()
             if data:
                 # bytes that come while the request is still being sent are no answer to it

@@ -319,7 +319,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         refusals: list[Refused] = []
         while True:
             look = last + LONG_PAUSE if came and not looked else deadline
-            data = self._port.read(self._now.until(min(look, deadline)))
+            data = self._take(min(look, deadline))
             now = self._now()
             if not data:
                 looked = now >= look

@@ -168,8 +168,8 @@ class BusNode(Node):
         if seconds:
             self.get_logger().warning(
                 f'{self._port}: no drive has answered for {seconds:.1f} s: the port is opened '
-                'again, and every few seconds until one answers; check power, cable, and adapter '
-                'or gateway'
+                'again, in growing pauses until one answers; check power, cable, and adapter or '
+                'gateway'
             )
         else:
             self.get_logger().info(f'{self._port}: drives answer again')

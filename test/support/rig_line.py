@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 import heapq
 import itertools
+import math
 from random import Random
 from typing import Any
 
@@ -79,13 +80,13 @@ class Line:
         bus.
     :ivar opened: when the port was opened.
     :ivar sent_at: when the port took a frame last.
+    :ivar boots_for: how long nothing passes after each opening, s, for what is there restarts by
+        it; :ivar banner: what it says then at once.
     :ivar place: where it is; a test may plug it in somewhere else.
     :ivar losses: how many answers are still lost; :ivar unheard: how many requests are;
         :ivar doubled: how many answers come twice.
     :ivar plan: called with each request; what it returns goes wrong with it: one of
         :data:`~nfo_sinus_driver.simulator.line_faults.ANSWER_FAULTS` or ``unheard``.
-    :ivar boots_for: nothing passes for so long after the port was opened, s: a board that restarts
-        with it.
     :ivar passed: called whenever the clock went on.
     :ivar frames: every frame, as :class:`~nfo_sinus_driver.simulator.line.Trace` writes them.
     :ivar drives: the simulated ones, by address.
@@ -147,6 +148,8 @@ class Line:
         self.opened: list[float] = []
         self.sent_at = -_NEVER
         self.mute_for = 1
+        self.boots_for = 0.0
+        self.banner = b''
         self.place = 'the first socket'
         self.sessions: list[Session] = []
         self.refuses = self.lost = self.closes = False
@@ -316,6 +319,8 @@ class Line:
     def note_opening(self) -> None:
         """Note that the port is opened, or a connection: a mute one may end by that."""
         self.opened.append(self.clock.now)
+        if self.boots_for:
+            self._come += self.banner
         if self.state == 'mute':
             self.mute_for -= 1
             if not self.mute_for:

@@ -56,6 +56,7 @@ class FakeLink:
     remarks = Remarks()
     supervision: Supervision | None = None
     place = ''
+    last_byte_at = -math.inf
 
     def __init__(self) -> None:
         self.done: list[Done] = []

@@ -16,11 +16,13 @@ import select
 import signal
 import subprocess
 import time
+from types import SimpleNamespace
 from typing import Any
 
 from cli_bench import COMMAND, PATIENCE, QUICK, ROOT, Bench, Done, MakeBench, wait_until
 import pytest
 
+from nfo_sinus_driver.cli.control_session import ControlSession
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.state_folder import StateFolder
 
@@ -632,3 +634,20 @@ def test_a_drive_whose_stop_takes_its_time_is_enabled_when_it_is_confirmed(
     assert done.status == 0, done.err
     assert '10.0 Hz' in done.out
     assert not bench.state()['driven']
+
+
+def test_the_last_tries_of_a_stop_open_a_mute_port_once_more() -> None:
+    tries: list[float] = []
+    lines: list[str] = []
+    session: Any = SimpleNamespace(
+        drive=lambda: None, on_mute=lambda call: None, last_tries=tries.append
+    )
+    screen: Any = SimpleNamespace(say=lines.append)
+    drive: Any = SimpleNamespace(stop_unconfirmed=False, stop_overdue=True)
+    signals: Any = None
+    control = ControlSession(session, screen, signals, ())
+    control.drive = drive
+    assert not control.confirmed_late()
+    # long enough for what starts after it
+    assert len(tries) == 1 and tries[0] >= 8.0
+    assert 'WITHOUT a confirmed stop' in lines[0]

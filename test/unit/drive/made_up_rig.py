@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 import struct
 from typing import Any
 
@@ -36,6 +37,7 @@ class FarEnd:
     remarks = Remarks()
     supervision = None
     place = ''
+    last_byte_at = -math.inf
     write_and_read = read_then_write = None
     rig: MadeUpRig
 

@@ -57,11 +57,99 @@ def test_it_is_opened_again_and_again_at_growing_intervals() -> None:
         assert rig.far.motor.frequency > 0
         _, *again = rig.line.opened
         pauses = [later - before for before, later in itertools.pairwise(again)]
-        assert pauses[0] < 4.0 < pauses[-1] < 8.0 and pauses == sorted(pauses)
+        assert pauses == pytest.approx([2, 4, 8, 8, 8, 8, 8][: len(pauses)], abs=1.5)
+        assert pauses == sorted(pauses) and len(pauses) > 2
         rig.wait_until(lambda: rig.line.state == 'whole')
         rig.pass_time(2.0)
         assert not rig.turns
         assert len(reports.all) == 2
+
+
+#: How long what is behind the port takes to start after each opening, s: what is opened again in
+#: that time restarts. The last is the longest pause while a stop is owed.
+STARTS = 3.0, 7.0, 8.0
+
+
+def go_mute(rig: Rig) -> None:
+    """Have nothing pass from now on, until the port was opened again."""
+    if rig.connection.protocol == 'modbus_tcp':
+        rig.line.sessions[-1].mute = True
+    else:
+        rig.line.state = 'mute'
+
+
+@pytest.mark.parametrize('seconds', STARTS)
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'tcp'])
+def test_what_starts_when_it_is_opened_has_the_time_for_it(connection: str, seconds: float) -> None:
+    with Rig(connection) as rig:
+        rig.turn()
+        rig.line.boots_for = seconds
+        go_mute(rig)
+        # the last pause is the first that is long enough: after 1, 2, 4 s and 8 s of starting
+        rig.pass_time(1 + 2 + 4 + 8 + 5)
+        assert not rig.turns and rig.drive.snapshot.connected
+        rig.assert_only_enable_helps()
+
+
+@pytest.mark.parametrize('seconds', [14.0, 29.0])
+@pytest.mark.parametrize('connection', ['rtu', 'tcp'])
+def test_what_takes_longer_has_that_where_no_stop_waits(connection: str, seconds: float) -> None:
+    with Rig(connection) as rig:
+        rig.connect()
+        rig.line.boots_for = seconds
+        go_mute(rig)
+        rig.pass_time(1 + 2 + 4 + 8 + 15 + 30 + 6)
+        assert rig.drive.snapshot.connected
+
+
+@pytest.mark.parametrize('connection', ['rtu', 'tcp'])
+def test_what_takes_longer_is_heard_in_the_end_although_a_stop_waits(connection: str) -> None:
+    with Rig(connection) as rig:
+        rig.turn()
+        rig.line.boots_for = 25.0
+        go_mute(rig)
+        rig.wait_until(lambda: not rig.turns, 1 + 2 + 4 + 10 * 8 + 25 + 15)
+        rig.wait_until(lambda: rig.drive.snapshot.connected, 2.0)
+
+
+@pytest.mark.parametrize('openings', [1, 2, 3, 4])
+@pytest.mark.parametrize('connection', ['rtu', 'optimal', 'canopen', 'described'])
+def test_the_stop_goes_out_at_once_after_an_opening(connection: str, openings: int) -> None:
+    with Rig(connection) as rig:
+        rig.turn()
+        rig.line.state, rig.line.mute_for = 'mute', openings
+        rig.wait_until(lambda: not rig.turns)
+        assert len(rig.line.opened) == 1 + openings
+        # what is read before, so that no other drive is stopped, included
+        assert rig.clock.now - rig.line.opened[-1] < 0.4
+
+
+@pytest.mark.parametrize('seconds', [7.0, 12.0])
+def test_a_port_that_says_anything_is_not_opened_again_meanwhile(seconds: float) -> None:
+    with Rig() as rig:
+        rig.turn()
+        rig.line.boots_for, rig.line.banner = seconds, b'ready soon\r\n'
+        rig.line.state = 'mute'
+        rig.pass_time(1 + seconds + 3)
+        assert not rig.turns and len(rig.line.opened) == 2
+
+
+def test_a_port_that_says_nothing_else_is_opened_again_all_the_same() -> None:
+    """Its rate may be another one until it is opened again."""
+    with Rig() as rig:
+        rig.turn()
+        rig.line.banner, rig.line.mute_for = b'\xff\x55', 2
+        rig.line.state, rig.line.boots_for = 'mute', 0.001
+        rig.pass_time(38.0)
+        assert not rig.turns and len(rig.line.opened) == 3
+
+
+def test_noise_opens_nothing() -> None:
+    with Rig() as rig:
+        rig.connect()
+        rig.line.state = 'noise'
+        rig.pass_time(10.0)
+        assert len(rig.line.opened) == 1
 
 
 def test_it_is_opened_at_once_when_it_goes_mute_anew() -> None:
@@ -112,7 +200,7 @@ def test_a_drive_that_is_switched_off_costs_little() -> None:
         reports = Reports(rig)
         rig.line.unplug(1)
         rig.pass_time(600.0)
-        assert 60 < len(rig.line.opened) < 110
+        assert 20 < len(rig.line.opened) < 30
         assert len(reports.all) == 1
         rig.line.unplug()
         rig.pass_time(10.0)
@@ -153,6 +241,16 @@ def test_an_end_opens_it_once_more_before_it_gives_up(connection: str, lost_afte
         assert len(rig.line.opened) == 2
 
 
+@pytest.mark.parametrize(('patience', 'seconds'), [(6.0, 3.0), (16.0, 7.0)])
+def test_an_end_opens_it_only_once(patience: float, seconds: float) -> None:
+    with Rig() as rig:
+        rig.turn()
+        rig.line.state, rig.line.boots_for = 'mute', seconds
+        answer = rig.answer(rig.drive.stop_for_good(patience))
+        assert 'NOT' not in answer and not rig.turns
+        assert len(rig.line.opened) == 2
+
+
 def test_an_end_without_patience() -> None:
     with Rig() as rig:
         rig.turn()
@@ -166,7 +264,7 @@ def test_an_end_does_not_wait_for_the_next_try() -> None:
         rig.turn()
         rig.line.state, rig.line.mute_for = 'mute', 100
         rig.pass_time(60.0)
-        rig.wait_until(lambda: rig.clock.now - rig.line.opened[-1] < 0.1)
+        rig.wait_until(lambda: rig.clock.now - rig.line.opened[-1] < 0.7)
         rig.line.mute_for = 1
         answer = rig.answer(rig.drive.stop_for_good(rig.drive.settings.shutdown_timeout))
         assert 'NOT' not in answer and not rig.turns
@@ -197,6 +295,19 @@ def test_a_node_that_watches_the_driver_goes_on_watching_it(state: str, watch: s
         rig.kill()
         rig.line.go_to(rig.clock.now + 5.0)
         assert rig.far.faults and not rig.turns
+
+
+@pytest.mark.parametrize('seconds', [0.3, 1.5])
+def test_all_stops_go_out_at_once_when_a_lost_port_is_back(seconds: float) -> None:
+    with Rig(drives=4) as rig:
+        rig.turn()
+        rig.line.state = 'gone'
+        rig.pass_time(seconds)
+        rig.line.state = 'whole'
+        rig.wait_until(
+            lambda: not any(far.motor.driven and far.motor.demand for far in rig.fars.values())
+        )
+        assert rig.clock.now - rig.line.opened[-1] < 0.5
 
 
 def test_what_takes_the_port_meanwhile_is_named() -> None:
