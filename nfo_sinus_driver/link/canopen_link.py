@@ -241,6 +241,8 @@ class CanopenLink:
     def open(self) -> None:
         """Open the port."""
         self._port.open()
+        if self._port.remark:
+            self.remarks.add(self._port.remark)
         self.supervision.opened()
 
     def close(self) -> None:

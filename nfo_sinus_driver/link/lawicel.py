@@ -164,6 +164,8 @@ class LawicelPort:
     :raises ValueError: there is no such bit rate; the message says which ones there are.
     """
 
+    remark = ''
+
     def __init__(self, port: Port, rate: int, now: Clock = time.monotonic) -> None:
         self._now = now
         self._port = port

@@ -53,6 +53,7 @@ class Bus:
         self._fates = iter(fates)
         self.now = 1000.0
         self.trouble = ''
+        self.remark = ''
         self.is_open = False
         self.servers = {
             unit: Server({**MANDATORY, (0x2013, 0): b'', (0x2022, 0): b'', (0x1008, 0): b''})

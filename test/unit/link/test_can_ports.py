@@ -15,6 +15,7 @@ import socket
 import struct
 import threading
 import tty
+from types import SimpleNamespace
 from typing import Any
 
 from canopen_far_end import Server
@@ -284,17 +285,19 @@ def test_no_node_behind_an_adapter(pty_bus: PtyBus) -> None:
 
 class PaperSocket:
     """
-    A CAN socket; a pipe is what ``select`` sees of it.
+    A CAN socket, and the queue of its interface; a pipe is what ``select`` sees of it.
 
     :ivar fails: with which error each of its methods fails.
+    :ivar leaves: what is sent leaves the interface at once, and comes back.
     """
 
     def __init__(self) -> None:
         self.options: list[tuple[int, int, bytes]] = []
         self.bound: tuple[str, ...] | None = None
         self.sent: list[bytes] = []
-        self.coming: list[bytes] = []
+        self.coming: list[tuple[bytes, int]] = []
         self.fails: dict[str, int] = {}
+        self.leaves = True
         self.is_open = True
         self._ready, self._wake = os.pipe()
 
@@ -315,23 +318,30 @@ class PaperSocket:
         self._may_fail('bind')
         self.bound = address
 
-    def arrive(self, *frames: bytes) -> None:
-        self.coming += frames
+    def arrive(self, *frames: bytes, flags: int = 0) -> None:
+        self.coming += [(frame, flags) for frame in frames]
         os.write(self._wake, b'x')
 
-    def recv(self, size: int) -> bytes:
-        self._may_fail('recv')
+    def recvmsg(self, size: int) -> tuple[bytes, list[Any], int, None]:
+        self._may_fail('recvmsg')
         if not self.coming:
-            os.read(self._ready, 1)
+            if select.select([self._ready], [], [], 0)[0]:
+                os.read(self._ready, 100)
             raise BlockingIOError
-        data = self.coming.pop(0)
+        data, flags = self.coming.pop(0)
         assert len(data) == size
-        return data
+        return data, [], flags, None
 
     def send(self, data: bytes) -> int:
         self._may_fail('send')
         self.sent.append(data)
+        if self.leaves:
+            self.leave(data)
         return len(data)
+
+    def leave(self, data: bytes) -> None:
+        """Have a frame leave the interface."""
+        self.arrive(data, flags=socket.MSG_CONFIRM | socket.MSG_DONTROUTE)
 
     def close(self) -> None:
         if self.is_open:
@@ -350,6 +360,7 @@ def paper(monkeypatch: pytest.MonkeyPatch) -> Iterator[PaperSocket]:
         return paper
 
     monkeypatch.setattr(can.socket, 'socket', make)
+    monkeypatch.setattr(can, 'restart_ms', lambda name: 100)
     yield paper
     paper.close()
 
@@ -367,16 +378,21 @@ def make(name: str = 'can0') -> SocketCan:
 def test_a_socket_lets_in_what_is_wanted_and_nothing_else(paper: PaperSocket) -> None:
     make().open()
     assert paper.bound == ('can0',)
-    # no extended, remote or error frames either
-    expected = struct.pack('=II', 0x580, 0x780 | 0xE0000000)
-    assert paper.options == [(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, expected)]
+    # no extended, remote or error frames either; but of what it sends itself, commands and requests
+    # for the state of a node
+    let_in = (0x580, 0x780 | 0xE0000000), (0, 0xE00007FF), (0x40000700, 0xE0000780)
+    expected = b''.join(struct.pack('=II', *one) for one in let_in)
+    assert paper.options == [
+        (socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, expected),
+        (socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, struct.pack('=i', 1)),
+    ]
 
 
 def test_a_link_lets_in_answers_signs_of_life_and_requests_of_others(paper: PaperSocket) -> None:
     CanopenLink.on_port('can0', LineSettings(125_000, '8N1')).open()
-    ((_, _, filters),) = paper.options
+    (_, _, filters), _ = paper.options
     identifiers = [identifier for identifier, _ in struct.iter_unpack('=II', filters)]
-    assert sorted(identifiers) == [0x580, 0x600, 0x700]
+    assert sorted(identifiers) == [0, 0x580, 0x600, 0x700, 0x40000700]
 
 
 def test_frames_of_a_socket(paper: PaperSocket) -> None:
@@ -426,23 +442,252 @@ def test_bus_off_is_told_with_the_command(
     paper: PaperSocket, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(can, '_INTERFACES', tmp_path)
+    monkeypatch.setattr(can, 'restart_ms', lambda name: None)
     (tmp_path / 'can0').mkdir()
     carrier = tmp_path / 'can0' / 'carrier'
     port = make()
     port.open()
-    assert port.trouble == ''
+    assert port.trouble == '' and port.remark == ''
     carrier.write_text('1\n', encoding='ascii')
     assert port.trouble == ''
     carrier.write_text('0\n', encoding='ascii')
     # a frame that is sent is dropped without an error
     port.send(REQUEST)
     assert re.search(
-        'can0 is in bus-off.*sudo ip link set can0 down, then sudo ip link set can0 up type can '
-        'restart-ms 100',
+        'can0 is in bus-off.*where it does not restart by itself, sudo ip link set can0 down, '
+        'then sudo ip link set can0 up type can restart-ms 100',
         port.trouble,
     )
     carrier.write_text('1\n', encoding='ascii')
     assert port.trouble == ''
+
+
+class Interface:
+    """
+    An interface, its files in sysfs, and the time; its queue is that of the paper socket.
+
+    :ivar now: the time, s.
+    """
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self._folder = folder / 'can0'
+        self._folder.mkdir()
+        self._changes = 0
+        self.now = 100.0
+        monkeypatch.setattr(can, '_INTERFACES', folder)
+        monkeypatch.setattr(can, 'time', SimpleNamespace(monotonic=lambda: self.now))
+        monkeypatch.setattr(can, 'select', SimpleNamespace(select=self._wait))
+        self.show('1')
+
+    def show(self, carrier: str) -> None:
+        """Be in bus-off (``0``), or out of it."""
+        self._changes += 1
+        for name, text in (('carrier', carrier), ('carrier_changes', self._changes)):
+            (self._folder / name).write_text(f'{text}\n', encoding='ascii')
+
+    def _wait(self, ready: Any, _: Any, __: Any, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.fixture
+def interface(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Interface:
+    return Interface(tmp_path, monkeypatch)
+
+
+#: A set-point, and a stop.
+SETPOINT, STOP = Frame(0x605, bytes(7) + b'\1'), Frame(0x605, bytes(7) + b'\2')
+
+
+def raw_of(*frames: Frame) -> list[bytes]:
+    return [raw(frame.identifier, frame.data) for frame in frames]
+
+
+@pytest.fixture
+def port(paper: PaperSocket, interface: Interface) -> SocketCan:
+    port = SocketCan('can0', ((0x580, 0x780), (0x600, 0x780)))
+    port.open()
+    return port
+
+
+def test_the_next_frame_waits_until_the_one_before_has_left(
+    paper: PaperSocket, port: SocketCan
+) -> None:
+    paper.leaves = False
+    port.send(SETPOINT)
+    port.send(STOP)
+    assert paper.sent == raw_of(SETPOINT)
+    paper.leave(paper.sent[0])
+    # what comes back is no frame of another
+    assert port.receive(0.0) == [] and paper.sent == raw_of(SETPOINT, STOP)
+
+
+def test_frames_leave_one_after_the_other_without_a_wait(
+    paper: PaperSocket, port: SocketCan, interface: Interface
+) -> None:
+    command, guarding = Frame(0, b'\1\5'), Frame(0x705, bytes(1), remote=True)
+    for frame in (command, guarding, SETPOINT):
+        port.send(frame)
+    assert port.receive(interface.now) == []
+    assert paper.sent == [raw(0, b'\1\5'), raw(0x40000705, bytes(1)), *raw_of(SETPOINT)]
+
+
+@pytest.fixture
+def sockets(paper: PaperSocket, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[PaperSocket]]:
+    """Yield all sockets of the interface, the newest one last; nothing leaves it."""
+    sockets = [paper]
+    paper.leaves = False
+
+    def make(*_: int) -> PaperSocket:
+        sockets.append(PaperSocket())
+        sockets[-1].leaves = False
+        return sockets[-1]
+
+    monkeypatch.setattr(can.socket, 'socket', make)
+    yield sockets
+    for one in sockets:
+        one.close()
+
+
+def sent(sockets: list[PaperSocket]) -> list[bytes]:
+    """Return what was handed to the interface, by any of them."""
+    return [frame for one in sockets for frame in one.sent]
+
+
+@pytest.mark.parametrize('restart', ['it leaves', 'it is lost'])
+def test_in_bus_off_one_frame_is_handed_over_and_then_the_stop(
+    sockets: list[PaperSocket], port: SocketCan, interface: Interface, restart: str
+) -> None:
+    interface.show('0')
+    for number in range(60):
+        port.send(Frame(0x605, bytes((0x2B, 0x22, 0x20, 0, number, 0, 0, 0))))
+        port.send(Frame(0x77F, b'\5'))
+        assert port.receive(interface.now + 0.2) == []
+        if number % 10 == 9:
+            port.open()
+    (old,) = sent(sockets)
+    assert len(sockets) > 5 and 'is in bus-off' in port.trouble
+    # the bus is back
+    if restart == 'it leaves':
+        sockets[-1].arrive(old, flags=socket.MSG_DONTROUTE)
+    interface.show('1')
+    port.send(STOP)
+    port.receive(interface.now + 0.1)
+    assert sent(sockets) == [old, *raw_of(STOP)]
+
+
+def test_where_no_node_listens_one_frame_waits_and_is_given_up_in_the_end(
+    sockets: list[PaperSocket], port: SocketCan, interface: Interface
+) -> None:
+    port.send(SETPOINT)
+    for _ in range(4):
+        port.receive(interface.now + 2.0)
+        port.open()
+        port.send(REQUEST)
+    assert sent(sockets) == raw_of(SETPOINT)
+    port.receive(interface.now + 2.1)
+    port.open()
+    port.send(STOP)
+    assert sent(sockets) == raw_of(SETPOINT, STOP)
+
+
+def test_a_frame_that_bus_off_has_swallowed_is_not_waited_for(
+    paper: PaperSocket, port: SocketCan, interface: Interface
+) -> None:
+    paper.leaves = False
+    port.send(SETPOINT)
+    interface.show('0')
+    port.receive(interface.now + 1.0)
+    paper.sent.clear()
+    # it restarts by itself, and nothing comes back
+    interface.show('1')
+    port.send(STOP)
+    assert paper.sent == raw_of(STOP)
+
+
+def test_on_a_bus_that_works_a_frame_that_does_not_come_back_is_not_waited_for(
+    paper: PaperSocket, port: SocketCan, interface: Interface
+) -> None:
+    paper.leaves = False
+    port.send(SETPOINT)
+    interface.now += 0.05
+    paper.arrive(raw(0x585, ANSWER.data))
+    assert port.receive(0.0) == [ANSWER]
+    port.send(STOP)
+    assert paper.sent == raw_of(SETPOINT), 'it may have to wait for others'
+    interface.now += 0.06
+    paper.arrive(raw(0x586, ANSWER.data))
+    assert port.receive(0.0) == [Frame(0x586, ANSWER.data)]
+    assert paper.sent == raw_of(SETPOINT, STOP)
+
+
+def test_a_frame_that_waits_too_long_never_leaves(
+    paper: PaperSocket, port: SocketCan, interface: Interface
+) -> None:
+    paper.leaves = False
+    port.send(REQUEST)
+    port.send(SETPOINT)
+    port.receive(interface.now + 0.5)
+    assert port.trouble == can.CANNOT_SEND
+    port.send(STOP)
+    paper.leave(paper.sent[0])
+    port.receive(0.0)
+    assert paper.sent == raw_of(REQUEST, STOP) and port.trouble == ''
+
+
+def test_a_frame_outlasts_its_socket(sockets: list[PaperSocket], port: SocketCan) -> None:
+    port.send(SETPOINT)
+    port.open()
+    port.send(STOP)
+    assert sent(sockets) == raw_of(SETPOINT)
+    # for this socket it is one of another, of the same computer
+    sockets[-1].arrive(*raw_of(SETPOINT), flags=socket.MSG_DONTROUTE)
+    assert port.receive(0.0) == [] and sent(sockets) == raw_of(SETPOINT, STOP)
+
+
+def test_another_program_of_this_computer_is_heard(paper: PaperSocket, port: SocketCan) -> None:
+    port.send(STOP)
+    paper.arrive(raw(0x605, SETPOINT.data), flags=socket.MSG_DONTROUTE)
+    paper.arrive(raw(0, b'\2\5'), flags=socket.MSG_DONTROUTE)
+    assert port.receive(0.0) == [SETPOINT], 'and no command of another'
+
+
+@pytest.mark.parametrize('number', [errno.ENETDOWN, errno.ENODEV])
+def test_an_interface_that_was_down_has_nothing_in_its_queue(
+    sockets: list[PaperSocket], port: SocketCan, number: int
+) -> None:
+    port.send(SETPOINT)
+    sockets[-1].fails['recvmsg'] = number
+    with pytest.raises(PortError, match='can0'):
+        port.receive(0.0)
+    port.open()
+    port.send(STOP)
+    assert sockets[-1].sent == raw_of(STOP)
+
+
+@pytest.mark.parametrize(
+    ('restart', 'remark', 'trouble'),
+    [
+        (0, 'stays in bus-off for good.*sudo ip link set can0 down, then', 'bit rate; sudo ip'),
+        (100, '^$', 'bit rate; it restarts by itself every 100 ms$'),
+        (None, '^$', 'bit rate; where it does not restart by itself, sudo ip link'),
+    ],
+)
+def test_an_interface_that_stays_in_bus_off_is_told(
+    interface: Interface,
+    paper: PaperSocket,
+    monkeypatch: pytest.MonkeyPatch,
+    restart: int | None,
+    remark: str,
+    trouble: str,
+) -> None:
+    monkeypatch.setattr(can, 'restart_ms', lambda name: restart)
+    link = CanopenLink.on_port('can0', LineSettings(125_000, '8N1'))
+    link.open()
+    assert re.search(remark, ''.join(link.remarks.texts))
+    interface.show('0')
+    with pytest.raises(NoAnswer, match=trouble):
+        link.read(5, Address('object', 0x2022, None, 2))
+    link.close()
 
 
 @pytest.mark.parametrize(
@@ -451,8 +696,8 @@ def test_bus_off_is_told_with_the_command(
         ('socket', errno.EAFNOSUPPORT, 'this kernel has no SocketCAN'),
         ('bind', errno.ENODEV, r'there is no CAN interface can0: .* Interfaces there are: vcan7'),
         ('send', errno.ENETDOWN, 'can0 is down: sudo ip link set can0 up type can bitrate'),
-        ('recv', errno.ENETDOWN, 'can0 is down'),
-        ('recv', errno.EIO, 'can0 was lost'),
+        ('recvmsg', errno.ENETDOWN, 'can0 is down'),
+        ('recvmsg', errno.EIO, 'can0 was lost'),
     ],
 )
 def test_what_is_wrong_with_an_interface(
@@ -471,7 +716,7 @@ def test_what_is_wrong_with_an_interface(
     port = make()
     acts: dict[str, Callable[[], Any]] = {
         'send': lambda: port.send(REQUEST),
-        'recv': lambda: (paper.arrive(b''), port.receive(0.0)),
+        'recvmsg': lambda: (paper.arrive(b''), port.receive(0.0)),
     }
     with pytest.raises(PortError, match=problem):
         port.open()

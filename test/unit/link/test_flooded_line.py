@@ -59,7 +59,7 @@ class Flood:
 
     # as a port of a CAN bus
 
-    trouble = ''
+    trouble = remark = ''
     send = write
 
     def receive(self, until: float) -> list[Frame]:

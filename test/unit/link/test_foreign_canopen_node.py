@@ -58,7 +58,7 @@ def dictionary() -> objectdictionary.ObjectDictionary:
 class Bridge:
     """A port of the link with the library's node on it; what it says is heard at once."""
 
-    trouble = ''
+    trouble = remark = ''
 
     def __init__(self) -> None:
         self.node = canopen.LocalNode(UNIT, dictionary())
