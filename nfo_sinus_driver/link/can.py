@@ -89,8 +89,9 @@ _FRAME = struct.Struct('=IB3x8s')
 #: How many frames are taken at once: on a full bus more keep coming.
 _MOST_AT_ONCE = 1000
 _FILTER = struct.Struct('=II')
-#: Extended, remote and error frames: in the identifier.
-_OTHER_FRAMES = 0xE000_0000
+#: Extended and remote frames: in the identifier. In a filter the bit of error frames lets in these,
+#: and nothing else.
+_OTHER_FRAMES = 0xC000_0000
 #: The second of them alone.
 _REMOTE = 0x4000_0000
 #: What a client of CANopen sends and none has to answer: commands to nodes, and requests for their
@@ -115,10 +116,11 @@ _NO_CARRIER, _CARRIER = '0', '1'
 
 
 class _Queued(NamedTuple):
-    """A frame that the interface has, and since when, s."""
+    """A frame that the interface has, since when, s, and by which socket."""
 
     raw: bytes
     since: float
+    sender: socket.socket
 
 
 class SocketCan:
@@ -129,7 +131,8 @@ class SocketCan:
     of the interface: what stands there leaves when the bus is back, a set-point seconds old, too.
     So one frame at most is handed over. Linux returns it when it has left, and then the next one
     is; what waits for that too long never leaves. One that is not returned has left or is lost
-    where others have come since, or where the interface was in bus-off meanwhile.
+    where others have come since, or where the interface was in bus-off meanwhile. A driver of Linux
+    that returns none, though nodes answer, is not waited for.
 
     :param name: of the interface, such as ``can0``.
     :param filters: identifiers, and by which of their bits frames are let in.
@@ -149,6 +152,8 @@ class SocketCan:
         self._is_full = False
         #: The frame of ours that the interface has; it outlasts the socket.
         self._queued: _Queued | None = None
+        #: The driver of the interface returns what has left.
+        self._returns = True
         #: Those that wait for it, and until when, s.
         self._waiting: dict[bytes, float] = {}
         #: What has come and was not taken yet.
@@ -271,27 +276,32 @@ class SocketCan:
         queued = self._queued
         self._is_full = False
         is_ours = bool(flags & socket.MSG_CONFIRM)
-        # of one that was sent by the socket before it is only said that it is of this computer
-        if queued is not None and raw == queued.raw and (is_ours or flags & socket.MSG_DONTROUTE):
-            is_ours, self._queued = True, None
+        if queued is not None and raw == queued.raw:
+            # of a socket that was closed meanwhile nothing is said
+            is_ours = is_ours or queued.sender is not self._socket
+            self._queued = None if is_ours else queued
         if is_ours:
+            self._returns = True
             return
+        identifier, length, data = _FRAME.unpack(raw)
+        if queued is not None and _node(raw) == _node(queued.raw):
+            # an answer to it
+            self._returns = False
         if self._queued_for >= _LEAVES_IN:
             # the bus works, so it has left, or never will
             self._queued = None
-        identifier, length, data = _FRAME.unpack(raw)
         is_wanted = any((identifier ^ one) & mask == 0 for one, mask in self._wanted)
         if identifier in IDENTIFIERS and length <= MOST_DATA and is_wanted:
             self._come.append(Frame(identifier, data[:length]))
 
     def _go_on(self) -> None:
         """Hand over what waits, as far as nothing of ours is in the queue of the interface."""
-        while self._waiting and (self._queued is None or self._was_in_bus_off):
-            self._queued = None
+        now = time.monotonic()
+        self._waiting = {raw: until for raw, until in self._waiting.items() if until >= now}
+        while self._waiting and self._is_free:
             raw = next(iter(self._waiting))
-            now = time.monotonic()
-            if self._waiting.pop(raw) < now:
-                continue
+            del self._waiting[raw]
+            self._queued = None
             try:
                 self._bus.send(raw)
             except OSError as error:
@@ -299,14 +309,17 @@ class SocketCan:
                     raise self._lost(error) from error
                 self._is_full = True
             else:
-                self._queued = _Queued(raw, now)
-        now = time.monotonic()
-        self._waiting = {raw: until for raw, until in self._waiting.items() if until >= now}
+                self._queued = _Queued(raw, now, self._bus)
 
     @property
     def _queued_for(self) -> float:
         """For how long the interface has had a frame of ours, s; 0: it has none."""
         return 0.0 if self._queued is None else time.monotonic() - self._queued.since
+
+    @property
+    def _is_free(self) -> bool:
+        """The queue of the interface has nothing of ours, as far as that can be known."""
+        return self._queued is None or not self._returns or self._was_in_bus_off
 
     @property
     def _was_in_bus_off(self) -> bool:
@@ -344,6 +357,12 @@ class SocketCan:
                 'restart-ms 100, with the bit rate of the drives'
             )
         return PortError(f'{name} was lost ({error.strerror})')
+
+
+def _node(raw: bytes) -> int:
+    """Return the node that a frame is for, or from."""
+    identifier: int = _FRAME.unpack(raw)[0]
+    return identifier & ~FUNCTION_CODE & IDENTIFIERS[-1]
 
 
 def interfaces() -> Sequence[str]:

@@ -40,6 +40,7 @@ REVERSES = ('test/unit/drive/test_table_16.py', '-k', 'reverse_is_bit_13')
 #: A port that is open and passes nothing.
 SILENCES = 'nfo_sinus_driver/bus/scheduler.py'
 MUTE_PORT = 'test/unit/drive/test_mute_port.py'
+CAN_PORTS = 'test/unit/link/test_can_ports.py'
 SERIAL_PORT = 'nfo_sinus_driver/link/serial_port.py'
 PORTS = 'test/unit/link/test_link_ports.py'
 GATE = 'nfo_sinus_driver/drive/recognition.py'
@@ -862,6 +863,48 @@ LAWS = (
         'any(task.stops for task in self._tasks)',
         'False',
         (MUTE_PORT, '-k', 'growing'),
+    ),
+    Mutant(
+        3,
+        'the filters of SocketCAN let in error frames alone',
+        'nfo_sinus_driver/link/can.py',
+        '_OTHER_FRAMES = 0xC000_0000',
+        '_OTHER_FRAMES = 0xE000_0000',
+        (CAN_PORTS, '-k', 'frames_of_a_socket'),
+    ),
+    Mutant(
+        3,
+        'a frame is handed over while one of ours is in the queue of the CAN interface',
+        'nfo_sinus_driver/link/can.py',
+        'while self._waiting and self._is_free:',
+        'while self._waiting:',
+        (CAN_PORTS, '-k', 'bus_off or waits'),
+    ),
+    Mutant(
+        3,
+        'a stop waits for good for a frame that bus-off has swallowed',
+        'nfo_sinus_driver/link/can.py',
+        '        return self._changes != before',
+        '        return False',
+        (CAN_PORTS, '-k', 'bus_off'),
+    ),
+    Mutant(
+        3,
+        'a stop waits for good for a frame that a bus that works does not return',
+        'nfo_sinus_driver/link/can.py',
+        """        if self._queued_for >= _LEAVES_IN:
+            # the bus works""",
+        """        if False:
+            # the bus works""",
+        (CAN_PORTS, '-k', 'bus_that_works'),
+    ),
+    Mutant(
+        3,
+        'a frame leaves a CAN interface however old it is',
+        'nfo_sinus_driver/link/can.py',
+        'for raw, until in self._waiting.items() if until >= now}',
+        'for raw, until in self._waiting.items()}',
+        (CAN_PORTS, '-k', 'too_long'),
     ),
     Mutant(
         3,

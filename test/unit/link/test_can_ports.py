@@ -289,6 +289,7 @@ class PaperSocket:
 
     :ivar fails: with which error each of its methods fails.
     :ivar leaves: what is sent leaves the interface at once, and comes back.
+    :ivar node: what answers as node 5.
     """
 
     def __init__(self) -> None:
@@ -298,6 +299,7 @@ class PaperSocket:
         self.coming: list[tuple[bytes, int]] = []
         self.fails: dict[str, int] = {}
         self.leaves = True
+        self.node: Server | None = None
         self.is_open = True
         self._ready, self._wake = os.pipe()
 
@@ -319,8 +321,18 @@ class PaperSocket:
         self.bound = address
 
     def arrive(self, *frames: bytes, flags: int = 0) -> None:
-        self.coming += [(frame, flags) for frame in frames]
+        self.coming += [(frame, flags) for frame in frames if self._is_let_in(frame)]
         os.write(self._wake, b'x')
+
+    def _is_let_in(self, frame: bytes) -> bool:
+        """Return whether a filter lets it in, as linux/can.h has it."""
+        (identifier,) = struct.unpack_from('=I', frame) if frame else (0,)
+        (filters,) = (value for _, name, value in self.options if name == socket.CAN_RAW_FILTER)
+        return any(
+            bool(identifier & 0x2000_0000) if mask & 0x2000_0000
+            else identifier & mask == wanted & mask
+            for wanted, mask in struct.iter_unpack('=II', filters)
+        )
 
     def recvmsg(self, size: int) -> tuple[bytes, list[Any], int, None]:
         self._may_fail('recvmsg')
@@ -342,6 +354,10 @@ class PaperSocket:
     def leave(self, data: bytes) -> None:
         """Have a frame leave the interface."""
         self.arrive(data, flags=socket.MSG_CONFIRM | socket.MSG_DONTROUTE)
+        if self.node is not None and struct.unpack_from('=I', data)[0] == 0x605:
+            answer = self.node.answer(data[8:])
+            if answer is not None:
+                self.arrive(raw(0x585, answer))
 
     def close(self) -> None:
         if self.is_open:
@@ -372,7 +388,7 @@ def raw(identifier: int, data: bytes, length: int | None = None) -> bytes:
 
 
 def make(name: str = 'can0') -> SocketCan:
-    return SocketCan(name, ((0x580, 0x780),))
+    return SocketCan(name, ((0x580, 0x780), (0x600, 0x780)))
 
 
 def test_a_socket_lets_in_what_is_wanted_and_nothing_else(paper: PaperSocket) -> None:
@@ -380,7 +396,8 @@ def test_a_socket_lets_in_what_is_wanted_and_nothing_else(paper: PaperSocket) ->
     assert paper.bound == ('can0',)
     # no extended, remote or error frames either; but of what it sends itself, commands and requests
     # for the state of a node
-    let_in = (0x580, 0x780 | 0xE0000000), (0, 0xE00007FF), (0x40000700, 0xE0000780)
+    wanted = (0x580, 0xC0000780), (0x600, 0xC0000780)
+    let_in = *wanted, (0, 0xC00007FF), (0x40000700, 0xC0000780)
     expected = b''.join(struct.pack('=II', *one) for one in let_in)
     assert paper.options == [
         (socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, expected),
@@ -504,9 +521,23 @@ def raw_of(*frames: Frame) -> list[bytes]:
 
 @pytest.fixture
 def port(paper: PaperSocket, interface: Interface) -> SocketCan:
-    port = SocketCan('can0', ((0x580, 0x780), (0x600, 0x780)))
+    port = make()
     port.open()
     return port
+
+
+def test_a_node_behind_an_interface(paper: PaperSocket) -> None:
+    paper.node = Server({(0x2022, 0): b'\1\0', (0x1008, 0): b'a text of many letters'})
+    link = CanopenLink.on_port('can0', LineSettings(125_000, '8N1', 10.0))
+    link.open()
+    mode, name = Address('object', 0x2022, None, 2), Address('object', 0x1008, None, 64)
+    assert link.read(5, mode).data == b'\1\0'
+    assert link.read(5, name).data == b'a text of many letters'
+    link.write(5, mode, b'\3\0')
+    assert link.read(5, mode).data == b'\3\0'
+    # it is made operational before it is written to
+    assert raw(0, b'\1\5') in paper.sent
+    link.close()
 
 
 def test_the_next_frame_waits_until_the_one_before_has_left(
@@ -568,7 +599,7 @@ def test_in_bus_off_one_frame_is_handed_over_and_then_the_stop(
     assert len(sockets) > 5 and 'is in bus-off' in port.trouble
     # the bus is back
     if restart == 'it leaves':
-        sockets[-1].arrive(old, flags=socket.MSG_DONTROUTE)
+        sockets[-1].arrive(old)
     interface.show('1')
     port.send(STOP)
     port.receive(interface.now + 0.1)
@@ -610,14 +641,33 @@ def test_on_a_bus_that_works_a_frame_that_does_not_come_back_is_not_waited_for(
     paper.leaves = False
     port.send(SETPOINT)
     interface.now += 0.05
-    paper.arrive(raw(0x585, ANSWER.data))
-    assert port.receive(0.0) == [ANSWER]
+    paper.arrive(raw(0x586, ANSWER.data))
+    assert port.receive(0.0) == [Frame(0x586, ANSWER.data)]
     port.send(STOP)
     assert paper.sent == raw_of(SETPOINT), 'it may have to wait for others'
     interface.now += 0.06
     paper.arrive(raw(0x586, ANSWER.data))
     assert port.receive(0.0) == [Frame(0x586, ANSWER.data)]
     assert paper.sent == raw_of(SETPOINT, STOP)
+
+
+def test_a_driver_of_linux_that_returns_nothing_is_not_waited_for(
+    paper: PaperSocket, port: SocketCan
+) -> None:
+    paper.leaves = False
+    port.send(REQUEST)
+    paper.arrive(raw(0x585, ANSWER.data))
+    assert port.receive(0.0) == [ANSWER]
+    command = Frame(0, b'\1\5')
+    port.send(command)
+    port.send(STOP)
+    assert paper.sent == raw_of(REQUEST, command, STOP)
+    # it does, after all
+    paper.leave(paper.sent[-1])
+    port.receive(0.0)
+    port.send(SETPOINT)
+    port.send(REQUEST)
+    assert paper.sent == raw_of(REQUEST, command, STOP, SETPOINT)
 
 
 def test_a_frame_that_waits_too_long_never_leaves(
@@ -639,8 +689,8 @@ def test_a_frame_outlasts_its_socket(sockets: list[PaperSocket], port: SocketCan
     port.open()
     port.send(STOP)
     assert sent(sockets) == raw_of(SETPOINT)
-    # for this socket it is one of another, of the same computer
-    sockets[-1].arrive(*raw_of(SETPOINT), flags=socket.MSG_DONTROUTE)
+    # for this socket it is one of another
+    sockets[-1].arrive(*raw_of(SETPOINT))
     assert port.receive(0.0) == [] and sent(sockets) == raw_of(SETPOINT, STOP)
 
 
