@@ -12,7 +12,8 @@ have been put in its place. One that has answered enough of them before needs on
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+import math
 
 from nfo_sinus_driver.link import (
     MAILBOX,
@@ -39,10 +40,19 @@ class RecognitionLaw:
 
     :param complaints: gets what breaks the law.
     :param lost_after: after which silence the drive of each unit is lost, s.
+    :param place: returns where the port is.
     """
 
-    def __init__(self, complaints: list[str], lost_after: Mapping[int, float]) -> None:
+    def __init__(
+        self,
+        complaints: list[str],
+        lost_after: Mapping[int, float],
+        place: Callable[[], str] = lambda: '',
+    ) -> None:
         self._complaints = complaints
+        self._place = place
+        self._lost_at_place: str | None = None
+        self._frame_at = -math.inf
         self._longest = {unit: max(_EXCHANGE, at + _BLIND) for unit, at in lost_after.items()}
         self._known: set[int] = set()
         self._answers: dict[int, int] = defaultdict(int)
@@ -50,11 +60,23 @@ class RecognitionLaw:
 
     def port_lost(self) -> None:
         """Record that the port is lost: whatever comes next may be another drive."""
-        self._answers.clear()
+        self._lost_at_place = self._place()
         self._silent_since.clear()
+
+    def _note_port(self, now: float) -> None:
+        """Judge a port that was lost, and is used again: soon, and where it was, it is the same."""
+        before, self._lost_at_place = self._lost_at_place, None
+        if before is None:
+            return
+        if self._place() != before:
+            self._known.clear()
+            self._answers.clear()
+        elif now - self._frame_at > _EXCHANGE:
+            self._answers.clear()
 
     def asked(self, unit: int, address: Address, *, writes: bool, now: float) -> None:
         """Judge a request before it is sent."""
+        self._note_port(now)
         if not writes and (address.block is None or address.space != MAILBOX):
             return
         least = _LEAST if address.block is None else _LEAST_OF_PLC
@@ -73,6 +95,7 @@ class RecognitionLaw:
         if error is not None and not (error.responded or isinstance(error, Refused)):
             self._silent_since.setdefault(unit, now)
             return
+        self._frame_at = now
         if now - self._silent_since.pop(unit, now) > _EXCHANGE:
             self._answers[unit] = 0
         # to what is known one stop may be written that nothing answers, and that may be answered

@@ -302,6 +302,7 @@ class Rig:
         self.law = law = RecognitionLaw(
             self.unrecognised,
             {address: settings.lost_after for address, settings in self._settings.items()},
+            lambda: self.line.place,
         )
         lose = self.bus._port.mark_lost
 

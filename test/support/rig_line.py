@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 import heapq
 import itertools
-import math
 from random import Random
 from typing import Any
 

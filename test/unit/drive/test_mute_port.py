@@ -58,7 +58,7 @@ def test_it_is_opened_again_and_again_at_growing_intervals() -> None:
         _, *again = rig.line.opened
         pauses = [later - before for before, later in itertools.pairwise(again)]
         assert pauses == pytest.approx([2, 4, 8, 8, 8, 8, 8][: len(pauses)], abs=1.5)
-        assert pauses == sorted(pauses) and len(pauses) > 2
+        assert len(pauses) > 2
         rig.wait_until(lambda: rig.line.state == 'whole')
         rig.pass_time(2.0)
         assert not rig.turns

@@ -183,6 +183,7 @@ def test_what_was_moved_to_another_line_is_not_written_to(tmp_path: Path) -> Non
         rig.line.state = 'gone'
         rig.pass_time(0.5)
         rig.line.exchange(other_make(tmp_path))
+        rig.line.place = 'another socket'
         before = len(writes_on_line(rig))
         rig.line.mend()
         rig.pass_time(10.0)
