@@ -64,6 +64,7 @@ class Silences:
     :ivar heard: something valid has ever come.
     :ivar opened_at: when the port was opened that had been lost.
     :ivar moved_at: when it was last opened where it may not be the port that it was before.
+    :ivar away_at: when it was last opened after so long that other units may be behind it.
     """
 
     def __init__(self) -> None:
@@ -95,7 +96,7 @@ class Silences:
         self._newly_at = -math.inf
         #: Until when it is opened once more at the latest, s, and until when only once.
         self._once_more = (math.inf, -math.inf)
-        self.opened_at = self.moved_at = -math.inf
+        self.opened_at = self.moved_at = self.away_at = -math.inf
         #: When a silence ended that was long enough for an exchange: of the line, and of each unit.
         self._line_since = -math.inf
         self._unit_since: dict[int, float] = {}
@@ -150,7 +151,7 @@ class Silences:
             if not same_place:
                 self.moved_at = now
             if not same_place or now - self._any_frame_at > EXCHANGE:
-                self._line_since = now
+                self._line_since = self.away_at = now
         self._opened += 1
         self._mute_since = math.inf
         self._newly_at = now

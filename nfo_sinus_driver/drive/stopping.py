@@ -345,7 +345,7 @@ class StopSequence:
         until = max(asked_at + own + _LEFT_ALONE_LONGER, now + _RETRY_PERIOD)
         if not self._was_left_alone:
             self._bus.keep_quiet(unit, until)
-            if self._bus.is_any_controlled:
+            if self._bus.is_any_controlled and not silences.is_line_silent:
                 named = self._state.report(Cause.MAY_RUN_ON, seconds=own)
                 self._state.notify(Severity.WARNING, named)
         await self._bus.sleep(until - now, or_opening=True)
@@ -366,7 +366,7 @@ class StopSequence:
         in_time = silences.is_line_silent or self._bus.now() <= self._due_at + EXCHANGE
         in_time |= self._blind_left == _BLIND_STOPS
         in_time &= self._bus.paused <= self._paused + EXCHANGE
-        return self._blind_left > 0 and in_time and self._due_at >= silences.moved_at
+        return self._blind_left > 0 and in_time and self._due_at >= silences.away_at
 
     async def find(self) -> None:
         """

@@ -284,7 +284,7 @@ class LineLaws:
         """Judge S1."""
         lost_at = self.lost_at(number)
         # an answer that comes before a loss has to be told may be in time
-        if self._clock.now <= lost_at + _TOLD + _SLACK:
+        if self._clock.now <= lost_at + _TOLD + self._waits_longer + _SLACK:
             return
         self._due(unit, lost_at, _AFTER_LOSS)
         snapshot = self._rig.notes_of[number].snapshot
@@ -294,11 +294,17 @@ class LineLaws:
                 self._break('S1', number, f'is told as {" and ".join(told)}, lost at', lost_at)
 
     @property
+    def _waits_longer(self) -> float:
+        """How much longer than usual a request waits on this line, s: P843 of a MOVITRAC."""
+        return LONGEST_RESPONSE_TIME if self._rig.connection.protocol == 'movitrac' else 0.0
+
+    @property
     def _under_way(self) -> float:
         """How long the request under way may take, s."""
         settings = self._line.settings
-        more = LONGEST_RESPONSE_TIME if self._rig.connection.protocol == 'movitrac' else 0.0
-        return _CHARACTERS * settings.char_time + settings.response_timeout + more
+        return (
+            _CHARACTERS * settings.char_time + settings.response_timeout + self._waits_longer
+        )
 
     def _round(self, looks: int) -> float:
         """Return how long the stops take that are due, with so many requests before each, s."""

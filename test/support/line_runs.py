@@ -32,6 +32,9 @@ _STEADY, _REQUESTS_FOR = 0.5, 1.0
 _AT_ONCE, _CALLED_BY = 0.001, 2.1
 #: By when a port is opened again that is mute, s, besides three times what it needs after that.
 _OPENED_AGAIN = 10.0
+#: The longest pause of the first minute and a half while a stop is owed, s; and by when even what
+#: needs longer to start is heard.
+_LONGEST_PAUSE, _HEARD_AT_LAST = 8.0, 130.0
 #: For how long a run goes on when all that happens has happened, s, and after the driver has ended:
 #: longer than the time-out of any drive.
 _GOES_ON = 8.0
@@ -238,8 +241,9 @@ class LineRun:
         """Let nothing pass until the port is opened again, and then for so long after each."""
         line = self.rig.line
         line.state, line.boots_for = 'mute', seconds
-        # each pause before it is opened again is longer than the one before
-        self.lasts = _OPENED_AGAIN + 3 * seconds
+        # each pause before it is opened again is longer than the one before, but with a stop owed
+        # none is longer than 8 s until a minute and a half is over
+        self.lasts = _OPENED_AGAIN + 3 * seconds if seconds <= _LONGEST_PAUSE else _HEARD_AT_LAST
         self.laws.heard_again_by = self.rig.clock.now + self.lasts
 
     def stand_still(self, seconds: float) -> None:

@@ -30,6 +30,8 @@ _EXCHANGE, _LATE = 3.0, 0.5
 #: How many reads a drive answers at least before it is written to, and a PLC; and one that is seen
 #: again.
 _LEAST, _LEAST_OF_PLC, _LEAST_OF_KNOWN = 2, 1, 1
+#: How long the stop of another drive may take that goes before, s.
+_TURN = 0.25
 #: How much longer than a loss takes a stop may be written although nothing answers, s.
 _BLIND = 0.5
 
@@ -82,7 +84,8 @@ class RecognitionLaw:
         least = _LEAST if address.block is None else _LEAST_OF_PLC
         least = _LEAST_OF_KNOWN if unit in self._known else least
         answers, silent = self._answers[unit], now - self._silent_since.get(unit, now)
-        if answers < least or silent > self._longest[unit] + _LATE:
+        late = _LATE + _TURN * len(self._longest)
+        if answers < least or silent > self._longest[unit] + late:
             self._complaints.append(
                 f'{now:.3f} s: {address} of unit {unit} is written, which has answered {answers} '
                 f'reads and is silent for {silent:.1f} s'
