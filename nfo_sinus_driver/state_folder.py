@@ -11,6 +11,7 @@ import contextlib
 import fcntl
 import hashlib
 import json
+import math
 import os
 from pathlib import Path
 import re
@@ -174,13 +175,14 @@ def _parsed(data: bytes, drive: str, path: Path) -> _Borrowed:
             str(key): (_value(found), _value(ours))
             for key, (found, ours) in content['borrowed'].items()
         }
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
         raise OSError(f'{path} is damaged: {error!r}') from error
     return borrowed
 
 
 def _value(value: object) -> object:
-    if not isinstance(value, (bool, int, float, str)):
+    is_finite = not isinstance(value, float) or math.isfinite(value)
+    if not isinstance(value, (bool, int, float, str)) or not is_finite:
         raise ValueError(value)
     return value
 

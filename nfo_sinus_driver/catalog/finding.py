@@ -141,9 +141,20 @@ def _declared_by_packages() -> Iterator[tuple[str, Path]]:
         index = prefix / 'share' / 'ament_index' / 'resource_index' / GROUP
         for resource in sorted(index.glob('*')):
             share = prefix / 'share' / resource.name
-            for line in resource.read_text(encoding='utf-8', errors='replace').split('\n'):
+            try:
+                text = resource.read_text(encoding='utf-8', errors='replace')
+            except OSError as error:
+                _report_unreadable(str(resource), error.strerror or str(error))
+                continue
+            for line in text.split('\n'):
                 if line.strip():
                     yield resource.name, share / line.strip()
+
+
+@functools.cache
+def _report_unreadable(resource: str, why: str) -> None:
+    """Warn, once, of a package whose families are not found."""
+    _log.warning(f'{resource} cannot be read ({why}): the families of this package are not found')
 
 
 def _take_entry_points() -> None:

@@ -129,6 +129,10 @@ def _parse(text: str, name: str) -> ParameterFile:
         tree = yaml.load(text, _Loader)
     except (yaml.YAMLError, ValueError) as error:
         raise CliError(f'{name} is no parameter file: {_one_line(str(error))}') from error
+    except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
+        # what PyYAML raises without a word for people: !!timestamp x, !!bool x, an escape
+        why = 'a value in it is none of its tag (!!), or an escape in it is no character'
+        raise CliError(f'{name} is no parameter file: {why}') from error
     header = dict(_header(text))
     found = {}
     skipped: dict[str, None] = {}

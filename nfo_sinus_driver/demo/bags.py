@@ -52,13 +52,27 @@ def read(folder: Path, is_wanted: Callable[[str], bool]) -> Iterator[tuple[str, 
     :raises ValueError: it is no bag, or one that cannot be read.
     """
     wanted = {topic for topic, _ in topics(folder) if is_wanted(topic)}
-    return _module().read(folder, wanted)
+    with reading():
+        yield from _module().read(folder, wanted)
+
+
+@contextlib.contextmanager
+def reading() -> Iterator[None]:
+    """Have all that a damaged bag leads to be an OSError or a ValueError."""
+    try:
+        yield
+    except (OSError, ValueError):
+        raise
+    except Exception as error:
+        # PyYAML and the libraries for bags do not say what they raise
+        raise ValueError(f'it is damaged ({type(error).__name__}: {error})') from error
 
 
 def metadata(folder: Path) -> dict[str, Any]:
     """Return what a bag says of itself; a ValueError where it is none."""
     path = folder / 'metadata.yaml'
-    found = yaml.safe_load(path.read_text()) if path.is_file() else None
+    with reading():
+        found = yaml.safe_load(path.read_bytes()) if path.is_file() else None
     if not isinstance(found, dict) or _INFORMATION not in found:
         raise ValueError('it is no bag: a folder with a metadata.yaml is one')
     return found[_INFORMATION]
@@ -66,12 +80,12 @@ def metadata(folder: Path) -> dict[str, Any]:
 
 def topics(folder: Path) -> list[tuple[str, str]]:
     """Return the topics of a bag that have messages, with their types."""
-    counted = metadata(folder)['topics_with_message_count']
-    return [
-        (one['topic_metadata']['name'], one['topic_metadata']['type'])
-        for one in counted
-        if one['message_count']
-    ]
+    with reading():
+        return [
+            (str(one['topic_metadata']['name']), str(one['topic_metadata']['type']))
+            for one in metadata(folder)['topics_with_message_count']
+            if one['message_count']
+        ]
 
 
 def _module() -> Any:

@@ -43,7 +43,7 @@ class Writer:
         self._count = 0
         self._writer = SequentialWriter()
         options = StorageOptions(uri=str(folder), storage_id='mcap', custom_data=remarks)
-        with _failures_as(OSError):
+        with _writing():
             self._writer.open(options, _AS_THEY_ARE)
 
     def add_topic(self, topic: str, type_: type, offered: QoSProfile) -> None:
@@ -63,38 +63,37 @@ class Writer:
 
     def write(self, topic: str, stamp: int, data: bytes) -> None:
         """Write a message as it came, with the time of its receipt, ns."""
-        with _failures_as(OSError):
+        with _writing():
             self._writer.write(topic, data, stamp)
 
     def close(self) -> None:
         """Make the bag whole."""
-        with _failures_as(OSError):
+        with _writing():
             self._writer.close()
 
 
 def read(folder: Path, wanted: Set[str]) -> Iterator[tuple[str, int, Any]]:
-    """Yield topic, time of receipt (ns) and message; a ValueError where that fails."""
+    """Yield topic, time of receipt (ns) and message."""
     compressed = metadata(folder).get('compression_format')
     reader = SequentialCompressionReader() if compressed else SequentialReader()
-    with _failures_as(ValueError):
-        reader.open(StorageOptions(uri=str(folder)), _AS_THEY_ARE)
-        types = {
-            one.name: _class_of(one.type)
-            for one in reader.get_all_topics_and_types()
-            if one.name in wanted
-        }
-        while reader.has_next():
-            topic, data, stamp = reader.read_next()
-            if topic in types:
-                yield topic, stamp, deserialize_message(data, types[topic])
+    reader.open(StorageOptions(uri=str(folder)), _AS_THEY_ARE)
+    types = {
+        one.name: _class_of(one.type)
+        for one in reader.get_all_topics_and_types()
+        if one.name in wanted
+    }
+    while reader.has_next():
+        topic, data, stamp = reader.read_next()
+        if topic in types:
+            yield topic, stamp, deserialize_message(data, types[topic])
 
 
 @contextlib.contextmanager
-def _failures_as(kind: type[Exception]) -> Iterator[None]:
+def _writing() -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
-        raise kind(str(error)) from error
+        raise OSError(str(error)) from error
 
 
 def _class_of(name: str) -> type:

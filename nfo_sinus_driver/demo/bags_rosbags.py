@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rclpy.qos import QoSProfile
-from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.highlevel import AnyReader
 from rosbags.interfaces import (
     Connection,
     Qos,
@@ -64,14 +64,11 @@ class Writer:
 
 
 def read(folder: Path, wanted: Set[str]) -> Iterator[tuple[str, int, Any]]:
-    """Yield topic, time of receipt (ns) and message; a ValueError where that fails."""
-    try:
-        with AnyReader([folder]) as reader:
-            chosen = [one for one in reader.connections if one.topic in wanted]
-            for connection, stamp, data in reader.messages(chosen):
-                yield connection.topic, stamp, reader.deserialize(data, connection.msgtype)
-    except AnyReaderError as error:
-        raise ValueError(str(error)) from error
+    """Yield topic, time of receipt (ns) and message."""
+    with AnyReader([folder]) as reader:
+        chosen = [one for one in reader.connections if one.topic in wanted]
+        for connection, stamp, data in reader.messages(chosen):
+            yield connection.topic, stamp, reader.deserialize(data, connection.msgtype)
 
 
 def _as_recorded(qos: QoSProfile) -> Qos:

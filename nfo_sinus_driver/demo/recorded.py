@@ -164,12 +164,13 @@ def read(folder: Path, drives: Sequence[str]) -> list[Recording]:
     connected = {drive: stamp for drive, stamp in began.items() if stamp is not None}
     if not connected:
         raise ValueError(f'{", ".join(drives)} was never connected')
-    described = bags.metadata(folder)
-    source = (
-        f'{folder.name}: {described["message_count"]} messages on '
-        f'{len(bags.topics(folder))} topics'
-    )
-    remarks = dict(described.get('custom_data') or {})
+    with bags.reading():
+        described = bags.metadata(folder)
+        source = (
+            f'{folder.name}: {described["message_count"]} messages on '
+            f'{len(bags.topics(folder))} topics'
+        )
+        remarks = dict(described.get('custom_data') or {})
     start = min(connected.values())
     return [_Reader(messages, drive, start).recording(source, remarks) for drive in connected]
 

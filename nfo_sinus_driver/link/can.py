@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+import contextlib
 import errno
 from pathlib import Path
 import select
@@ -367,5 +368,10 @@ def _node(raw: bytes) -> int:
 
 def interfaces() -> Sequence[str]:
     """Return the names of all CAN interfaces."""
-    types = sorted(_INTERFACES.glob('*/type'))
-    return [path.parent.name for path in types if path.read_text('ascii').strip() == _IS_CAN]
+    found = []
+    for path in sorted(_INTERFACES.glob('*/type')):
+        # one may go away meanwhile
+        with contextlib.suppress(OSError):
+            if path.read_text('ascii').strip() == _IS_CAN:
+                found.append(path.parent.name)
+    return found

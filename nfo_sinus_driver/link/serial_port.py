@@ -206,7 +206,11 @@ def _busy(path: str) -> PortError:
 
 def _ports() -> list[str]:
     by_id = '/dev/serial/by-id'
-    names = [f'{by_id}/{name}' for name in os.listdir(by_id)] if os.path.isdir(by_id) else []
+    try:
+        names = [f'{by_id}/{name}' for name in os.listdir(by_id)]
+    except OSError:
+        # it comes with the first adapter, and goes with the last
+        names = []
     prefixes = ('ttyUSB', 'ttyACM', 'ttyAMA')
     names += [f'/dev/{name}' for name in os.listdir('/dev') if name.startswith(prefixes)]
     return sorted(names)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 import itertools
 from pathlib import Path
-from typing import Any
 
 from rclpy.node import Node
 import yaml
@@ -90,22 +89,22 @@ def _files(arguments: list[str]) -> Iterator[str]:
     return (path for flag, path in itertools.pairwise(arguments) if flag == _PARAMS_FILE)
 
 
-def _load(path: str) -> Any:
+def _load(path: str) -> yaml.Node | None:
     try:
-        # bytes: YAML may be UTF-16, and ROS reads that, too
-        return yaml.safe_load(Path(path).read_bytes())
-    except (OSError, yaml.YAMLError):
-        # ROS has reported it by now
+        # bytes: YAML may be UTF-16, and ROS reads that, too; not the values: what is a text to
+        # ROS, such as 2000-13-45, may be a date to PyYAML that there is not
+        return yaml.compose(Path(path).read_bytes(), Loader=yaml.SafeLoader)
+    except Exception:
+        # ROS has reported it by now, or reads what PyYAML does not
         return None
 
 
-def _sections(tree: Any, prefix: str = '') -> Iterator[str]:
+def _sections(tree: yaml.Node | None, prefix: str = '') -> Iterator[str]:
     """Return the names of the nodes in a parameter file."""
-    if not isinstance(tree, dict):
-        return
-    for key, value in tree.items():
-        name = f'{prefix}/{key}'.replace('//', '/') if prefix else str(key)
-        if isinstance(value, dict) and _PARAMETERS in value:
+    for key, value in tree.value if isinstance(tree, yaml.MappingNode) else ():
+        name = f'{prefix}/{key.value}'.replace('//', '/') if prefix else str(key.value)
+        below = value.value if isinstance(value, yaml.MappingNode) else ()
+        if any(one.value == _PARAMETERS for one, _ in below):
             yield name
         else:
             yield from _sections(value, name)

@@ -73,7 +73,7 @@ class _Request(socketserver.StreamRequestHandler):
             request = json.loads(line)
             result = self.server.verbs[request['verb']](**request.get('arguments', {}))
             return json.dumps({'ok': True, 'result': result})
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             return json.dumps({'ok': False, 'error': str(error)})
 
 

@@ -376,7 +376,8 @@ def test_unknown_names_in_a_parameter_file_are_warned_about(bench: Bench) -> Non
     parameters = bench.folder / 'misspelt.yaml'
     parameters.write_text(
         'nfo_sinus_bus: {ros__parameters: {respons_timeout: 0.3}}\n'
-        'nfo_sinus: {ros__parameters: {setpoint_timout: 1.0, retries: 3}}\n'
+        # a text to ROS, and to others a date that there is not
+        'nfo_sinus: {ros__parameters: {setpoint_timout: 1.0, retries: 3, frame_id: 2000-13-45}}\n'
         'nfo_sinsu: {ros__parameters: {address: 2}}\n'
     )
     bench.simulator()
@@ -388,6 +389,7 @@ def test_unknown_names_in_a_parameter_file_are_warned_about(bench: Bench) -> Non
     _says(driver, 'nfo_sinsu', 'did you mean', 'nfo_sinus')
     assert 'port was given' not in driver.text, 'what the command line gives to all is no mistake'
     assert client.parameter('setpoint_timeout') == 2.5
+    assert client.parameter('frame_id') == '2000-13-45'
 
 
 @needs('own')

@@ -23,6 +23,7 @@ from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 
 from nfo_sinus_driver.demo import bags
+from nfo_sinus_driver.demo.recorded import drives_in, read
 from nfo_sinus_driver.node.qos import LATCHED, NEWEST, RELIABLE
 
 MODULES = ('bags_rosbag2', 'bags_rosbags')
@@ -119,6 +120,34 @@ def test_what_is_no_bag_is_said_to_be_none(tmp_path: Path, text: str) -> None:
     (tmp_path / 'metadata.yaml').write_text(text)
     with pytest.raises(ValueError, match='it is no bag'):
         bags.topics(tmp_path)
+
+
+def test_a_spoilt_bag_is_a_sentence(modules: dict[str, ModuleType], tmp_path: Path) -> None:
+    name, module = next(iter(modules.items()))
+    bag = written(module, tmp_path / name)
+    (file,) = bag.glob('*.mcap')
+    described, data = (bag / 'metadata.yaml').read_text(), file.read_bytes()
+    spoilt = [
+        '[' * 65536, 'a: !!timestamp x', 'a: "\\UFFFFFFFF"',
+        described.replace('topics_with_message_count', 'topics'),
+        described.replace('topic_metadata', 'other'),
+        described.replace('message_count: 1', 'message_count: []'),
+        described.replace('custom_data', 'custom_data: 1\n  other'),
+        described.replace('  message_count', '  messages'),
+        described.replace('version', 'versions'),
+    ]
+    for text in spoilt:
+        (bag / 'metadata.yaml').write_text(text)
+        with pytest.raises((OSError, ValueError)):
+            read(bag, drives_in(bag))
+    (bag / 'metadata.yaml').write_text(described)
+    for number in range(0, len(data), max(1, len(data) // 20)):
+        file.write_bytes(data[:number] + bytes([data[number] ^ 0xFF]) + data[number + 1:])
+        with contextlib.suppress(OSError, ValueError):
+            read(bag, drives_in(bag))
+        file.write_bytes(data[:number])
+        with contextlib.suppress(OSError, ValueError):
+            read(bag, drives_in(bag))
 
 
 def test_rosbag2_py_is_preferred() -> None:

@@ -106,13 +106,16 @@ def test_numbers_and_switches_come_back_as_they_were(files: Path) -> None:
         f'{{"drive": "{DRIVE}", "borrowed": {{"a.b": 1}}}}',
         f'{{"drive": "{DRIVE}", "borrowed": {{"a.b": [1, [2]]}}}}',
         f'{{"drive": "{DRIVE}", "borrowed": {{"a.b": [1, null]}}}}', '\x00' * 100,
+        f'{{"drive": "{DRIVE}", "borrowed": {{"a.b": [NaN, 1]}}}}',
+        f'{{"drive": "{DRIVE}", "borrowed": {{"a.b": [1, 1e999]}}}}',
+        '9' * 5000, '[' * 65536, '\ufeff' * 9, '\udc80',
     ],
 )
 def test_a_damaged_file_is_said_and_replaced(files: Path, content: str) -> None:
     one = folder()
     one.write(DRIVE, BORROWED).result()
     one._hold(DRIVE, None)
-    the_file(files).write_text(content)
+    the_file(files).write_text(content, encoding='utf-8', errors='surrogateescape')
     one = folder()
     with pytest.raises(OSError, match='is damaged'):
         one.read(DRIVE).result()

@@ -186,6 +186,9 @@ def load(path: Path) -> tuple[Node, Problems]:
         said = getattr(error, 'problem', None) or str(error).replace('\n', ' ')
         problems.add(line, f'is no YAML: {said}')
         raise DescriptionError(tuple(problems.found)) from None
+    except (ValueError, OverflowError) as error:
+        # an escape that is no character, a version of too many digits
+        raise DescriptionError((f'{path}: is no YAML: {error}',)) from None
     except RecursionError:
         raise DescriptionError((f'{path}: is nested too deeply',)) from None
     if composed is None:

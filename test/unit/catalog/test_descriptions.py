@@ -534,6 +534,15 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
         read(tmp_path / 'bytes.vfd.yaml')
 
 
+@pytest.mark.parametrize(
+    'text', ['[' * 65536, 'a: "\\U00110000"', 'a: "\\UFFFFFFFF"', '%YAML 1.' + '9' * 5000]
+)
+def test_a_file_that_its_reader_cannot_bear(tmp_path: Path, text: str) -> None:
+    (tmp_path / 'spoilt.vfd.yaml').write_text(text)
+    with pytest.raises(DescriptionError, match=str(tmp_path)):
+        read(tmp_path / 'spoilt.vfd.yaml')
+
+
 # --- what is right ---
 
 

@@ -77,6 +77,16 @@ def test_of_two_workspaces_with_one_package_the_first_hides_the_other_without_a_
     assert f'{overlay / file} is taken, not {hidden}' in caplog.text
 
 
+def test_a_package_that_cannot_be_read_hides_no_other_family(
+    prefix: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    index = prefix / 'share' / 'ament_index' / 'resource_index' / GROUP
+    (index / 'broken').mkdir()
+    assert find('theirs') and find('delta_vfd_el') == str(DELTA)
+    (said,) = caplog.messages
+    assert str(index / 'broken') in said
+
+
 @pytest.mark.parametrize(
     ('line', 'name', 'said'),
     [

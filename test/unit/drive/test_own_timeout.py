@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 import itertools
+import json
+import os
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,10 +18,11 @@ from support.rig import CONNECTIONS, Rig
 from support.said import says
 from support.variants import ramps
 
-from nfo_sinus_driver.catalog import Role, load_family
+from nfo_sinus_driver.catalog import Role, Value, load_family
 from nfo_sinus_driver.drive import Cause, Severity, StopReason
 from nfo_sinus_driver.drive.memory import ProcessMemory
 from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
+from nfo_sinus_driver.state_folder import StateFolder
 
 #: How soon after its time-out a motor has to stand, s.
 _SOON = 1.5
@@ -453,6 +457,39 @@ def test_9_a_disk_that_keeps_nothing_prevents_no_enable_and_is_reported_once(
         key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
         said = [one.text for one in rig.notes.events if says(one.text, Cause.NOT_REMEMBERED)]
         assert len(said) == 1 and f'check {key}' in said[0], said
+
+
+@pytest.mark.parametrize('borrowed', [None, 'Ramp', True, 1e300, -1.0])
+@pytest.mark.parametrize('connection', ['rtu', 'movitrac', 'described'])
+def test_9_a_spoilt_file_keeps_no_drive_from_being_connected_to(
+    connection: str, borrowed: Value | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('XDG_STATE_HOME', str(tmp_path))
+    folder = StateFolder('/dev/ttyUSB0', lambda work: work())
+    with by_default(connection, 0.0) as rig:
+        key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
+        rig.memory = folder
+        rig.begin()
+        rig.connect()
+        rig.enable()
+        rig.kill()
+    ((drive, descriptor),) = folder._locked.items()
+    os.close(descriptor)
+    (path,) = (tmp_path / 'nfo_sinus_driver').iterdir()
+    spoilt = {'drive': drive, 'borrowed': {key: (borrowed, 2.0)}}
+    path.write_text('[' * 65536 if borrowed is None else json.dumps(spoilt), encoding='utf-8')
+    with by_default(connection, 2.0) as rig:
+        rig.memory = StateFolder('/dev/ttyUSB0', lambda work: work())
+        rig.begin()
+        rig.connect()
+        said = [one.text for one in rig.notes.events if says(one.text, Cause.NOT_REMEMBERED)]
+        assert [f'check {key}' in text and str(path) in text for text in said] == (
+            [True] if borrowed is None else []
+        )
+        rig.turn()
+        rig.answer(rig.drive.stop())
+        end(rig)
+        assert not rig.turns and own_timeout(rig) == 2.0
 
 
 class Slow(ProcessMemory):

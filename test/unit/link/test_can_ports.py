@@ -761,6 +761,8 @@ def test_what_is_wrong_with_an_interface(
     for name, kind in (('vcan7', '280'), ('eth0', '1')):
         (tmp_path / name).mkdir()
         (tmp_path / name / 'type').write_text(f'{kind}\n', encoding='ascii')
+    # one that goes away meanwhile
+    (tmp_path / 'can9' / 'type').mkdir(parents=True)
     monkeypatch.setattr(can, '_INTERFACES', tmp_path)
     paper.fails[method] = number
     port = make()

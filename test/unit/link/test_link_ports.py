@@ -361,8 +361,15 @@ def test_ports_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
         '/dev': ['null', 'ttyUSB0', 'tty1', 'ttyACM3', 'ttyS0'],
         '/dev/serial/by-id': ['usb-FTDI'],
     }
-    path = SimpleNamespace(isdir=folders.__contains__)
-    monkeypatch.setattr(serial_port, 'os', SimpleNamespace(listdir=folders.get, path=path))
+
+    def listdir(folder: str) -> list[str]:
+        # it is gone with the last adapter
+        if folder not in folders:
+            raise FileNotFoundError(folder)
+        return folders[folder]
+
+    path = SimpleNamespace(isdir=lambda _: True)
+    monkeypatch.setattr(serial_port, 'os', SimpleNamespace(listdir=listdir, path=path))
     assert serial_port._ports() == ['/dev/serial/by-id/usb-FTDI', '/dev/ttyACM3', '/dev/ttyUSB0']
     del folders['/dev/serial/by-id']
     assert serial_port._ports() == ['/dev/ttyACM3', '/dev/ttyUSB0']
