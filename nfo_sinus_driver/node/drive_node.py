@@ -205,7 +205,7 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     @_guarded
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop the motor and only watch the drive; fails if it responds and does not stop."""
+        """Stop the motor and only watch the drive; fails where the stop is not confirmed."""
         self.lifecycle.note_transition()
         if not self._let_go('deactivated'):
             self.managed.drive.activate()
@@ -214,23 +214,28 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     @_guarded
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Release control and disconnect; fails if the drive responds and does not stop."""
+        """Release control and disconnect; fails where the stop is not confirmed."""
         self.lifecycle.note_transition()
         if not self._let_go('cleaned up'):
             return TransitionCallbackReturn.FAILURE
         self._stop_for('cleaned up', self.managed.disconnect)
+        if self._may_turn:
+            # it is disconnected, and can no more be inactive
+            return TransitionCallbackReturn.ERROR
         self._drive_parameters.undeclare()
         return TransitionCallbackReturn.SUCCESS
 
     @_guarded
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop the motor and release control."""
+        """Stop the motor and release control; fails where the stop is not confirmed."""
         self.lifecycle.note_transition()
         if self.managed.drive.identity is not None:
             self._stop_for('shut down', self.managed.drive.stop)
             self._stop_for('shut down', self.managed.disconnect)
         self._drive_parameters.undeclare()
-        return TransitionCallbackReturn.SUCCESS
+        # after a failure, too, the node is finalized, and the stop goes on
+        may_turn = self._may_turn
+        return TransitionCallbackReturn.FAILURE if may_turn else TransitionCallbackReturn.SUCCESS
 
     @_guarded
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -255,14 +260,17 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _let_go(self, what: str) -> bool:
         """
-        Stop the motor; false if the drive responds and its motor is energised all the same.
+        Stop the motor; false where the drive does not confirm it and the motor may turn.
 
-        A drive that does not respond is let go: it is stopped as soon as it responds again.
+        A drive that does not respond is let go, unless this driver may have run its motor.
         """
+        return self._stop_for(what, self.managed.drive.deactivate) or not self._may_turn
+
+    @property
+    def _may_turn(self) -> bool:
+        """The motor may turn by this driver: its stop is not confirmed, and goes on."""
         drive = self.managed.drive
-        confirmed = self._stop_for(what, drive.deactivate)
-        turns = drive.stop_unconfirmed or drive.stop_overdue
-        return confirmed or not (turns and drive.snapshot.connected)
+        return drive.stop_unconfirmed or drive.stop_overdue
 
     def _stop_for(self, what: str, command: Callable[[Report], Future[Any]]) -> bool:
         """Send a command that stops the motor; return whether the drive has confirmed it."""

@@ -24,13 +24,19 @@ from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
 
 _REFUSING = ('--stop-in-tuning', 'refused')
 #: How a person, a manager of lifecycles or a script stops a drive.
-_STOPS = ('stop', 'disable', 'stop_all', 'deactivate', 'shutdown signal')
+_STOPS = ('stop', 'disable', 'stop_all', 'deactivate', 'lifecycle shutdown', 'shutdown signal')
+
+
+_TRANSITIONS = {
+    'deactivate': Transition.TRANSITION_DEACTIVATE,
+    'lifecycle shutdown': Transition.TRANSITION_ACTIVE_SHUTDOWN,
+}
 
 
 def _succeeds(client: Client, driver: Process, out: str) -> bool:
     """Stop the drive one way; return whether that is said to have succeeded."""
-    if out == 'deactivate':
-        return client.change_state(Transition.TRANSITION_DEACTIVATE)
+    if out in _TRANSITIONS:
+        return client.change_state(_TRANSITIONS[out])
     if out == 'shutdown signal':
         driver.signal(signal.SIGTERM)
         return driver.wait() == 0
@@ -62,6 +68,24 @@ def test_a_stop_during_a_tuning_that_the_drive_refuses_is_no_success(
             'it can be deactivated when the tuning is over',
         )
         assert client.change_state(Transition.TRANSITION_CLEANUP)
+
+
+@pytest.mark.parametrize('out', ['stop', *_TRANSITIONS])
+def test_a_stop_of_a_drive_that_was_lost_is_no_success(bench: Bench, out: str) -> None:
+    drive = bench.simulator(*bench.drives.ramps(0.5))
+    driver = bench.driver('-p', 'drive_timeout:=0.0')
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        drive.inject('silence', 3600.0)
+        client.wait_for('status', lambda status: not status.connected, 'it is lost')
+        assert drive.state()['turning']
+        assert not _succeeds(client, driver, out), driver.text
+        assert client.state() == ('finalized' if out == 'lifecycle shutdown' else 'active')
+        # it is still stopped as soon as it answers
+        drive.inject('silence', 0.0)
+        drive.wait_for(lambda state: not state['turning'], timeout=PATIENCE)
+    if out == 'deactivate':
+        wait_until(lambda: client.change_state(_TRANSITIONS[out]), 'it can be deactivated then')
 
 
 def test_no_enable_survives_a_later_stop(bench: Bench) -> None:
