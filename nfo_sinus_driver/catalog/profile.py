@@ -450,10 +450,10 @@ class ControlMethod(abc.ABC):
         obeyed = yield from try_steps(self.quick_stop(control_mode))
         return obeyed or removed is Removal.COMMAND
 
-    def has_run_command(self) -> Steps[bool]:
-        """Return whether a run command of the line stands in a drive that shows a run."""
+    def has_run_command(self) -> Steps[bool | None]:
+        """Return whether a run command of the line is read back; ``None``: none can be read."""
         yield from ()
-        return True
+        return None
 
     def perhaps_in_control(self) -> Steps[bool]:
         """Return whether the bus may have control: it has, or the drive does not report who has."""

@@ -280,11 +280,18 @@ class Controller:
         if not status.driven:
             return self._state.report(Cause.COASTING if self._sequence.coasts else Cause.STOPPED)
         try:
-            coasts = await self._coasts(status)
+            if await self._coasts(status):
+                return Report(Cause.COASTING)
+            if status.runs_by_bus and await self._read_run_command() is None:
+                # a ramp to set-point 0 would show the same
+                return Report(Cause.RAMPING_SO_FAR)
         except (LinkError, DriveError):
             # the stop is confirmed all the same
             return self._state.report(Cause.STOPPING)
-        return Report(Cause.COASTING if coasts else Cause.RAMPING)
+        return Report(Cause.RAMPING)
+
+    async def _read_run_command(self) -> bool | None:
+        return await carry_out(self._state, self.method.has_run_command(), Priority.LOOK)
 
     async def _coasts(self, status: InverterStatus) -> bool:
         """Return whether a motor that is shown as driven after a stop is released all the same."""
@@ -472,6 +479,8 @@ class Controller:
         if self._control.blocked:
             raise DriveError(self._state.report(Cause.RELEASE_BLOCKED))
         stands = await self._await_standstill(timeout)
+        if stands and stopped.cause is Cause.RAMPING_SO_FAR:
+            stopped = Report(Cause.RAMPING)
         await prepare()
         if not stands:
             # not every drive shows whether it ramps or runs again, by a command that came late

@@ -679,6 +679,9 @@ class Cause(enum.Enum):
     STOPPING = 'stopping ({status})'
     COASTING = 'stopping: it coasts'
     RAMPING = 'stopping: it ramps down'
+    RAMPING_SO_FAR = (
+        'stopping: it ramps down; that its run command is gone shows only once it stands'
+    )
     QUICK_STOPPED = 'released: the motor coasts'
     RAPID_STOPPING = 'stopping: by its stop ramp ({status})'
     STOP_CONFIRMED_LATE = 'the stop is confirmed now: {status}'

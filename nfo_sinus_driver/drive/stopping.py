@@ -512,6 +512,9 @@ class StopSequence:
             # the line may have come back only after the first one
             return self._ignored > 1
         shows_at = min(self._sent_at + _RAMP_SHOWS_BY, self._force_at)
+        if status.by_frequency and status.driven and not status.keeps_running:
+            # set-point 0 leads it to standstill, whatever the run command does
+            shows_at = self._force_at
         if status.stands_running:
             # it may be braked first, or magnetised for a while
             shows_at = max(shows_at, self._stands_since(status) + self.shown_for)
@@ -593,8 +596,9 @@ class StopSequence:
 
     async def _has_run_command(self, status: InverterStatus) -> bool:
         """Return whether a drive that shows a run has a run command, as far as that shows yet."""
-        if self._method.reads_run_command:
-            return await carry_out(self._state, self._method.has_run_command(), Priority.LOOK)
+        stands = await carry_out(self._state, self._method.has_run_command(), Priority.LOOK)
+        if stands or self._method.reads_run_command:
+            return bool(stands)
         # on its ramp it shows a run, too
         braking = await self._state.read_stop_braking()
         self.shown_for = _SHOWN_FOR + braking

@@ -286,6 +286,22 @@ LAWS = (
     ),
     Mutant(
         3,
+        'a run command that is read back is not believed',
+        SEQUENCE,
+        'if stands or self._method.reads_run_command:',
+        'if self._method.reads_run_command:',
+        (STOPPED_IS_TRUE, '-k', 'last_word and ds402'),
+    ),
+    Mutant(
+        3,
+        'a ramp to set-point 0 is taken for one to a stop',
+        CONTROLLER,
+        'if status.runs_by_bus and await self._read_run_command() is None:',
+        'if False:',
+        (STOPPED_IS_TRUE, '-k', 'last_word and (DriveStatus or states or holder)'),
+    ),
+    Mutant(
+        3,
         'a run command that shows after a ramp is left',
         CONTROLLER,
         'if stood_for < self._sequence.shown_for:',

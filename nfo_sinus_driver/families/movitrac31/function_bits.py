@@ -146,7 +146,7 @@ class FunctionBits(ByLine):
         """
         yield from self._stop_by(take_direction(), self.target.zero(retry=False))
 
-    def has_run_command(self) -> Steps[bool]:
+    def has_run_command(self) -> Steps[bool | None]:
         """Return whether a direction stands in the function bits; false if they are not read."""
         bits = yield from read_if_there(BITS)
         return bits is not None and bool(int(bits) & _DIRECTIONS)

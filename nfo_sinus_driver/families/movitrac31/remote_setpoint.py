@@ -106,7 +106,7 @@ class RemoteSetpoint(ByLine):
         """Write set-point 0; and take the direction away that function bits may give."""
         yield from self._stop_by(self.target.zero(retry=False), take_direction())
 
-    def has_run_command(self) -> Steps[bool]:
+    def has_run_command(self) -> Steps[bool | None]:
         """Return false: the terminals go on running the motor, at set-point 0."""
         yield from ()
         return False

@@ -33,7 +33,7 @@ from nfo_sinus_driver.simulator.sinus_g2.control_unit import G2ControlUnit
 
 #: Their status repeats what was commanded, so that the speed alone counts, however long it takes.
 _BY_SPEED_ALONE = ('telegram1 g2', 'telegram1 sinus_h')
-_RAMPS = (Cause.RAMPING, Cause.STOPPING)
+_RAMPS = (Cause.RAMPING, Cause.RAMPING_SO_FAR, Cause.STOPPING)
 
 
 def by_speed_alone(connection: str) -> bool:
@@ -124,7 +124,7 @@ _WAYS = {
     'rapid stop': lambda drive: drive.rapid_stop(),
     'release': lambda drive: drive.disconnect(1.0),
 }
-_SAYS_RAMPS = (Cause.RAMPING, Cause.RAPID_STOPPING)
+_SAYS_RAMPS = (Cause.RAMPING, Cause.RAMPING_SO_FAR, Cause.RAPID_STOPPING)
 _SAYS_RELEASED = (
     Cause.COASTING, Cause.QUICK_STOPPED, Cause.COASTED_FOR_TIMEOUT,
     # a drive measures 0 while the motor is released
@@ -304,9 +304,14 @@ def test_a_run_command_that_shows_after_the_ramp_is_removed_by_force(
         rig.send(None)
         # another word of the same register releases the motor
         command = command_of(connection)
-        rig.meet = lambda key, data: (
-            'ignored' if key == command and data is not None and rig.number(data) == stop else None
-        )
+
+        def meet(key: str, data: bytes | None) -> str | None:
+            if key != command:
+                return None
+            # read back, it would show at once
+            return 'refused' if data is None else 'ignored' if rig.number(data) == stop else None
+
+        rig.meet = meet
         assert rig.answer(rig.drive.stop()).startswith('stopping')
         rig.wait_until(lambda: rig.notes.said(Cause.RUN_COMMAND_STANDS), 20.0)
         assert not rig.far.motor.turning and rig.far.motor.driven
@@ -476,3 +481,67 @@ def test_a_code_that_the_manual_does_not_list_confirms_no_stop(
             assert rig.drive.stop_unconfirmed
             rig.pass_time(1.0)
         rig.wait_until(lambda: not rig.drive.stop_unconfirmed)
+
+
+# --- a run command whose end is answered, and not done --------------------------------------------
+
+
+@pytest.mark.parametrize('how', ['stop', 'rapid stop', 'deactivate'])
+@pytest.mark.parametrize('connection', [one for one in _RUN_COMMANDS if 'telegram1' not in one])
+def test_the_answer_to_a_stop_that_is_not_done_is_the_last_word_on_it(
+    connection: str, how: str
+) -> None:
+    one = CONNECTIONS[connection]
+    with Rig(connection, parameters={**ramps(one.model, 0.3, 6.0), **one.parameters}) as rig:
+        rig.turn()
+        rig.send(None)
+        ignore_the_removal(rig, connection)
+        stop = _ANSWERED[how](rig.drive)
+        rig.answer(stop)
+        # that it is not done shows, or is said not to show yet
+        unread = connection in _UNREAD
+        assert cause_of(stop) == (Cause.RAMPING_SO_FAR if unread else None), said(stop.result())
+
+
+#: No manual says of their commands that they can be read, and their status shows the same of a ramp
+#: to set-point 0 as of one to a stop.
+_UNREAD = (
+    'classic v5.0', 'canopen, no DriveStatus', 'described, by states', 'described, no holder'
+)
+_ANSWERED = {
+    'stop': lambda drive: drive.stop(),
+    'rapid stop': lambda drive: drive.rapid_stop(),
+    'deactivate': lambda drive: drive.deactivate(),
+}
+
+
+@pytest.mark.parametrize('wrong', ['refused', 'none such'])
+def test_where_the_control_word_cannot_be_read_back_standstill_shows_the_end(wrong: str) -> None:
+    with Rig('canopen, ds402', parameters=ramps('sinus_g2', 0.3, 6.0)) as rig:
+        rig.turn()
+        rig.send(None)
+        rig.spoil(wrong, 'fieldbus.control_word', 10**6, written=False)
+        stop = rig.drive.stop()
+        rig.answer(stop)
+        assert cause_of(stop) is Cause.RAMPING_SO_FAR
+        rig.wait_until(lambda: not rig.far.motor.turning, 20.0)
+        assert not rig.notes.said(Cause.CANNOT_STOP, Severity.ERROR)
+
+
+def test_a_motor_that_ramps_by_its_set_point_alone_is_released_once_it_stands() -> None:
+    with Rig('canopen, ds402', parameters={'control.retard': 30.0}) as rig:
+        rig.turn()
+        rig.send(None)
+        # another word releases the motor
+        rig.meet = lambda key, data: (
+            'ignored' if key == 'fieldbus.control_word' and data and rig.number(data) == 0x76
+            else None
+        )
+        stop = rig.drive.stop()
+        rig.answer(stop)
+        assert stop.exception()
+        rig.wait_until(lambda: not rig.far.motor.turning, 30.0)
+        assert rig.far.motor.driven and not rig.notes.said(Cause.STOP_FORCED)
+        rig.wait_until(lambda: not rig.far.motor.driven, 10.0)
+        rig.pass_time(1.0)
+        assert rig.notes.said(Cause.STOP_FORCED) and not rig.drive.stop_unconfirmed

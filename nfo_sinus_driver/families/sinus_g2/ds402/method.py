@@ -153,6 +153,14 @@ class Ds402(ControlMethod):
         """Take the voltage away: the motor coasts ([M0 table 16], [C96]); control is kept."""
         yield from self._command(words.DISABLE_VOLTAGE, control_mode, retry=True)
 
+    def has_run_command(self) -> Steps[bool | None]:
+        """Return whether the control word has more than "shutdown"; ``None``: it is not read."""
+        try:
+            word = int((yield Read(CONTROL_WORD)))
+        except Refusal:
+            return None
+        return bool(word & words.ControlWord.SWITCH_ON)
+
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Switch off, take the voltage away, and take control away by MODE = Stop."""
         obeyed = yield from super().force_stop(control_mode)
