@@ -290,7 +290,7 @@ LAWS = (
         SEQUENCE,
         'if stands or self._method.reads_run_command:',
         'if self._method.reads_run_command:',
-        (STOPPED_IS_TRUE, '-k', 'last_word and ds402'),
+        (STOPPED_IS_TRUE, '-k', 'set_point_alone'),
     ),
     Mutant(
         3,
