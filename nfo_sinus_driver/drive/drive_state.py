@@ -33,7 +33,7 @@ from nfo_sinus_driver.drive.identity import Nameplate
 from nfo_sinus_driver.drive.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.settings import DriveSettings
 from nfo_sinus_driver.drive.snapshot import NOT_MEASURED, Listener, Measured
-from nfo_sinus_driver.link import LinkError, NoAnswer, PortError, Refused, Reply
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, PortError, Refused, Reply
 
 _log = logging.getLogger(__name__)
 
@@ -49,6 +49,8 @@ _LONGEST_START_DELAY = 3600.0
 _SOON = 2.0
 #: How long bus control is assumed to last, s, where it has to be read separately.
 _BY_MODE_FOR = 1.0
+#: And while the motor is enabled: a hand takes longer to take control and to give it back.
+_BY_MODE_WHILE_ENABLED = 0.08
 #: Settings that mean another drive, or another way to command it.
 _FIXED = (
     'address',
@@ -374,20 +376,36 @@ class DriveState:
         """
         Add to a status who has control, where neither its word nor its code shows it.
 
-        Bus control is assumed to last for a while, as long as the code stays the same.
+        Bus control is assumed to last for a while, as long as the code stays the same; not for long
+        where the motor is enabled, which would go on after a take-over that was not seen. That is
+        one if it is read twice, for one reading may be wrong.
         """
         in_word = status.word is not None and Fact.NETWORK_CONTROL in status.valid
         if in_word or not status.means(Meaning.ANONYMOUS):
             return status
         before = self.status
         same = before is not None and before.code == status.code
-        if same and status.by_mode and status.at - status.by_mode_at < _BY_MODE_FOR:
+        enabled = self.control.enabled
+        age = status.at - status.by_mode_at if same and status.by_mode else math.inf
+        if age < (_BY_MODE_WHILE_ENABLED if enabled else _BY_MODE_FOR):
             return status
+        try:
+            by_bus, at = await self._held_by_bus(priority, retry)
+            if enabled and not by_bus:
+                by_bus, at = await self._held_by_bus(Priority.LOOK, retry)
+        except (NoAnswer, DamagedAnswer):
+            if age < _BY_MODE_FOR:
+                return status
+            raise
+        return replace(status, by_mode=by_bus, by_mode_at=at)
+
+    async def _held_by_bus(self, priority: Priority, retry: bool) -> tuple[bool, float]:
+        """Read whether the bus has control; return when the answer came, too, s."""
         source = self.model.key(Role.CONTROL_SOURCE)
         reply = await self.params.read_reply(source, priority, retry=retry)
         holder = self.model.profile.holders.get(self.params.value(source, reply.data))
         by_bus = holder is Holder.BUS and not await self._operated_locally(priority, retry)
-        return replace(status, by_mode=by_bus, by_mode_at=reply.arrived)
+        return by_bus, reply.arrived
 
     async def _operated_locally(self, priority: Priority, retry: bool) -> bool:
         """Return whether keypad or terminals command, whatever the control source says."""

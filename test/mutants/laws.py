@@ -228,6 +228,14 @@ LAWS = (
         REVERSES,
     ),
     Mutant(
+        2,
+        'a take-over that is over after less than a second is not noticed',
+        'nfo_sinus_driver/drive/drive_state.py',
+        '_BY_MODE_WHILE_ENABLED if enabled else _BY_MODE_FOR',
+        '_BY_MODE_FOR',
+        ('test/unit/drive/test_described_oddities.py', '-k', 'however_short'),
+    ),
+    Mutant(
         3,
         'a Sinus H that ignores its stops is not released',
         'nfo_sinus_driver/families/sinus_h/profile.py',

@@ -14,7 +14,7 @@ from support.described import SHIPPED, DescribedRig
 import yaml
 
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.drive import Cause, Severity, StopReason
 from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
 from nfo_sinus_driver.simulator.memory import Refused
 
@@ -400,6 +400,49 @@ def test_what_is_written_by_an_enable_takes_effect_too(tmp_path: Path) -> None:
         written = [key for _, key, data in rig.asked if data is not None]
         for key in ('source.command', 'serial.timeout'):
             assert written[written.index(key) + 1] == 'line.r0032', written
+
+
+@pytest.mark.parametrize('poll_rate', [10.0, 50.0])
+@pytest.mark.parametrize('lasts', [0.15, 0.3, 0.5, 0.9])
+def test_a_take_over_by_the_keypad_is_noticed_however_short_it_is(
+    tmp_path: Path, lasts: float, poll_rate: float
+) -> None:
+    file = described(tmp_path, **ODD['a parameter tells who has control'])
+    with DescribedRig(file, parameters={'ramp.accel': 1.0, 'ramp.decel': 1.0}, poll_rate=poll_rate) as rig:
+        rig.connect()
+        for wait in (0.1, 0.4, 0.7):
+            rig.enable()
+            rig.follow(20.0)
+            rig.pass_time(wait)
+            rig.far.set_from_keypad('source.command', 'Keypad')
+            rig.pass_time(lasts)
+            rig.far.set_from_keypad('source.command', 'Bus')
+            rig.pass_time(4.0)
+            assert not rig.drive.following and not rig.turns
+            assert rig.drive.snapshot.stop_reason is StopReason.CONTROL_TAKEN
+
+
+def test_one_reading_that_another_has_control_is_read_again_and_stops_no_motor(
+    tmp_path: Path,
+) -> None:
+    file = described(tmp_path, **ODD['a parameter tells who has control'])
+    with DescribedRig(file) as rig:
+        rig.connect()
+        rig.enable()
+        rig.follow(20.0)
+        read: list[str] = []
+
+        def misread(key: str, data: bytes | None) -> None:
+            read.append(key)
+            is_first = key == 'source.command' and read.count(key) == 1
+            rig.far.memory.set('source.command', 'Keypad' if is_first else 'Bus')
+
+        rig.meet = misread
+        rig.pass_time(1.5)
+        first = read.index('source.command')
+        assert read[first + 1] == 'source.command'
+        assert rig.drive.following and rig.turns
+        assert not rig.notes.said(Cause.STOPPED_BECAUSE)
 
 
 def test_a_change_at_the_keypad_is_said_and_one_of_the_driver_is_not(tmp_path: Path) -> None:

@@ -199,7 +199,8 @@ def test_what_is_measured_is_that_of_the_motor() -> None:
             assert rig.drive.snapshot.speed == pytest.approx(motor.speed, abs=1.0)
             measured = rig.notes.telemetry[-1]
             # P010, P011, P020
-            assert measured.values[Role.DC_LINK_VOLTAGE] == pytest.approx(motor.dc_link, abs=1.0)
+            # it ripples
+            assert measured.values[Role.DC_LINK_VOLTAGE] == pytest.approx(motor.dc_link, abs=2.0)
             assert measured.values[Role.OUTPUT_VOLTAGE] == pytest.approx(motor.voltage, abs=1.0)
             current = 100 * motor.current / motor.plate.current
             assert measured.measured['status.apparent_current'] == pytest.approx(current, abs=2.0)
