@@ -73,6 +73,11 @@ class InverterStatus:
             crest, fell = (size, self.at), (crest[1], self.at)
         return replace(self, frequency=frequency, crest=crest, fell=fell)
 
+    def tells_otherwise(self, other: InverterStatus) -> bool:
+        """Return whether another one says something else of the drive than this."""
+        mine = self.word, self.code, self.by_mode, self.facts
+        return mine != (other.word, other.code, other.by_mode, other.facts)
+
     @functools.cached_property
     def listed(self) -> StatusCode:
         """What the model's table says of the code."""

@@ -127,6 +127,7 @@ class Controller:
             self._control.access.abort()
         if self._control.state is ControlState.IDLE and not self._state.connected:
             self._control.dispatch(ControlEvent.LOST)
+        self._state.hooks.changed()
 
     def _notify_stop(self, why: Report) -> None:
         # after the stop of this motor is on its way

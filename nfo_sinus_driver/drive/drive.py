@@ -125,6 +125,9 @@ class Drive:
             request_missed=self._poller.poll_soon,
             fault_came=self._error_log_monitor.expect,
             motor_stopped=self._motor_stopped,
+            # a poll judges it before it is published
+            status_changed=self._poller.wake,
+            changed=self._poller.publish_change,
         )
         if self._controller is not None:
             hooks = hooks._replace(setpoint_refused=self._controller.refused)

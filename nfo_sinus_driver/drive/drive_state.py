@@ -77,6 +77,8 @@ class Hooks(NamedTuple):
     :ivar fault_came: a fault that was not active before.
     :ivar setpoint_refused: the drive takes no set-points any more, for this reason.
     :ivar motor_stopped: a stop of the motor was begun, for this reason.
+    :ivar status_changed: a status was read, by a poll or not, that says otherwise than the last.
+    :ivar changed: what else is published of the drive may have changed, measured values aside.
     """
 
     status_arrived: Callable[[Reply], None] = _nothing
@@ -84,6 +86,8 @@ class Hooks(NamedTuple):
     fault_came: Callable[[], None] = _nothing
     setpoint_refused: Callable[[Report], None] = _nothing
     motor_stopped: Callable[[Report], None] = _nothing
+    status_changed: Callable[[], None] = _nothing
+    changed: Callable[[], None] = _nothing
 
 
 class DriveState:
@@ -425,6 +429,8 @@ class DriveState:
             self._alone = self.bus.silences.take_longest(self.settings.address)
             self._asked_in_vain, self._in_vain = self._in_vain, False
             self._note_fault(before)
+            if before is None or before.tells_otherwise(status):
+                self.hooks.status_changed()
         return status
 
     async def keep_alive(self) -> None:

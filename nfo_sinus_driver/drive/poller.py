@@ -144,6 +144,8 @@ class Poller:
         self.active = False
         #: The newest poll.
         self.snapshot = take_snapshot(state, setpoint)
+        #: When it was published, s; its own time is that of its status.
+        self._shown_at = -math.inf
         self._failures = _Failures()
         #: How often in a row it could not be connected to.
         self._failed_reconnects = 0
@@ -158,6 +160,8 @@ class Poller:
         self._complaint: Report | None = None
         #: A status word that came with a set-point, and has not been checked yet.
         self._received: Reply | None = None
+        #: For how long the worker had paused when the status was last requested, s.
+        self._status_paused = 0.0
         self._reported_fault = 0
         self._conditions = Conditions(state)
         self._bus.on_silence(self._unit, self._look_for_loss, lambda: state.control.stop_owed)
@@ -269,10 +273,13 @@ class Poller:
                 if not self._state.connected:
                     if not self._waits_to_look:
                         await self._connect()
+                        # nothing is measured yet: it is polled at once
+                        due, polled_at = False, started - self._period
                 elif due:
                     await self._poll()
                 else:
                     await self._read_status()
+                    self._publish_changed()
                 if self._state.connected and not self._params.recognition.holds:
                     # it was silent for long, or this driver stood still: is it still the same?
                     await self._recogniser.recognise(retry=False)
@@ -445,9 +452,11 @@ class Poller:
                 code_for=self._code_holds,
             )
 
+        paused = self._bus.paused
         while (status := await self._try(_STATUS, read)) is None:
             # what was read before stays valid
             continue
+        self._status_paused = paused
         if self._received is taken:
             self._received = None
         state.require_fresh(status)
@@ -460,7 +469,6 @@ class Poller:
     async def _poll(self) -> None:
         state = self._state
         last = state.last_polled(state.controlled).value
-        paused = self._bus.paused
         status = await self._read_status()
         rare = self._rare_is_due
         every = rare and self._rare_reads % _ALL_SCALES == 0
@@ -481,7 +489,7 @@ class Poller:
             age = self._bus.now() - state.last_polled(role).at
             if role is not actual and (age >= self._slow_period or not steady):
                 await self._measure(role)
-        if self._bus.paused == paused:
+        if self._bus.paused == self._status_paused:
             # else the status may be old: the next poll is due
             self._publish(status)
 
@@ -659,6 +667,36 @@ class Poller:
             # an error of the listener must not end the polling
             _log.exception('the loss of the drive could not be reported')
 
+    def publish_change(self) -> None:
+        """
+        Publish what is known, if that is not what was published last.
+
+        However seldom the polls: what the driver acts on is shown when it changes.
+        """
+        def publish() -> None:
+            try:
+                self._publish_changed()
+            except Exception:
+                # an error of the listener must end nothing
+                _log.exception('a change could not be reported')
+
+        # what happens at this moment may change more of it, and be a stop, which goes first
+        self._bus.call(publish)
+
+    def _publish_changed(self) -> None:
+        """Publish what is known if it has changed, but for what the next poll has to show."""
+        state = self._state
+        if self._task is None:
+            return
+        if state.connected:
+            is_old = self._bus.paused != self._status_paused
+            if is_old or not self.snapshot.connected:
+                # it is read, or measured for the first time, at once
+                return
+        snapshot = self._snapshot(state.status if state.connected else None, polled=False)
+        if not snapshot.shows_the_same(self.snapshot):
+            self._show(snapshot)
+
     def show_stop(self) -> None:
         """Have what is known published until the motor is stopped."""
         self._bus.cancel(self._show_task)
@@ -667,16 +705,27 @@ class Poller:
     async def _show_while_stopping(self) -> None:
         """Publish what is known while the stop of a drive that answers in part delays its polls."""
         control = self._state.control
+        pause = _SHOW_PERIOD
         while control.stopping:
-            before = self.snapshot, self._bus.paused
-            await self._bus.sleep(_SHOW_PERIOD)
-            waits = before == (self.snapshot, self._bus.paused) and control.stopping
+            paused = self._bus.paused
+            await self._bus.sleep(pause)
+            left = self._shown_at + _SHOW_PERIOD - self._bus.now()
+            pause = left if left > 0 else _SHOW_PERIOD
+            waits = left <= 0 and paused == self._bus.paused and control.stopping
             # one that was lost has shown nothing since that could be shown again
             known = self._state.connected and self.snapshot.connected
             if waits and known and self._task is not None:
                 self._publish(self._state.status)
 
     def _publish(self, status: InverterStatus | None) -> None:
+        self._show(self._snapshot(status))
+
+    def _show(self, snapshot: Snapshot) -> None:
+        self.snapshot = snapshot
+        self._shown_at = self._bus.now()
+        self._state.listener.on_snapshot(snapshot)
+
+    def _snapshot(self, status: InverterStatus | None, *, polled: bool = True) -> Snapshot:
         state = self._state
         if status is not None and state.status is not None and state.status.at > status.at:
             # a command has read a newer one: the drive may be enabled since, its fault acknowledged
@@ -684,10 +733,9 @@ class Poller:
         frequency, speed = (state.last_polled(role) for role in _BASIC)
         actual = state.shown(state.controlled, state.last_polled(state.controlled).value)
         stop = None if self._controller is None else self._controller.stopped_for
-        self.snapshot = take_snapshot(
-            state, self._setpoint, status, frequency, speed, actual, stop
+        return take_snapshot(
+            state, self._setpoint, status, frequency, speed, actual, stop, polled=polled
         )
-        state.listener.on_snapshot(self.snapshot)
 
 
 def _is(error: Exception, cause: Cause) -> bool:
@@ -702,11 +750,13 @@ def take_snapshot(
     speed: Measured = NOT_MEASURED,
     actual: float = NAN,
     stop: Report | None = None,
+    *,
+    polled: bool = True,
 ) -> Snapshot:
-    """Return the snapshot of a poll; without a status while the drive is not connected."""
+    """Return a snapshot; without a status while the drive is not connected."""
     common = (state.connected, setpoint.following, state.settings.method)
     if status is None:
-        return Snapshot(state.bus.now(), *common, stop=stop)
+        return Snapshot(state.bus.now(), *common, stop=stop, polled=polled)
     code = status.listed
     watched = state.settings.method == MONITOR
     return Snapshot(
@@ -729,4 +779,5 @@ def take_snapshot(
         speed_at=speed.at,
         actual=actual,
         stop=stop,
+        polled=polled,
     )

@@ -167,7 +167,8 @@ class DriveSettings:
     poll_rate: float = setting(
         50.0,
         'status and actual values; while the drive is enabled or a stop is not confirmed, the '
-        'status is read at least five times a second, as far as the line carries that',
+        'status is read at least five times a second, as far as the line carries that, and '
+        'published when it changes',
         0, 1000, unit='Hz', zero='as fast as the bus allows',
     )
     idle_poll_rate: float = setting(

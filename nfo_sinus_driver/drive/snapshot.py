@@ -36,7 +36,7 @@ NOT_MEASURED = Measured()
 @dataclass(frozen=True)
 class Snapshot:
     """
-    One poll of a drive; NaN where nothing was measured.
+    One poll of a drive, or what has changed since; NaN where nothing was measured.
 
     :ivar at: when the status arrived, s of the clock of the bus.
     :ivar status: ``None`` while the drive is not connected.
@@ -50,6 +50,9 @@ class Snapshot:
     :ivar kind: its kind; the fault bit decides [C95].
     :ivar stop: why the motor was stopped last; ``None`` before the first time, and while it is
         enabled and set-points arrive.
+    :ivar polled: a poll has measured it just now. Else it is there because something else has
+        changed, and the measured values are those of the last poll: no time tells that apart, for
+        a poll does not measure each of them.
     """
 
     at: float
@@ -73,6 +76,28 @@ class Snapshot:
     kind: Kind = Kind.STATUS
     requires_ack: bool = False
     stop: Report | None = None
+    polled: bool = True
+
+    def shows_the_same(self, other: Snapshot) -> bool:
+        """Return whether another one shows the same, but for measured values and times."""
+        return self._known == other._known
+
+    @property
+    def _known(self) -> tuple[object, ...]:
+        status = self.status
+        shown = () if status is None else (status.shown_word, status.facts, status.code)
+        return (
+            self.connected,
+            self.enabled,
+            self.control_mode,
+            self.unit,
+            self.setpoint,
+            self.setpoint_clamped,
+            self.text,
+            self.kind,
+            self.stop,
+            *shown,
+        )
 
     @property
     def stop_reason(self) -> StopReason:

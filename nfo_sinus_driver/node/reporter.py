@@ -99,7 +99,7 @@ class Reporter:
     # --- called by the bus --------------------------------------------------------------------
 
     def on_snapshot(self, snapshot: Snapshot) -> None:
-        """Publish a poll."""
+        """Publish a poll, or what has changed since."""
         self._snapshots(snapshot)
 
     def on_telemetry(self, telemetry: Telemetry) -> None:
@@ -119,7 +119,7 @@ class Reporter:
         self._queue.put(lambda: self._log_event(event))
 
     def _is_urgent(self, snapshot: Snapshot) -> bool:
-        """Return whether a poll is awaited, or shows other things than the one before."""
+        """Return whether a snapshot is awaited, or shows other things than the one before."""
         before = self._newest
         self._newest = shown = (
             snapshot.connected, snapshot.enabled, snapshot.text, snapshot.kind, snapshot.stop
@@ -154,7 +154,11 @@ class Reporter:
         heard = {publisher for publisher in of_each_poll if _is_heard(publisher)}
         self._heard = bool(heard)
         self._diagnose(snapshot)
-        self._joint.move(snapshot)
+        if snapshot.polled:
+            self._joint.move(snapshot)
+        else:
+            # nothing was measured
+            heard &= {self._status}
         inv_st = self._last_inv_st if status is None else (status.code, snapshot.kind)
         # a message costs as much as a transaction, heard or not; why it stopped goes out always
         stop_is_new = snapshot.stop is not self._stop

@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a family of one's own may have that the messages have no constant for."""
+"""What is published of a drive, and when."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
+from bench import Bench, wait_until
 from builtin_interfaces.msg import Time
+from connections import needs
 from hypothesis import given, strategies as st
 from nfo_sinus_msgs.msg import DriveStatus, InvSt, Telemetry
 import pytest
@@ -136,3 +138,22 @@ def test_what_is_new_or_subscribed_to_is_published_at_once(change: dict[str, Any
     assert not is_urgent(**{**plain, **change})
     reporter._heard = True
     assert is_urgent(**{**plain, **change})
+
+
+@needs('own')
+def test_what_the_driver_acts_on_is_published_however_seldom_it_polls(bench: Bench) -> None:
+    drive = bench.simulator(*bench.drives.ramps(1))
+    bench.driver('-p', 'poll_rate:=0.001', '-p', 'telemetry_rate:=0.0')
+    client = bench.client().connected()
+    measured = ('actual_speed', 'actual_frequency')
+    wait_until(lambda: all(map(client.latest, measured)), 'it was measured once')
+    assert client.enable().success
+    with client.setpoints(20.0):
+        client.wait_for('status', lambda one: one.enabled and one.setpoint == 20.0, 'it follows')
+        drive.inject('fault', bench.drives.overload.code)
+        client.wait_for(
+            'status', lambda one: one.fault and not one.enabled and one.stop_text, 'a fault'
+        )
+        client.wait_for('inv_st', lambda one: one.code == bench.drives.overload.code, 'which one')
+    # no message repeats what was measured before
+    assert [len(client.messages[topic]) for topic in measured] == [1, 1]
