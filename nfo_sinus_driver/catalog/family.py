@@ -172,6 +172,17 @@ class Family(Mapping[str, Parameter]):
         of_line = {self.key(role) for role in _OF_LINE if role in self.roles}
         return self.group_of(Role.BUS_ADDRESS) | of_line
 
+    def needs_standstill(self, key: str) -> bool:
+        """
+        Return whether a setting is written only while the motor stands.
+
+        By the manual, or because the drive may be lost by it: its motor could not be stopped then.
+        The drive's own time-out is a setting of its line by which none is lost.
+        """
+        own_timeout = key == self.key(Role.COMMUNICATION_TIMEOUT)
+        own_timeout = own_timeout or key in self.profile.timeout_conditions
+        return self[key].stopped or (key in self.communication and not own_timeout)
+
     @functools.cached_property
     def scaling(self) -> frozenset[str]:
         """The keys of the parameters that set-points or measured values are multiplied by."""

@@ -155,7 +155,7 @@ class ParameterWriter:
         keys = tuple(keys)
         for key in keys:
             self._require_not_enabled(key)
-        stopped = ', '.join(key for key in keys if self._params.model[key].stopped)
+        stopped = ', '.join(filter(self._params.model.needs_standstill, keys))
         if not stopped:
             return
         try:
@@ -166,9 +166,13 @@ class ParameterWriter:
             raise not_changed(stopped, self._state.report(Cause.STANDSTILL_NEEDED))
 
     def _require_not_enabled(self, key: str) -> None:
-        """Refuse what a start or a set-point depends on while enabled, even at set-point 0."""
+        """
+        Refuse what a start, a set-point or the line depends on while enabled, even at set-point 0.
+        """
         model = self._state.model
         depends = key in model.profile.start_settings or key in model.scaling
+        # a drive may show no run at set-point 0
+        depends = depends or (key in model.communication and model.needs_standstill(key))
         if depends and self._procedures.enabled:
             raise not_changed(key, Report(Cause.NOT_WHILE_ENABLED))
 

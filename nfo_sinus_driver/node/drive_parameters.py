@@ -264,7 +264,7 @@ def _constraints(parameter: CatalogParameter, model: Family) -> Iterator[str]:
         yield f'steps of {parameter.shown_steps}'
     if parameter.option:
         yield f'needs option {parameter.option}'
-    if parameter.stopped:
+    if model.needs_standstill(parameter.key):
         yield 'the motor must be stopped'
     if parameter.key in model.communication:
         yield 'needs allow_communication_changes'

@@ -221,6 +221,66 @@ def test_settings_of_the_line_are_changed_last_and_followed() -> None:
         assert rig.notes.said(hint, Severity.WARNING)
 
 
+#: Settings of the line for which the drive itself does not want a motor at standstill.
+LINE_SETTINGS: dict[str, dict[str, Value]] = {
+    'rtu': {
+        'serial.address': 9, 'serial.si_baud': '9600bps', 'serial.si_prot': '8b Op 1s',
+        'serial.bus_type': 'NFO', 'serial.auto_reset': True,
+    },
+    'classic': {'serial.address': 9, 'serial.si_baud': '9600bps', 'serial.bus_type': 'ABCC'},
+    'movitrac': {'serial.inverter_address': 9, 'serial.response_time': 20},
+}
+
+
+@pytest.mark.parametrize('connection', LINE_SETTINGS)
+def test_no_running_motor_is_lost_by_a_setting_of_the_line(connection: str) -> None:
+    with Rig(connection, allow_communication_changes=True) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        parameters = rig.drive.parameters
+        up, down = ramps(rig.connection.model, 7.0, 9.0).items()
+        for frequency in (0.0, 20.0):
+            rig.send(frequency)
+            rig.wait_until(lambda: abs(rig.far.motor.frequency - frequency) < 0.2)  # noqa: B023
+            for key, value in LINE_SETTINGS[connection].items():
+                before = rig.far.peek(key)
+                answer = rig.answer(parameters.change(dict([up, (key, value)])))
+                assert answer.startswith(f'{key}: the motor is enabled'), answer
+                assert rig.far.peek(key) == before
+        assert rig.drive.following and not rig.far.writes[up[0]]
+        # nor one that is still on its ramp
+        rig.far.set_from_keypad(*down)
+        rig.answer(rig.drive.stop())
+        assert rig.far.motor.driven
+        for key, value in LINE_SETTINGS[connection].items():
+            answer = rig.answer(parameters.change({key: value}))
+            assert answer.startswith(f'{key}: only while the motor is stopped'), answer
+
+
+def test_a_setting_of_the_line_that_waits_is_not_written_once_it_is_enabled() -> None:
+    with Rig(allow_communication_changes=True) as rig:
+        rig.connect(parameters=True)
+        begun = []
+
+        def meet(key: str, data: bytes | None) -> None:
+            if key == ACCEL and not begun:
+                begun.append(rig.drive.enable())
+
+        rig.meet = meet
+        answer = rig.answer(rig.drive.parameters.change({ACCEL: 7, 'serial.address': 9}))
+        assert answer.startswith('serial.address: the motor is enabled'), answer
+        assert 'enabled' in rig.answer(begun[0]) and rig.drive.following
+        assert rig.far.peek('serial.address') == 1
+
+
+def test_the_time_out_of_a_drive_can_be_set_while_its_motor_runs() -> None:
+    with Rig(allow_communication_changes=True).turn() as rig:
+        parameters = rig.drive.parameters
+        rig.result(parameters.change({'serial.sio_tot': 5.0, 'serial.auto_stop': True}))
+        rig.result(rig.drive.set_drive_timeout(2.0))
+        assert far(rig, 'serial.sio_tot') == [2.0]
+
+
 @pytest.mark.parametrize('connection', ['rtu', 'classic', 'canopen'])
 def test_the_protocol_of_the_drive_is_changed_with_permission_alone(connection: str) -> None:
     # the codes of [M0 tables 2, 4]: of the line that it has it hears until the next power-on
