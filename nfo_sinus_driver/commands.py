@@ -20,7 +20,7 @@ COMMANDS = {
     'driver': ('nfo_sinus_driver.node.__main__', 'main'),
     'families': ('nfo_sinus_driver.cli.families', 'main'),
     'monitor': ('nfo_sinus_driver.node.monitor', 'main'),
-    'nfo-sinus': ('nfo_sinus_driver.cli.main', 'main'),
+    'nfo-sinus': ('nfo_sinus_driver.cli.main', 'command'),
     'plot': ('nfo_sinus_driver.demo.record', 'plot'),
     'record': ('nfo_sinus_driver.demo.record', 'main'),
     'simulator': ('nfo_sinus_driver.simulator.main', 'main'),

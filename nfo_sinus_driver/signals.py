@@ -48,6 +48,24 @@ def signal_name(number: int) -> str:
 
 
 _HELD = ENDING | SUSPENDING
+#: What has held signals is all that this process is for: see :func:`hold_to_the_end`.
+_to_the_end = False
+
+
+def hold_to_the_end() -> None:
+    """
+    Have signals that were held stay so after it, until the process ends by itself.
+
+    What is done then has an exit status, which one more signal would take the place of. For the
+    main function of a command alone: it has to end.
+    """
+    global _to_the_end
+    _to_the_end = True
+
+
+def are_held_to_the_end() -> bool:
+    """Return whether signals that were held stay so."""
+    return _to_the_end
 
 
 class HeldSignals:
@@ -86,7 +104,8 @@ class HeldSignals:
             self._cleanup = cleanup.pop_all()
 
     def __exit__(self, *_: object) -> None:
-        self._cleanup.close()
+        if not _to_the_end:
+            self._cleanup.close()
 
     def next(self, timeout: float) -> int | None:
         """Return the next signal, or ``None`` when none came in time, s."""

@@ -25,6 +25,7 @@ from tqdm import tqdm
 
 from nfo_sinus_driver.drive import DriveError, Report
 from nfo_sinus_driver.drive.events import Calls, sentence
+from nfo_sinus_driver.signals import are_held_to_the_end
 
 #: What takes less needs no bar, s.
 _DELAY = 0.3
@@ -93,11 +94,15 @@ def _without_nan(facts: Any) -> Any:
 
 
 @contextlib.contextmanager
-def signals_handled(handler: Callable[[int, Any], Any]) -> Iterator[None]:
+def signals_handled(
+    handler: Callable[[int, Any], Any], *, to_the_end: bool = False
+) -> Iterator[None]:
     """
     Handle the signals that would end this tool, if this is the main thread.
 
     Whatever was inherited: a shell lets its background jobs ignore Ctrl-C.
+
+    :param to_the_end: ignore them afterwards, where this process is a command that ends then.
     """
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     if threading.current_thread() is not threading.main_thread():
@@ -107,15 +112,20 @@ def signals_handled(handler: Callable[[int, Any], Any]) -> Iterator[None]:
     try:
         yield
     finally:
+        ignored = to_the_end and are_held_to_the_end()
         for number, former in before.items():
-            signal.signal(number, former)
+            signal.signal(number, signal.SIG_IGN if ignored else former)
 
 
 @contextlib.contextmanager
-def signals_noted() -> Iterator[Callable[[], bool]]:
-    """Let signals that end the program wait; what it yields says whether one came."""
+def signals_noted(*, to_the_end: bool = False) -> Iterator[Callable[[], bool]]:
+    """
+    Let signals that end the program wait; what it yields says whether one came.
+
+    :param to_the_end: as for :func:`signals_handled`.
+    """
     came = threading.Event()
-    with signals_handled(lambda *_: came.set()):
+    with signals_handled(lambda *_: came.set(), to_the_end=to_the_end):
         yield came.is_set
 
 

@@ -40,6 +40,7 @@ from nfo_sinus_driver.cli.stop import Ack, Stop
 from nfo_sinus_driver.cli.transfer import Diff, Dump, Load
 from nfo_sinus_driver.drive import DriveError
 from nfo_sinus_driver.link import PROTOCOLS
+from nfo_sinus_driver.signals import hold_to_the_end
 from nfo_sinus_driver.version import VERSION
 
 _USAGE = 2
@@ -82,6 +83,12 @@ VERBS: dict[str, Verb] = {
 }
 
 
+def command() -> int:
+    """Run the command as a process of its own, which ends with this exit status."""
+    hold_to_the_end()
+    return main()
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status, 0 only when the drive did it."""
     for stream in (sys.stdout, sys.stderr):
@@ -92,7 +99,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     verb = VERBS[options.verb]
     try:
         # SIGTERM and SIGHUP end it as Ctrl-C does, so that everything is cleaned up
-        with signals_handled(signal.default_int_handler):
+        with signals_handled(signal.default_int_handler, to_the_end=True):
             return verb.main(options)
     except UsageError as error:
         remark(str(error))

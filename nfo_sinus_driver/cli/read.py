@@ -324,7 +324,7 @@ class Set(Verb):
             if wrong:
                 raise CliError(listed('nothing was written:', wrong))
             # what is half-way is not all or none: a signal waits until it is done
-            with signals_noted():
+            with signals_noted(to_the_end=True):
                 changes = drive.parameters.change(wanted).result()
             values = drive.parameters.values
         try:

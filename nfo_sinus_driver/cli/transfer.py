@@ -197,7 +197,7 @@ def _left_as_it_is(file: ParameterFile, drive: OfflineDrive, keys: list[str]) ->
 
 def _require_standstill(drive: OfflineDrive, data: Mapping[str, bytes]) -> None:
     """Ensure that what only a standing motor allows is not tried while it runs."""
-    keys = [key for key in data if drive.model[key].stopped]
+    keys = [key for key in data if drive.model.needs_standstill(key)]
     if keys and drive.read_status().driven:
         head = f'the motor runs ({drive.state.describe()}), and these need it stopped{_NOTHING}:'
         raise CliError(listed(head, keys))
@@ -219,7 +219,7 @@ class Loading:
     def run(self) -> None:
         """Write all of it; if that fails, say what was written and what not, or put it back."""
         # a second Ctrl-C does not keep the first from being answered
-        with signals_noted():
+        with signals_noted(to_the_end=True):
             self._run()
 
     def _run(self) -> None:

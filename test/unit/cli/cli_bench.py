@@ -15,6 +15,7 @@ import re
 import select
 import subprocess
 import sys
+import threading
 import time
 from typing import Any, NamedTuple
 
@@ -29,7 +30,8 @@ ROOT = Path(__file__).resolve().parents[3]
 PATIENCE = 60.0
 #: The functions that write [M0 §6.2.3].
 WRITES = {6, 16, 23}
-COMMAND = (sys.executable, '-c', 'from nfo_sinus_driver.cli.main import main; exit(main())')
+_PROGRAM = 'from nfo_sinus_driver.commands import nfo_sinus; exit(nfo_sinus())'
+COMMAND = (sys.executable, '-c', _PROGRAM)
 #: As a shell starts its background jobs.
 BACKGROUND = ('env', '--ignore-signal=INT,QUIT')
 
@@ -57,6 +59,24 @@ def wait_until(condition: Callable[[], object]) -> None:
     while not condition():
         assert time.monotonic() < deadline, 'it never came true'
         time.sleep(0.005)
+
+
+def signals_until_it_ends(process: subprocess.Popen[str], number: int) -> tuple[str, str]:
+    """Send a signal again and again, as an impatient operator does; return its output."""
+    ended = threading.Event()
+
+    def send() -> None:
+        while not ended.wait(0.02):
+            process.send_signal(number)
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    try:
+        return process.communicate(timeout=PATIENCE)
+    finally:
+        ended.set()
+        sender.join()
+
 
 
 class Bench:

@@ -19,7 +19,17 @@ import time
 from types import SimpleNamespace
 from typing import Any
 
-from cli_bench import COMMAND, PATIENCE, QUICK, ROOT, Bench, Done, MakeBench, wait_until
+from cli_bench import (
+    COMMAND,
+    PATIENCE,
+    QUICK,
+    ROOT,
+    Bench,
+    Done,
+    MakeBench,
+    signals_until_it_ends,
+    wait_until,
+)
 import pytest
 
 from nfo_sinus_driver.cli.control_session import ControlSession
@@ -234,6 +244,18 @@ def test_a_signal_stops_the_motor(bench: Bench, number: signal.Signals) -> None:
     name = 'Ctrl-C' if number is signal.SIGINT else number.name
     assert f'{name}: stopping the motor' in err
     assert 'ramps down' in err and 'control released' in err
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_signals_without_end_stop_the_motor_and_the_status_is_its_own(
+    bench: Bench, number: signal.Signals
+) -> None:
+    with bench.running() as process:
+        _, err = signals_until_it_ends(process, number)
+    assert process.returncode == SIGNALS[number], err
+    # a second one leaves the motor to its ramp
+    wait_until(lambda: not bench.state()['frequency'])
+    assert 'ramps down' in err and 'Traceback' not in err
 
 
 @pytest.mark.parametrize('connection', ['classic', 'optimal', 'drive_control'])

@@ -12,8 +12,9 @@ import os
 from pathlib import Path
 import shlex
 import signal
+import threading
 
-from cli_bench import PATIENCE, Bench, Done, wait_until
+from cli_bench import PATIENCE, Bench, Done, signals_until_it_ends, wait_until
 import pytest
 
 from nfo_sinus_driver.catalog import load_family
@@ -401,8 +402,8 @@ def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     sent: list[int] = []
 
     @contextlib.contextmanager
-    def noting() -> Iterator[Callable[[], bool]]:
-        with original() as came:
+    def noting(**how: bool) -> Iterator[Callable[[], bool]]:
+        with original(**how) as came:
             noted.append(came)
             yield came
 
@@ -442,6 +443,25 @@ def test_what_interrupts_a_set_leaves_all_or_none_and_it_is_said(
     assert done.status == 0, done.err
     assert done.out == 'control.accel: 5 -> 7.5 s\ncontrol.retard: 5 -> 8 s\n'
     assert has(bench, {'control.accel': 7.5, 'control.retard': 8})
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('verb', ['set', 'load'])
+def test_what_is_written_is_said_and_is_the_status_whatever_signals_come(
+    bench: Bench, some: Path, verb: str, number: int
+) -> None:
+    begun = threading.Event()
+    bench.on_write('control.accel', begun.set)
+    last = 'freque.f_fix2'
+    changes = [some] if verb == 'load' else [f'{key}={value}' for key, value in SOME.items()]
+    back = ['--put-back'] if verb == 'load' else []
+    with bench.begun(verb, *changes, *back) as process:
+        wait_until(lambda: begun.is_set() or process.poll() is not None)
+        out, err = signals_until_it_ends(process, number)
+    written = has(bench, SOME)
+    assert process.returncode == (0 if written else 1), (out, err)
+    assert written or has(bench, BEFORE)
+    assert last in out + err and 'Traceback' not in err
 
 
 def test_a_second_ctrl_c_keeps_nothing_from_being_put_back(
