@@ -24,6 +24,7 @@ from nfo_sinus_driver.drive.settings import BLOCK_SIZE
 from nfo_sinus_driver.node.graph_watch import PERIOD, GraphWatch
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.publish_queue import PublishQueue
+from nfo_sinus_driver.node.setpoint_checks import Origin
 from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
 
 _log = logging.getLogger(__name__)
@@ -51,7 +52,7 @@ class BusContext:
     names: list[str] = field(default_factory=list)
     drives: list[ManagedDrive] = field(default_factory=list)
     #: The functions that take a set-point for all drives of the line, one for each drive.
-    on_setpoint_all: list[Callable[[Float32], None]] = field(default_factory=list)
+    on_setpoint_all: list[Callable[[Float32, Origin], None]] = field(default_factory=list)
     #: The functions that return the diagnosis of each drive, called by the publish queue.
     diagnose: list[Callable[[], DiagnosticStatus]] = field(default_factory=list)
 
@@ -69,7 +70,7 @@ class BusContext:
                 one.drive.stop_beside(why)
 
     def subscribe(
-        self, node: Node, topics: Mapping[str, tuple[type, Callable[[Any], None]]]
+        self, node: Node, topics: Mapping[str, tuple[type, Callable[[Any, Origin], None]]]
     ) -> None:
         """Subscribe to topics, each of a type and for a function; warn of other types."""
         for topic, (type_, callback) in topics.items():

@@ -30,6 +30,7 @@ from nfo_sinus_driver.node.factory_settings import line_of
 from nfo_sinus_driver.node.parameter_names import require_parameter
 from nfo_sinus_driver.node.qos import RELIABLE
 from nfo_sinus_driver.node.rclpy_internals import given_to, overrides_of
+from nfo_sinus_driver.node.setpoint_checks import Origin
 from nfo_sinus_driver.node.settings import BUS_SETTINGS
 from nfo_sinus_driver.node.stamps import Stamps
 from nfo_sinus_driver.setting import Setting
@@ -125,9 +126,9 @@ class BusNode(Node):
             return SetParametersResult(successful=False, reason=str(error))
         return super().set_parameters_atomically(parameter_list)
 
-    def _on_setpoint_all(self, message: Float32) -> None:
+    def _on_setpoint_all(self, message: Float32, origin: Origin) -> None:
         for take in self.bus_context.on_setpoint_all:
-            take(message)
+            take(message, origin)
 
     def _report(self) -> None:
         if not self.bus_context.bus.alive:

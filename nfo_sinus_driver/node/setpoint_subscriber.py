@@ -19,6 +19,7 @@ from rclpy.subscription import Subscription
 from rclpy.utilities import get_default_context
 
 from nfo_sinus_driver.node.qos import NEWEST
+from nfo_sinus_driver.node.setpoint_checks import Origin
 
 _log = logging.getLogger(__name__)
 
@@ -44,19 +45,24 @@ class SetpointSubscriber:
 
     def __init__(self) -> None:
         self._context = get_default_context()
-        self._subscriptions: list[tuple[Subscription, Callable[[Any], None]]] = []
+        self._subscriptions: list[tuple[Subscription, Callable[[Any, Origin], None]]] = []
         self._guard = GuardCondition(None, None, self._context)
         self._closing = False
         self._thread = threading.Thread(target=self._work, name='setpoint subscriber', daemon=True)
 
     def subscribe(
-        self, node: Node, message_type: type, topic: str, callback: Callable[[Any], None]
+        self,
+        node: Node,
+        message_type: type,
+        topic: str,
+        callback: Callable[[Any, Origin], None],
     ) -> None:
-        """Call a function with each message, once :meth:`start` was called."""
+        """Call a function with each message and its origin, once :meth:`start` was called."""
         subscription = node.create_subscription(
             message_type,
             topic,
-            callback,
+            # not called: no executor takes its messages
+            lambda _: None,
             NEWEST,
             callback_group=_Apart(),
             # rclpy's own would stay with the executor, and each message would wake it repeatedly
@@ -104,11 +110,13 @@ class SetpointSubscriber:
                 if subscription.handle.pointer in ready:
                     self._take(subscription, callback)
 
-    def _take(self, subscription: Subscription, callback: Callable[[Any], None]) -> None:
+    def _take(self, subscription: Subscription, callback: Callable[[Any, Origin], None]) -> None:
         try:
             taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
             if taken is not None:
-                callback(taken[0])
+                message, facts = taken
+                number = facts['publication_sequence_number']
+                callback(message, Origin(subscription.topic_name, number))
         except Exception:
             # an error with one message must not keep out the next
             _log.exception('error in a callback; the driver goes on')

@@ -8,6 +8,7 @@ newest valid one counts, from whichever topic.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 import math
 import time
 
@@ -24,6 +25,7 @@ from nfo_sinus_driver.node.bus_context import BusContext
 from nfo_sinus_driver.node.log_limit import LogLimit
 from nfo_sinus_driver.node.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import Joint, control_mode, require_whole
+from nfo_sinus_driver.node.setpoint_checks import Origin, Repeated, Sources
 
 #: The control mode that each unit is for, and what it is called.
 _UNITS = {
@@ -50,6 +52,11 @@ class Setpoints:
         #: The last stamp was one that is to come, and that was reported.
         self._was_ahead = False
         self._joint_command = node.resolve_topic_name('~/joint_command')
+        #: The publishers of a topic are looked up there, which takes longer than a set-point has.
+        self._queue = context.publish_queue
+        self._node = node
+        self._sources = Sources()
+        self._repeated = Repeated()
         context.subscribe(
             node,
             {
@@ -64,15 +71,15 @@ class Setpoints:
         """Log, or do not log, that set-points arrive while the drive is not enabled."""
         self._logged_idle = quiet
 
-    def _on_setpoint(self, message: Float32) -> None:
-        self._take(self._managed.scale.of_drive(message.data))
+    def _on_setpoint(self, message: Float32, origin: Origin) -> None:
+        self._take(self._managed.scale.of_drive(message.data), origin)
 
-    def _on_setpoint_all(self, message: Float32) -> None:
+    def _on_setpoint_all(self, message: Float32, origin: Origin) -> None:
         # a monitored drive takes no part in commands for all
         if self._managed.settings.method != MONITOR:
-            self._on_setpoint(message)
+            self._on_setpoint(message, origin)
 
-    def _on_stamped(self, message: Setpoint) -> None:
+    def _on_stamped(self, message: Setpoint, origin: Origin) -> None:
         if not self._managed.active:
             return
         try:
@@ -85,9 +92,9 @@ class Setpoints:
             self._ignore('unit', f'set-point in {unit} ignored: the control mode is {mode}')
             return
         if self._is_of_now(message.header.stamp):
-            self._take(message.value)
+            self._take(message.value, origin)
 
-    def _on_joint_command(self, message: JointState) -> None:
+    def _on_joint_command(self, message: JointState, origin: Origin) -> None:
         if not self._managed.active:
             return
         try:
@@ -112,24 +119,34 @@ class Setpoints:
         except ValueError as error:
             self._ignore('joint', f'joint command ignored: {error}')
             return
-        self._take(value)
+        self._take(value, origin)
 
     def _is_of_now(self, stamp: Time) -> bool:
         """
         Return whether a stamp is within ``setpoint_timeout`` of the node's clock; 0 is now.
 
         One that is to come would be fresh until then. It is the clock that is wrong, which is
-        reported once, until a stamp is right again.
+        reported once, until a stamp is right again. One that is repeated for longer than that by
+        the clock of this machine is not of now, whatever that of the node shows.
         """
         timeout = self._managed.settings.setpoint_timeout
         # the type of the message can have moments that are none for rclpy
         made = stamp.sec * 10**9 + stamp.nanosec
         if not (made and timeout):
             return True
-        age = (self._clock.now().nanoseconds - made) / 1e9
+        clock = self._clock.now().nanoseconds
+        age = (clock - made) / 1e9
         if abs(age) <= timeout:
             self._was_ahead = False
-            return True
+            repeated = self._repeated.age(made, clock, time.monotonic())
+            if repeated <= timeout:
+                return True
+            self._ignore(
+                'repeated',
+                f'set-point ignored: for {repeated:.1f} s none has come with a newer stamp: an old '
+                'one is repeated, or the clock of its publisher stands, as /clock at pause',
+            )
+            return False
         if age > 0:
             self._ignore('old', f'set-point ignored: it was made {age:.1f} s ago')
         elif not self._was_ahead:
@@ -141,7 +158,7 @@ class Setpoints:
             )
         return False
 
-    def _take(self, value: float) -> None:
+    def _take(self, value: float, origin: Origin) -> None:
         if not self._managed.active:
             return
         if not math.isfinite(value):
@@ -154,6 +171,7 @@ class Setpoints:
             return
         if self._managed.drive.following:
             self._logged_idle = False
+            self._warn_of_two(self._sources.take(origin, value, time.monotonic()))
         elif not self._logged_idle and self._managed.drive.snapshot.connected:
             # before that an enable would be refused
             self._logged_idle = True
@@ -161,6 +179,27 @@ class Setpoints:
             self._log.info(
                 f'set-points arrive, but the drive is not enabled: {enable} to follow them'
             )
+
+    def _warn_of_two(self, topics: Collection[str]) -> None:
+        """Warn of two sources of set-points at once, unless there is but one."""
+        if not topics or self._limit.left_out('sources', time.monotonic()) is None:
+            return
+
+        def warn() -> None:
+            named = ' and '.join(
+                f'{topic} (published by {self._publishers(topic)})' for topic in sorted(topics)
+            )
+            self._log.warning(
+                f'different set-points come from two sources at once, and the motor follows each '
+                f'in turn: {named}; let one of them publish at a time'
+            )
+
+        self._queue.put(warn)
+
+    def _publishers(self, topic: str) -> str:
+        found = self._node.get_publishers_info_by_topic(topic)
+        names = {f'{one.node_namespace.rstrip("/")}/{one.node_name}' for one in found}
+        return ' and '.join(sorted(names)) or 'a node that has ended'
 
     def _ignore(self, kind: str, text: str) -> bool:
         """Log why something is ignored, unless its kind was logged just now; return whether."""

@@ -61,7 +61,7 @@ def test_a_callback_that_raises_keeps_no_later_message_out(
     subscriber = SetpointSubscriber()
     publishers = {topic: node.create_publisher(Float32, topic, 1) for topic in heard}
     for topic in heard:
-        subscriber.subscribe(node, Float32, topic, lambda _, topic=topic: raises(topic))
+        subscriber.subscribe(node, Float32, topic, lambda _, __, topic=topic: raises(topic))
     subscriber.start()
     for topic, publisher in publishers.items():
 
@@ -78,7 +78,7 @@ def test_a_callback_that_raises_keeps_no_later_message_out(
 
 def test_it_ends_without_a_message(node: Node) -> None:
     subscriber = SetpointSubscriber()
-    subscriber.subscribe(node, Float32, '/one', lambda _: None)
+    subscriber.subscribe(node, Float32, '/one', lambda _, __: None)
     subscriber.start()
     assert subscriber.alive
     subscriber.close()
@@ -129,3 +129,35 @@ def test_another_node_of_its_name_is_warned_of(bench: Bench, node: Node) -> None
     namesake = Node('nfo_sinus')
     wait_until(lambda: 'another node is called /nfo_sinus, too' in driver.text, 'it is warned of')
     namesake.destroy_node()
+
+
+@pytest.mark.parametrize('other', ['/nfo_sinus_bus/setpoint_all', '/nfo_sinus/setpoint'])
+def test_two_sources_at_once_are_warned_of_by_name(bench: Bench, node: Node, other: str) -> None:
+    bench.simulator(*bench.drives.ramps(1))
+    driver = bench.driver()
+    client = bench.client().connected()
+    publisher = node.create_publisher(Float32, other, 1)
+    words = 'different set-points come from two sources at once'
+    assert client.enable().success
+    with client.setpoints(20.0):
+        client.wait_for('status', lambda one: one.enabled and one.setpoint == 20.0, 'it follows')
+        # that two agree is no harm, nor one that is heard now and then
+        for value in (20.0, 20.0, 20.0, 10.0):
+            publisher.publish(Float32(data=value))
+            time.sleep(0.1)
+        assert words not in driver.text
+
+        def warned() -> bool:
+            publisher.publish(Float32(data=-20.0))
+            return words in driver.text
+
+        wait_until(warned, 'they are warned of', period=0.05)
+    (line,) = [one for one in driver.text.splitlines() if words in one]
+    mine, theirs = client.node.get_fully_qualified_name(), '/test_subscriber'
+    if other == '/nfo_sinus/setpoint':
+        both = ' and '.join(sorted((mine, theirs)))
+        assert f'/nfo_sinus/setpoint (published by {both})' in line
+    else:
+        # the client of the bench has a publisher of its own alone
+        assert f'/nfo_sinus/setpoint (published by {mine})' in line
+        assert f'{other} (published by {theirs})' in line

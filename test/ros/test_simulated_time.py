@@ -1,10 +1,11 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""With ``use_sim_time`` the clock of a drive node goes on whatever else the node does."""
+"""With ``use_sim_time`` the clock of a drive node goes on whatever else it does, or stands."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import threading
 import time
 
@@ -72,3 +73,40 @@ def test_the_clock_goes_on_while_a_setting_waits_for_the_drive(bench: Bench) -> 
         ended.set()
         thread.join()
     assert 'no set-point for' not in driver.text
+
+
+@needs('own')
+def test_a_set_point_that_is_repeated_while_the_clock_stands_is_missed(bench: Bench) -> None:
+    drive = bench.simulator(*bench.drives.ramps(1))
+    driver = bench.driver('-p', 'setpoint_timeout:=1.0', '-p', 'use_sim_time:=true')
+    client = bench.client().connected()
+    clock = client.node.create_publisher(Clock, '/clock', 10)
+    setpoint = client.node.create_publisher(Setpoint, '/nfo_sinus/setpoint_stamped', 1)
+    now = _APART
+
+    def publish(passes: float) -> None:
+        nonlocal now
+        now += passes
+        stamp = Time(sec=int(now), nanosec=int(now % 1 * 1e9))
+        clock.publish(Clock(clock=stamp))
+        message = Setpoint(value=20.0, unit=Setpoint.HZ)
+        message.header.stamp = stamp
+        setpoint.publish(message)
+
+    def until(passes: float, condition: Callable[[], object], what: str) -> None:
+        def met() -> object:
+            publish(passes)
+            return condition()
+
+        wait_until(met, what, period=_PERIOD)
+
+    until(_PERIOD, lambda: client.latest('status').header.stamp.sec >= _APART, 'its time')
+    assert client.enable().success
+    until(_PERIOD, lambda: drive.state()['frequency'] == 20.0, 'it follows')
+    # the simulation pauses, and its last command is repeated
+    until(0.0, lambda: 'no set-point for 1 s' in driver.text, 'it is missed')
+    until(0.0, lambda: drive.state()['frequency'] == 0.0, 'the motor stands')
+    assert 'an old one is repeated, or the clock of its publisher stands' in driver.text
+    assert client.newest('status').enabled
+    # it goes on
+    until(_PERIOD, lambda: drive.state()['frequency'] == 20.0, 'it follows again')
