@@ -132,7 +132,7 @@ fuzz: setup ## spoiled frames through every decoder (FRAMES=1000000 SEED=1 ONLY=
 		--frames $(or $(FRAMES),1000000) $(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only $(ONLY))
 
 # Not a part of setup: only the peer needs it.
-bench: setup ## measure speed, stops and noise, and a peer (two hours; BENCH=--quick: 10 minutes)
+bench: setup ## measure speed, stops, noise and silence, and a peer (two hours; BENCH=--quick: 10 minutes)
 	@env -u PYTHONPATH .venv/bin/python -m pip install --quiet --no-input --no-cache-dir \
 		--disable-pip-version-check --requirement=benchmark/requirements.txt
 	@tools/run python benchmark/run.py $(BENCH)

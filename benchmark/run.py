@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How fast the driver is, how soon it stops a motor, and how it bears noise: prints tables.
+How fast the driver is, how soon it stops a motor, how it bears noise and silence: prints tables.
 
 Simulated drives on a line that takes its time, a master and its clients, each a process of its
 own. The peer is what a user would write instead; benchmark/results.md explains the rows.
@@ -24,6 +24,7 @@ import sys
 
 import commands
 import noise
+import silence
 import speed
 
 from nfo_sinus_driver.demo.bench import own_domain
@@ -41,6 +42,7 @@ _GROUPS: dict[str, tuple[Columns, Callable[[], Rows], Callable[[], Rows]]] = {
         commands.COLUMNS, lambda: commands.measure(500), lambda: commands.measure(100)
     ),
     'noise': (noise.COLUMNS, lambda: noise.measure(60.0), lambda: noise.measure(10.0, 3)),
+    'silence': (silence.COLUMNS, silence.measure, lambda: silence.measure((57600,))),
 }
 
 
@@ -55,8 +57,8 @@ def main() -> None:
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         for group in options.only or _GROUPS:
             columns, whole, quick = _GROUPS[group]
-            # noise lasts long enough for one run
-            times = 1 if group == 'noise' else runs
+            # noise lasts long enough for one run, and virtual time is the same in each
+            times = 1 if group in ('noise', 'silence') else runs
             found: dict[str, list[dict[str, float]]] = {}
             for _ in range(times):
                 for title, figures in (quick if options.quick else whole)():
