@@ -116,6 +116,8 @@ class Bus:
         self._current: Task | None = None
         #: What looks whether the drive at a unit is lost, and whether its motor may run.
         self._watches: dict[int, tuple[Callable[[], float], Callable[[], bool]]] = {}
+        #: When the next drive that does not answer is lost, s.
+        self._lost_at = math.inf
         #: Until when each unit is left alone, s.
         self._quiet_until: dict[int, float] = {}
         #: Called when the port is found mute, and when it is not any more.
@@ -195,6 +197,11 @@ class Bus:
         if unit is not None:
             return figures
         return dataclasses.replace(figures, foreign_frames=self._link.remarks.foreign_frames)
+
+    def round_time(self) -> float:
+        """Return how long it takes to ask each drive of the line once, s; NaN: not known yet."""
+        mean = self.recorder.statistics(None).round_trip_mean
+        return len(self._watches) * max(mean, self._request_period)
 
     @property
     def port_error(self) -> PortError | None:
@@ -423,7 +430,7 @@ class Bus:
         self._take_in()
         self._ring_timers()
         reopen_at = self._open_when_due()
-        lost_at = self._look_for_losses()
+        self._lost_at = self._look_for_losses()
         quiet_until = self._line_quiet_until()
         supervised_at = math.inf
         if self._port.is_open and not quiet_until:
@@ -438,7 +445,7 @@ class Bus:
         until = min(paced_until, missing_from, supervised_at, reopen_at)
         if quiet_until:
             until = quiet_until
-        return self._clock.until(min(self._sleepers.next_moment, lost_at, until))
+        return self._clock.until(min(self._sleepers.next_moment, self._lost_at, until))
 
     def _look_for_losses(self) -> float:
         """Have the drives looked at that do not answer; return when again, s."""
@@ -595,7 +602,12 @@ class Bus:
         started = self._clock()
         paced_until = self._paced_until
         self._paced_until = started + self._request_period
-        self._link.is_brief = self._scheduler.is_brief(exchange)
+        self._link.patience = math.inf
+        if self._scheduler.is_brief(exchange):
+            self._link.patience = 0.0
+        elif self.silences.is_silent(exchange.unit) or self.silences.is_line_silent:
+            # a loss is noticed when it is due
+            self._link.patience = self._lost_at - started
         try:
             reply = carry_out(self._link, exchange.unit, exchange.operation)
             if self._clock.resumed_at > started:

@@ -117,6 +117,8 @@ class Drive:
         self._tuning = Tuning(
             self.state, self.parameters, procedures, self._watchdog.ensure_set
         )
+        #: Once a session: with each reconnect it would be said again.
+        self._slow_line_reported = False
         #: Stops the drives that stop with this one.
         self._on_stop: Callable[[Report], None] = lambda why: None
         # what follows in one part of it from what happens in another
@@ -486,6 +488,12 @@ class Drive:
         if self._controller is None and takes_control:
             state.notify(Severity.WARNING, Cause.HELD_BY_LINE, why=takes_control)
         self._watchdog.warn_if_unfit()
+        seconds, longest = self._bus.round_time(), self.settings.lost_after
+        if seconds > longest and not self._slow_line_reported:
+            self._slow_line_reported = True
+            state.notify(
+                Severity.WARNING, Cause.LINE_TOO_SLOW, seconds=seconds, lost_after=longest
+            )
 
     def _report_identity(self) -> None:
         state, profile, identity = self.state, self.model.profile, self.identity

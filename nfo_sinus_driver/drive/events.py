@@ -63,6 +63,13 @@ class Cause(enum.Enum):
     TOO_LATE = 'no answer within {timeout:g} s'
     """Check the cable; try again"""
 
+    LINE_TOO_SLOW = (
+        'the line is slow: to ask each of its drives once takes {seconds:.1f} s, longer than '
+        'lost_after ({lost_after:g} s), so one lost answer may pass for the loss of a drive: raise '
+        'the baud rate, or lost_after'
+    )
+    """A drive counts as lost that was asked in vain and sent nothing for `lost_after`, and there is
+    no time to ask it again before. Raise the baud rate, or `lost_after`"""
     # --- Another drive than expected
     OTHER_MODEL = '{error}: every {model} has {what}; is this another model? {call.set_model}'
     """The drive refuses what every drive of `model` has. In unconfigured: `ros2 param set

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import contextlib
 import math
 
-from nfo_sinus_driver.bus import Priority
+from nfo_sinus_driver.bus import Priority, Task
 from nfo_sinus_driver.catalog import InverterStatus, Role, Value
 from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.drive_state import DriveState
@@ -21,6 +21,8 @@ from nfo_sinus_driver.link import LinkError, PortError, Refused
 
 #: An inverter status has one byte; firmware that is newer than the manual may have more of them.
 _LAST_CODE = 0xFF
+#: How often who waits for a recognition looks whether it has ended unnoticed, s.
+_JOINED_FOR = 10.0
 #: No firmware has this number: so answers what has no such register, or all bits set.
 _NO_FIRMWARE = (0.0, 100.0)
 
@@ -34,6 +36,8 @@ class Recogniser:
         self._profile = state.model.profile
         #: What the parameter that identifies the family was when all was read.
         self._identified_as: Value | None = None
+        #: The recognition that is under way for all that want to write.
+        self._task: Task | None = None
 
     async def recognise(self, *, retry: bool = True) -> bool:
         """
@@ -69,12 +73,28 @@ class Recogniser:
         return named
 
     async def require(self) -> None:
-        """Recognise it before a write (DriveError: it is not known what is there)."""
+        """
+        Recognise it before a write, once for all that wait for it.
+
+        :raises DriveError: it is not known what is there.
+        """
+        if self._task is None or self._task.future.done():
+            self._task = self._state.bus.spawn(self._find_out())
+        task = self._task
+        while not await self._state.bus.join(task, _JOINED_FOR):
+            continue
+        error = task.future.result()
+        if error is not None:
+            why = explain_failure(error, self._state)
+            raise self._params.recognition.error(why) from error
+
+    async def _find_out(self) -> LinkError | DriveError | None:
+        """Recognise it; return why not."""
         try:
             await self.recognise()
         except (LinkError, DriveError) as error:
-            why = explain_failure(error, self._state)
-            raise self._params.recognition.error(why) from error
+            return error
+        return None
 
     async def look(self) -> None:
         """

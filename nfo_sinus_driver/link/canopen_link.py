@@ -193,7 +193,7 @@ class CanopenLink:
 
     #: Node ids and bit rates (CiA 301). No manual says with which the drive leaves the factory.
     protocol = CANOPEN
-    is_brief = False
+    patience = math.inf
 
     def __init__(
         self, port: CanPort, settings: LineSettings, now: Clock = time.monotonic
@@ -467,8 +467,9 @@ class CanopenLink:
     def _receive(self, transfer: Transfer, sent: float) -> float:
         """Take the answer to the present request, sent just now; return when it came."""
         unit = transfer.unit
-        patience, ever = self._settings.response_timeout, self._late.longest_ever(unit)
-        deadline = sent + (min(patience, ever) if self.is_brief and ever else patience)
+        ever = self._late.longest_ever(unit)
+        most = max(self.patience, ever) if ever else math.inf
+        deadline = sent + min(self._settings.response_timeout, most)
         other = 0
         while True:
             until = min(deadline, self.supervision.sign_due)

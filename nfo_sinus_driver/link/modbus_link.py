@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+import math
 import re
 from typing import TypeVar
 
@@ -45,7 +46,7 @@ class ModbusLink(ABC):
     protocol: LineProtocol
     remarks: Remarks
     supervision = None
-    is_brief = False
+    patience = math.inf
     clock: ThreadClock
 
     @cached_property

@@ -339,8 +339,8 @@ class TcpLink(ModbusLink):
         self._unanswered = True
         connection.write(encode(request, self._number))
         sent_at, ever = self._now(), self._longest_ever.get(request.unit, 0.0)
-        patience = self._response_timeout
-        deadline = sent_at + (min(patience, ever) if self.is_brief and ever else patience)
+        most = max(self.patience, ever) if ever else math.inf
+        deadline = sent_at + min(self._response_timeout, most)
         others: list[int] = []
         while True:
             data = connection.read(self._now.until(deadline))

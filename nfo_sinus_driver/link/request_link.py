@@ -142,7 +142,7 @@ class RequestLink(ABC, Generic[_Request]):
     """
 
     supervision = None
-    is_brief = False
+    patience = math.inf
     protocol: LineProtocol
     _another: ForeignTraffic
     _late: LateReplies[Any, Any]
@@ -241,18 +241,17 @@ class RequestLink(ABC, Generic[_Request]):
     def _take_late(self, request: _Request, now: float) -> None:
         """Quarantine the late answers to requests of another master."""
 
-    def _patience(self, unit: int, length: int) -> float:
+    def _most(self, unit: int, length: int) -> float:
         """
-        Return how long the first byte of an answer may take, s.
+        Return how long the first byte of an answer is waited for at most, s.
 
-        One that comes and is not heard has left the line after a brief one, too.
+        One that comes and is not heard has left the line by then, too.
 
         :param length: of the answer, in characters.
         """
-        whole, ever = self._settings.response_timeout, self._late.longest_ever(unit)
-        if not (self.is_brief and ever):
-            return whole
-        return min(whole, ever + length * self._settings.char_time + self._gap)
+        ever = self._late.longest_ever(unit)
+        least = ever + length * self._settings.char_time + self._gap
+        return max(self.patience, least) if ever else math.inf
 
     def _gap_before(self, request: _Request) -> float:
         """Return how long the line is silent before a request if nothing unrequested comes, s."""
@@ -591,9 +590,7 @@ class CodecLink(RequestLink[Any]):
         quarantined = self._late.quarantined(unit, self._now())
         longest = codec.longest_answer * self._settings.char_time + codec.inter_byte_timeout
         deadline = due + self._settings.response_timeout
-        if self.is_brief:
-            patience = self._patience(unit, codec.longest_answer)
-            deadline = min(deadline, self._sent_at + patience)
+        deadline = min(deadline, self._sent_at + self._most(unit, codec.longest_answer))
         # one answer, and as much noise again, however long the line is not silent
         last_chance = deadline + 2 * longest
         reader = codec.reader()

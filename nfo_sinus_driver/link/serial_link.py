@@ -311,7 +311,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         believe_refusal = refusal_head(request) not in quarantined
         # one answer, and as much noise again, however long bytes keep coming
         length = self._frame_length(request.answer_length)
-        first = deadline = self._line_end + self._patience(request.unit, length)
+        patience = min(self._settings.response_timeout, self._most(request.unit, length))
+        first = deadline = self._line_end + patience
         last_chance = first + 2 * length * char_time
         came = 0
         last = longest = 0.0

@@ -408,7 +408,8 @@ def test_a_take_over_by_the_keypad_is_noticed_however_short_it_is(
     tmp_path: Path, lasts: float, poll_rate: float
 ) -> None:
     file = described(tmp_path, **ODD['a parameter tells who has control'])
-    with DescribedRig(file, parameters={'ramp.accel': 1.0, 'ramp.decel': 1.0}, poll_rate=poll_rate) as rig:
+    ramps = {'ramp.accel': 1.0, 'ramp.decel': 1.0}
+    with DescribedRig(file, parameters=ramps, poll_rate=poll_rate) as rig:
         rig.connect()
         for wait in (0.1, 0.4, 0.7):
             rig.enable()
