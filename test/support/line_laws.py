@@ -11,7 +11,8 @@ requests on.
 
 S2: a stop for it has been on the wire 0.5 s after that, or 0.3 s after it was called for; besides
 there is the rest of the request under way, and the stops of all that are due, one after the other,
-each of which waits as long as the drive has ever taken to answer.
+each of which waits as long as the drive has ever taken to answer. One that is not answered goes
+twice.
 
 S3: or the motor is stopped by the time-out of the drive: whatever the driver still sends does not
 keep it from striking. A drive without one is looked for once a second, and stopped with its first
@@ -76,6 +77,8 @@ class _Unit:
     :ivar due_since: since when a stop is due that was not sent; infinite: none is.
     :ivar due_within: how long after that it has to be sent, s.
     :ivar asked_since_due: how many requests it has got since a stop is due that could be sent.
+    :ivar again_by: by then a stop goes a second time that was not answered; infinite: none has to.
+    :ivar went_twice: it did, and nothing was answered since.
     :ivar running: its motor may run by this driver: it did, and no stop was sent since.
     :ivar stopped_with: what was told last when that was sent.
     :ivar to_stand_since: since when its motor has to be stopped, and is not.
@@ -91,6 +94,8 @@ class _Unit:
     due_since: float = math.inf
     due_within: float = 0.0
     asked_since_due: int = 0
+    again_by: float = math.inf
+    went_twice: bool = False
     running: bool = False
     stopped_with: Snapshot | None = None
     to_stand_since: float = math.inf
@@ -170,6 +175,7 @@ class LineLaws:
         for unit in self._units.values():
             unit.asked_at += seconds
             # what was called for meanwhile is due from now on
+            unit.again_by += seconds
             unit.due_since = min(unit.due_since + seconds, max(unit.due_since, self._clock.now))
             unit.to_stand_since = min(
                 unit.to_stand_since + seconds, max(unit.to_stand_since, self._clock.now)
@@ -193,14 +199,18 @@ class LineLaws:
             unit.asked_at = self._asked_at = math.inf
             self._frame_at = asked.ended
             self._in_vain.clear()
+            unit.again_by, unit.went_twice = math.inf, False
         elif asked.sent > -math.inf:
             unit.asked_at = min(unit.asked_at, asked.sent)
             self._asked_at = min(self._asked_at, asked.sent)
             self._in_vain.add(asked.unit)
         if stops:
             self._stopped(asked.unit)
+            if not asked.answered:
+                self._not_answered(unit, asked.ended)
         elif asked.sent > unit.due_since and self._reaches_since < asked.sent:
-            unit.asked_since_due += 1
+            # nothing is kept back from one that has stopped by itself
+            unit.asked_since_due += self._turns(asked.unit)
 
     def _stopped(self, number: int) -> None:
         unit = self._units[number]
@@ -211,6 +221,14 @@ class LineLaws:
         unit.due_since = math.inf
         unit.running = False
         unit.stopped_with = self._rig.notes_of[number].snapshot
+
+    def _not_answered(self, unit: _Unit, at: float) -> None:
+        """Note that a stop was not answered."""
+        if unit.again_by < math.inf:
+            unit.again_by, unit.went_twice = math.inf, True
+        elif not unit.went_twice:
+            # behind the first and the second of each other, which waits for its whole time-out
+            unit.again_by = at + _AFTER_LOSS + len(self._units) * self._under_way
 
     def _due(self, unit: _Unit, since: float, within: float) -> None:
         """Note that a stop is due for a drive; the earliest counts."""
@@ -318,7 +336,11 @@ class LineLaws:
 
     def _judge_stop(self, number: int, unit: _Unit) -> None:
         """Judge S2."""
-        if unit.due_since == math.inf or self._there_since == math.inf:
+        if self._there_since == math.inf:
+            return
+        if self._clock.now > max(unit.again_by, self._there_since + _OPENED + _AFTER_LOSS):
+            self._break('S2', number, 'gets no second stop, due at', unit.again_by)
+        if unit.due_since == math.inf:
             return
         since = max(unit.due_since, self._there_since + _OPENED)
         looks = _SHORT_LOOK if since - self._frame_at > _SAME else 0
