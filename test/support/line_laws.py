@@ -199,7 +199,9 @@ class LineLaws:
             unit.asked_at = self._asked_at = math.inf
             self._frame_at = asked.ended
             self._in_vain.clear()
-            unit.again_by, unit.went_twice = math.inf, False
+            for each in self._units.values():
+                # the line is not silent
+                each.again_by, each.went_twice = math.inf, False
         elif asked.sent > -math.inf:
             unit.asked_at = min(unit.asked_at, asked.sent)
             self._asked_at = min(self._asked_at, asked.sent)
