@@ -15,7 +15,8 @@ each of which waits as long as the drive has ever taken to answer. One that is n
 twice.
 
 S3: or the motor is stopped by the time-out of the drive: whatever the driver still sends does not
-keep it from striking. A drive without one is looked for once a second, and stopped with its first
+keep it from striking. One that answers is asked before its own does, whatever becomes of the
+others. A drive without one is looked for once a second, and stopped with its first
 answer. A port that needs a while after it was opened is opened more and more seldom, until it
 passes something.
 
@@ -73,6 +74,7 @@ class _Unit:
     One drive, as it was seen from both ends of the line.
 
     :ivar asked_at: when the first request in vain was sent since its last valid frame.
+    :ivar answered_at: when the last request was sent that it has answered.
     :ivar longest: the longest time from a request to the end of its answer, s.
     :ivar due_since: since when a stop is due that was not sent; infinite: none is.
     :ivar due_within: how long after that it has to be sent, s.
@@ -90,6 +92,7 @@ class _Unit:
     """
 
     asked_at: float = math.inf
+    answered_at: float = math.inf
     longest: float = -math.inf
     due_since: float = math.inf
     due_within: float = 0.0
@@ -176,6 +179,7 @@ class LineLaws:
             unit.asked_at += seconds
             # what was called for meanwhile is due from now on
             unit.again_by += seconds
+            unit.answered_at += seconds
             unit.due_since = min(unit.due_since + seconds, max(unit.due_since, self._clock.now))
             unit.to_stand_since = min(
                 unit.to_stand_since + seconds, max(unit.to_stand_since, self._clock.now)
@@ -196,6 +200,7 @@ class LineLaws:
         if asked.answered:
             if asked.sent > -math.inf:
                 unit.longest = max(unit.longest, asked.ended - asked.sent)
+                unit.answered_at = asked.sent
             unit.asked_at = self._asked_at = math.inf
             self._frame_at = asked.ended
             self._in_vain.clear()
@@ -360,6 +365,11 @@ class LineLaws:
 
     def _judge_standstill(self, number: int, unit: _Unit) -> None:
         """Judge S3."""
+        own = self.own_timeout(number)
+        asked_by = max(unit.answered_at, self._there_since + _OPENED) + (own or math.inf)
+        may_answer = unit.running and unit.asked_at == math.inf and not self._has_ended
+        if may_answer and self._clock.now >= asked_by:
+            self._break('S3', number, 'gets no request in time, the last that it answered at', unit.answered_at)
         if not self._turns(number):
             unit.to_stand_since = math.inf
             return
@@ -367,7 +377,7 @@ class LineLaws:
             unit.to_stand_since = unit.due_since
         if unit.to_stand_since == math.inf or not self.heard:
             return
-        own, share = self.own_timeout(number), self.noise
+        share = self.noise
         until = math.inf
         if share:
             until = unit.to_stand_since + _IN_NOISE[share]

@@ -564,7 +564,7 @@ class Rig:
                 tell(begun, unit, key, written, error.responded or isinstance(error, Refused))
                 raise
             law.ended(unit, None, reads=name == 'read', now=self.clock.now)
-            tell(begun, unit, key, written, answered=unit in self.fars)
+            tell(begun, unit, key, written, unit in self.fars and self.line.sent_at >= begun)
             return reply
 
         def tell(
