@@ -198,9 +198,8 @@ class LineLaws:
                 self._stopped(number)
             return
         if asked.answered:
-            if asked.sent > -math.inf:
-                unit.longest = max(unit.longest, asked.ended - asked.sent)
-                unit.answered_at = asked.sent
+            unit.longest = max(unit.longest, asked.ended - asked.sent)
+            unit.answered_at = asked.sent
             unit.asked_at = self._asked_at = math.inf
             self._frame_at = asked.ended
             self._in_vain.clear()
@@ -369,7 +368,7 @@ class LineLaws:
         asked_by = max(unit.answered_at, self._there_since + _OPENED) + (own or math.inf)
         may_answer = unit.running and unit.asked_at == math.inf and not self._has_ended
         if may_answer and self._clock.now >= asked_by:
-            self._break('S3', number, 'gets no request in time, the last that it answered at', unit.answered_at)
+            self._break('S3', number, 'gets no request in time, the last one at', unit.answered_at)
         if not self._turns(number):
             unit.to_stand_since = math.inf
             return

@@ -564,7 +564,7 @@ class Rig:
                 tell(begun, unit, key, written, error.responded or isinstance(error, Refused))
                 raise
             law.ended(unit, None, reads=name == 'read', now=self.clock.now)
-            tell(begun, unit, key, written, unit in self.fars and self.line.sent_at >= begun)
+            tell(begun, unit, key, written, answered=unit in self.fars)
             return reply
 
         def tell(
@@ -572,6 +572,8 @@ class Rig:
         ) -> None:
             at = self.line.sent_at
             sent = at if at >= begun else -math.inf
+            # what was not sent was answered by the link itself
+            answered = answered and sent > -math.inf
             self.told(Asked(unit, key, written, sent, self.clock.now, answered))
 
         def send(
@@ -579,6 +581,7 @@ class Rig:
         ) -> Reply:
             wrong = self.meet(key, written)
             if wrong in _REFUSALS:
+                self.line.sent_at = self.clock.now
                 self.line.go_to(self.clock.now + _TURN)
                 raise Refused(_REFUSALS[wrong])
             if wrong == 'carried out, refused':
