@@ -397,7 +397,8 @@ class DriveState:
             by_bus, at = await self._held_by_bus(priority, retry)
             if enabled and not by_bus:
                 by_bus, at = await self._held_by_bus(Priority.LOOK, retry)
-        except (NoAnswer, DamagedAnswer):
+        except DamagedAnswer:
+            # noise; after no answer at all the whole status is read anew, for it is from before
             if age < _BY_MODE_FOR:
                 return status
             raise

@@ -142,14 +142,19 @@ def test_the_word_has_the_sign_of_what_is_measured() -> None:
 
 
 def test_who_has_control_is_asked_now_and_then() -> None:
-    with Bench() as rig:
+    with Bench(poll_rate=50.0) as rig:
         rig.turn_at_40()
-        rig.bolt.reads.clear()
-        rig.wait_until(lambda: rig.bolt.reads.count(SOURCE) > 1)
-        asked = [number for number in rig.bolt.reads if number in (STATUS, SOURCE)]
-        first = asked.index(SOURCE)
-        # not with every status
-        assert asked.index(SOURCE, first + 1) - first > 10
+        for enabled, least in ((True, 3), (False, 10)):
+            rig.bolt.reads.clear()
+            rig.wait_until(lambda: rig.bolt.reads.count(SOURCE) > 1)
+            asked = [number for number in rig.bolt.reads if number in (STATUS, SOURCE)]
+            first = asked.index(SOURCE)
+            # not with every status
+            assert asked.index(SOURCE, first + 1) - first > least
+            assert rig.drive.snapshot.enabled == enabled
+            rig.answer(rig.drive.stop())
+            rig.pass_time(0.5)
+        rig.turn_at_40()
         rig.bolt.registers[SOURCE] = 0
         rig.pass_time(5.0)
         assert rig.notes.said(Cause.OTHERS_IN_CONTROL)
