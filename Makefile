@@ -16,7 +16,7 @@ WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PAT
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench docs pages
-.PHONY: all bench-gate build clean coverage exhaustive golden laws
+.PHONY: all bench-gate build clean coverage exhaustive golden laws soak
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -120,6 +120,10 @@ campaign: setup ## many histories of commands, faults and line losses in any ord
 exhaustive: setup ## each thing that can go wrong at each request of a run (PART=1/8 PAIRS=1)
 	@$(WITHOUT_ROS) .venv/without-ros/bin/python test/exhaustive/run.py $(if $(PART),--part $(PART)) \
 		$(if $(PAIRS),--pairs) $(if $(MACHINE),--machine $(MACHINE))
+
+soak: setup ## one driver and four drives for hours: do memory and threads settle? (HOURS=2 SEED=1)
+	@tools/run python test/soak/run.py $(if $(MINUTES),--minutes $(MINUTES),--hours $(or $(HOURS),2)) \
+		$(if $(SEED),--seed $(SEED))
 
 golden: setup ## name the tests whose frames are others than with the driver of COMMIT (HEAD)
 	@$(WITHOUT_ROS) .venv/without-ros/bin/python tools/golden.py $(COMMIT)
