@@ -52,7 +52,8 @@ How to read the tables:
   Modbus, then the one over the Classic protocol. The steps of frequencies, speeds, torques and of
   the process regulator are the factory's; the drive's scale factors change them.
 - **Option**: the option cards of which the drive needs one for it.
-- **Stopped**: it can only be written while the motor stands still.
+- **Stopped**: it can only be written while the motor stands still. The driver wants that of the
+  settings of the line, too ([what is not to be set](interface.md#drive-parameters)).
 - **Modbus** is the first holding register, counted from 0, **Classic** the parameter's id (two: the
   low word first), **PROFIBUS** its parameter number (PNU), on PROFINET, too, **CANopen** its index.
 - A **type** with bits behind it, such as `[0:23]`: only these bits count, on one of the buses.
