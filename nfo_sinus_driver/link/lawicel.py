@@ -158,7 +158,9 @@ class LawicelPort:
     One adapter; it is on the bus as long as the port is open.
 
     After too many errors it leaves the bus by itself (bus-off), and refuses every frame until it
-    was taken off the bus and onto it again, as :meth:`open` does.
+    was taken off the bus and onto it again, as :meth:`open` does. One that restarts when its port
+    is opened hears none of that; so as long as nothing has shown that it is on the bus, it is taken
+    onto it ahead of every frame.
 
     :param rate: bit rate of the bus, bit/s.
     :raises ValueError: there is no such bit rate; the message says which ones there are.
@@ -172,6 +174,7 @@ class LawicelPort:
         self._rate = rate
         self._set_rate = bit_rate(rate)
         self._reader = Reader()
+        self._is_on_bus = False
         self.trouble = ''
 
     @property
@@ -206,11 +209,16 @@ class LawicelPort:
 
     def send(self, frame: Frame) -> None:
         """Hand a frame over."""
+        if not self._is_on_bus:
+            self._port.write(self._set_rate)
+            self._port.write(OPEN)
         self._port.write(encode(frame))
 
     def receive(self, until: float) -> Sequence[Frame]:
         """Return what has come; wait for the first bytes until a moment of ``time.monotonic``."""
         output = self._reader.feed(self._port.read(until))
+        if output.frames or output.done:
+            self._is_on_bus = True
         if output.frames:
             self.trouble = ''
         elif output.flags is not None:
@@ -229,8 +237,10 @@ class LawicelPort:
         self._hear_out(silence)
         if self._ask(self._set_rate).refused:
             return f'the adapter cannot do {self._rate} bit/s on the CAN bus'
-        if self._ask(OPEN).refused:
+        opened = self._ask(OPEN)
+        if opened.refused:
             return 'the adapter does not go onto the CAN bus: unplug it and try again'
+        self._is_on_bus = opened.done > 0
         return ''
 
     def _hear_out(self, silence: float) -> None:

@@ -320,6 +320,10 @@ class Line:
         self.opened.append(self.clock.now)
         if self.boots_for:
             self._come += self.banner
+            if self._protocol.name == 'canopen':
+                # an adapter that has restarted is not on the bus
+                just_before = self.clock.now + self.boots_for - 0.001
+                self.later(just_before, lambda: self.wire.receive(b'C\r', self.clock.now))
         if self.state == 'mute':
             self.mute_for -= 1
             if not self.mute_for:

@@ -79,7 +79,7 @@ def go_mute(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize('seconds', STARTS)
-@pytest.mark.parametrize('connection', ['rtu', 'classic', 'tcp'])
+@pytest.mark.parametrize('connection', ['rtu', 'classic', 'tcp', 'canopen'])
 def test_what_starts_when_it_is_opened_has_the_time_for_it(connection: str, seconds: float) -> None:
     with Rig(connection) as rig:
         rig.turn()

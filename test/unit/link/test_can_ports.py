@@ -201,6 +201,41 @@ def test_an_adapter_is_asked_once_what_keeps_frames_off(adapter: Adapter) -> Non
     assert not port.trouble
 
 
+def test_an_adapter_that_restarts_when_it_is_opened_is_taken_onto_the_bus(
+    adapter: Adapter,
+) -> None:
+    says = dict(adapter.says)
+    # it hears nothing meanwhile
+    adapter.says.clear()
+    port = LawicelPort(adapter, 125_000, adapter.monotonic)
+    port.open()
+    adapter.written.clear()
+    for adapter.says in ({}, says):
+        adapter.coming = b''
+        port.send(REQUEST)
+        assert adapter.written == [b'S4\r', b'O\r', b't60584013200000000000\r']
+        assert port.receive(0.0) == []
+        adapter.written.clear()
+    port.send(REQUEST)
+    assert adapter.written == [b't60584013200000000000\r'], 'it has confirmed that'
+
+
+def test_an_adapter_that_confirms_nothing_but_passes_frames_is_on_the_bus(
+    adapter: Adapter,
+) -> None:
+    adapter.says.clear()
+    port = LawicelPort(adapter, 125_000, adapter.monotonic)
+    port.open()
+    adapter.coming = ANSWER_LINE
+    found: list[Frame] = []
+    while adapter.coming:
+        found += port.receive(0.0)
+    assert found == [ANSWER]
+    adapter.written.clear()
+    port.send(REQUEST)
+    assert adapter.written == [b't60584013200000000000\r']
+
+
 def test_an_adapter_that_has_no_flags(adapter: Adapter) -> None:
     port = LawicelPort(adapter, 125_000, adapter.monotonic)
     port.open()
