@@ -123,6 +123,9 @@ class Bus:
         #: Called when the port is found mute, and when it is not any more.
         self._on_mute: Callable[[float], None] = lambda seconds: None
         self._is_mute = False
+        #: For which opening of a mute port those were woken that wait for it: one that asks nothing
+        #: all the same is not woken for it again.
+        self._woken_for = math.inf
         #: Called when a unit has restarted.
         self._on_restart: dict[int, Callable[[], None]] = {}
         self._thread = threading.Thread(target=self._work, name='bus', daemon=True)
@@ -651,7 +654,9 @@ class Bus:
         # ahead of the request that shows whether it helps
         if not lost:
             if not self.silences.is_mute_at(due, self._link.last_byte_at):
-                self._wake_for_port()
+                if due != self._woken_for:
+                    self._woken_for = due
+                    self._wake_for_port()
                 return math.inf
             if self.silences.heard:
                 self._report_mute(self.silences.mute_for(now))

@@ -188,6 +188,43 @@ def test_tries_in_vain_do_not_count_for_the_place(link: FakeLink) -> None:
     assert port.is_open and not port.is_at_same_place
 
 
+def test_who_waits_for_a_mute_port_and_asks_nothing_is_woken_once(link: FakeLink) -> None:
+    now = 0.0
+    link.time = lambda: now
+    bus = Bus(link, now=link.now)
+    bus.require_sign_of_life(UNIT, 1.0)
+    woken: list[float] = []
+
+    async def wait() -> None:
+        while True:
+            await bus.sleep(1000.0, or_opening=True)
+            woken.append(now)
+
+    def try_in_vain() -> None:
+        nonlocal now
+        ask(bus, 1, Priority.POLL)
+        while bus.step() == -math.inf:
+            continue
+        now += 0.1
+
+    try_in_vain()
+    link.answer = raiser(NoAnswer(''))
+    bus.run(wait())
+    while link.opened < 2:
+        try_in_vain()
+    assert len(woken) == 1
+    try_in_vain()
+    # the next opening waits for a request in vain
+    now += 10.0
+    for _ in range(20):
+        bus.step()
+    assert len(woken) == 2 and link.opened == 2
+    try_in_vain()
+    bus.step()
+    assert len(woken) == 3 and link.opened == 3
+    bus.close()
+
+
 def test_reconnects_are_counted(bus: Bus, link: FakeLink) -> None:
     for times in range(1, 4):
         link.answer = raiser(PortError('gone'))
