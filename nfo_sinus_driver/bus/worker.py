@@ -654,7 +654,8 @@ class Bus:
         # ahead of the request that shows whether it helps
         if not lost:
             if not self.silences.is_mute_at(due, self._link.last_byte_at):
-                if due != self._woken_for:
+                # while the line is left alone a time-out of a drive runs, which a request may feed
+                if due != self._woken_for and not self._line_quiet_until():
                     self._woken_for = due
                     self._wake_for_port()
                 return math.inf

@@ -38,7 +38,7 @@ from mutant import (
 #: What reverses under DriveControl.
 REVERSES = ('test/unit/drive/test_table_16.py', '-k', 'reverse_is_bit_13')
 #: A port that is open and passes nothing.
-SILENCES = 'nfo_sinus_driver/bus/scheduler.py'
+SILENCES = 'nfo_sinus_driver/bus/silences.py'
 MUTE_PORT = 'test/unit/drive/test_mute_port.py'
 CAN_PORTS = 'test/unit/link/test_can_ports.py'
 SERIAL_PORT = 'nfo_sinus_driver/link/serial_port.py'
@@ -933,10 +933,10 @@ LAWS = (
     Mutant(
         3,
         'the stop of a lost drive waits after the port was opened',
-        SEQUENCE,
-        'self._bus.sleep(_LOST_RETRY_PERIOD, or_opening=True)',
-        'self._bus.sleep(_LOST_RETRY_PERIOD)',
-        (MUTE_PORT, '-k', 'all_stops'),
+        'nfo_sinus_driver/bus/worker.py',
+        '            self._wake_for_port()\n        return math.inf',
+        '        return math.inf',
+        (MUTE_PORT, '-k', 'at_once'),
     ),
     Mutant(
         3,

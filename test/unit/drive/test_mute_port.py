@@ -251,6 +251,17 @@ def test_an_end_opens_it_only_once(patience: float, seconds: float) -> None:
         assert len(rig.line.opened) == 2
 
 
+@pytest.mark.parametrize('connection', ['rtu', 'described'])
+def test_a_time_out_that_runs_is_not_fed_for_the_next_opening(connection: str) -> None:
+    with Rig(connection, drive_timeout=8.0) as rig:
+        rig.turn()
+        begun = rig.clock.now
+        # the drive hears reads alone, and no answer comes
+        rig.line.plan = lambda frame: 'drop' if frame[1] == 0x03 else 'unheard'
+        rig.wait_until(lambda: not rig.turns)
+        assert rig.clock.now - begun < 12.0
+
+
 def test_an_end_without_patience() -> None:
     with Rig() as rig:
         rig.turn()
