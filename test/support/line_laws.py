@@ -80,7 +80,6 @@ class _Unit:
     :ivar due_within: how long after that it has to be sent, s.
     :ivar asked_since_due: how many requests it has got since a stop is due that could be sent.
     :ivar again_by: by then a stop goes a second time that was not answered; infinite: none has to.
-    :ivar went_twice: it did, and nothing was answered since.
     :ivar running: its motor may run by this driver: it did, and no stop was sent since.
     :ivar stopped_with: what was told last when that was sent.
     :ivar to_stand_since: since when its motor has to be stopped, and is not.
@@ -98,7 +97,6 @@ class _Unit:
     due_within: float = 0.0
     asked_since_due: int = 0
     again_by: float = math.inf
-    went_twice: bool = False
     running: bool = False
     stopped_with: Snapshot | None = None
     to_stand_since: float = math.inf
@@ -205,15 +203,15 @@ class LineLaws:
             self._in_vain.clear()
             for each in self._units.values():
                 # the line is not silent
-                each.again_by, each.went_twice = math.inf, False
+                each.again_by = math.inf
         elif asked.sent > -math.inf:
             unit.asked_at = min(unit.asked_at, asked.sent)
             self._asked_at = min(self._asked_at, asked.sent)
             self._in_vain.add(asked.unit)
         if stops:
-            self._stopped(asked.unit)
             if not asked.answered:
                 self._not_answered(unit, asked.ended)
+            self._stopped(asked.unit)
         elif asked.sent > unit.due_since and self._reaches_since < asked.sent:
             # nothing is kept back from one that has stopped by itself
             unit.asked_since_due += self._turns(asked.unit)
@@ -230,11 +228,11 @@ class LineLaws:
 
     def _not_answered(self, unit: _Unit, at: float) -> None:
         """Note that a stop was not answered."""
-        if unit.again_by < math.inf:
-            unit.again_by, unit.went_twice = math.inf, True
-        elif not unit.went_twice:
+        if unit.due_since < math.inf:
             # behind the first and the second of each other, which waits for its whole time-out
             unit.again_by = at + _AFTER_LOSS + len(self._units) * self._under_way
+        else:
+            unit.again_by = math.inf
 
     def _due(self, unit: _Unit, since: float, within: float) -> None:
         """Note that a stop is due for a drive; the earliest counts."""
