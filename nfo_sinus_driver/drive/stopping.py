@@ -117,8 +117,9 @@ class StopSequence:
         self._unconfirmed = _NO_ANSWER_YET
         #: When the stop for the present reasons had been sent.
         self._sent_at = math.inf
-        #: From when on an unconfirmed stop is reported.
-        self._due = 0.0
+        #: From when on an unconfirmed stop is reported, when again, and how long after the last
+        #: report, s; 0: there was none.
+        self._due = self._complain_at = self._pause = 0.0
         #: From when on a drive that has taken it and does not confirm it is stopped by force, and
         #: when one has first taken that.
         self._force_at = self._forced_at = math.inf
@@ -248,37 +249,47 @@ class StopSequence:
             raise DriveError(self.unclear)
 
     async def _keep_trying(self) -> None:
-        complain_at = self._due
-        pause = 0.0
+        self._complain_at, self._pause = self._due, 0.0
+        alarm = self._bus.spawn(self._complain_in_time())
         stood = False
         outcome = _Outcome.UNCONFIRMED
         while (outcome := await self._attempt(outcome)) not in _ENDS:
             if self._control.blocked:
                 await self._fault_gone()
-                self._due = complain_at = self._bus.now() + drive_state.TIMEOUT
+                self._due = self._complain_at = self._bus.now() + drive_state.TIMEOUT
                 continue
             stands = self._at_standstill
-            if self._bus.now() >= complain_at or (stood and not stands):
-                pause = min(pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
-                complain_at = self._bus.now() + pause
-                why = self._unconfirmed
-                if stands:
-                    standing = self._state.report(Cause.CANNOT_STOP_BUT_STANDS, why=why)
-                    self._state.notify(Severity.WARNING, standing)
-                else:
-                    by = self._state.model.profile.enable_input
-                    self._state.notify(
-                        Severity.ERROR, Cause.CANNOT_STOP, why=why, enable_input=by
-                    )
+            if self._bus.now() >= self._complain_at or (stood and not stands):
+                self._complain(stands=stands)
                 stood = stands
             await self._rest(outcome)
+        self._bus.cancel(alarm)
         if outcome is _Outcome.UNCLEAR:
             self.unclear = self._state.report(Cause.STOP_UNCLEAR, why=self._unconfirmed)
             self._state.notify(Severity.ERROR, self.unclear)
         self._task = None
         self._report_end()
-        if pause and self.unclear is None:
+        if self._pause and self.unclear is None:
             self._state.notify(Severity.INFO, self._state.report(Cause.STOP_CONFIRMED_LATE))
+
+    async def _complain_in_time(self) -> None:
+        """Report once that no stop is acknowledged, however long the present attempt takes."""
+        await self._bus.sleep(self._due - self._bus.now())
+        is_due = self._bus.now() >= self._complain_at
+        if is_due and self._unanswered and not self._control.blocked:
+            self._complain(stands=self._at_standstill)
+
+    def _complain(self, *, stands: bool) -> None:
+        """Report that the stop is not confirmed, and when to report it again."""
+        self._pause = min(self._pause + _COMPLAINT_PERIOD, _LONGEST_COMPLAINT_PERIOD)
+        self._complain_at = self._bus.now() + self._pause
+        why = self._unconfirmed
+        if stands:
+            standing = self._state.report(Cause.CANNOT_STOP_BUT_STANDS, why=why)
+            self._state.notify(Severity.WARNING, standing)
+            return
+        by = self._state.model.profile.enable_input
+        self._state.notify(Severity.ERROR, Cause.CANNOT_STOP, why=why, enable_input=by)
 
     @property
     def _at_standstill(self) -> bool:
