@@ -50,11 +50,13 @@ from nfo_sinus_driver.link import (
     LineProtocol,
     Link,
     LinkError,
+    NoAnswer,
     NotReady,
     Operation,
     PortError,
     Read,
     Reconnect,
+    Refused,
     Reply,
     Why,
     carry_out,
@@ -126,6 +128,8 @@ class Bus:
         #: For which opening of a mute port those were woken that wait for it: one that asks nothing
         #: all the same is not woken for it again.
         self._woken_for = math.inf
+        #: How many writes were not answered since any unit has answered one.
+        self.writes_in_vain = 0
         #: Called when a unit has restarted.
         self._on_restart: dict[int, Callable[[], None]] = {}
         self._thread = threading.Thread(target=self._work, name='bus', daemon=True)
@@ -623,6 +627,7 @@ class Bus:
             raise
         except LinkError as error:
             self._account(exchange.unit, started, error)
+            self._count_write(exchange, error)
             raise
         except BaseException as error:
             # an error in the link must reach the caller, not leave it waiting
@@ -631,6 +636,7 @@ class Bus:
         if not reply.requests:
             self._paced_until = paced_until
         self._account(exchange.unit, started, None)
+        self._count_write(exchange, None)
         return reply
 
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
@@ -644,6 +650,15 @@ class Bus:
             self._port.mark_lost(error, now + REOPEN_PERIOD)
         else:
             self.recorder.transaction(unit, now, seconds, error)
+
+    def _count_write(self, exchange: Exchange, error: LinkError | None) -> None:
+        if not exchange.writes or exchange.unit == self.protocol.broadcast:
+            return
+        if error is None or isinstance(error, Refused):
+            self.writes_in_vain = 0
+        elif isinstance(error, NoAnswer):
+            # what comes damaged shows that something comes
+            self.writes_in_vain += 1
 
     def _open_when_due(self) -> float:
         """Open a port that is not open, or open and mute; return when to call it again, s."""

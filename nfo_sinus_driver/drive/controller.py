@@ -665,7 +665,10 @@ class Controller:
         return status.keeps_running and not (ramps and status.at - since < TIMEOUT)
 
     def refused(self, reason: Report) -> None:
-        """Stop because of a set-point; the next status may show a better reason."""
+        """Stop because of a set-point; the next status may show why it was refused."""
+        if reason.cause is Cause.SETPOINT_UNACKNOWLEDGED:
+            self.stop_because(reason)
+            return
         self._sequence.start(reason)
         self._refusal = (self._bus.now(), reason)
 
@@ -684,6 +687,9 @@ class Controller:
         status = self._state.status
         if status is not None and status.faulted:
             self._state.notify(Severity.ERROR, Cause.STOPPED_BECAUSE_OF_FAULT, why=reason)
+        elif reason.cause in (Cause.SETPOINT_UNACKNOWLEDGED, Cause.NOTHING_CHANGES):
+            # a stop may not get there either
+            self._state.notify(Severity.WARNING, Cause.STOPPING_BECAUSE, why=reason)
         else:
             self._state.notify(Severity.WARNING, Cause.STOPPED_BECAUSE, why=reason)
 

@@ -131,8 +131,9 @@ class Cause(enum.Enum):
         'the drive stays in standby after the run command ({status}): check its enable input, and '
         'whether it takes the run command from the line'
     )
-    """Close the input and the safety contact; set the drive to commands from the line. Of a drive
-    that a file describes, compare `run` and `running` of `status` with its manual"""
+    """Close the input and the safety contact; set the drive to commands from the line; let [no
+    cache](serial_line.md#modbus-tcp) answer in its place. Of a drive that a file describes, compare
+    `run` and `running` of `status` with its manual"""
     START_FAULTED = 'the drive did not start: {status}'
     NOT_STARTED = 'the drive does not start: {status}'
     """Acknowledge; check the enable input"""
@@ -269,7 +270,16 @@ class Cause(enum.Enum):
         '{unit}, {status}). Check the least frequency that the drive is set to, and whether '
         'another master commands it'
     )
-    """Set the least frequency of the drive to 0; look for another master; enable"""
+    """Set the least frequency of the drive to 0; look for another master, and for [a
+    cache](serial_line.md#modbus-tcp) that answers in place of the drive; enable"""
+    NOTHING_CHANGES = (
+        'set-points ask for standstill or the other direction, and neither the status ({status}) '
+        'nor the speed ({now:.4g} {unit}) has changed for {seconds:g} s: the drive does not '
+        'follow, or something on the way answers in its place, such as a gateway or proxy with a '
+        'cache'
+    )
+    """The motor is stopped, and a drive that has stopped shows that; what answers from a cache does
+    not: use the enable input. Let [no cache](serial_line.md#modbus-tcp) be between; enable"""
     FASTER_THAN_SETPOINT = (
         'the motor turns at {now:.4g} {unit}, and its set-point is {setpoint:g} ({status}): the '
         'set-point is written again. Check whether the load drives the motor, and whether another '
@@ -322,7 +332,8 @@ class Cause(enum.Enum):
     NO_ANSWER_YET = 'no answer yet'
     """The stop did not reach the drive. Check the line"""
     DRIVE_SAYS = 'the drive still runs: its status is {status}'
-    """The drive has the stop and still runs: another master or its terminals command it"""
+    """The drive has the stop and still runs: another master or its terminals command it, or [a
+    cache](serial_line.md#modbus-tcp) on the way answers in its place"""
     UNKNOWN_STATUS = (
         'its status ({status}) is none that its manual or its file lists, and shows nothing: look '
         'at the drive what it does, and check that it is of this model'
@@ -334,7 +345,8 @@ class Cause(enum.Enum):
         'motor'
     )
     """The drive answered the stop and did not carry it out, or its status shows a run for another
-    reason. The driver releases the motor if it can"""
+    reason, or [a cache](serial_line.md#modbus-tcp) on the way answers in its place. The driver
+    releases the motor if it can"""
     STILL_TURNS = (
         'the status is {status}, yet the motor turns at {now:.4g} {unit} and does not slow down'
     )
@@ -434,6 +446,13 @@ class Cause(enum.Enum):
     """Logged once. After a change of SpdScl (G2) stop and call `~/enable`"""
     SETPOINT_REFUSED = 'it refused set-point {value:g}: {error}'
     """The motor was stopped. Check the limits of the drive, enable"""
+    SETPOINT_UNACKNOWLEDGED = (
+        'set-point {value:g} was not acknowledged for {seconds:.1f} s: if the drive answers reads, '
+        'something on the way lets no writes pass, such as a gateway that is set to read only, or '
+        'a filter'
+    )
+    """The motor is stopped, if a stop passes; if not, [It does not stop](#it-does-not-stop). Let
+    gateways and filters pass writes, enable"""
 
     # --- Faults, alarms and values
     STILL_FAULTED = f'{{status}} is still active: {_REMEDY}'

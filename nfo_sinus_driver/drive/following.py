@@ -6,12 +6,13 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from nfo_sinus_driver.catalog import Meaning
+from nfo_sinus_driver.catalog import Fact, Meaning
 from nfo_sinus_driver.catalog.status import FREQUENCY, SPEED
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, Report, Severity
-from nfo_sinus_driver.drive.setpoint import Setpoint
+from nfo_sinus_driver.drive.setpoint import NO_TURN, Setpoint, sign
 
 #: How much a frequency has to fall, Hz, and within how long, s: the slowest ramp, of 2000 s, falls
 #: by 0.1 in 4 s, and no drive shows it in greater steps.
@@ -31,6 +32,9 @@ _BEYOND = 0.1
 _BEYOND_BY = 3.0
 #: How far below its set-points a motor is, and by how much it has slowed down, if it stops: Hz.
 _SHORT, _FALLEN = 1.0, 0.4
+#: How much faster than a set-point a motor turns at most that follows it: this share of it and this
+#: much, Hz. One that turns faster does so for another reason, such as a least frequency.
+_ABOVE, _ABOVE_BY = 1.1, 0.5
 #: What is compared with set-points, and what one of its units is for 1 Hz of a four-pole motor.
 _COMPARED = {FREQUENCY.mode: (FREQUENCY.role, 1.0), SPEED.mode: (SPEED.role, 30.0)}
 
@@ -47,6 +51,14 @@ class _DecelerationCheck:
         if size < self.least - wobble:
             self.least, self._fell_at = size, at
         return at - self._fell_at > _FALLS_WITHIN
+
+
+class _Shown(NamedTuple):
+    """What a status shows; the speed in Hz, whatever its direction."""
+
+    word: int | None
+    code: int
+    size: float
 
 
 class FollowingCheck:
@@ -73,6 +85,11 @@ class FollowingCheck:
         #: The speed from which the drive slows it down, below its set-points.
         self._falls_from = 0.0
         self._reported = False
+        #: What the newest status shows, and what that was that has to change, with the moment from
+        #: which on; ``None``: it has changed, or need not.
+        self._shown: _Shown | None = None
+        self._stale: _Shown | None = None
+        self._newest_turn = self._stale_turn = NO_TURN
 
     def check(self) -> Report | None:
         """Return why the last measurement has to stop the motor; report what else is wrong."""
@@ -88,6 +105,8 @@ class FollowingCheck:
         cause = None
         if self._goes_on(frequency, measured.at):
             cause = Cause.NOT_SLOWER_AFTER_TIME_OUT
+        elif role is not None and self._has_not_changed(frequency, measured.at, unit):
+            cause = Cause.NOTHING_CHANGES
         elif self._stands(frequency, measured.at):
             cause = Cause.STOPPED_BY_ITSELF
         elif role is not None and self._turns_back(frequency, measured.at, least, most):
@@ -98,11 +117,41 @@ class FollowingCheck:
             self._check_overspeed(actual.value, measured.at, max(-least, most), unit)
         turning = self._state.turning
         now = frequency / turning.hertz
-        return cause and self._state.report(cause, now=now, unit=turning.unit)
+        return cause and self._state.report(
+            cause, now=now, unit=turning.unit, seconds=_FALLS_WITHIN
+        )
+
+    def _has_not_changed(self, frequency: float, at: float, unit: float) -> bool:
+        """
+        Return whether nothing at all has changed since set-points have another sign, or are 0.
+
+        Word, code or speed of a drive that has got them must: what answers may not be the drive.
+        Counted is from when they were due, whether they are acknowledged or not.
+        """
+        status, turn = self._state.status, self._setpoint.turn
+        if status is None:
+            return False
+        before, shown = self._shown, _Shown(status.word, status.code, abs(frequency))
+        self._shown = shown
+        if turn != self._newest_turn:
+            self._newest_turn = turn
+            # one that has been held at 0 for a moment since still has to change
+            if self._stale is None or sign(turn.value) == sign(self._stale_turn.before):
+                follows = abs(turn.before) / unit * _ABOVE + _ABOVE_BY
+                must = before is not None and _BACKWARDS < before.size <= follows
+                self._stale, self._stale_turn = before if must else None, turn
+        stale = self._stale
+        limited = status.means(Meaning.CURRENT_LIMIT) or Fact.LIMIT_ACTIVE in status.facts
+        changed = stale is None or stale[:2] != shown[:2] or abs(stale.size - shown.size) > _FALL
+        if stale is None or changed or limited:
+            self._stale = None
+            return False
+        # what has ceased is looked at for itself
+        return not self._setpoint.ceased and at - self._stale_turn.at > _FALLS_WITHIN
 
     def _goes_on(self, frequency: float, at: float) -> bool:
-        """Return whether it does not slow down, although set-points have ceased."""
-        if not self._setpoint.expired or not abs(frequency) > _STANDSTILL:
+        """Return whether it does not slow down, although set-points have ceased and 0 is due."""
+        if not self._setpoint.ceased or not abs(frequency) > _STANDSTILL:
             self._after_expiry = _DecelerationCheck()
             return False
         return self._after_expiry.take(abs(frequency), at)

@@ -18,6 +18,7 @@ from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.link import (
     Address,
+    DamagedAnswer,
     Interrupted,
     LinkError,
     Refused,
@@ -34,8 +35,14 @@ _REWRITE_PERIOD = 5.0
 _KEEP_ALIVE_SHARE = 1 / 3
 #: How long a drive may be too busy for a set-point, s.
 _LONGEST_BUSY = 1.0
-#: The age is checked at least this often, so that a changed time-out takes effect, s.
+#: Age and acknowledgement are checked at least this often, so that a changed time-out takes
+#: effect, s.
 _WATCH_PERIOD = 0.25
+#: How often a set-point is sent in vain at least before it counts as failed, and 0: less may be
+#: noise, where an answer is waited for long, or each drive of a line has few turns.
+_TRIES, _TRIES_OF_0 = 5, 3
+#: How much later a drive is lost that does not answer at all, at most, s.
+_LOST_WITHIN = 0.5
 #: How long the set-points that the drive had are remembered, s.
 _REMEMBERED = 10.0
 
@@ -46,13 +53,46 @@ class Request(NamedTuple):
 
     :ivar value: in the unit of the control mode.
     :ivar at: when it came in, s of the clock of the bus.
+    :ivar since: when the first of its like came in, with no other one between.
     """
 
     value: float
     at: float
+    since: float
 
 
-_NONE = Request(NAN, -math.inf)
+_NONE = Request(NAN, -math.inf, -math.inf)
+
+
+class _InVain(NamedTuple):
+    """
+    A write of a set-point that is not acknowledged.
+
+    :ivar value: the newest that was to be written.
+    :ivar since: when it was first sent, or 0 was due, s of the clock of the bus.
+    :ivar tries: how often it was sent since; one that is answered in doubt counts half, for after
+        a lost answer the next one may be that of the write before.
+    """
+
+    value: float
+    since: float
+    tries: float
+
+
+class Turn(NamedTuple):
+    """
+    The moment from which on set-points have another sign than before, or none any more.
+
+    :ivar at: when the first of them was due, s of the clock of the bus.
+    :ivar before: the last one before; ``value`` that one.
+    """
+
+    at: float
+    before: float
+    value: float
+
+
+NO_TURN = Turn(math.inf, 0.0, 0.0)
 
 
 class Setpoint:
@@ -85,14 +125,21 @@ class Setpoint:
         #: What the drive has and since when, by address; nothing where that is not known, and minus
         #: infinity where it may have taken a later write.
         self._written: dict[Address, tuple[bytes, float]] = {}
-        self._age_task: Task | None = None
-        #: No set-point has come within ``setpoint_timeout``: the drive was given 0.
-        self.expired = False
+        #: What watches the age of set-points, and whether they are acknowledged.
+        self._tasks: list[Task] = []
+        #: No set-point has come within ``setpoint_timeout``: 0 is due, and the drive has taken it.
+        self.ceased = self.expired = False
         #: The report of the set-point time-out, until set-points arrive again.
         self.timed_out: Report | None = None
         self._waits_for_answer = False
         #: What was written last, and what of that was not answered; NaN: nothing.
         self._sent = self._unanswered = NAN
+        #: Since when the last write is due, s.
+        self._sent_due = -math.inf
+        #: What is not acknowledged, by address.
+        self._in_vain: dict[Address, _InVain] = {}
+        #: What was wanted last, in the unit of the control mode, and when that got another sign.
+        self._wanted, self.turn = 0.0, NO_TURN
         self._busy_since = math.inf
         self._clamp_reported = False
         #: The set-points that the drive may have had recently, and until when; newest last.
@@ -105,7 +152,8 @@ class Setpoint:
         """Request a set-point, from any thread; it must be finite, and counts only if enabled."""
         if not math.isfinite(value):
             raise ValueError(f'a set-point of {value} is no number')
-        self._request = Request(value, self._bus.now())
+        now, last = self._bus.now(), self._request
+        self._request = Request(value, now, last.since if value == last.value else now)
         if self.following:
             self._bus.request(self._slot)
 
@@ -149,13 +197,18 @@ class Setpoint:
         self._state.direction.command(self.commanded)
         self._had = [(0.0, math.inf)]
         self.clamped = self._clamp_reported = False
-        self.expired = False
+        self.ceased = self.expired = False
         self.timed_out = None
         self._waits_for_answer = False
         self._unanswered = NAN
+        self._in_vain = {}
+        self._wanted, self.turn = 0.0, NO_TURN
         self._busy_since = math.inf
         if follows:
-            self._age_task = self._bus.spawn(self._watch_age())
+            self._tasks = [
+                self._bus.spawn(self._watch_age()),
+                self._bus.spawn(self._watch_acknowledgement()),
+            ]
 
     def stop_following(self) -> None:
         """Follow no more set-points."""
@@ -163,9 +216,9 @@ class Setpoint:
         self.commanded = NAN
         self._state.direction.command(NAN)
         self.clamped = False
-        if self._age_task is not None:
-            self._bus.cancel(self._age_task)
-        self._age_task = None
+        tasks, self._tasks = self._tasks, []
+        for task in tasks:
+            self._bus.cancel(task)
 
     def answered(self) -> None:
         """Note that the drive responds; write what could not be written before."""
@@ -277,7 +330,7 @@ class Setpoint:
     def _accept(self, request: Request, limited: float) -> None:
         """Note that a request counts, with its limited value."""
         self.clamped = limited != request.value
-        self.expired = False
+        self.ceased = self.expired = False
         if self.timed_out is not None:
             self.timed_out = None
             self._state.notify(Severity.INFO, Cause.SETPOINTS_AGAIN)
@@ -287,9 +340,12 @@ class Setpoint:
         if self._target is None or not self._counts(request):
             return None
         limited = self._limited(request)
+        due_at = max(request.since, self.following_since)
+        self._want(limited, due_at)
         unanswered = not self._state.responsive and limited == self._unanswered
         if unanswered or not self._params.recognition.holds:
             self._waits_for_answer = True
+            self._note_zero(request)
             return None
         self._accept(request, limited)
         if self.clamped and not self._clamp_reported:
@@ -297,13 +353,40 @@ class Setpoint:
         self._clamp_reported = self.clamped
         due = self._due(request)
         if not due:
+            self._in_vain.clear()
             return None
         # each of several writes has its own turn, and a newer set-point may come between
         address, data = due[0]
         self._sent = limited
+        self._sent_due = self._due_since(address, data, due_at) if limited == 0 else self._bus.now()
         self._may_have(self._decoded({**self._in_drive, address: data}))
         by_itself = len(due) > 1 or self._is_once(address)
         return Write(address, data) if by_itself else self._params.with_status(address, data)
+
+    def _due_since(self, address: Address, data: bytes, at: float) -> float:
+        """Return since when a write is due, s; one that the drive has is only repeated, now."""
+        return self._bus.now() if self._in_drive.get(address) == data else at
+
+    def _want(self, value: float, at: float) -> None:
+        """Note what is wanted from a moment on, s."""
+        before, self._wanted = self._wanted, value
+        if sign(value) != sign(before):
+            self.turn = Turn(at, before, value)
+
+    def _note_zero(self, request: Request) -> None:
+        """Note that 0 is not sent yet: it is watched from when it is due."""
+        if self._limited(request) != 0:
+            return
+        at = max(request.since, self.following_since)
+        for address, data in self._due(request):
+            self._note_in_vain(address, 0.0, self._due_since(address, data, at))
+
+    def _note_in_vain(
+        self, address: Address, value: float, since: float, tries: float = 0.0
+    ) -> None:
+        """Note that a set-point is not acknowledged; the first of several in a row counts."""
+        before = self._in_vain.get(address, _InVain(value, since, 0))
+        self._in_vain[address] = _InVain(value, before.since, before.tries + tries)
 
     def _report_limited(self, value: float, limited: float) -> None:
         chosen = self._state.settings.setpoint_max
@@ -336,6 +419,7 @@ class Setpoint:
     def _take_note(self, address: Address, data: bytes) -> None:
         self._busy_since = math.inf
         self._unanswered = NAN
+        self._in_vain.pop(address, None)
         self._written[address] = data, self._bus.now()
         if len(self._written) == len(self._keys):
             self._has(self._decoded(self._in_drive))
@@ -351,6 +435,8 @@ class Setpoint:
         # the poll finds out at once whether it responds, in the time that a silent drive may
         # take from its neighbours
         self._params.count(error)
+        if not isinstance(error, Refused):
+            self._note_in_vain(address, self._sent, self._sent_due, _try(error))
         self._waits_for_answer = True
         self._unanswered = self._sent
         if len(self._keys) > 1 and address in self._written:
@@ -382,6 +468,38 @@ class Setpoint:
         value = self._params.value
         return self._target.value({key: value(key, data[address]) for address, key in keys})
 
+    def _require_acknowledged(self) -> None:
+        """
+        Stop the motor where what it was to do is not acknowledged for ``lost_after``.
+
+        A drive that answers nothing at all ought to be lost by then, for a better reason.
+        """
+        now, seconds = self._bus.now(), self._state.settings.lost_after
+        silences, unit = self._bus.silences, self._state.settings.address
+        if self._slot.pending and self._counts(self._request):
+            # it waits for its turn
+            self._note_zero(self._request)
+        is_held = not self._params.recognition.holds
+        for one in self._in_vain.values():
+            silent = silences.is_silent(unit) and silences.last_frame_at(unit) <= one.since
+            least = _TRIES if one.value else _TRIES_OF_0
+            tried = is_held or max(one.tries, self._bus.writes_in_vain) >= least
+            if tried and one.since + seconds + silent * _LOST_WITHIN <= now:
+                why = Report(
+                    Cause.SETPOINT_UNACKNOWLEDGED, value=one.value, seconds=now - one.since
+                )
+                self._state.hooks.setpoint_refused(why)
+                return
+
+    async def _watch_acknowledgement(self) -> None:
+        try:
+            while True:
+                await self._bus.sleep(_WATCH_PERIOD)
+                self._require_acknowledged()
+        except Exception as error:
+            # what is not watched must not be followed
+            self._state.hooks.setpoint_refused(Report(Cause.DRIVER_ERROR, error=repr(error)))
+
     async def _watch_age(self) -> None:
         try:
             while True:
@@ -399,11 +517,12 @@ class Setpoint:
     async def _expire(self, timeout: float) -> None:
         assert self._target is not None
         zero = self._target.writes(0.0, self._decoded(self._in_drive))
-        if self._in_drive != dict(map(self._params.target, zero)):
-            if self.timed_out is None:
-                self.timed_out = Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
-                self._state.notify(Severity.WARNING, self.timed_out)
+        # what is not acknowledged the drive may have taken all the same
+        if self._in_vain or self._in_drive != dict(map(self._params.target, zero)):
             before = self._request
+            due_at = max(before.at, self.following_since) + timeout
+            self._want(0.0, due_at)
+            self.ceased = True
             for step in zero:
                 if self._request is not before:
                     # that one is written instead
@@ -412,6 +531,7 @@ class Setpoint:
                 address, data = self._params.target(step)
                 if self._is_once(address) and self._is_current(address, data):
                     continue
+                self._note_in_vain(address, 0.0, due_at)
                 try:
                     await self._params.write(replace(step, retry=False), Priority.STOP)
                 except (LinkError, DriveError) as error:
@@ -420,10 +540,25 @@ class Setpoint:
                         self._state.hooks.setpoint_refused(why)
                         return
                     # the poll finds out whether the drive is lost; until then this is tried again
+                    if not isinstance(error, Refused):
+                        self._note_in_vain(address, 0.0, due_at, _try(error))
                     await self._bus.sleep(_WATCH_PERIOD)
                     return
+                self._in_vain.pop(address, None)
                 self._written[address] = data, self._bus.now()
                 self._busy_since = math.inf
             if self._request is before:
                 self._has(0.0)
-        self.expired = True
+                self.timed_out = Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
+                self._state.notify(Severity.WARNING, self.timed_out)
+        self.ceased = self.expired = True
+
+
+def sign(value: float) -> int:
+    """Return 1, -1, or 0 for 0."""
+    return (value > 0) - (value < 0)
+
+
+def _try(error: LinkError | DriveError) -> float:
+    """Return what a write counts as that failed."""
+    return 0.5 if isinstance(error, DamagedAnswer) else 1.0
