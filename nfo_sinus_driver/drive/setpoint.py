@@ -35,14 +35,15 @@ _REWRITE_PERIOD = 5.0
 _KEEP_ALIVE_SHARE = 1 / 3
 #: How long a drive may be too busy for a set-point, s.
 _LONGEST_BUSY = 1.0
-#: Age and acknowledgement are checked at least this often, so that a changed time-out takes
-#: effect, s.
+#: The age is checked at least this often, so that a changed time-out takes effect, s; and whether
+#: the last write was acknowledged.
 _WATCH_PERIOD = 0.25
-#: How often a set-point is sent in vain at least before it counts as failed, and 0: less may be
-#: noise, where an answer is waited for long, or each drive of a line has few turns.
+_ACKNOWLEDGED_PERIOD = 0.1
+#: How often a set-point is sent in vain until it counts as failed after ``lost_after``, and 0: less
+#: may be noise, where an answer is waited for long, or each drive of a line has few turns.
 _TRIES, _TRIES_OF_0 = 5, 3
-#: How much later a drive is lost that does not answer at all, at most, s.
-_LOST_WITHIN = 0.5
+#: How much later it has failed at the latest, and a drive is lost that does not answer at all, s.
+_LOST_WITHIN = 0.3
 #: How long the set-points that the drive had are remembered, s.
 _REMEMBERED = 10.0
 
@@ -484,7 +485,9 @@ class Setpoint:
             silent = silences.is_silent(unit) and silences.last_frame_at(unit) <= one.since
             least = _TRIES if one.value else _TRIES_OF_0
             tried = is_held or max(one.tries, self._bus.writes_in_vain) >= least
-            if tried and one.since + seconds + silent * _LOST_WITHIN <= now:
+            # after that long it does not matter whether there was time to try it again
+            longer = _LOST_WITHIN if silent or not tried else 0.0
+            if one.since + seconds + longer <= now:
                 why = Report(
                     Cause.SETPOINT_UNACKNOWLEDGED, value=one.value, seconds=now - one.since
                 )
@@ -494,7 +497,7 @@ class Setpoint:
     async def _watch_acknowledgement(self) -> None:
         try:
             while True:
-                await self._bus.sleep(_WATCH_PERIOD)
+                await self._bus.sleep(_ACKNOWLEDGED_PERIOD)
                 self._require_acknowledged()
         except Exception as error:
             # what is not watched must not be followed
