@@ -55,7 +55,7 @@ from nfo_sinus_driver.bus.by_address import ByAddress
 from nfo_sinus_driver.bus.silences import EXCHANGE
 from nfo_sinus_driver.bus.statistics import Statistics
 from nfo_sinus_driver.bus.tasks import Cancelled, Exchange, LatestValue, Priority, Task
-from nfo_sinus_driver.bus.worker import Bus
+from nfo_sinus_driver.bus.worker import Bus, Watch
 
 __all__ = [
     'EXCHANGE',
@@ -67,4 +67,5 @@ __all__ = [
     'Priority',
     'Statistics',
     'Task',
+    'Watch',
 ]

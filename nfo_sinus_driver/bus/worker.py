@@ -24,7 +24,7 @@ import logging
 import math
 import threading
 import time
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from nfo_sinus_driver.bus.scheduler import Scheduler, Waiting
 from nfo_sinus_driver.bus.silences import Silences
@@ -67,6 +67,27 @@ _T = TypeVar('_T')
 
 #: How often a lost port is tried again, s.
 REOPEN_PERIOD = 0.5
+
+
+#: What comes again soon where its answer is missed: the first time that is waited for so long, s,
+#: or as long as the unit has ever taken. In noise the other drives of the line have the rest.
+_PASSING = (Priority.SETPOINT, Priority.POLL, Priority.TELEMETRY, Priority.REFRESH)
+_PASSING_PATIENCE = 0.05
+
+
+class Watch(NamedTuple):
+    """
+    What a line has to do with a drive beside its requests; called on the worker.
+
+    :ivar look: called before each request while the unit, or no unit, answers; returns when it has
+        to be called again at the latest, s, or infinity.
+    :ivar may_run: returns whether the driver may have run its motor.
+    :ivar paused: told for how long the worker has not run, s.
+    """
+
+    look: Callable[[], float]
+    may_run: Callable[[], bool]
+    paused: Callable[[float], None]
 
 
 class Bus:
@@ -116,8 +137,9 @@ class Bus:
         self._being_read_first: set[int] = set()
         self._read_before: set[int] = set()
         self._current: Task | None = None
-        #: What looks whether the drive at a unit is lost, and whether its motor may run.
-        self._watches: dict[int, tuple[Callable[[], float], Callable[[], bool]]] = {}
+        #: The drives of the line, and for how long the worker had paused when they were told.
+        self._watches: dict[int, Watch] = {}
+        self._pause_told = 0.0
         #: When the next drive that does not answer is lost, s.
         self._lost_at = math.inf
         #: Until when each unit is left alone, s.
@@ -228,16 +250,9 @@ class Bus:
         """Open the port again when no unit has answered for ``seconds``, the longest of all."""
         self.call(lambda: self.silences.watch(unit, seconds))
 
-    def on_silence(
-        self, unit: int, look: Callable[[], float], may_run: Callable[[], bool]
-    ) -> None:
-        """
-        Call a function, on the worker, before each request while a unit does not answer.
-
-        :param look: returns when it has to be called again at the latest, s; or infinity.
-        :param may_run: returns whether the driver may have run the motor of the unit.
-        """
-        self.call(lambda: self._watches.update({unit: (look, may_run)}))
+    def watch_over(self, unit: int, watch: Watch) -> None:
+        """Ask and tell, on the worker, what stands between the line and the drive of a unit."""
+        self.call(lambda: self._watches.update({unit: watch}))
 
     def on_mute(self, call: Callable[[float], None]) -> None:
         """
@@ -293,8 +308,8 @@ class Bus:
     def is_any_controlled(self) -> bool:
         """A drive of the line that may run is not left alone."""
         return any(
-            may_run() and self.now() >= self._quiet_until.get(unit, -math.inf)
-            for unit, (_, may_run) in self._watches.items()
+            watch.may_run() and self.now() >= self._quiet_until.get(unit, -math.inf)
+            for unit, watch in self._watches.items()
         )
 
     def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
@@ -437,6 +452,7 @@ class Bus:
         self._take_in()
         self._ring_timers()
         reopen_at = self._open_when_due()
+        self._tell_pause()
         self._lost_at = self._look_for_losses()
         quiet_until = self._line_quiet_until()
         supervised_at = math.inf
@@ -459,10 +475,18 @@ class Bus:
         if not self.silences.any_silent:
             return math.inf
         again_at = math.inf
-        for unit, (look, _) in self._watches.items():
+        for unit, watch in self._watches.items():
             if self.silences.is_silent(unit) or self.silences.is_line_silent:
-                again_at = min(again_at, look())
+                again_at = min(again_at, watch.look())
         return again_at
+
+    def _tell_pause(self) -> None:
+        """Tell all drives, ahead of the next request, that the worker did not run."""
+        seconds = self._clock.paused - self._pause_told
+        if seconds:
+            self._pause_told = self._clock.paused
+            for watch in self._watches.values():
+                watch.paused(seconds)
 
     def _line_quiet_until(self) -> float:
         """Return until when only stops are sent, s: all that may run are left alone; 0: not so."""
@@ -615,6 +639,8 @@ class Bus:
         elif self.silences.is_silent(exchange.unit) or self.silences.is_line_silent:
             # a loss is noticed when it is due
             self._link.patience = self._lost_at - started
+        elif exchange.priority in _PASSING and len(self._watches) > 1:
+            self._link.patience = _PASSING_PATIENCE
         try:
             reply = carry_out(self._link, exchange.unit, exchange.operation)
             if self._clock.resumed_at > started:

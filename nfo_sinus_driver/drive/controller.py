@@ -616,6 +616,12 @@ class Controller:
         if self._control.enabled and self._state.may_have_restarted(seconds):
             self.stop_because(Report(Cause.MAY_HAVE_RESTARTED))
 
+    def paused(self, seconds: float) -> None:
+        """Stop a motor whose drive has stopped it by itself while the driver did not run, s."""
+        timeout = self._state.timeout
+        if self._control.enabled and timeout.stops_motor and 0 < timeout.shortest <= seconds:
+            self.stop_because(self._state.report(Cause.DRIVER_PAUSED, seconds=timeout.shortest))
+
     def alarmed_by(self, status: InverterStatus) -> bool:
         """Return whether a status is a reason to stop."""
         follows = self._control.enabled and status.at >= self._control.since

@@ -12,7 +12,7 @@ import logging
 import math
 from typing import TypeVar
 
-from nfo_sinus_driver.bus import Priority, Task
+from nfo_sinus_driver.bus import Priority, Task, Watch
 from nfo_sinus_driver.catalog import InverterStatus, Role
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import Conditions, explain_failure, explain_fault
@@ -164,7 +164,8 @@ class Poller:
         self._status_paused = 0.0
         self._reported_fault = 0
         self._conditions = Conditions(state)
-        self._bus.on_silence(self._unit, self._look_for_loss, lambda: state.control.stop_owed)
+        watch = Watch(self._look_for_loss, lambda: state.control.stop_owed, self._paused)
+        self._bus.watch_over(self._unit, watch)
 
     @property
     def begun(self) -> bool:
@@ -617,6 +618,11 @@ class Poller:
         # it has begun before the request that was in vain just now
         if self._controller is not None and silences.lasts(self._unit, asked_at) >= 0:
             self._controller.silent(now - silences.last_frame_at(self._unit))
+
+    def _paused(self, seconds: float) -> None:
+        """Note that the driver did not run for so long, s."""
+        if self._controller is not None:
+            self._controller.paused(seconds)
 
     def _look_for_loss(self) -> float:
         """Treat the drive as lost once it is silent for too long; return by when it may be, s."""

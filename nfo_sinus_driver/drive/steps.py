@@ -76,7 +76,10 @@ async def carry_out(
             if isinstance(step, profile.Read):
                 params.require_fitted(step.key)
                 retry = step.retry and not is_blind
-                brought = await params.read(step.key, priority, retry=retry)
+                # what is read behind a stop keeps back no stop of another drive
+                behind = priority is Priority.STOP and written_at > -math.inf
+                urgency = Priority.LOOK if behind else priority
+                brought = await params.read(step.key, urgency, retry=retry)
             elif isinstance(step, profile.Write) and step.stored:
                 await _store(state, step, priority)
             elif isinstance(step, profile.Write):
