@@ -285,6 +285,6 @@ def test_a_stop_that_was_not_confirmed_in_time_is_no_deactivation(domain: int) -
         capture_output=True, text=True, timeout=PATIENCE, check=False,
     )
     assert done.stdout.splitlines() == [
-        # it stops as soon as it answers again, or has said so a moment after the time was up
-        'False False SUCCESS', 'False True SUCCESS', 'True False SUCCESS', 'True True FAILURE',
+        # it has said so a moment after the time was up; and one that is lost may run on
+        'False False SUCCESS', 'False True SUCCESS', 'True False FAILURE', 'True True FAILURE',
     ], done.stderr
