@@ -37,6 +37,8 @@ EXCHANGE = 3.0
 _NOTICED_WITHIN = 0.5
 #: How long after a request its answer counts as missing, s, however long it is waited for.
 _ANSWERED_WITHIN = 0.1
+#: A silence of one unit that is longer is no noise, s.
+_NOISE = 0.4
 #: How many units have to be asked in vain until it is the line that is silent.
 _A_LINE = 2
 
@@ -244,9 +246,10 @@ class Silences:
         since = self._since.get(unit, math.inf)
         return min(since, self._in_vain_since) if is_watched and self.is_line_silent else since
 
-    def line_lasts(self, now: float) -> float:
-        """Return for how long the line has been silent, s; 0 if a unit answers."""
-        return now - self._in_vain_since if self.is_line_silent else 0.0
+    def is_dead(self, now: float) -> bool:
+        """Return whether the line is silent for more than noise: for several units, or for long."""
+        several = len(self._in_vain) >= _A_LINE
+        return several or (self.is_line_silent and now - self._in_vain_since >= _NOISE)
 
     @property
     def any_silent(self) -> bool:

@@ -68,6 +68,8 @@ class Exchange:
 
     :ivar require_wanted: called by the worker at the moment of sending; what it raises goes to the
         coroutine, and nothing is sent.
+    :ivar is_brief: its answer is waited for no longer than the unit has ever taken: it is sent for
+        the unit to hear it.
     :ivar anew: it is read once more already, because what it read was old.
     """
 
@@ -75,6 +77,7 @@ class Exchange:
     operation: Operation
     priority: Priority
     require_wanted: Callable[[], None] = lambda: None
+    is_brief: bool = False
     anew: bool = False
 
     @property

@@ -285,6 +285,10 @@ class Bus:
             return consistent_read(unit, parts, priority)
         return Exchange(unit, operation, priority, require_wanted)
 
+    def keep_alive(self, unit: int, address: Address) -> Awaitable[Reply]:
+        """Have a unit hear something soon (to be awaited), by reading a parameter of it."""
+        return Exchange(unit, Read(address), Priority.LOOK, is_brief=True)
+
     def last_tries(self, seconds: float) -> None:
         """
         Open a port that is mute once more, in time for an end that takes ``seconds``.
@@ -451,9 +455,10 @@ class Bus:
         self._note_pause()
         self._take_in()
         self._ring_timers()
-        reopen_at = self._open_when_due()
         self._tell_pause()
+        # ahead of the port: to open it may take long
         self._lost_at = self._look_for_losses()
+        reopen_at = self._open_when_due()
         quiet_until = self._line_quiet_until()
         supervised_at = math.inf
         if self._port.is_open and not quiet_until:

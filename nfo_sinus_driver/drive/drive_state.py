@@ -438,7 +438,7 @@ class DriveState:
         """Keep the drive from stopping by itself, with one request (LinkError: it failed)."""
         has_word = self.nameplate.has(self.word_key)
         key = self.word_key if has_word else self.model.key(Role.STATUS_CODE)
-        await self.params.read_data(key, Priority.SERVICE, retry=False)
+        await self.bus.keep_alive(self.settings.address, self.params.address(key))
 
     @property
     def left_alone(self) -> bool:

@@ -29,9 +29,6 @@ _LOOK_AGAIN_PERIOD = 1.0
 #: How often a stop is written that nothing answers, from when it became due, whether another drive
 #: may be there by then or not.
 _BLIND_STOPS = 2
-#: After how long without an answer of any drive a stop is written that would be read for first, s:
-#: in a shorter one what is in the drive may yet be read, and left as it is.
-_BLIND_AFTER = 0.4
 #: How much longer than its own time-out a drive is left alone, s.
 _LEFT_ALONE_LONGER = 0.5
 #: How often an unconfirmed stop is reported, s.
@@ -109,6 +106,8 @@ class StopSequence:
         #: then, s; and how often it may be written since although nothing answers.
         self._due_at, self._paused = -math.inf, 0.0
         self._blind_left = 0
+        #: The present attempt has written something.
+        self._wrote = False
         #: What has ended the last attempt; ``None``: it was answered.
         self._failure: Exception | None = None
         #: Its own time-out has had the time to stop the drive.
@@ -323,6 +322,9 @@ class StopSequence:
         )
         if outcome is _Outcome.IGNORED or (unanswered and self._blind_left):
             return
+        if isinstance(self._failure, DriveError) and self._failure.report == self._not_known:
+            # it may not be written to any more since the attempt began: it is looked for
+            return
         if not self._state.connected:
             await self._leave_alone()
         elif self._is_lost or self._bus.now() >= self._due:
@@ -379,6 +381,10 @@ class StopSequence:
         in_time &= self._bus.paused <= self._paused + EXCHANGE
         return self._blind_left > 0 and in_time and self._due_at >= silences.away_at
 
+    @property
+    def _not_known(self) -> Report:
+        return self._state.params.recognition.error(_NO_ANSWER_YET).report
+
     async def find(self) -> None:
         """
         Look for the drive before it is stopped, if it is not known what is there.
@@ -397,7 +403,8 @@ class StopSequence:
     def require_same(self) -> None:
         """Make sure, at the moment of sending, that a stop may be written (DriveError: not)."""
         if not self._may_write:
-            raise self._state.params.recognition.error(_NO_ANSWER_YET)
+            raise DriveError(self._not_known)
+        self._wrote = True
 
     @property
     def _is_lost(self) -> bool:
@@ -437,6 +444,7 @@ class StopSequence:
         faulted = self._state.status is not None and self._state.status.faulted
         failure: LinkError | None = None
         await self.find()
+        self._wrote = False
         try:
             await carry_out(
                 self._state,
@@ -457,7 +465,9 @@ class StopSequence:
         except PortError:
             raise
         except LinkError as error:
-            self._blind_left -= self._blind_left > 0
+            if self._wrote or not self._state.connected:
+                # else what is read before a stop had no answer
+                self._blind_left -= self._blind_left > 0
             if not isinstance(error, (NoAnswer, DamagedAnswer)):
                 raise
             self._unanswered += 1
@@ -508,8 +518,8 @@ class StopSequence:
     @property
     def _is_blind(self) -> bool:
         """Nothing answers, and the bus had control of the drive when something did."""
-        status, silent_for = self._state.status, self._bus.silences.line_lasts(self._bus.now())
-        silent = not self._state.connected or silent_for >= _BLIND_AFTER
+        status = self._state.status
+        silent = not self._state.connected or self._bus.silences.is_dead(self._bus.now())
         return silent and status is not None and status.from_bus
 
     def _needs_force(self, status: InverterStatus, failure: LinkError | None) -> bool:

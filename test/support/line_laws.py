@@ -230,7 +230,8 @@ class LineLaws:
         """Note that a stop was not answered."""
         if unit.due_since < math.inf:
             # behind the first and the second of each other, which waits for its whole time-out
-            unit.again_by = at + _AFTER_LOSS + len(self._units) * self._under_way
+            reads = 2 if self._rig.connection.protocol == 'movitrac' else 1
+            unit.again_by = at + _AFTER_LOSS + reads * len(self._units) * self._under_way
         else:
             unit.again_by = math.inf
 
