@@ -365,7 +365,10 @@ class LineLaws:
         """Judge S3."""
         own = self.own_timeout(number)
         asked_by = max(unit.answered_at, self._there_since + _OPENED) + (own or math.inf)
-        may_answer = unit.running and unit.asked_at == math.inf and not self._has_ended
+        # one that is told as lost may be left in peace
+        snapshot = self._rig.notes_of[number].snapshot
+        told = snapshot is not None and snapshot.connected
+        may_answer = told and unit.running and unit.asked_at == math.inf and not self._has_ended
         if may_answer and self._clock.now >= asked_by:
             self._break('S3', number, 'gets no request in time, the last one at', unit.answered_at)
         if not self._turns(number):
