@@ -76,6 +76,7 @@ class _Unit:
     :ivar asked_at: when the first request in vain was sent since its last valid frame.
     :ivar answered_at: when the last request was sent that it has answered.
     :ivar longest: the longest time from a request to the end of its answer, s.
+    :ivar stop_at: when the last request was sent that takes its run command away.
     :ivar due_since: since when a stop is due that was not sent; infinite: none is.
     :ivar due_within: how long after that it has to be sent, s.
     :ivar asked_since_due: how many requests it has got since a stop is due that could be sent.
@@ -93,6 +94,7 @@ class _Unit:
     asked_at: float = math.inf
     answered_at: float = math.inf
     longest: float = -math.inf
+    stop_at: float = -math.inf
     due_since: float = math.inf
     due_within: float = 0.0
     asked_since_due: int = 0
@@ -193,7 +195,7 @@ class LineLaws:
         if unit is None:
             # all obey it
             for number in self._units if stops else ():
-                self._stopped(number)
+                self._stopped(number, asked.sent)
             return
         if asked.answered:
             unit.longest = max(unit.longest, asked.ended - asked.sent)
@@ -211,18 +213,18 @@ class LineLaws:
         if stops:
             if not asked.answered:
                 self._not_answered(unit, asked.ended)
-            self._stopped(asked.unit)
+            self._stopped(asked.unit, asked.sent)
         elif asked.sent > unit.due_since and self._reaches_since < asked.sent:
             # nothing is kept back from one that has stopped by itself
             unit.asked_since_due += self._turns(asked.unit)
 
-    def _stopped(self, number: int) -> None:
+    def _stopped(self, number: int, at: float) -> None:
         unit = self._units[number]
         if unit.due_since < math.inf and unit.asked_since_due > _SHORT_LOOK:
             asked = unit.asked_since_due
             self._break('S4', number, f'has got {asked} requests before its stop, due since',
                         unit.due_since)
-        unit.due_since = math.inf
+        unit.stop_at, unit.due_since = at, math.inf
         unit.running = False
         unit.stopped_with = self._rig.notes_of[number].snapshot
 
@@ -329,14 +331,19 @@ class LineLaws:
             _CHARACTERS * settings.char_time + settings.response_timeout + self._waits_longer
         )
 
-    def _round(self, looks: int) -> float:
-        """Return how long the stops take that are due, with so many requests before each, s."""
+    def _round(self, looks: int, since: float) -> float:
+        """
+        Return how long the stops take that are due, s.
+
+        :param looks: how many requests go before each.
+        :param since: those that were sent since then are of the same round.
+        """
         least = _GATEWAY if self._rig.connection.protocol == 'modbus_tcp' else 0.0
         frame = _CHARACTERS * self._line.settings.char_time
         return sum(
             (1 + looks) * (frame + (max(each.longest, least) if each.longest > 0 else 0.2))
             for each in self._units.values()
-            if each.due_since < math.inf
+            if each.due_since < math.inf or each.stop_at >= since
         )
 
     def _judge_stop(self, number: int, unit: _Unit) -> None:
@@ -349,7 +356,7 @@ class LineLaws:
             return
         since = max(unit.due_since, self._there_since + _OPENED)
         looks = _SHORT_LOOK if since - self._frame_at > _SAME else 0
-        until = since + unit.due_within + self._under_way + self._round(looks)
+        until = since + unit.due_within + self._under_way + self._round(looks, unit.due_since)
         if self._clock.now > until + _SLACK:
             self._break('S2', number, 'has no stop on the wire, due since', unit.due_since)
 
@@ -386,7 +393,7 @@ class LineLaws:
             until = unit.to_stand_since + _AFTER_LOSS + own + _IN_PEACE
         elif self._reaches_since < math.inf and not self._has_ended:
             until = max(unit.to_stand_since, self._reaches_since) + _LOOKED_FOR
-        until += self._under_way + self._round(_SHORT_LOOK) + _CARRIED_OUT
+        until += self._under_way + self._round(_SHORT_LOOK, unit.to_stand_since) + _CARRIED_OUT
         if self._clock.now > until:
             self._break('S3', number, 'turns its motor, to be stopped since', unit.to_stand_since)
 
@@ -403,7 +410,7 @@ class LineLaws:
         notes, snapshot = self._rig.notes_of[number], self._rig.notes_of[number].snapshot
         if snapshot is None:
             return
-        patience = drive.settings.lost_after + _TOLD + self._round(0) + _CARRIED_OUT
+        patience = drive.settings.lost_after + _TOLD + self._round(0, now) + _CARRIED_OUT
         if self.noise:
             # before it is sent it waits for those of all others, many of which take all their time
             patience += len(self._units) * self._under_way
