@@ -350,6 +350,9 @@ class LineLaws:
         """Judge S2."""
         if self._there_since == math.inf:
             return
+        if self._line.plc is not None and not self._turns(number):
+            # its program has taken the word of a driver away that it does not hear
+            return
         if self._clock.now > max(unit.again_by, self._there_since + _OPENED + _AFTER_LOSS):
             self._break('S2', number, 'gets no second stop, due at', unit.again_by)
         if unit.due_since == math.inf:
