@@ -44,6 +44,7 @@ from nfo_sinus_driver.bus.tasks import (
 )
 from nfo_sinus_driver.link import (
     Address,
+    AnotherValue,
     Clock,
     Identification,
     InProgress,
@@ -685,7 +686,7 @@ class Bus:
     def _count_write(self, exchange: Exchange, error: LinkError | None) -> None:
         if not exchange.writes or exchange.unit == self.protocol.broadcast:
             return
-        if error is None or isinstance(error, Refused):
+        if error is None or isinstance(error, (Refused, AnotherValue)):
             self.writes_in_vain = 0
         elif isinstance(error, NoAnswer):
             # what comes damaged shows that something comes

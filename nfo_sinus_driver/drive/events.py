@@ -446,6 +446,12 @@ class Cause(enum.Enum):
     """Logged once. After a change of SpdScl (G2) stop and call `~/enable`"""
     SETPOINT_REFUSED = 'it refused set-point {value:g}: {error}'
     """The motor was stopped. Check the limits of the drive, enable"""
+    SETPOINT_HELD = (
+        'the drive answers {held:g} {unit} where set-point {value:g} was written: it limits or '
+        'rounds what it takes; check its limits'
+    )
+    """Nothing is stopped; `setpoint` of `~/status` is what the drive answers. Check the least and
+    the greatest set-point in the drive, and `setpoint_max`"""
     SETPOINT_UNACKNOWLEDGED = (
         'set-point {value:g} was not acknowledged for {seconds:.1f} s: if the drive answers reads, '
         'something on the way lets no writes pass, such as a gateway that is set to read only, or '

@@ -15,6 +15,7 @@ from nfo_sinus_driver.drive.recognition import Recognition
 from nfo_sinus_driver.link import (
     MAILBOX,
     Address,
+    AnotherValue,
     DamagedAnswer,
     Identification,
     LinkError,
@@ -281,9 +282,11 @@ class ParameterAccess:
         priority: Priority,
         require_wanted: Callable[[], None] = lambda: None,
         permit: Callable[[], None] | None = None,
-    ) -> None:
+    ) -> bytes:
         """
         Write as a profile says, unless ``require_wanted`` raises when its turn has come.
+
+        :returns: what the drive has then, as far as its answer shows.
 
         :param permit: raises likewise where it is not known what is there, in place of the usual
             recognition: of a stop.
@@ -292,7 +295,7 @@ class ParameterAccess:
         priority = Priority.STOP if step.head else priority
         self._own[step.key] = data
         try:
-            await self._ask(
+            reply = await self._ask(
                 Write(address, data),
                 priority,
                 step.retry,
@@ -300,6 +303,7 @@ class ParameterAccess:
                 permit,
                 patient=step.head,
             )
+            return reply.data or data
         except Refused as error:
             self._own.pop(step.key, None)
             raise self._named(error, step.key) from None
@@ -428,6 +432,9 @@ class ParameterAccess:
         while True:
             try:
                 return await self._bus.carry_out(self._unit, operation, priority, require)
+            except AnotherValue as error:
+                # what writes looks at what the drive has then
+                return Reply(error.data, self.now())
             except (NoAnswer, DamagedAnswer) as error:
                 self.count(error)
                 tries -= 1

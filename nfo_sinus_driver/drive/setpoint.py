@@ -18,6 +18,7 @@ from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.snapshot import NAN
 from nfo_sinus_driver.link import (
     Address,
+    AnotherValue,
     DamagedAnswer,
     Interrupted,
     LinkError,
@@ -126,6 +127,8 @@ class Setpoint:
         #: What the drive has and since when, by address; nothing where that is not known, and minus
         #: infinity where it may have taken a later write.
         self._written: dict[Address, tuple[bytes, float]] = {}
+        #: What it answers that it has in place of that, by address.
+        self._held: dict[Address, bytes] = {}
         #: What watches the age of set-points, and whether they are acknowledged.
         self._tasks: list[Task] = []
         #: No set-point has come within ``setpoint_timeout``: 0 is due, and the drive has taken it.
@@ -187,7 +190,7 @@ class Setpoint:
         self._limits = limits
         self._target, follows = target, target is not None
         self.following_since = self._bus.now()
-        self._keys, self._written = {}, {}
+        self._keys, self._written, self._held = {}, {}, {}
         self._encode.cache_clear()
         if target is not None:
             for step in target.writes(0.0):
@@ -346,7 +349,8 @@ class Setpoint:
         unanswered = not self._state.responsive and limited == self._unanswered
         if unanswered or not self._params.recognition.holds:
             self._waits_for_answer = True
-            self._note_zero(request)
+            if limited == 0:
+                self._note_waiting(request)
             return None
         self._accept(request, limited)
         if self.clamped and not self._clamp_reported:
@@ -366,7 +370,7 @@ class Setpoint:
 
     def _due_since(self, address: Address, data: bytes, at: float) -> float:
         """Return since when a write is due, s; one that the drive has is only repeated, now."""
-        return self._bus.now() if self._in_drive.get(address) == data else at
+        return self._bus.now() if self._written.get(address, (b'',))[0] == data else at
 
     def _want(self, value: float, at: float) -> None:
         """Note what is wanted from a moment on, s."""
@@ -374,13 +378,12 @@ class Setpoint:
         if sign(value) != sign(before):
             self.turn = Turn(at, before, value)
 
-    def _note_zero(self, request: Request) -> None:
-        """Note that 0 is not sent yet: it is watched from when it is due."""
-        if self._limited(request) != 0:
-            return
-        at = max(request.since, self.following_since)
+    def _note_waiting(self, request: Request) -> None:
+        """Note what waits to be sent, where others are in vain: 0 from when it is due, else now."""
+        value, now = self._limited(request), self._bus.now()
+        at = now if value else max(request.since, self.following_since)
         for address, data in self._due(request):
-            self._note_in_vain(address, 0.0, self._due_since(address, data, at))
+            self._note_in_vain(address, value, self._due_since(address, data, at))
 
     def _note_in_vain(
         self, address: Address, value: float, since: float, tries: float = 0.0
@@ -403,8 +406,9 @@ class Setpoint:
     def _done(self, written: Written, error: LinkError | None) -> None:
         if not self.following:
             return
-        if error is None:
-            self._take_note(written.address, written.data)
+        if error is None or isinstance(error, AnotherValue):
+            held = None if error is None else error.data
+            self._take_note(written.address, written.data, held)
             if len(self._keys) > 1:
                 self._bus.request(self._slot)
         elif isinstance(error, Refused) and not self._may_be_busy(error):
@@ -417,13 +421,37 @@ class Setpoint:
         else:
             self._missed(error, written.address)
 
-    def _take_note(self, address: Address, data: bytes) -> None:
+    def _take_note(self, address: Address, data: bytes, held: bytes | None = None) -> None:
+        """
+        Note that a write was acknowledged.
+
+        :param held: what the drive answers that it has, if that is another value.
+        """
         self._busy_since = math.inf
         self._unanswered = NAN
-        self._in_vain.pop(address, None)
-        self._written[address] = data, self._bus.now()
+        self._note_written(address, data, held)
         if len(self._written) == len(self._keys):
             self._has(self._decoded(self._in_drive))
+
+    def _note_written(self, address: Address, data: bytes, held: bytes | None) -> None:
+        self._in_vain.pop(address, None)
+        self._written[address] = data, self._bus.now()
+        if held is None:
+            self._held.pop(address, None)
+            return
+        is_news = self._held.get(address) != held
+        self._held[address] = held
+        if is_news:
+            asked, has = (
+                self._decoded({**self._in_drive, address: one}) for one in (data, held)
+            )
+            self._state.notify(
+                Severity.WARNING,
+                Cause.SETPOINT_HELD,
+                value=asked,
+                held=has,
+                unit=self._state.unit,
+            )
 
     def _missed(self, error: LinkError, address: Address) -> None:
         """
@@ -458,7 +486,9 @@ class Setpoint:
     @property
     def _in_drive(self) -> dict[Address, bytes]:
         """The bytes that the drive has, as far as they are known."""
-        return {address: data for address, (data, _) in self._written.items()}
+        return {
+            address: self._held.get(address, data) for address, (data, _) in self._written.items()
+        }
 
     def _decoded(self, data: Mapping[Address, bytes]) -> float:
         """Return the set-point that bytes mean to the drive, after its own rounding."""
@@ -478,14 +508,16 @@ class Setpoint:
         now, seconds = self._bus.now(), self._state.settings.lost_after
         silences, unit = self._bus.silences, self._state.settings.address
         if self._slot.pending and self._counts(self._request):
-            # it waits for its turn
-            self._note_zero(self._request)
+            self._note_waiting(self._request)
         is_held = not self._params.recognition.holds
         for one in self._in_vain.values():
             silent = silences.is_silent(unit) and silences.last_frame_at(unit) <= one.since
             least = _TRIES if one.value else _TRIES_OF_0
             tried = is_held or max(one.tries, self._bus.writes_in_vain) >= least
-            # after that long it does not matter whether there was time to try it again
+            if not tried and one.tries <= (1 if one.value else 0):
+                # on a slow line it waits for its turn, or one try was lost in noise
+                continue
+            # after that long it does not matter how often there was time to try it again
             longer = _LOST_WITHIN if silent or not tried else 0.0
             if one.since + seconds + longer <= now:
                 why = Report(
@@ -536,7 +568,7 @@ class Setpoint:
                     continue
                 self._note_in_vain(address, 0.0, due_at)
                 try:
-                    await self._params.write(replace(step, retry=False), Priority.STOP)
+                    has = await self._params.write(replace(step, retry=False), Priority.STOP)
                 except (LinkError, DriveError) as error:
                     if isinstance(error, Refused) and not self._may_be_busy(error):
                         why = Report(Cause.SETPOINT_REFUSED, value=0.0, error=str(error))
@@ -547,11 +579,10 @@ class Setpoint:
                         self._note_in_vain(address, 0.0, due_at, _try(error))
                     await self._bus.sleep(_WATCH_PERIOD)
                     return
-                self._in_vain.pop(address, None)
-                self._written[address] = data, self._bus.now()
+                self._note_written(address, data, None if has == data else has)
                 self._busy_since = math.inf
             if self._request is before:
-                self._has(0.0)
+                self._has(self._decoded(self._in_drive))
                 self.timed_out = Report(Cause.SETPOINT_TIMED_OUT, timeout=timeout)
                 self._state.notify(Severity.WARNING, self.timed_out)
         self.ceased = self.expired = True

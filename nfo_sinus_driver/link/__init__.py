@@ -51,6 +51,7 @@ for it, too); a link with threads or callbacks of its own (only the bus knows wh
 from nfo_sinus_driver.link.interface import (
     MAILBOX,
     Address,
+    AnotherValue,
     Ask,
     Clock,
     Connecting,
@@ -97,6 +98,7 @@ __all__ = [
     'MAILBOX',
     'PROTOCOLS',
     'Address',
+    'AnotherValue',
     'Ask',
     'BusSettings',
     'Clock',

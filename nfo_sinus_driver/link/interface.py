@@ -472,6 +472,21 @@ class NeverSilent(DamagedAnswer):
     maybe_done = False
 
 
+class AnotherValue(LinkError):
+    """
+    A unit has taken a write, and answers that it has another value than was written.
+
+    :ivar data: that value.
+    """
+
+    maybe_done = True
+    responded = True
+
+    def __init__(self, unit: int, written: bytes, data: bytes) -> None:
+        super().__init__(f'unit {unit} has {data.hex()}h where {written.hex()}h was written')
+        self.data = data
+
+
 class Refused(LinkError):
     """
     The drive refused a request.

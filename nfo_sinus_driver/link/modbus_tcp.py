@@ -40,8 +40,10 @@ from nfo_sinus_driver.link.interface import (
     Reply,
     Why,
 )
+from nfo_sinus_driver.link.late_replies import LATEST_REPLY
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, read_of, understand
+from nfo_sinus_driver.link.other_values import OtherValues
 from nfo_sinus_driver.link.protocols import MODBUS_TCP
 from nfo_sinus_driver.link.tcp_connection import CLOSED_HINT, Connection, TcpConnection
 from nfo_sinus_driver.link.thread_clock import ThreadClock
@@ -147,6 +149,7 @@ class TcpLink(ModbusLink):
         self._longest_ever: dict[int, float] = {}
         #: The requests on this connection without an answer, and how many answers came.
         self._given_up: deque[int] = deque(maxlen=_GIVEN_UP)
+        self._others = OtherValues(LATEST_REPLY * response_timeout)
         self._answers = 0
         #: The last request on this connection has not been answered.
         self._unanswered = False
@@ -338,6 +341,7 @@ class TcpLink(ModbusLink):
         self._number = self._number % 0xFFFF + 1
         self._unanswered = True
         connection.write(encode(request, self._number))
+        self._others.sent(request, self._now())
         sent_at, ever = self._now(), self._longest_ever.get(request.unit, 0.0)
         most = max(self.patience, ever) if ever else math.inf
         deadline = sent_at + min(self._response_timeout, most)
@@ -407,11 +411,14 @@ class TcpLink(ModbusLink):
                 f'the gateway answered as unit {message[0]} and not as unit {request.unit}, which '
                 'was asked: correct the table of units in the settings of the gateway, or address'
             )
+        if answer is None and (error := self._others.error_of(request, message)) is not None:
+            raise error
         if answer is None:
             raise GatewayFault(
                 f'unit {request.unit}: the gateway sent what is no answer: update or replace it, '
                 'and check protocol'
             )
+        self._others.took(request)
         return answer
 
     def _unreachable(self, error: OSError) -> PortError:

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from nfo_sinus_driver.link.foreign_traffic import DOUBTFUL, ForeignModbus
 from nfo_sinus_driver.link.interface import (
     Address,
+    AnotherValue,
     Clock,
     DamagedAnswer,
     LineSettings,
@@ -24,7 +25,7 @@ from nfo_sinus_driver.link.interface import (
     Why,
     silent,
 )
-from nfo_sinus_driver.link.late_replies import STOP_WAITS, Doubt, LateReplies
+from nfo_sinus_driver.link.late_replies import LATEST_REPLY, STOP_WAITS, Doubt, LateReplies
 from nfo_sinus_driver.link.modbus_link import SPECIFIC, ModbusLink, ReadDevice, ReportSlaveId
 from nfo_sinus_driver.link.modbus_pdu import (
     AnswerReader,
@@ -35,6 +36,7 @@ from nfo_sinus_driver.link.modbus_pdu import (
     refusal_head,
     write_of,
 )
+from nfo_sinus_driver.link.other_values import OtherValues
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.request_link import LONG_PAUSE, WRITE_WAIT, RequestLink
 
@@ -85,6 +87,9 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self._stray = False
         #: The last answer may be to another master.
         self._doubtful = False
+        #: What units answer in place of what was written, and whether the last answer is such.
+        self._others = OtherValues(LATEST_REPLY * settings.response_timeout)
+        self._has_other_value = False
 
     def use_resync_reads(self, unit: int, addresses: Sequence[Address], why: Why = None) -> None:
         """Name parameters of different sizes that are safe to read at any time."""
@@ -253,12 +258,17 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
     def _transact(self, request: Request[_T]) -> tuple[_T, float]:
         frame = self._encode(request)
         self._another.sent(frame)
+        self._has_other_value = False
+        self._others.sent(request, self._now())
         self._send(request, frame)
         reader = self._reader(request)
         try:
             answer, arrived = self._receive(request, reader, frame)
         except (NoAnswer, DamagedAnswer):
             self._late.expect(request, self._now())
+            raise
+        except AnotherValue:
+            self._late.release(request.unit)
             raise
         except Refused:
             self._late.release(request.unit)
@@ -276,6 +286,9 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             if alone and came_back:
                 self._echo.present = True
             stray = self._echo.before + other.replace(frame, b'', 1)
+            if self._has_other_value:
+                # it is the unit's, and not of another master
+                stray = b''
             self._stray = bool(stray)
             if stray:
                 self._another.hear(stray, now)
@@ -283,6 +296,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             self._doubtful = there and (
                 self._stray or now < self._another.open_until(request.unit)
             )
+        self._others.took(request)
         length = len(reader.frame) * self._settings.char_time
         self._late.note(request, reader.frame, arrived, length)
         late = request.answer_head in self._late.quarantined(request.unit, arrived)
@@ -359,6 +373,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         if self._confirming and len(refusals) == 1 and not held and came == len(reader.frame):
             # a second answer would have come by now
             raise refusals[0]
+        if came and not held:
+            self._require_written(request, reader.other)
         if held or (came and reader.other != frame):
             another = self._another.is_there(now)
             if not another and self._lacks_first_byte(request, frame, reader.other + held):
@@ -368,6 +384,14 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             )
         raise silent(request.unit)
 
+    def _require_written(self, request: Request[Any], came: bytes) -> None:
+        """Raise what it means if the unit alone has answered, and another value."""
+        messages = [message for _, _, message in self._messages(came)]
+        if len(messages) != 1 or self._frame_length(len(messages[0])) != len(came):
+            return
+        if (error := self._others.error_of(request, messages[0])) is not None:
+            self._has_other_value = True
+            raise error
 
     def _learn_pause(self, longest: float) -> None:
         """Note the longest pause, s, within a complete answer, and of no other."""

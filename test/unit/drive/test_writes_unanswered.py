@@ -219,3 +219,18 @@ def test_a_current_limit_is_no_set_point_that_is_not_followed(connection: str) -
             rig.send(value)
             rig.pass_time(6.0)
             assert not rig.notes.said(Cause.NOTHING_CHANGES)
+
+
+# --- slow lines -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('value', [0.0, 10.0])
+def test_a_set_point_that_waits_for_a_slow_line_has_not_failed(value: float) -> None:
+    # one round of set-points takes longer than lost_after
+    with Rig('described', drives=16, line={'baud': 2400}, lost_after=0.5) as rig:
+        rig.turn()
+        rig.send(value)
+        rig.pass_time(5.0)
+        for address, drive in rig.drives.items():
+            assert drive.following, rig.notes_of[address].events
+            assert abs(rig.fars[address].motor.demand - value) < 0.1
