@@ -6,16 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import contextlib
-import os
-import select
 import signal
-import socket
-import threading
-import tty
 
 from bench import FULL_RATE, Bench, wait_until
 from connections import needs
+from device_server import DeviceServer
 import pytest
 
 pytestmark = needs('rtu')
@@ -23,58 +18,6 @@ pytestmark = needs('rtu')
 _SPEED = 20.0
 #: Longer than it may take to find out, to connect again and to stop, also on a busy machine, s.
 _SOON = 10.0
-
-
-class DeviceServer:
-    """
-    One that serves one client after another.
-
-    :ivar mute: nothing passes for the present client.
-    :ivar clients: how many there were.
-    """
-
-    def __init__(self, line: str) -> None:
-        self._line = os.open(line, os.O_RDWR | os.O_NOCTTY)
-        tty.setraw(self._line)
-        self._listener = socket.create_server(('127.0.0.1', 0))
-        self.port = f'socket://127.0.0.1:{self._listener.getsockname()[1]}'
-        self.mute = False
-        self.clients = 0
-        self._stop, self._stopped = os.pipe()
-        self._thread = threading.Thread(target=self._work)
-        self._thread.start()
-
-    def close(self) -> None:
-        os.write(self._stopped, b'x')
-        self._thread.join()
-        self._listener.close()
-        for fd in (self._line, self._stop, self._stopped):
-            os.close(fd)
-
-    def _work(self) -> None:
-        while self._stop not in select.select([self._listener, self._stop], [], [])[0]:
-            client, _ = self._listener.accept()
-            self.mute = False
-            self.clients += 1
-            with client, contextlib.suppress(ConnectionError):
-                self._serve(client)
-
-    def _serve(self, client: socket.socket) -> None:
-        while True:
-            ready = select.select([client, self._line, self._stop], [], [])[0]
-            if self._stop in ready:
-                os.write(self._stopped, b'x')
-                return
-            if client in ready:
-                data = client.recv(4096)
-                if not data:
-                    return
-                if not self.mute:
-                    os.write(self._line, data)
-            if self._line in ready:
-                data = os.read(self._line, 4096)
-                if not self.mute:
-                    client.sendall(data)
 
 
 @pytest.fixture
