@@ -180,11 +180,9 @@ class LineRun:
 
     def begin_again(self) -> None:
         """Put all right, have all motors turn, and judge anew (AssertionError: they do not)."""
-        rig, line = self.rig, self.rig.line
+        rig = self.rig
         rig.send(None)
-        line.mend()
-        line.plan = lambda frame: None
-        rig.meet = lambda key, data: None
+        self._mend()
         drives = rig.drives.values()
         for drive in drives:
             drive.on_stop(lambda why: None)
@@ -206,6 +204,11 @@ class LineRun:
         self.laws.begin()
         self._stops = {}
 
+    def _mend(self) -> None:
+        self.rig.line.mend()
+        self.rig.line.plan = lambda frame: None
+        self.rig.meet = lambda key, data: None
+
     def _until_told(self) -> None:
         """Let all motors turn for a while, and until each is told as enabled."""
         self.rig.pass_time(_STEADY)
@@ -214,6 +217,7 @@ class LineRun:
     def begin_with_another_driver(self) -> None:
         """End the driver, if it has not ended, and begin with another one."""
         self.rig.kill()
+        self._mend()
         self.rig.begin()
         self.rig.connect()
         self.begin_again()
@@ -288,6 +292,9 @@ class LineRun:
                 self.rig.drives[unit].stop_beside(why)
 
         self.rig.drives[last].on_stop(stop_others)
+        if not self.rig.drives[last].following:
+            # they would have stopped with it before
+            stop_others(Report(Cause.STOP_REQUESTED, by='the program'))
         for unit in others:
             self.laws.called(unit)
         self.stop(last)
