@@ -6,8 +6,8 @@ What must hold for each motor of a line that stops answering, judged from both e
 
 S1: a drive that was asked in vain, and sent no valid frame for ``lost_after`` since that request,
 is lost: this is told within 0.3 s, and ``enabled`` is false. Where no drive of the line answers and
-two were asked in vain (one, if the line has one), each counts as asked from the first of these
-requests on.
+two were asked in vain (one, if the line has one), each that is enabled counts as asked from the
+first of these requests on.
 
 S2: a stop for it has been on the wire 0.5 s after that, or 0.3 s after it was called for; besides
 there is the rest of the request under way, and the stops of all that are due, one after the other,
@@ -302,7 +302,9 @@ class LineLaws:
         """Return when a drive is lost by S1; infinite: it is not asked in vain."""
         unit, settings = self._units[number], self._rig.drives[number].settings
         whole_line = len(self._in_vain) >= min(2, len(self._units))
-        asked_at = min(unit.asked_at, self._asked_at if whole_line else math.inf)
+        snapshot = self._rig.notes_of[number].snapshot
+        enabled = unit.running or (snapshot is not None and snapshot.enabled)
+        asked_at = min(unit.asked_at, self._asked_at if whole_line and enabled else math.inf)
         return asked_at + settings.lost_after
 
     def _judge_loss(self, number: int, unit: _Unit) -> None:

@@ -193,6 +193,7 @@ class LineRun:
         )
         for unit, far in rig.fars.items():
             if far.faults:
+                rig.acknowledged += 1
                 rig.answer(rig.drives[unit].acknowledge())
         rig.enable()
         self.give(_BEFORE)
