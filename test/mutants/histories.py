@@ -166,7 +166,7 @@ HISTORIES = (
         3,
         'in any order: a motor that cannot be stopped is not said to be',
         SEQUENCE,
-        '            if self._bus.now() >= complain_at or (stood and not stands):',
+        '            if self._bus.now() >= self._complain_at or (stood and not stands):',
         '            if False:',
         G2_SCMD,
     ),

@@ -48,6 +48,7 @@ RECOGNISING = 'nfo_sinus_driver/drive/recognising.py'
 #: Whether a motor follows its set-points, and why it stopped.
 FOLLOWING = 'nfo_sinus_driver/drive/following.py'
 MOTOR_FOLLOWS = 'test/unit/drive/test_motor_follows.py'
+WRITES_UNANSWERED = 'test/unit/drive/test_writes_unanswered.py'
 WHY_STOPPED = 'test/unit/drive/test_why_stopped.py'
 #: What is tested of a driver that stood still, and of a drive whose status cannot be read.
 STANDS_STILL = 'test/unit/drive/test_driver_stands_still.py'
@@ -1204,6 +1205,54 @@ LAWS = (
         'return self._after_expiry.take(abs(frequency), at)',
         'return False',
         (MOTOR_FOLLOWS,),
+    ),
+    Mutant(
+        12,
+        'a set-point that is not acknowledged is tried again for good',
+        SETPOINT,
+        '            if one.since + seconds + longer <= now:',
+        '            if False:',
+        (WRITES_UNANSWERED,),
+    ),
+    Mutant(
+        12,
+        'a set-point that waits for a slow line has failed',
+        SETPOINT,
+        '            if not tried and one.tries <= (1 if one.value else 0):',
+        '            if False:',
+        (WRITES_UNANSWERED, '-k', 'slow_line'),
+    ),
+    Mutant(
+        12,
+        'what is acknowledged and changes nothing is a set-point',
+        FOLLOWING,
+        'elif role is not None and self._has_not_changed(frequency, measured.at, unit):',
+        'elif False:',
+        (WRITES_UNANSWERED, '-k', 'changes_nothing'),
+    ),
+    Mutant(
+        12,
+        'a drive that limits its set-point has what was written',
+        SETPOINT,
+        'address: self._held.get(address, data) for',
+        'address: data for',
+        ('test/unit/drive/test_answers_another_value.py',),
+    ),
+    Mutant(
+        8,
+        'an answer that names another value is believed at once',
+        'nfo_sinus_driver/link/other_values.py',
+        '        if before == value:',
+        '        if True:',
+        ('test/unit/link/test_other_values.py',),
+    ),
+    Mutant(
+        8,
+        'a late answer to an earlier write is what the drive has now',
+        'nfo_sinus_driver/link/other_values.py',
+        '        if any((where, data) == (place, value) for where, data, _ in self._written):',
+        '        if False:',
+        ('test/unit/link/test_other_values.py',),
     ),
     Mutant(
         2,
