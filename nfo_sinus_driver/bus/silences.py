@@ -53,7 +53,7 @@ class Silences:
 
     Where no unit answers, they share the time, and each request takes the longest: many would get
     none for a while. So from the first request in vain on, the line is silent, once two units were
-    asked (one, if there are no more), and whoever would have been asked counts as asked.
+    asked (one, if there are no more), and all that would have been asked count as asked.
 
     Each request to a unit that is missing costs the others a whole time-out, so there is a pause
     behind it, in which none of the missing units gets one.

@@ -248,7 +248,7 @@ class LineRun:
         line.state, line.boots_for = 'mute', seconds
         # each pause before it is opened again is longer than the one before, but with a stop owed
         # none is longer than 8 s until a minute and a half is over
-        self.lasts = _OPENED_AGAIN + 3 * seconds if seconds <= _LONGEST_PAUSE else _HEARD_AT_LAST
+        self.lasts = _OPENED_AGAIN + 3 * seconds if seconds < _LONGEST_PAUSE else _HEARD_AT_LAST
         self.laws.heard_again_by = self.rig.clock.now + self.lasts
 
     def stand_still(self, seconds: float) -> None:
