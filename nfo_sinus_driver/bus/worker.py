@@ -639,14 +639,7 @@ class Bus:
         started = self._clock()
         paced_until = self._paced_until
         self._paced_until = started + self._request_period
-        self._link.patience = math.inf
-        if self._scheduler.is_brief(exchange):
-            self._link.patience = 0.0
-        elif self.silences.is_silent(exchange.unit) or self.silences.is_line_silent:
-            # a loss is noticed when it is due
-            self._link.patience = self._lost_at - started
-        elif exchange.priority in _PASSING and len(self._watches) > 1:
-            self._link.patience = _PASSING_PATIENCE
+        self._link.wait_at_most(self._patience(exchange, started))
         try:
             reply = carry_out(self._link, exchange.unit, exchange.operation)
             if self._clock.resumed_at > started:
@@ -670,6 +663,16 @@ class Bus:
         self._account(exchange.unit, started, None)
         self._count_write(exchange, None)
         return reply
+
+    def _patience(self, exchange: Exchange, now: float) -> float:
+        """Return how long an answer is waited for at most, s."""
+        if self._scheduler.is_brief(exchange):
+            return 0.0
+        if self.silences.is_silent(exchange.unit) or self.silences.is_line_silent:
+            # a loss is noticed when it is due
+            return self._lost_at - now
+        passes = exchange.priority in _PASSING and len(self._watches) > 1
+        return _PASSING_PATIENCE if passes else math.inf
 
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = self.now()

@@ -193,7 +193,7 @@ class CanopenLink:
 
     #: Node ids and bit rates (CiA 301). No manual says with which the drive leaves the factory.
     protocol = CANOPEN
-    patience = math.inf
+    _patience = math.inf
 
     def __init__(
         self, port: CanPort, settings: LineSettings, now: Clock = time.monotonic
@@ -212,6 +212,10 @@ class CanopenLink:
         self._started: set[int] = set()
         self._shapes = ObjectShapes()
         self.supervision = CanopenSupervision(port, now, self._take)
+
+    def wait_at_most(self, seconds: float) -> None:
+        """Wait for the next answers so long at most, s, but as long as the unit has ever taken."""
+        self._patience = seconds
 
     def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
         """Wait for no more than the answer to the request that was sent, where a stop waits."""
@@ -468,7 +472,7 @@ class CanopenLink:
         """Take the answer to the present request, sent just now; return when it came."""
         unit = transfer.unit
         ever = self._late.longest_ever(unit)
-        most = max(self.patience, ever) if ever else math.inf
+        most = max(self._patience, ever) if ever else math.inf
         deadline = sent + min(self._settings.response_timeout, most)
         other = 0
         while True:

@@ -277,16 +277,20 @@ class Link(Protocol):
     :ivar remarks: what it has noticed.
     :ivar last_byte_at: when the last byte has come, whatever it was, s; on CAN the last frame.
     :ivar clock: the clock of that thread, for what else it waits for, too.
-    :ivar patience: how long the next answers are waited for at most, s, but always as long as the
-        unit has ever taken: where many units have to get something, and may all be silent. What
-        comes after that is a late answer.
     """
 
     protocol: LineProtocol
     remarks: Remarks
     last_byte_at: float
     clock: ThreadClock
-    patience: float
+
+    def wait_at_most(self, seconds: float) -> None:
+        """
+        Wait for the next answers so long at most, s, but always as long as the unit has ever taken.
+
+        It is for a line where many units have to get something, and may all be silent. What comes
+        after that is a late answer.
+        """
 
     def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
         """

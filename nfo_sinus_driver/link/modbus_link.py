@@ -46,7 +46,7 @@ class ModbusLink(ABC):
     protocol: LineProtocol
     remarks: Remarks
     supervision = None
-    patience = math.inf
+    _patience = math.inf
     clock: ThreadClock
 
     @cached_property

@@ -159,6 +159,10 @@ class TcpLink(ModbusLink):
         self.remarks = Remarks()
         self.last_byte_at = -math.inf
 
+    def wait_at_most(self, seconds: float) -> None:
+        """Wait for the next answers so long at most, s, but as long as the unit has ever taken."""
+        self._patience = seconds
+
     def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
         """Wait for no more than the answer to the request that was sent, where a stop waits."""
         self.stop_waits = stop_waits
@@ -343,7 +347,7 @@ class TcpLink(ModbusLink):
         connection.write(encode(request, self._number))
         self._others.sent(request, self._now())
         sent_at, ever = self._now(), self._longest_ever.get(request.unit, 0.0)
-        most = max(self.patience, ever) if ever else math.inf
+        most = max(self._patience, ever) if ever else math.inf
         deadline = sent_at + min(self._response_timeout, most)
         others: list[int] = []
         while True:

@@ -142,7 +142,7 @@ class RequestLink(ABC, Generic[_Request]):
     """
 
     supervision = None
-    patience = math.inf
+    _patience = math.inf
     protocol: LineProtocol
     _another: ForeignTraffic
     _late: LateReplies[Any, Any]
@@ -161,6 +161,10 @@ class RequestLink(ABC, Generic[_Request]):
         self._in_pieces = 0.0
         #: When the last request had been sent.
         self._sent_at = 0.0
+
+    def wait_at_most(self, seconds: float) -> None:
+        """Wait for the next answers so long at most, s, but as long as the unit has ever taken."""
+        self._patience = seconds
 
     def end_listening_if(self, stop_waits: Callable[[], bool]) -> None:
         """Wait for no more than the answer to the request that was sent, where a stop waits."""
@@ -251,7 +255,7 @@ class RequestLink(ABC, Generic[_Request]):
         """
         ever = self._late.longest_ever(unit)
         least = ever + length * self._settings.char_time + self._gap
-        return max(self.patience, least) if ever else math.inf
+        return max(self._patience, least) if ever else math.inf
 
     def _gap_before(self, request: _Request) -> float:
         """Return how long the line is silent before a request if nothing unrequested comes, s."""

@@ -71,6 +71,9 @@ class FakeLink:
         self._condition = threading.Condition()
         self._hold = self._holds = False
 
+    def wait_at_most(self, seconds: float) -> None:
+        pass
+
     def end_listening_if(self, stop_waits: Any) -> None:
         pass
 

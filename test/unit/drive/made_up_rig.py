@@ -50,6 +50,9 @@ class FarEnd:
         self.writes: list[tuple[int, int]] = []
         self.reads: list[int] = []
 
+    def wait_at_most(self, seconds: float) -> None:
+        pass
+
     def end_listening_if(self, stop_waits: Any) -> None:
         pass
 
