@@ -29,6 +29,8 @@ RETRY_SHARE = 1 / 2
 _MOST_OWED = 0.07
 #: How much it may save up while it is idle, s: less than the shortest transaction takes.
 _MOST_SAVED = 0.005
+#: What takes no longer in vain is noise, s.
+_PASSING = 0.1
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
 #: What only reads, and can wait for a unit that does not answer.
 _READS = (Priority.POLL, *_BACKGROUND)
@@ -167,6 +169,10 @@ class Scheduler:
             entry = next(iter(others), None)
             if entry is None or rank == _MISSING:
                 return entry
+            if rank in _STOPS and self._unanswered_stops:
+                # those that answer come first
+                news = itertools.filterfalse(self._was_in_vain, queue)
+                entry = next(itertools.filterfalse(self._gives_way, news), entry)
             behind = self._rank(entry)
             if behind == rank or behind not in (_RETRY, _MISSING):
                 return entry
@@ -193,6 +199,10 @@ class Scheduler:
             isinstance(entry, Waiting) and entry.exchange.unit != exchange.unit
             for entry in self._queues[Priority.STOP]
         )
+
+    def _was_in_vain(self, entry: LatestValue | Waiting) -> bool:
+        """Return whether it is a stop that was not answered before, or its read."""
+        return isinstance(entry, Waiting) and self._is_repeated(entry.exchange)
 
     def _gives_way(self, entry: LatestValue | Waiting) -> bool:
         """Return whether it is for the unit that has just not answered, or for one like it."""
@@ -232,7 +242,7 @@ class Scheduler:
         self._slot_went = self._given == _SLOT or (
             self._slot_went and self._unanswered is not None
         )
-        if self._unanswered is not None and is_stop:
+        if self._unanswered is not None and is_stop and not self._unanswered.is_brief:
             # each by itself: the stop behind a read that was not answered goes out at once
             stop = self._unanswered.unit, self._unanswered.writes
             self._unanswered_stops[stop] = 1 + self._unanswered_stops.get(stop, 0)
@@ -240,8 +250,10 @@ class Scheduler:
             if self._slot_went and rank in _BACKGROUND:
                 continue
             owed = self._owed[rank] + seconds * share
-            if rank == self._given or (rank == _RETRY and in_vain and not is_stop):
-                # the request with which a unit falls silent is of that share, too;
+            falls_silent = in_vain and not is_stop and seconds > _PASSING
+            if rank == self._given or (rank == _RETRY and falls_silent):
+                # the request with which a unit falls silent is of that share, too, but for what
+                # noise costs: in that it would leave none for those that are to be asked again;
                 # no debt beyond this transaction: what is sent on an idle line delays none
                 self._owed[rank] = max(owed - seconds, -seconds)
             else:

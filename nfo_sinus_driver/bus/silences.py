@@ -80,6 +80,8 @@ class Silences:
         #: The units asked in vain since the last valid frame, and since when one of them was.
         self._in_vain: set[int] = set()
         self._in_vain_since = math.inf
+        #: How long a request in vain has taken at most, s.
+        self._longest_in_vain = 0.0
         #: When each unit was last sent anything.
         self._asked_at: dict[int, float] = {}
         #: The longest time from one valid frame to the next.
@@ -133,6 +135,7 @@ class Silences:
             self._since.setdefault(unit, failed_at)
             self._gone_since.setdefault(unit, now)
             self._in_vain.add(unit)
+            self._longest_in_vain = max(seconds, self._longest_in_vain)
             self._in_vain_since = min(self._in_vain_since, failed_at)
         if error is None or error.responded or error.heard:
             self.heard, self._opened, self._mute_since = True, 0, math.inf
@@ -245,6 +248,11 @@ class Silences:
         """
         since = self._since.get(unit, math.inf)
         return min(since, self._in_vain_since) if is_watched and self.is_line_silent else since
+
+    @property
+    def round_in_vain(self) -> float:
+        """How long it takes at most to send something to each drive in vain, s."""
+        return len(self._lost_after) * self._longest_in_vain
 
     def is_dead(self, now: float) -> bool:
         """Return whether the line is silent for more than noise: for several units, or for long."""

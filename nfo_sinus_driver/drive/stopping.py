@@ -375,9 +375,9 @@ class StopSequence:
         silences = self._bus.silences
         if self._state.params.recognition.allows_stop:
             return True
-        # where others answer, they may have kept back the second one until now
-        in_time = silences.is_line_silent or self._bus.now() <= self._due_at + EXCHANGE
-        in_time |= self._blind_left == _BLIND_STOPS
+        # the stops of all others may go before the second one
+        longest = EXCHANGE + silences.round_in_vain
+        in_time = self._bus.now() <= self._due_at + longest
         in_time &= self._bus.paused <= self._paused + EXCHANGE
         return self._blind_left > 0 and in_time and self._due_at >= silences.away_at
 

@@ -417,8 +417,9 @@ class LineLaws:
             return
         patience = drive.settings.lost_after + _TOLD + self._round(0, now) + _CARRIED_OUT
         if self.noise:
-            # before it is sent it waits for those of all others, many of which take all their time
-            patience += len(self._units) * self._under_way
+            # before it is sent it waits for those of all others, many of which take all their time,
+            # and for a stop, whose status goes ahead of them until it is read whole
+            patience += 2 * len(self._units) * self._under_way
         stopped = not (snapshot.enabled or drive.stop_owed or drive.stop_waits)
         claims = stopped and self._turns(number)
         unit.claims_since = min(unit.claims_since, now) if claims else math.inf

@@ -31,7 +31,7 @@ _EXCHANGE, _LATE = 3.0, 0.5
 #: again.
 _LEAST, _LEAST_OF_PLC, _LEAST_OF_KNOWN = 2, 1, 1
 #: How long the stop of another drive may take that goes before, s.
-_TURN = 0.25
+_TURN = 0.45
 #: How much longer than a loss takes a stop may be written although nothing answers, s.
 _BLIND = 0.5
 
