@@ -184,10 +184,10 @@ class Scheduler:
         Return whether its answer is waited for no longer than the unit has ever taken.
 
         That is so of every other stop, where others wait for it or may be in vain as well, of every
-        other look at a unit that answers no stop, of what is read before a stop is written, and of
-        what is sent to be heard.
+        other look at a unit that answers no stop, of what is read before a stop is written, for
+        that goes without it, and of what is sent to be heard.
         """
-        if exchange.is_brief:
+        if exchange.is_brief or (exchange.priority is Priority.STOP and not exchange.writes):
             return True
         tries = self._unanswered_stops
         is_look = exchange.priority is Priority.LOOK and (exchange.unit, True) in tries
@@ -195,7 +195,7 @@ class Scheduler:
             return False
         if tries.get((exchange.unit, exchange.writes), 0) % 2:
             return False
-        return self._is_silent(exchange.unit) or not exchange.writes or any(
+        return self._is_silent(exchange.unit) or any(
             isinstance(entry, Waiting) and entry.exchange.unit != exchange.unit
             for entry in self._queues[Priority.STOP]
         )

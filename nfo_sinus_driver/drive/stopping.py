@@ -29,6 +29,8 @@ _LOOK_AGAIN_PERIOD = 1.0
 #: How often a stop is written that nothing answers, from when it became due, whether another drive
 #: may be there by then or not.
 _BLIND_STOPS = 2
+#: After how many attempts without an answer a stop is written without what it would read before.
+_READ_IN_VAIN = 2
 #: How much longer than its own time-out a drive is left alone, s.
 _LEFT_ALONE_LONGER = 0.5
 #: How often an unconfirmed stop is reported, s.
@@ -106,8 +108,9 @@ class StopSequence:
         #: then, s; and how often it may be written since although nothing answers.
         self._due_at, self._paused = -math.inf, 0.0
         self._blind_left = 0
-        #: The present attempt has written something.
-        self._wrote = False
+        #: The present attempt has written something; and that was acknowledged, a word made without
+        #: what is in the drive: what cannot be read before a stop cannot be read after it either.
+        self._wrote = self._removed_blind = False
         #: What has ended the last attempt; ``None``: it was answered.
         self._failure: Exception | None = None
         #: Its own time-out has had the time to stop the drive.
@@ -444,17 +447,18 @@ class StopSequence:
         faulted = self._state.status is not None and self._state.status.faulted
         failure: LinkError | None = None
         await self.find()
-        self._wrote = False
+        is_blind, self._wrote, self._removed_blind = self._is_blind, False, False
         try:
             await carry_out(
                 self._state,
                 self._method.stop(control_mode),
                 Priority.STOP,
                 permit=self.require_same,
-                is_blind=self._is_blind,
+                is_blind=is_blind,
             )
             self._sent_at = min(self._sent_at, self._bus.now())
             self._refusals = self._unanswered = self._ignored = 0
+            self._removed_blind = is_blind
         except Refused as error:
             self._unanswered = self._ignored = 0
             if error.code == Refused.BUSY and self._bus.now() < self._due:
@@ -520,6 +524,8 @@ class StopSequence:
         """Nothing answers, and the bus had control of the drive when something did."""
         status = self._state.status
         silent = not self._state.connected or self._bus.silences.is_dead(self._bus.now())
+        # what is read before a stop was read in vain
+        silent |= self._unanswered >= _READ_IN_VAIN and not self._wrote
         return silent and status is not None and status.from_bus
 
     def _needs_force(self, status: InverterStatus, failure: LinkError | None) -> bool:
@@ -617,7 +623,9 @@ class StopSequence:
 
     async def _has_run_command(self, status: InverterStatus) -> bool:
         """Return whether a drive that shows a run has a run command, as far as that shows yet."""
-        stands = await carry_out(self._state, self._method.has_run_command(), Priority.LOOK)
+        # without an answer, a word that was acknowledged just now has none
+        steps, onward = self._method.has_run_command(), self._removed_blind
+        stands = await carry_out(self._state, steps, Priority.LOOK, onward=onward)
         if stands or self._method.reads_run_command:
             return bool(stands)
         # on its ramp it shows a run, too
