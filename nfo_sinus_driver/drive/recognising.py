@@ -120,11 +120,22 @@ class Recogniser:
         if key and await self._is_same(key, values):
             recognition.look_again()
             return
-        status = await state.read_status(Priority.LOOK, retry=False)
-        if status.driven or status.runs_by_bus:
+        if await self._still_runs():
             recognition.look_again()
         else:
             await self.recognise(retry=False)
+
+    async def _still_runs(self) -> bool:
+        """Return whether the drive shows a run, by its status word alone where it has one."""
+        state, params = self._state, self._params
+        if not state.nameplate.has(state.word_key):
+            status = await state.read_status(Priority.LOOK, retry=False)
+            return status.driven or status.runs_by_bus
+        reply = await params.read_reply(state.word_key, Priority.LOOK, retry=False)
+        if not params.can_be(state.word_key, reply.data):
+            return False
+        shown = state.status_of_word(state.status_word(reply.data), reply.arrived)
+        return shown.driven or shown.runs_by_bus
 
     async def _is_same(self, key: str, values: Sequence[Value]) -> bool:
         """Return whether what identifies the drive is as before; false: it is not told any more."""

@@ -31,6 +31,8 @@ _LOOK_AGAIN_PERIOD = 1.0
 _BLIND_STOPS = 2
 #: After how many attempts without an answer a stop is written without what it would read before.
 _READ_IN_VAIN = 2
+#: For how long after a damaged answer the line is taken for noisy, s.
+_NOISE_LASTS = 5.0
 #: How much longer than its own time-out a drive is left alone, s.
 _LEFT_ALONE_LONGER = 0.5
 #: How often an unconfirmed stop is reported, s.
@@ -111,6 +113,8 @@ class StopSequence:
         #: The present attempt has written something; and that was acknowledged, a word made without
         #: what is in the drive: what cannot be read before a stop cannot be read after it either.
         self._wrote = self._removed_blind = False
+        #: When an answer was damaged last, s.
+        self._damaged_at = -math.inf
         #: What has ended the last attempt; ``None``: it was answered.
         self._failure: Exception | None = None
         #: Its own time-out has had the time to stop the drive.
@@ -350,9 +354,9 @@ class StopSequence:
         own = timeout.shortest if timeout.stops_motor else 0.0
         if not own or self._may_write:
             pause = _LOST_RETRY_PERIOD if self._may_write else _LOOK_AGAIN_PERIOD
-            if isinstance(self._failure, DamagedAnswer):
-                # that comes from something
-                pause = _RETRY_PERIOD
+            if now < self._damaged_at + _NOISE_LASTS:
+                # something is there: in noise it is tried on and on, by requests of a moment
+                pause = 0.0
             await self._bus.sleep(pause, or_opening=True)
             return
         unit = self._state.settings.address
@@ -423,6 +427,8 @@ class StopSequence:
         except (NoAnswer, DamagedAnswer) as error:
             outcome, self._unconfirmed = _Outcome.UNANSWERED, report_of(error)
             self._failure = error
+            if isinstance(error, DamagedAnswer):
+                self._damaged_at = self._bus.now()
         except Exception as error:
             # even an error in the driver must not end the tries
             outcome, self._unconfirmed = _Outcome.UNCONFIRMED, report_of(error)
