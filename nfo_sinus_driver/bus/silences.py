@@ -254,6 +254,15 @@ class Silences:
         """How long it takes at most to send something to each drive in vain, s."""
         return len(self._lost_after) * self._longest_in_vain
 
+    @property
+    def soonest_loss(self) -> float:
+        """After which silence the first drive of the line is lost, s."""
+        return min(self._lost_after.values(), default=math.inf)
+
+    def was_asked_since_silent(self, unit: int) -> bool:
+        """Return whether a unit was sent anything since the line is silent."""
+        return self._asked_at.get(unit, -math.inf) >= self._in_vain_since
+
     def is_dead(self, now: float) -> bool:
         """Return whether the line is silent for more than noise: for several units, or for long."""
         several = len(self._in_vain) >= _A_LINE

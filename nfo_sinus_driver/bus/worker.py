@@ -70,10 +70,8 @@ _T = TypeVar('_T')
 REOPEN_PERIOD = 0.5
 
 
-#: What comes again soon where its answer is missed: the first time that is waited for so long, s,
-#: or as long as the unit has ever taken. In noise the other drives of the line have the rest.
-_PASSING = (Priority.SETPOINT, Priority.POLL, Priority.TELEMETRY, Priority.REFRESH)
-_PASSING_PATIENCE = 0.05
+#: What share of the time after which another drive is lost a silent one may have at a time.
+_OF_A_LOSS = 1 / 4
 
 
 class Watch(NamedTuple):
@@ -286,6 +284,11 @@ class Bus:
             return consistent_read(unit, parts, priority)
         return Exchange(unit, operation, priority, require_wanted)
 
+    @property
+    def is_quiet(self) -> bool:
+        """Nothing but stops is sent on the line."""
+        return self._line_quiet_until() > 0.0
+
     def keep_alive(self, unit: int, address: Address) -> Awaitable[Reply]:
         """Have a unit hear something soon (to be awaited), by reading a parameter of it."""
         return Exchange(unit, Read(address), Priority.LOOK, is_brief=True)
@@ -303,7 +306,8 @@ class Bus:
         """
         Leave the whole line alone, stops aside, while each drive that may run is left alone.
 
-        A drive may take any message on the line for a sign that the driver is there [C127].
+        A drive may take any message on the line for a sign that the driver is there [C127]. So one
+        at standstill may trip by its own time-out, in favour of a motor that runs.
 
         :param until: until when this one is, s of the steady clock.
         """
@@ -669,10 +673,12 @@ class Bus:
         if self._scheduler.is_brief(exchange):
             return 0.0
         if self.silences.is_silent(exchange.unit) or self.silences.is_line_silent:
-            # a loss is noticed when it is due
-            return self._lost_at - now
-        passes = exchange.priority in _PASSING and len(self._watches) > 1
-        return _PASSING_PATIENCE if passes else math.inf
+            # a loss is noticed when it is due, and no other drive is lost because of this one
+            most = self._lost_at - now
+            if len(self._watches) > 1:
+                most = min(most, _OF_A_LOSS * self.silences.soonest_loss)
+            return most
+        return math.inf
 
     def _account(self, unit: int, started: float, error: LinkError | None) -> None:
         now = self.now()

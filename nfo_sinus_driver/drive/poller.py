@@ -58,6 +58,8 @@ _KEEP_ALIVE_SHARE = 1 / 3
 _LATEST_SHARE = 0.5
 #: How long before its own time-out stops it a lost drive is tried again and again, s.
 _LAST_CHANCE = 0.6
+#: How long before the silence of all others passes for its own a drive is asked itself, s.
+_LOOK_BEFORE_LOSS = 0.4
 #: The shortest pause between two tries, if the port is gone, too, s.
 _SHORTEST_PAUSE = 0.02
 #: What is measured in every control mode.
@@ -140,6 +142,8 @@ class Poller:
         self._task: Task | None = None
         self._keep_alive_task: Task | None = None
         self._show_task: Task | None = None
+        #: Asks the drive before the silence of all others passes for its own.
+        self._look_task: Task | None = None
         #: Poll at full rate.
         self.active = False
         #: The newest poll.
@@ -308,15 +312,14 @@ class Poller:
         asked_after = -math.inf
         while True:
             latest = state.timeout.seconds * _LATEST_SHARE
-            if not state.connected or not latest:
+            if not state.connected or not latest or self._bus.is_quiet:
                 await self._bus.sleep(_WATCH_PERIOD)
                 continue
             frame_at = self._bus.silences.last_frame_at(self._unit)
             left = frame_at + latest - self._bus.now()
             if left <= 0 and frame_at != asked_after:
                 asked_after = frame_at
-                with contextlib.suppress(LinkError):
-                    await state.keep_alive()
+                await self._be_heard()
             await self._bus.sleep(left if left > 0 else latest / 2)
 
     def _pause(self, polled_at: float) -> float:
@@ -624,14 +627,27 @@ class Poller:
         if self._controller is not None:
             self._controller.paused(seconds)
 
+    async def _be_heard(self) -> None:
+        """Send the drive a request, ahead of what can wait."""
+        with contextlib.suppress(LinkError):
+            await self._state.keep_alive()
+
     def _look_for_loss(self) -> float:
         """Treat the drive as lost once it is silent for too long; return by when it may be, s."""
         state, now = self._state, self._bus.now()
         if not state.connected or self._task is None:
             return math.inf
         # a motor that may run is watched all the time
-        since = self._bus.silences.silent_since(self._unit, is_watched=state.control.stop_owed)
+        silences = self._bus.silences
+        since = silences.silent_since(self._unit, is_watched=state.control.stop_owed)
         lost_at = since + state.settings.lost_after
+        if not (silences.is_silent(self._unit) or silences.was_asked_since_silent(self._unit)):
+            # it is only the others that were asked in vain
+            look_at = lost_at - min(_LOOK_BEFORE_LOSS, state.settings.lost_after / 2)
+            if now < look_at:
+                return look_at
+            if self._look_task is None or self._look_task.future.done():
+                self._look_task = self._bus.spawn(self._be_heard())
         if now < lost_at:
             return lost_at
         self._begin_anew(silent(self._unit))

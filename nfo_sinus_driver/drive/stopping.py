@@ -18,7 +18,14 @@ from nfo_sinus_driver.drive.diagnosis import report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.steps import carry_out
-from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, PortError, Refused
+from nfo_sinus_driver.link import (
+    DamagedAnswer,
+    LinkError,
+    NoAnswer,
+    NoData,
+    PortError,
+    Refused,
+)
 
 #: How often a stop that was answered and is not confirmed is written again, s.
 _RETRY_PERIOD = 0.2
@@ -324,8 +331,9 @@ class StopSequence:
 
     async def _rest(self, outcome: _Outcome) -> None:
         """Let some time pass before the next attempt, but none after one without an answer."""
+        # a PLC that has no data of the drive is heard
         unanswered = isinstance(self._failure, LinkError) and not isinstance(
-            self._failure, (Refused, PortError)
+            self._failure, (Refused, PortError, NoData)
         )
         if outcome is _Outcome.IGNORED or (unanswered and self._blind_left):
             return

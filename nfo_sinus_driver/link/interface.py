@@ -286,7 +286,7 @@ class Link(Protocol):
 
     def wait_at_most(self, seconds: float) -> None:
         """
-        Wait for the next answers so long at most, s, but always as long as the unit has ever taken.
+        Wait for the next answers so long at most, s, but longer than the unit has ever taken.
 
         It is for a line where many units have to get something, and may all be silent. What comes
         after that is a late answer.

@@ -22,10 +22,17 @@ SUSPECT_FOR = 60.0
 #: How often a link that listens finds out whether a stop waits, s; and why it then believes less.
 LISTENING_STEP = 0.005
 STOP_WAITS = 'a stop was sent before the answer was certain'
+#: How much longer a reply may take on a busy machine, s.
+_JITTER = 0.003
 #: How much later than its slowest recent reply a unit may reply.
 _LATER = 1.25
 #: The share of a slow reply that is remembered with each of the next ones.
 _DECAY = 0.95
+
+
+def longer_than(ever: float) -> float:
+    """Return how long something may take that has taken so long at most, s; 0 for 0."""
+    return _LATER * ever + _JITTER if ever else 0.0
 
 
 class Request(Protocol):
@@ -204,5 +211,5 @@ class LateReplies(Generic[_Request, _Kind]):
         return min(_LATER * self._slowest.get(unit, 0.0), self._longest)
 
     def longest_ever(self, unit: int) -> float:
-        """Return how long a unit has ever taken to reply, s; 0: it has not yet."""
-        return self._longest_ever.get(unit, 0.0)
+        """Return how long a unit that has ever replied may take, s; 0: it has not yet."""
+        return longer_than(self._longest_ever.get(unit, 0.0))

@@ -40,7 +40,7 @@ from nfo_sinus_driver.link.interface import (
     Reply,
     Why,
 )
-from nfo_sinus_driver.link.late_replies import LATEST_REPLY
+from nfo_sinus_driver.link.late_replies import LATEST_REPLY, longer_than
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, read_of, understand
 from nfo_sinus_driver.link.other_values import OtherValues
@@ -347,7 +347,7 @@ class TcpLink(ModbusLink):
         connection.write(encode(request, self._number))
         self._others.sent(request, self._now())
         sent_at, ever = self._now(), self._longest_ever.get(request.unit, 0.0)
-        most = max(self._patience, ever) if ever else math.inf
+        most = max(self._patience, longer_than(ever)) if ever else math.inf
         deadline = sent_at + min(self._response_timeout, most)
         others: list[int] = []
         while True:
