@@ -44,6 +44,8 @@ _Rank = Priority | Literal['slot', 'retry', 'missing']
 _STOPS = (Priority.STOP, Priority.LOOK)
 #: How often all stops are sent where no unit answers, before anything else that may be in vain.
 _ROUNDS = 2
+#: Of so many stops in vain one is waited for as long as an answer may take, the second first.
+_PATIENT = 8
 #: What goes on at once where it was not answered.
 _REPEATED = (*_STOPS, Priority.SERVICE)
 _SHARES: dict[_Rank, float] = {
@@ -183,9 +185,9 @@ class Scheduler:
         """
         Return whether its answer is waited for no longer than the unit has ever taken.
 
-        That is so of every other stop, where others wait for it or may be in vain as well, of every
-        other look at a unit that answers no stop, of what is read before a stop is written, for
-        that goes without it, and of what is sent to be heard.
+        That is so of a stop, where others wait for it or may be in vain as well, of a look at one
+        that answers no stop, both but for the second and then each eighth one, of what is read
+        before a stop is written, for that goes without it, and of what is sent to be heard.
         """
         if exchange.is_brief or (exchange.priority is Priority.STOP and not exchange.writes):
             return True
@@ -193,7 +195,7 @@ class Scheduler:
         is_look = exchange.priority is Priority.LOOK and (exchange.unit, True) in tries
         if exchange.priority is not Priority.STOP and not is_look:
             return False
-        if tries.get((exchange.unit, exchange.writes), 0) % 2:
+        if tries.get((exchange.unit, exchange.writes), 0) % _PATIENT == 1:
             return False
         return self._is_silent(exchange.unit) or any(
             isinstance(entry, Waiting) and entry.exchange.unit != exchange.unit

@@ -95,7 +95,7 @@ class Controller:
 
     @property
     def waits_to_look(self) -> bool:
-        """The drive gets no other request than its look, after which it is stopped."""
+        """The drive gets no other request than its stop, and the look before it."""
         return self._sequence.waits_to_look
 
     @property

@@ -99,6 +99,7 @@ class StopSequence:
         look: Callable[[], Awaitable[None]],
     ) -> None:
         self._bus = state.bus
+        self._unit = state.settings.address
         self._state = state
         self._method = method
         self._control = state.control
@@ -366,13 +367,14 @@ class StopSequence:
                 # something is there: in noise it is tried on and on, by requests of a moment
                 pause = 0.0
             await self._bus.sleep(pause, or_opening=True)
-            return
-        unit = self._state.settings.address
+            if not own or self._may_write:
+                return
+            now = self._bus.now()
         silences = self._bus.silences
-        asked_at = silences.asked_at(unit if self._was_left_alone else None)
+        asked_at = silences.asked_at(self._unit if self._was_left_alone else None)
         until = max(asked_at + own + _LEFT_ALONE_LONGER, now + _RETRY_PERIOD)
         if not self._was_left_alone:
-            self._bus.keep_quiet(unit, until)
+            self._bus.keep_quiet(self._unit, until)
             if self._bus.is_any_controlled and not silences.is_line_silent:
                 named = self._state.report(Cause.MAY_RUN_ON, seconds=own)
                 self._state.notify(Severity.WARNING, named)
@@ -381,8 +383,9 @@ class StopSequence:
 
     @property
     def waits_to_look(self) -> bool:
-        """The drive gets no other request than its look, after which it is stopped."""
-        return self._task is not None and not (self._state.connected or self._may_write)
+        """The drive gets no other request than its stop, and the look before it."""
+        answers = self._may_write and not self._bus.silences.is_silent(self._unit)
+        return self._task is not None and not (self._state.connected or answers)
 
     @property
     def _may_write(self) -> bool:
@@ -425,7 +428,7 @@ class StopSequence:
     def _is_lost(self) -> bool:
         """The drive has been silent for ``lost_after``: the next poll will find it lost."""
         settings = self._state.settings
-        silent = self._bus.silences.lasts(settings.address, self._bus.now())
+        silent = self._bus.silences.lasts(self._unit, self._bus.now())
         return silent >= settings.lost_after
 
     async def _attempt(self, before: _Outcome) -> _Outcome:
