@@ -21,6 +21,7 @@ class DeviceServer:
 
     :ivar mute: nothing passes for the present client.
     :ivar reads_only: what writes does not pass.
+    :ivar unheard: requests that have these bytes do not pass.
     :ivar clients: how many there were.
     """
 
@@ -30,6 +31,7 @@ class DeviceServer:
         self._listener = socket.create_server(('127.0.0.1', 0))
         self.port = f'socket://127.0.0.1:{self._listener.getsockname()[1]}'
         self.mute = self.reads_only = False
+        self.unheard = b''
         self.clients = 0
         self._stop, self._stopped = os.pipe()
         self._thread = threading.Thread(target=self._work)
@@ -62,6 +64,7 @@ class DeviceServer:
                     return
                 # the driver hands over a frame as a whole
                 held = self.reads_only and is_write('modbus_rtu', data)
+                held |= bool(self.unheard) and self.unheard in data
                 if not (self.mute or held):
                     os.write(self._line, data)
             if self._line in ready:

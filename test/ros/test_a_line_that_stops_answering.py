@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import contextlib
 from dataclasses import replace
+import itertools
 import signal
 import threading
 import time
@@ -19,6 +20,7 @@ from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 from std_msgs.msg import Float32
 from std_srvs.srv import Trigger
+from support.writes import is_write
 
 pytestmark = needs('rtu')
 
@@ -27,6 +29,12 @@ _SPEED = 20.0
 _LOST_AFTER = 1.0
 #: Until every motor of a line slows down: from what makes its stop due, s.
 _SOON = 1.0
+#: The units that hear nothing any more.
+_DEAF = (1, 3, 5, 7)
+#: Of answers that have 8 bytes: one in twenty of their bytes.
+_DAMAGED = 1 - 0.95 ** 8
+#: serial.sio_tot, whichever drive.
+_READ_SIO_TOT = bytes.fromhex('0303DC')
 
 
 @pytest.fixture(scope='module')
@@ -150,3 +158,68 @@ def test_answers_are_lost_and_every_motor_stops(
             assert line.driver.wait() == 1
         else:
             line.all_lost()
+
+
+def test_a_port_that_is_back_soon_costs_one_look_for_each_stop(bench: Bench) -> None:
+    line = Line(bench, 8)
+    # an answer that is late on a busy machine makes no second look
+    line.start('-p', 'response_timeout:=0.5')
+    with line.turning():
+        gone = time.monotonic()
+        line.simulator.inject('hangup', 0.5)
+        line.all_stop(0.5 + _SOON)
+        for unit in line.units:
+            sent = [
+                bytes.fromhex(frame['hex'])
+                for frame in bench.frames()
+                if frame['direction'] == 'request' and frame['first'] > gone + 0.3
+            ]
+            own = [frame for frame in sent if frame[0] == unit]
+            looks = list(itertools.takewhile(lambda frame: not is_write('modbus_rtu', frame), own))
+            assert len(looks) <= 1 and len(looks) < len(own), [frame.hex() for frame in own]
+
+
+def test_a_line_that_is_cut_loses_all_its_drives(bench: Bench) -> None:
+    line = Line(bench, 8)
+    line.start()
+    with line.turning():
+        line.simulator.inject('line-dead', 60.0)
+        line.all_lost()
+        assert line.on() == [*line.units], 'they hear nothing, which makes this a test'
+        line.simulator.inject('heal')
+        line.all_stop(3.0)
+
+
+def test_a_read_that_fails_for_good_keeps_no_stop_back(bench: Bench) -> None:
+    line = Line(bench, 1)
+    server = DeviceServer(bench.port)
+    bench.callback(server.close)
+    bench.port = server.port
+    line.start()
+    with line.turning():
+        line.simulator.inject('line-dead', 4.5)
+        server.unheard = _READ_SIO_TOT
+        line.all_stop(4.5 + 3.0)
+
+
+def test_a_stop_goes_with_noise_on_the_line(bench: Bench) -> None:
+    line = Line(bench, 3)
+    line.start()
+    with line.turning():
+        line.simulator.inject('noise-rate', 'damage', _DAMAGED, 1)
+        line.simulator.inject('line-dead', 4.5)
+        time.sleep(4.5)
+        answer = line.client.call_async('stop_all', Trigger)
+        line.all_stop(5.0)
+        wait_until(answer.done, 'it is answered')
+
+
+def test_at_the_end_drives_that_answer_wait_for_none_that_do_not(bench: Bench) -> None:
+    line = Line(bench, 8)
+    line.start('-p', 'shutdown_timeout:=3.0')
+    with line.turning():
+        for unit in _DEAF:
+            line.simulator.inject('silence', 60.0, address=unit)
+        line.driver.signal(signal.SIGTERM)
+        line.all_stop(_SOON, *(set(line.units) - {*_DEAF}))
+        assert line.driver.wait() == 1
