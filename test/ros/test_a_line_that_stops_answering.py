@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
-from dataclasses import replace
 import itertools
 import signal
 import threading
 import time
 
-from bench import FULL_RATE, PATIENCE, Bench, wait_until
-from connections import CONNECTIONS, Connection, needs
+from bench import PATIENCE, Bench, wait_until
+from connections import needs
 from device_server import DeviceServer
 from nfo_sinus_msgs.msg import DriveStatus
 import pytest
@@ -37,12 +36,6 @@ _DAMAGED = 1 - 0.95 ** 8
 _READ_SIO_TOT = bytes.fromhex('0303DC')
 
 
-@pytest.fixture(scope='module')
-def connection(request: pytest.FixtureRequest) -> Connection:
-    """Return a connection over a line that is slow enough to be full with eight drives."""
-    return replace(CONNECTIONS[request.param], baud_rate=19200)
-
-
 class Line:
     """
     Some drives on a line, their driver, and a client of all of them.
@@ -55,7 +48,7 @@ class Line:
         self._bench = bench
         self.simulator = bench.simulator(
             *bench.drives.ramps(2.0, 20.0), *bench.drives.no_timeout,
-            *(f'--address={unit}' for unit in self.units), paced=True,
+            *(f'--address={unit}' for unit in self.units),
         )
 
     def start(self, *settings: str) -> None:
@@ -68,7 +61,7 @@ class Line:
             *(f'{names[unit - 1]}: {{ros__parameters: {{address: {unit}}}}}' for unit in self.units),
         )))
         self.driver = self._bench.driver(
-            *FULL_RATE, '-p', 'telemetry_rate:=0.0', *settings, '--params-file', str(parameters)
+            '-p', 'telemetry_rate:=0.0', *settings, '--params-file', str(parameters)
         )
         self.client = self._bench.client('/nfo_sinus_bus')
         self.status: dict[int, DriveStatus] = {}
@@ -108,6 +101,8 @@ class Line:
         finally:
             ended.set()
             thread.join()
+            # so that the driver ends soon
+            self.simulator.inject('heal')
 
     def on(self) -> list[int]:
         """Return the units whose motors are not being stopped."""
@@ -216,7 +211,7 @@ def test_a_stop_goes_with_noise_on_the_line(bench: Bench) -> None:
 
 def test_at_the_end_drives_that_answer_wait_for_none_that_do_not(bench: Bench) -> None:
     line = Line(bench, 8)
-    line.start('-p', 'shutdown_timeout:=3.0')
+    line.start('-p', 'shutdown_timeout:=3.0', '-p', 'response_timeout:=0.5')
     with line.turning():
         for unit in _DEAF:
             line.simulator.inject('silence', 60.0, address=unit)
