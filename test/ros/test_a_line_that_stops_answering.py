@@ -38,7 +38,7 @@ _READ_SIO_TOT = bytes.fromhex('0303DC')
 
 class Line:
     """
-    Some drives on a line, their driver, and a client of all of them.
+    Drives on one line, their driver, and a client of all of them.
 
     No drive has a time-out of its own that stops it: what stops a motor here is the driver.
     """
@@ -52,20 +52,20 @@ class Line:
         )
 
     def start(self, *settings: str) -> None:
-        """Start the driver, and wait until all motors turn."""
+        """Start the driver, and what listens to it."""
         parameters = self._bench.folder / 'line.yaml'
-        names = [f'drive{unit}' for unit in self.units]
+        names = {unit: f'drive{unit}' for unit in self.units}
         parameters.write_text('\n'.join((
-            f'nfo_sinus_bus: {{ros__parameters: {{drives: [{", ".join(names)}]}}}}',
+            f'nfo_sinus_bus: {{ros__parameters: {{drives: [{", ".join(names.values())}]}}}}',
             '/**: {ros__parameters: {drive_timeout: 0.0, setpoint_timeout: 0.0}}',
-            *(f'{names[unit - 1]}: {{ros__parameters: {{address: {unit}}}}}' for unit in self.units),
+            *(f'{name}: {{ros__parameters: {{address: {unit}}}}}' for unit, name in names.items()),
         )))
         self.driver = self._bench.driver(
             '-p', 'telemetry_rate:=0.0', *settings, '--params-file', str(parameters)
         )
         self.client = self._bench.client('/nfo_sinus_bus')
         self.status: dict[int, DriveStatus] = {}
-        for unit, name in zip(self.units, names, strict=True):
+        for unit, name in names.items():
             self.client.node.create_subscription(
                 DriveStatus, f'/{name}/status',
                 lambda status, unit=unit: self.status.__setitem__(unit, status), 10,
@@ -195,6 +195,7 @@ def test_a_read_that_fails_for_good_keeps_no_stop_back(bench: Bench) -> None:
         line.simulator.inject('line-dead', 4.5)
         server.unheard = _READ_SIO_TOT
         line.all_stop(4.5 + 3.0)
+        server.unheard = b''
 
 
 def test_a_stop_goes_with_noise_on_the_line(bench: Bench) -> None:
