@@ -222,3 +222,23 @@ def test_a_drive_that_is_seldom_asked_is_not_lost_for_that(poll_rate: float) -> 
         rig.line.state = 'silent'
         rig.pass_time(1 / poll_rate + 1.5)
         assert len(ends(rig)) == 1
+
+
+#: How soon a stop takes effect by which share of damaged bytes, s; docs/serial_line.md has them.
+IN_NOISE = {0.02: 2.0, 0.05: 4.0, 0.1: 8.0, 0.2: 60.0}
+
+
+@pytest.mark.parametrize('share', IN_NOISE)
+@pytest.mark.parametrize('connection', ['rtu', 'optimal', 'classic', 'movitrac', 'described'])
+def test_a_stop_takes_effect_in_noise_that_has_gone_on_for_a_while(
+    connection: str, share: float
+) -> None:
+    for seed in range(5):
+        line = {'baud': 19200} if connection in ('rtu', 'optimal') else {}
+        rig = Rig(connection, line=line, poll_rate=50.0)
+        rig.turn()
+        rig.line.damage_bytes(share, seed)
+        rig.pass_time(2.0)
+        rig.drive.stop()
+        rig.wait_until(lambda rig=rig: not rig.turns, IN_NOISE[share])
+        rig.kill()
