@@ -314,6 +314,14 @@ class Bus:
         self._quiet_until[unit] = until
 
     @property
+    def is_any_reached(self) -> bool:
+        """A drive of the line that may run answers."""
+        return any(
+            watch.may_run() and not self.silences.is_silent(unit)
+            for unit, watch in self._watches.items()
+        )
+
+    @property
     def is_any_controlled(self) -> bool:
         """A drive of the line that may run is not left alone."""
         return any(

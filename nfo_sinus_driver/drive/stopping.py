@@ -336,7 +336,6 @@ class StopSequence:
 
     async def _rest(self, outcome: _Outcome) -> None:
         """Let some time pass before the next attempt, but none after one without an answer."""
-        # a PLC that has no data of the drive is heard
         unanswered = isinstance(self._failure, LinkError) and not isinstance(
             self._failure, (Refused, PortError, NoData)
         )
@@ -383,7 +382,7 @@ class StopSequence:
         until = max(asked_at + own + _LEFT_ALONE_LONGER, now + _RETRY_PERIOD)
         if not self._was_left_alone:
             self._bus.keep_quiet(self._unit, until)
-            if self._bus.is_any_controlled and not silences.is_line_silent:
+            if self._bus.is_any_reached:
                 named = self._state.report(Cause.MAY_RUN_ON, seconds=own)
                 self._state.notify(Severity.WARNING, named)
         await self._bus.sleep(until - now, or_opening=True)
@@ -444,8 +443,10 @@ class StopSequence:
         try:
             outcome = await self._try_once(before)
         except (NoAnswer, DamagedAnswer) as error:
-            outcome, self._unconfirmed = _Outcome.UNANSWERED, report_of(error)
-            self._failure = error
+            # a PLC that has no data of the drive has answered
+            heard = isinstance(error, NoData)
+            outcome = _Outcome.UNCONFIRMED if heard else _Outcome.UNANSWERED
+            self._unconfirmed, self._failure = report_of(error), error
             if isinstance(error, DamagedAnswer):
                 self._damaged_at = self._bus.now()
         except Exception as error:

@@ -303,6 +303,7 @@ class Rig:
             self.unrecognised,
             {address: settings.lost_after for address, settings in self._settings.items()},
             lambda: self.line.place,
+            self.line.settings.response_timeout,
         )
         lose = self.bus._port.mark_lost
 
