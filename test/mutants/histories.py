@@ -126,8 +126,8 @@ HISTORIES = (
         3,
         'in any order: a stop that a fault has refused waits for measured values',
         SEQUENCE,
-        'carry_out(self._state, steps, Priority.STOP) is Removal.COMMAND',
-        'carry_out(self._state, steps, Priority.SERVICE) is Removal.COMMAND',
+        'self._method.remove(control_mode),\n                Priority.STOP,',
+        'self._method.remove(control_mode),\n                Priority.SERVICE,',
         ('test/unit/drive/test_any_order_found.py',),
     ),
     Mutant(
