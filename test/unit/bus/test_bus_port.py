@@ -13,7 +13,15 @@ from fake_link import PATIENCE, Done, FakeLink, wait_until
 import pytest
 from support.addresses import packed, register
 
-from nfo_sinus_driver.bus import Bus, Cancelled, LatestValue, Priority, Task, worker as bus_module
+from nfo_sinus_driver.bus import (
+    Bus,
+    Cancelled,
+    LatestValue,
+    Priority,
+    Task,
+    Watch,
+    worker as bus_module,
+)
 from nfo_sinus_driver.link import (
     DamagedAnswer,
     LinkError,
@@ -352,3 +360,20 @@ def test_figures_of_the_line(link: FakeLink, monkeypatch: pytest.MonkeyPatch) ->
 
 async def nothing() -> None:
     return
+
+
+def test_each_drive_is_looked_at_on_a_silent_line_asked_or_not(bus: Bus, link: FakeLink) -> None:
+    looked: list[int] = []
+
+    def look() -> float:
+        looked.append(3)
+        return math.inf
+
+    for unit in (1, 2, 3):
+        bus.require_sign_of_life(unit, 100.0)
+    bus.watch_over(3, Watch(look, lambda: False, lambda seconds: None))
+    link.answer = raiser(NoAnswer())
+    assert failure(ask(bus, 1, Priority.POLL, unit=1)) is not None
+    assert not looked
+    assert failure(ask(bus, 1, Priority.POLL, unit=2)) is not None
+    wait_until(lambda: looked)

@@ -318,3 +318,20 @@ def test_a_file_tells_its_drive_from_one_that_has_all_its_registers(tmp_path: Pa
         keys = [key for _, key, _ in rig.asked]
         stop = next(number for number, (_, _, data) in enumerate(rig.asked) if data is not None)
         assert 'line.identity_1' in keys[:stop]
+
+
+def test_one_that_identifies_itself_as_another_after_a_loss_is_not_written_to(
+    tmp_path: Path,
+) -> None:
+    known = with_identity(tmp_path, register=0, values=[2, 4])
+    with Rig(Connection('modbus_rtu', known, 'custom')) as rig:
+        rig.turn()
+        rig.line.state = 'silent'
+        rig.pass_time(6.0)
+        rig.line.exchange(
+            other_make(tmp_path, answers_all=True, also={'drive.size': {'register': 0}})
+        )
+        before = len(writes_on_line(rig))
+        rig.line.mend()
+        rig.pass_time(5.0)
+        assert len(writes_on_line(rig)) == before and not rig.far.motor.driven
