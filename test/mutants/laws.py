@@ -1271,8 +1271,8 @@ LAWS = (
         3,
         'on a silent line each drive is lost by its own requests alone',
         SILENCES,
-        '        return min(since, self._in_vain_since) if is_watched and self.is_line_silent else since',
-        '        return since',
+        'min(since, self._in_vain_since) if is_watched and self.is_line_silent else since',
+        'since',
         (LINES, '-k', 'all_answers_are_lost'),
     ),
     Mutant(
@@ -1335,8 +1335,8 @@ LAWS = (
         2,
         'a drive whose own time-out has struck in a pause of the driver goes on',
         CONTROLLER,
-        '        if self._control.enabled and timeout.stops_motor and 0 < timeout.shortest <= seconds:',
-        '        if False:',
+        'if self._control.enabled and timeout.stops_motor and 0 < timeout.shortest <= seconds:',
+        'if False:',
         (LINES, '-k', 'stood_still_is'),
     ),
     Mutant(
