@@ -1442,10 +1442,10 @@ LAWS = (
     ),
     Mutant(
         12,
-        'a 0 that is due is watched only once it has failed',
+        'a set-point in vain is watched from its last try',
         SETPOINT,
-        '                self._note_in_vain(address, 0.0, due_at)\n                try:',
-        '                try:',
+        '_InVain(value, before.since, before.tries + tries)',
+        '_InVain(value, since, before.tries + tries)',
         (WRITES_UNANSWERED,),
     ),
     Mutant(
