@@ -85,6 +85,11 @@ class Exchange:
         """It writes a parameter."""
         return not isinstance(self.operation, (Read, Ask))
 
+    @property
+    def is_for_all(self) -> bool:
+        """Every unit answers it; a question who it is some ignore, and that is no silence."""
+        return not isinstance(self.operation, Ask)
+
     def reads(self, unit: int, address: Address) -> bool:
         """Return whether it only reads a parameter."""
         operation = self.operation

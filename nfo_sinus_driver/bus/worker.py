@@ -72,6 +72,8 @@ REOPEN_PERIOD = 0.5
 
 #: What share of the time after which another drive is lost a silent one may have at a time.
 _OF_A_LOSS = 1 / 4
+#: The same of a drive that has answered so far.
+_ALONE_OF_A_LOSS = 1 / 2
 
 
 class Watch(NamedTuple):
@@ -663,7 +665,7 @@ class Bus:
             self._paced_until = paced_until
             raise
         except LinkError as error:
-            self._account(exchange.unit, started, error)
+            self._account(exchange.unit, started, error, tells=exchange.is_for_all)
             self._count_write(exchange, error)
             raise
         except BaseException as error:
@@ -686,12 +688,18 @@ class Bus:
             if len(self._watches) > 1:
                 most = min(most, _OF_A_LOSS * self.silences.soonest_loss)
             return most
-        return math.inf
+        if exchange.priority is Priority.SERVICE or self.protocol.most_requests:
+            # a gateway would go on waiting, and so would the next request
+            return math.inf
+        # one lost answer is no loss, however long an answer may take
+        return _ALONE_OF_A_LOSS * self.silences.soonest_loss
 
-    def _account(self, unit: int, started: float, error: LinkError | None) -> None:
+    def _account(
+        self, unit: int, started: float, error: LinkError | None, *, tells: bool = True
+    ) -> None:
         now = self.now()
         seconds = now - started - self._note_pause()
-        answered = unit != self.protocol.broadcast
+        answered = unit != self.protocol.broadcast and tells
         if answered and self.silences.note(unit, now, error, seconds):
             self._report_mute(0.0)
         self._scheduler.took(seconds)

@@ -67,6 +67,8 @@ def test_what_is_there_after_a_loss_is_left_alone(bench: Bench, other: str) -> N
         assert drive.state()['driven']
         first.end()
         wait_until(lambda: 'lost: ' in driver.text, 'the loss')
+    # a port that is back there within 3 s is no exchange of drives
+    holds_for(3.5, lambda: driver.running, 'the driver waits')
     _, drive = simulated(bench, other)
     wait_until(lambda: 'is this another model?' in driver.text, 'it is refused')
     assert not client.call('stop').success
