@@ -43,6 +43,8 @@ TIMEOUT = 2.0
 SHORTEST_POWER_OFF = 0.4
 #: How often the status is read while something is awaited, s.
 LOOK_PERIOD = 0.02
+#: How long before its own time-out stops it a silent drive is tried without a longer pause, s.
+_LAST_CHANCE = 0.6
 #: No start delay of a drive is longer, s.
 _LONGEST_START_DELAY = 3600.0
 #: A fault whose status comes so soon after the one before has come just now, s.
@@ -439,6 +441,18 @@ class DriveState:
         has_word = self.nameplate.has(self.word_key)
         key = self.word_key if has_word else self.model.key(Role.STATUS_CODE)
         await self.bus.keep_alive(self.settings.address, self.params.address(key))
+
+    def pause_before_timeout(self, pause: float, timeout: float) -> float:
+        """
+        Return a pause, s, that leaves time for tries before a silent drive stops by itself.
+
+        :param timeout: after which silence it does, s; 0: it does not.
+        """
+        strikes_in = self.bus.silences.last_frame_at(self.settings.address) + timeout
+        strikes_in -= self.bus.now()
+        if strikes_in <= 0:
+            return pause
+        return min(pause, max(strikes_in - _LAST_CHANCE, LOOK_PERIOD))
 
     @property
     def left_alone(self) -> bool:

@@ -56,12 +56,8 @@ _SLOWEST_RECONNECT = 4.0
 _KEEP_ALIVE_SHARE = 1 / 3
 #: After this share of it the drive gets a request ahead of all but stops and set-points.
 _LATEST_SHARE = 0.5
-#: How long before its own time-out stops it a lost drive is tried again and again, s.
-_LAST_CHANCE = 0.6
 #: How long before the silence of all others passes for its own a drive is asked itself, s.
 _LOOK_BEFORE_LOSS = 0.4
-#: The shortest pause between two tries, if the port is gone, too, s.
-_SHORTEST_PAUSE = 0.02
 #: What is measured in every control mode.
 _BASIC = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
 #: How often the rest of a poll is read, s: the other one of frequency and speed, and an inverter
@@ -331,10 +327,7 @@ class Poller:
         if not state.connected:
             # a drive that stays silent costs its neighbours less and less
             pause = min(_RECONNECT_PERIOD * self._failed_reconnects, _SLOWEST_RECONNECT)
-            frame_at = self._bus.silences.last_frame_at(self._unit)
-            strikes_in = frame_at + state.timeout.seconds - self._bus.now()
-            if strikes_in > 0:
-                pause = min(pause, max(strikes_in - _LAST_CHANCE, _SHORTEST_PAUSE))
+            pause = state.pause_before_timeout(pause, state.timeout.seconds)
             # the life counter goes on, else the PLC takes the driver for dead
             return min(pause, self._period) if self._behind_plc else pause
         pause = polled_at + self._period - self._bus.now()

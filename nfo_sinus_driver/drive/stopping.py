@@ -38,10 +38,6 @@ _LOOK_AGAIN_PERIOD = 1.0
 _BLIND_STOPS = 2
 #: After how many attempts without an answer a stop is written without what it would read before.
 _READ_IN_VAIN = 2
-#: How long before its own time-out stops it a lost drive is tried without a pause, s, but for the
-#: shortest.
-_LAST_CHANCE = 0.6
-_SHORTEST_PAUSE = 0.02
 #: For how long after a damaged answer the line is taken for noisy, s.
 _NOISE_LASTS = 5.0
 #: How much longer than its own time-out a drive is left alone, s.
@@ -366,13 +362,10 @@ class StopSequence:
         own = timeout.shortest if timeout.stops_motor else 0.0
         if not own or self._may_write:
             pause = _LOST_RETRY_PERIOD if self._may_write else _LOOK_AGAIN_PERIOD
-            strikes_in = self._bus.silences.last_frame_at(self._unit) + own - now
-            is_last_chance = 0 < strikes_in < _LAST_CHANCE
-            if is_last_chance or now < self._damaged_at + _NOISE_LASTS:
-                # a fault may be spared; and in noise something is there
-                pause = _SHORTEST_PAUSE
-            elif strikes_in > 0:
-                pause = min(pause, strikes_in - _LAST_CHANCE + _SHORTEST_PAUSE)
+            if now < self._damaged_at + _NOISE_LASTS:
+                # in noise something is there
+                pause = drive_state.LOOK_PERIOD
+            pause = self._state.pause_before_timeout(pause, own)
             await self._bus.sleep(pause, or_opening=True)
             if not own or self._may_write:
                 return

@@ -471,8 +471,7 @@ class CanopenLink:
     def _receive(self, transfer: Transfer, sent: float) -> float:
         """Take the answer to the present request, sent just now; return when it came."""
         unit = transfer.unit
-        ever = self._late.longest_ever(unit)
-        most = max(self._patience, ever) if ever else math.inf
+        most = max(self._patience, self._late.longest_ever(unit))
         deadline = sent + min(self._settings.response_timeout, most)
         other = 0
         while True:

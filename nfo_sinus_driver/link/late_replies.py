@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Set as AbstractSet
 import enum
+import math
 from typing import Generic, Protocol, TypeVar
 
 from nfo_sinus_driver.link.interface import NotReady
@@ -31,8 +32,8 @@ _DECAY = 0.95
 
 
 def longer_than(ever: float) -> float:
-    """Return how long something may take that has taken so long at most, s; 0 for 0."""
-    return _LATER * ever + _JITTER if ever else 0.0
+    """Return how long something may take that has taken so long at most, s."""
+    return _LATER * ever + _JITTER
 
 
 class Request(Protocol):
@@ -204,6 +205,7 @@ class LateReplies(Generic[_Request, _Kind]):
         """Note how long a unit took to reply; a slow reply is remembered for some dozens."""
         slowest = max(seconds, _DECAY * self._slowest.get(unit, 0.0))
         self._slowest[unit] = min(slowest, self._longest)
+        # a port may be faster than its settings say, and the reply here before it is due
         self._longest_ever[unit] = max(seconds, self._longest_ever.get(unit, 0.0))
 
     def longest(self, unit: int) -> float:
@@ -211,5 +213,5 @@ class LateReplies(Generic[_Request, _Kind]):
         return min(_LATER * self._slowest.get(unit, 0.0), self._longest)
 
     def longest_ever(self, unit: int) -> float:
-        """Return how long a unit that has ever replied may take, s; 0: it has not yet."""
-        return longer_than(self._longest_ever.get(unit, 0.0))
+        """Return how long a unit that has ever replied may take, s; infinity: it has not yet."""
+        return longer_than(self._longest_ever.get(unit, math.inf))

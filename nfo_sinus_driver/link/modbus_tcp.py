@@ -346,8 +346,8 @@ class TcpLink(ModbusLink):
         self._unanswered = True
         connection.write(encode(request, self._number))
         self._others.sent(request, self._now())
-        sent_at, ever = self._now(), self._longest_ever.get(request.unit, 0.0)
-        most = max(self._patience, longer_than(ever)) if ever else math.inf
+        sent_at, unit = self._now(), request.unit
+        most = max(self._patience, longer_than(self._longest_ever.get(unit, math.inf)))
         deadline = sent_at + min(self._response_timeout, most)
         others: list[int] = []
         while True:
@@ -359,7 +359,8 @@ class TcpLink(ModbusLink):
                 if number == self._number:
                     self._note_answer()
                     if self._now.resumed_at <= sent_at:
-                        self._longest_ever[request.unit] = max(ever, now - sent_at)
+                        longest = self._longest_ever.get(unit, 0.0)
+                        self._longest_ever[unit] = max(longest, now - sent_at)
                     return self._understood(request, message), now
                 others.append(number)
             if self._reader.out_of_step:

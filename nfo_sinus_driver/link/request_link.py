@@ -253,9 +253,8 @@ class RequestLink(ABC, Generic[_Request]):
 
         :param length: of the answer, in characters.
         """
-        ever = self._late.longest_ever(unit)
-        least = ever + length * self._settings.char_time + self._gap
-        return max(self._patience, least) if ever else math.inf
+        least = self._late.longest_ever(unit) + length * self._settings.char_time + self._gap
+        return max(self._patience, least)
 
     def _gap_before(self, request: _Request) -> float:
         """Return how long the line is silent before a request if nothing unrequested comes, s."""

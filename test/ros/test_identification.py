@@ -89,8 +89,7 @@ def test_it_is_asked_once_for_each_connection(bench: Bench) -> None:
 def test_a_drive_without_an_identity_connects_and_runs(bench: Bench, treated: str) -> None:
     drive = bench.simulator('--newer-functions', treated, *_QUICK)
     # else a machine that stands still asks again, to be certain whose answer it has
-    # and a drive that is waited for so long must not be lost in that time
-    driver = bench.driver('-p', 'response_timeout:=4.0', '-p', 'lost_after:=10.0')
+    driver = bench.driver('-p', 'response_timeout:=4.0')
     client = bench.client().connected()
     (line,) = re.findall(r'connected: .*', driver.text)
     assert line == 'connected: sinus_g2, firmware 4.38 / 4018'

@@ -98,3 +98,20 @@ def test_a_drive_of_which_the_plc_has_no_data_is_lost_also_while_it_is_stopped()
         rig.fars[1].silence(3600.0)
         rig.drives[1].stop()
         rig.wait_until(lambda: not rig.drives[1].snapshot.connected, 2.0)
+
+
+@pytest.mark.parametrize('connection', ['rtu', 'ascii', 'tcp', 'classic', 'movitrac', 'canopen'])
+def test_drives_that_answer_in_no_time_are_waited_for_no_longer_than_others(
+    connection: str,
+) -> None:
+    at_once = {'response_timeout': 4.0, 'turnaround': 0.0, 'paced': False}
+    with Rig(connection, drives=3, line=at_once) as rig:
+        rig.turn()
+        rig.line.spoil('drop')
+        rig.send(10.0)
+        rig.pass_time(2.0)
+        assert all(drive.following for drive in rig.drives.values())
+        # they hear all that is sent, and nothing of them is heard
+        rig.line.state = 'deaf'
+        rig.pass_time(4.0)
+        assert not any(far.motor.driven for far in rig.fars.values())

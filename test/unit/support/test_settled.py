@@ -32,13 +32,19 @@ def test_what_has_settled_is_not_complained_of() -> None:
 
 
 @pytest.mark.parametrize(('growth', 'what'), [
-    ({'growth': 2 * MOST_GROWTH * 4 / MINUTES}, 'memory'),
+    ({'growth': 2 * MOST_GROWTH['memory'] * 4 / MINUTES}, 'memory'),
     ({'threads': 0.1}, 'threads'),
     ({'descriptors': 0.1}, 'descriptors'),
 ])
 def test_what_grows_is_named(growth: dict[str, float], what: str) -> None:
     (complaint,) = unsettled(samples(**growth))
     assert complaint.startswith(what)
+
+
+def test_a_pool_that_gets_one_more_thread_has_settled() -> None:
+    before = samples()
+    after = [one._replace(threads=one.threads + (n > MINUTES // 2)) for n, one in enumerate(before)]
+    assert unsettled(after) == []
 
 
 def test_too_short_a_run_shows_nothing() -> None:
