@@ -56,8 +56,9 @@ _SLOWEST_RECONNECT = 4.0
 _KEEP_ALIVE_SHARE = 1 / 3
 #: After this share of it the drive gets a request ahead of all but stops and set-points.
 _LATEST_SHARE = 0.5
-#: How long before the silence of all others passes for its own a drive is asked itself, s.
-_LOOK_BEFORE_LOSS = 0.4
+#: How long before the silence of all others passes for its own a drive is asked itself, s, and for
+#: how long its turn is waited for, where a request to another one took all of that time.
+_LOOK_BEFORE_LOSS, _LOOKED_FOR = 0.4, 0.2
 #: What is measured in every control mode.
 _BASIC = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
 #: How often the rest of a poll is read, s: the other one of frequency and speed, and an inverter
@@ -140,6 +141,7 @@ class Poller:
         self._show_task: Task | None = None
         #: Asks the drive before the silence of all others passes for its own.
         self._look_task: Task | None = None
+        self._looked_at = -math.inf
         #: Poll at full rate.
         self.active = False
         #: The newest poll.
@@ -640,7 +642,8 @@ class Poller:
             if now < look_at:
                 return look_at
             if self._look_task is None or self._look_task.future.done():
-                self._look_task = self._bus.spawn(self._be_heard())
+                self._look_task, self._looked_at = self._bus.spawn(self._be_heard()), now
+            lost_at = max(lost_at, self._looked_at + _LOOKED_FOR)
         if now < lost_at:
             return lost_at
         self._begin_anew(silent(self._unit))
@@ -705,7 +708,9 @@ class Poller:
             return
         if state.connected:
             is_old = self._bus.paused != self._status_paused
-            if is_old or not self.snapshot.connected:
+            # on a slow line one may be enabled before it is measured for the first time
+            is_shown = self.snapshot.connected or state.control.enabled
+            if is_old or not is_shown:
                 # it is read, or measured for the first time, at once
                 return
         snapshot = self._snapshot(state.status if state.connected else None, polled=False)

@@ -45,6 +45,8 @@ _ACKNOWLEDGED_PERIOD = 0.1
 _TRIES, _TRIES_OF_0 = 5, 3
 #: How much later it has failed at the latest, and a drive is lost that does not answer at all, s.
 _LOST_WITHIN = 0.3
+#: How much later one has failed for which there was no second turn, s, and in rounds of the line.
+_TURNS_WITHIN, _ROUNDS = 2.0, 2
 #: How long the set-points that the drive had are remembered, s.
 _REMEMBERED = 10.0
 
@@ -515,8 +517,10 @@ class Setpoint:
             least = _TRIES if one.value else _TRIES_OF_0
             tried = is_held or max(one.tries, self._bus.writes_in_vain) >= least
             if not tried and one.tries <= (1 if one.value else 0):
-                # on a slow line it waits for its turn, or one try was lost in noise
-                continue
+                # on a slow line it waits for its turn, or one try was lost in noise; not for ever
+                rounds = _ROUNDS * self._bus.round_time()
+                if now < one.since + seconds + max(_TURNS_WITHIN, rounds):
+                    continue
             # after that long it does not matter how often there was time to try it again
             longer = _LOST_WITHIN if silent or not tried else 0.0
             if one.since + seconds + longer <= now:

@@ -494,8 +494,10 @@ class StopSequence:
             if not isinstance(error, (NoAnswer, DamagedAnswer)):
                 raise
             self._unanswered += 1
-            # among late answers a refusal is not believed until another request was answered
-            if isinstance(error, DamagedAnswer) and before is _Outcome.UNANSWERED:
+            # among late answers a refusal is not believed until another request was answered; what
+            # only reads before a stop does not have to be: the stop is written without it
+            is_damaged = isinstance(error, DamagedAnswer) and self._wrote
+            if is_damaged and before is _Outcome.UNANSWERED:
                 await self._state.read_status(Priority.LOOK, retry=False)
             if self._unanswered < _UNANSWERED_BEFORE_FORCE:
                 raise

@@ -84,6 +84,7 @@ class _Unit:
     :ivar running: its motor may run by this driver: it did, and no stop was sent since.
     :ivar stopped_with: what was told last when that was sent.
     :ivar to_stand_since: since when its motor has to be stopped, and is not.
+    :ivar tried_at: when the newest set-point was first sent to it.
     :ivar strays_since: since when it is told as following, and does not.
     :ivar claims_since: since when it is told as stopped, and is not.
     :ivar ramps_from: when it was told that it ramps to a stop.
@@ -102,6 +103,7 @@ class _Unit:
     running: bool = False
     stopped_with: Snapshot | None = None
     to_stand_since: float = math.inf
+    tried_at: float = math.inf
     strays_since: float = math.inf
     claims_since: float = math.inf
     ramps_from: float = math.inf
@@ -156,7 +158,7 @@ class LineLaws:
         """Note what the program gives from now on."""
         self._wanted = hertz
         for unit in self._units.values():
-            unit.strays_since = math.inf
+            unit.strays_since = unit.tried_at = math.inf
 
     def called(self, number: int, answer: Future[Any] | None = None) -> None:
         """Note that a stop is called for, and what it is answered by."""
@@ -210,6 +212,8 @@ class LineLaws:
             unit.asked_at = min(unit.asked_at, asked.sent)
             self._asked_at = min(self._asked_at, asked.sent)
             self._in_vain.add(asked.unit)
+        if asked.data is not None and asked.sent > -math.inf:
+            unit.tried_at = min(unit.tried_at, asked.sent)
         if stops:
             if not asked.answered:
                 self._not_answered(unit, asked.ended)
@@ -362,6 +366,13 @@ class LineLaws:
         since = max(unit.due_since, self._there_since + _OPENED)
         looks = _SHORT_LOOK if since - self._frame_at > _SAME else 0
         until = since + unit.due_within + self._under_way + self._round(looks, unit.due_since)
+        if self.noise:
+            # what is damaged is waited for until the line is silent, and may be any of the others
+            until += len(self._units) * self._under_way
+        if self._line.plc is not None:
+            # the driver writes to no PLC that has not answered for so long: by then its program
+            # stops the drive, and counts from what it heard last, which may be later
+            until += self._line.plc.setting.ros_time
         if self._clock.now > until + _SLACK:
             self._break('S2', number, 'has no stop on the wire, due since', unit.due_since)
 
@@ -431,7 +442,10 @@ class LineLaws:
             motor.driven and abs(motor.demand - (self._wanted or 0.0)) < _NEAR
         )
         unit.strays_since = min(unit.strays_since, now) if strays else math.inf
-        if now > unit.strays_since + patience:
+        # it counts from when it was first sent: before, one request to each other may be in vain
+        longest = unit.strays_since + len(self._units) * self._under_way
+        since = max(unit.strays_since, min(unit.tried_at, longest))
+        if now > since + patience:
             self._break('S5', number, 'is told as following, and does not since',
                         unit.strays_since)
         new = notes.events[self._events[number] :]

@@ -159,3 +159,14 @@ def test_nothing_from_before_a_pause_of_the_driver_is_published_with_what_change
         rig.pass_time(4.0)
         read_at = [one.status.at for one in rig.notes.snapshots if one.status is not None]
         assert read_at and min(read_at) >= resumed[0]
+
+
+@pytest.mark.parametrize('connection', ['classic', 'movitrac'])
+def test_a_drive_that_is_enabled_before_its_first_poll_is_shown(connection: str) -> None:
+    # on a slow line that takes a while
+    with Rig(connection, drives=16) as rig:
+        rig.connect()
+        rig.enable()
+        rig.pass_time(0.1)
+        assert all(drive.snapshot.enabled for drive in rig.drives.values())
+        assert all(notes.snapshots[-1].enabled for notes in rig.notes_of.values())
