@@ -154,9 +154,13 @@ class Controller:
             raise DriveError(Cause.OTHER_PROCEDURE_GOES_ON, what=what, other=other)
         if self._control.commanded:
             raise DriveError(Cause.MOTOR_ENABLED, what=what)
-        if self._control.blocked and self._state.status is not None:
-            require_no_fault(self._state, self._state.status)
+        self._require_no_known_fault()
         raise DriveError(Cause.STOP_NOT_CONFIRMED_YET, what=what)
+
+    def _require_no_known_fault(self) -> None:
+        """Make sure that the drive had no fault last: it outlasts the stop that it causes."""
+        if self._state.connected and self._state.status is not None:
+            require_no_fault(self._state, self._state.status)
 
     def require_newer(self, requested_at: float) -> None:
         """
@@ -185,6 +189,7 @@ class Controller:
             status = await self._state.read_status(Priority.SERVICE)
             self._explain_refusal(status)
             require_no_fault(self._state, status)
+        self._require_no_known_fault()
         raise DriveError(Cause.STOP_PENDING)
 
     # --- commands -----------------------------------------------------------------------------

@@ -28,6 +28,9 @@ TYPES = {
 }
 GROUPS = {name.partition('.')[0] for name in MANUAL}
 
+#: What belongs to the drive's own time-out: the line is not lost by it.
+OF_TIMEOUT = {'serial.sio_tot', 'serial.auto_stop'}
+
 #: Some in full, copied from the manual [M0 table 2].
 IN_FULL = {
     'motor.p_nom': 'P-Nom: Nominal motor output (RMS) [kW]',
@@ -93,9 +96,12 @@ def _complaints(shown: Any, ends: Ends) -> Iterator[str]:
     if ends.unit != unit and 'pi_reg.unit' not in text:
         yield f'does not say whose unit it has: {text}'
     constraints = shown.additional_constraints
-    if ('the motor must be stopped' in constraints) != ends.stopped:
+    of_line = ends.name.startswith('serial.')
+    # by the manual, or because the drive may be lost by it, and with it the stop
+    stopped = ends.stopped or (of_line and ends.name not in OF_TIMEOUT)
+    if ('the motor must be stopped' in constraints) != stopped:
         yield f'when it can be set: {constraints}'
-    if ('allow_communication_changes' in constraints) != ends.name.startswith('serial.'):
+    if ('allow_communication_changes' in constraints) != of_line:
         yield f'what it needs: {constraints}'
     labels = ', '.join(map(str, ends.counts))
     if type(ends.low) is str and not constraints.startswith(f'one of {labels}'):

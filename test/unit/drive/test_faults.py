@@ -11,7 +11,7 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.catalog import Fact, Family, Kind, Meaning, load_family
-from nfo_sinus_driver.drive import Cause, Severity
+from nfo_sinus_driver.drive import Cause, Procedure, Severity
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.sinus_g2.state_machine import TRIES
 
@@ -65,6 +65,21 @@ def test_every_fault_is_shown_reported_and_acknowledged(connection: str) -> None
         assert rig.far.control_unit.sio_err_reads == 0
         rig.wait_until(lambda: not rig.drive.stop_unconfirmed, 5.0)
         rig.enable()
+
+
+@every_connection
+def test_an_enable_is_told_of_the_fault_also_before_its_stop_is_confirmed(connection: str) -> None:
+    with Rig(connection) as rig:
+        rig.turn(25.0)
+        rig.meet = lambda key, data: 'busy' if data is not None else None
+        rig.far.trip(OVERLOAD)
+        rig.wait_until(lambda: rig.drive.stop_unconfirmed, 1.0)
+        commands = [rig.drive.enable()]
+        if connection == 'rtu':
+            commands.append(rig.drive.tune(Procedure.FULL))
+        for command in commands:
+            assert f'fault {OVERLOAD} Overload is active' in rig.answer(command)
+            assert rig.drive.stop_unconfirmed
 
 
 @pytest.mark.parametrize('connection', ['optimal', 'optimal, control word'])
