@@ -321,13 +321,16 @@ class Line:
         if self.boots_for:
             self._come += self.banner
             if self._protocol.name == 'canopen':
-                # an adapter that has restarted is not on the bus
-                just_before = self.clock.now + self.boots_for - 0.001
-                self.later(just_before, lambda: self.wire.receive(b'C\r', self.clock.now))
+                self.later(self.clock.now + self.boots_for - 0.001, self._restart_adapter)
         if self.state == 'mute':
             self.mute_for -= 1
             if not self.mute_for:
                 self.state, self.mute_for = 'whole', 1
+
+    def _restart_adapter(self) -> None:
+        """Take an adapter off the bus that has restarted, unless all is put right meanwhile."""
+        if self.boots:
+            self.wire.receive(b'C\r', self.clock.now)
 
     def close(self) -> None:
         self._come = b''
