@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import itertools
+import math
 from typing import Literal, NamedTuple
 
 from nfo_sinus_driver.bus.tasks import Exchange, LatestValue, Priority, Task
@@ -88,6 +89,7 @@ class Scheduler:
     :param is_silent: whether a unit has not answered the last request.
     :param is_missing: whether it has been silent for long.
     :param is_line_silent: whether no unit of the line answers.
+    :param asked_at: when a unit was last sent anything, s.
     """
 
     def __init__(
@@ -95,10 +97,12 @@ class Scheduler:
         is_silent: Callable[[int], bool] = lambda unit: False,
         is_missing: Callable[[int], bool] = lambda unit: False,
         is_line_silent: Callable[[], bool] = lambda: False,
+        asked_at: Callable[[int], float] = lambda unit: -math.inf,
     ) -> None:
         self._is_silent = is_silent
         self._is_missing = is_missing
         self._is_line_silent = is_line_silent
+        self._asked_at = asked_at
         #: In order; the values are not used.
         self._queues: dict[_Rank, dict[LatestValue | Waiting, None]] = {
             rank: {} for rank in (*Priority, _SLOT, _RETRY, _MISSING)
@@ -125,32 +129,53 @@ class Scheduler:
         return bool(self._queues[_MISSING])
 
     @property
+    def stops_in_vain(self) -> list[tuple[_Rank, Waiting]]:
+        """The stops, and looks, of silent units beside others that answer, and of which rank."""
+        if self._is_line_silent():
+            return []
+        return [
+            (rank, entry)
+            for rank in (*_STOPS, _MISSING)
+            for entry in self._queues[rank]
+            if isinstance(entry, Waiting)
+            and entry.exchange.priority in _STOPS
+            and self._is_silent(entry.exchange.unit)
+        ]
+
+    @property
     def waits(self) -> bool:
         """Anything waits that is not for a missing unit."""
         return any(queue for rank, queue in self._queues.items() if rank != _MISSING)
 
     def take(
-        self, *, missing: bool = True, only_stops: bool = False
+        self, *, missing: bool = True, in_vain: bool = False, only_stops: bool = False
     ) -> LatestValue | Waiting | None:
         """
         Take out what goes next, or ``None``; for a missing unit only with ``missing``.
 
+        :param in_vain: a stop that was in vain before goes ahead of everything else.
         :param only_stops: everything but a stop has to wait.
         """
         self._release_found()
+        if in_vain and (stops := self.stops_in_vain):
+            longest_ago = min(stops, key=lambda stop: self._asked_at(stop[1].exchange.unit))
+            return self._take_out(*longest_ago)
         for rank in _STOPS if only_stops else self._order(missing):
             # most are empty, and this runs for every transaction
             entry = self._first(rank) if self._queues[rank] else None
             if entry is not None:
-                del self._queues[rank][entry]
-                self._given = rank
-                self._wanted = entry if isinstance(entry, LatestValue) else entry.exchange
-                return entry
+                return self._take_out(rank, entry)
         if self._unanswered is None:
             return None
         # no other unit waits
         self._unanswered = None
         return self.take(missing=missing, only_stops=only_stops)
+
+    def _take_out(self, rank: _Rank, entry: LatestValue | Waiting) -> LatestValue | Waiting:
+        del self._queues[rank][entry]
+        self._given = rank
+        self._wanted = entry if isinstance(entry, LatestValue) else entry.exchange
+        return entry
 
     def _release_found(self) -> None:
         """Requeue what waits for a unit that answers again: it may be a stop."""

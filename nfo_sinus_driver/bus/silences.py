@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from nfo_sinus_driver.link import LinkError, NotSent, PortError, Refused
+from nfo_sinus_driver.link import DamagedAnswer, LinkError, NotSent, PortError, Refused
 
 __all__ = ['EXCHANGE', 'Silences']
 
@@ -21,6 +21,8 @@ __all__ = ['EXCHANGE', 'Silences']
 _MISSING_AFTER = 2.0
 #: The share of the time that all missing units may take together while others answer.
 _MISSING_SHARE = 1 / 20
+#: The same for stops to silent units while noise damages answers: they may be there.
+_STOPS_IN_NOISE = 1 / 2
 #: How long a port that was opened is mute, s, until it is opened again, each time in vain: what is
 #: behind it may restart whenever it is opened, and takes so long.
 _MUTE_PAUSES = (2.0, 4.0, 8.0, 15.0, 30.0)
@@ -39,6 +41,8 @@ _NOTICED_WITHIN = 0.5
 _ANSWERED_WITHIN = 0.1
 #: A silence of one unit that is longer is no noise, s.
 _NOISE = 0.4
+#: For how long noise counts that has damaged an answer, s.
+_NOISE_LASTS = 5.0
 #: How many units have to be asked in vain until it is the line that is silent.
 _A_LINE = 2
 
@@ -82,6 +86,8 @@ class Silences:
         self._in_vain_since = math.inf
         #: How long a request in vain has taken at most, s.
         self._longest_in_vain = 0.0
+        #: When an answer was last damaged.
+        self._damaged_at = -math.inf
         #: When each unit was last sent anything.
         self._asked_at: dict[int, float] = {}
         #: The longest time from one valid frame to the next.
@@ -89,6 +95,8 @@ class Silences:
         #: When the last valid frame of any unit came.
         self._any_frame_at = -math.inf
         self._pause_ends = -math.inf
+        #: The same of stops to units that are silent, in noise.
+        self._stops_from = -math.inf
         #: When the last silence of the whole line ended.
         self._back_at = -math.inf
         self.heard = False
@@ -109,10 +117,24 @@ class Silences:
         """Note that there is a drive at a unit, and after which silence that is lost, s."""
         self._lost_after[unit] = lost_after
 
-    def note(self, unit: int, now: float, error: LinkError | None, seconds: float = 0.0) -> bool:
-        """Note the outcome of a request that took ``seconds``; return whether the port carries."""
+    def note(
+        self,
+        unit: int,
+        now: float,
+        error: LinkError | None,
+        seconds: float = 0.0,
+        *,
+        is_stop: bool = False,
+    ) -> bool:
+        """
+        Note the outcome of a request that took ``seconds``; return whether the port carries.
+
+        :param is_stop: it was a stop, or the look before it.
+        """
         if isinstance(error, NotSent):
             return False
+        if isinstance(error, DamagedAnswer):
+            self._damaged_at = now
         if not isinstance(error, PortError):
             self._asked_at[unit] = now
         if error is None or error.responded or isinstance(error, Refused):
@@ -129,6 +151,8 @@ class Silences:
             self._in_vain_since = math.inf
         elif self.is_missing(unit, now):
             self._pause_ends = now + seconds * (1 / _MISSING_SHARE - 1)
+        if is_stop and unit in self._since:
+            self._stops_from = now + seconds * (1 / _STOPS_IN_NOISE - 1)
         if error is not None and not isinstance(error, (PortError, Refused)):
             # by then a drive has answered
             failed_at = now - max(seconds - _ANSWERED_WITHIN, 0.0)
@@ -295,10 +319,18 @@ class Silences:
         """Return whether a unit has been silent for so long that it gets few requests."""
         return min(self.lasts(unit, now), now - self._back_at) >= _MISSING_AFTER
 
+    def is_in_noise(self, now: float) -> bool:
+        """Return whether an answer was damaged just before: those that are missing may be there."""
+        return now < self._damaged_at + _NOISE_LASTS
+
     @property
     def missing_from(self) -> float:
         """From when on a missing unit may get a request; at any time while no unit responds."""
         return min(self._pause_ends, self._any_frame_at + _MISSING_AFTER)
+
+    def stops_in_vain_from(self, now: float) -> float:
+        """Return from when on a silent unit gets its stop ahead of others; infinity: not."""
+        return self._stops_from if self.is_in_noise(now) else math.inf
 
 
 def _mute_pause(opened: int, *, stop_waits: bool) -> float:

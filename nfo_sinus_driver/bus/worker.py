@@ -125,6 +125,7 @@ class Bus:
             self.silences.is_silent,
             lambda unit: self.silences.is_missing(unit, self.now()),
             lambda: self.silences.is_line_silent,
+            self.silences.asked_at,
         )
         self._sleepers = Sleepers()
         self._stopping = False
@@ -484,7 +485,12 @@ class Bus:
         if self._send_next(only_stops=bool(quiet_until)):
             return -math.inf
         paced_until = self._paced_until if self._scheduler.waits else math.inf
-        missing_from = self.silences.missing_from if self._scheduler.missing_wait else math.inf
+        missing_from = math.inf
+        if self._scheduler.missing_wait:
+            missing_from = self.silences.missing_from
+            if self._scheduler.stops_in_vain:
+                stops_from = self.silences.stops_in_vain_from(self.now())
+                missing_from = min(missing_from, stops_from)
         until = min(paced_until, missing_from, supervised_at, reopen_at)
         if quiet_until:
             until = quiet_until
@@ -599,6 +605,7 @@ class Bus:
         now = self.now()
         entry = self._scheduler.take(
             missing=now >= self.silences.missing_from,
+            in_vain=now >= self.silences.stops_in_vain_from(now),
             only_stops=only_stops or now < self._paced_until,
         )
         if isinstance(entry, LatestValue):
@@ -659,13 +666,13 @@ class Bus:
             if self._clock.resumed_at > started:
                 reply = exchange.without_old(reply)
         except InProgress:
-            self._account(exchange.unit, started, None)
+            self._account(exchange, started, None)
             raise
         except NotReady:
             self._paced_until = paced_until
             raise
         except LinkError as error:
-            self._account(exchange.unit, started, error, tells=exchange.is_for_all)
+            self._account(exchange, started, error, tells=exchange.is_for_all)
             self._count_write(exchange, error)
             raise
         except BaseException as error:
@@ -674,7 +681,7 @@ class Bus:
             raise LinkError(f'error in the link: {error!r}') from error
         if not reply.requests:
             self._paced_until = paced_until
-        self._account(exchange.unit, started, None)
+        self._account(exchange, started, None)
         self._count_write(exchange, None)
         return reply
 
@@ -695,12 +702,13 @@ class Bus:
         return _ALONE_OF_A_LOSS * self.silences.soonest_loss
 
     def _account(
-        self, unit: int, started: float, error: LinkError | None, *, tells: bool = True
+        self, exchange: Exchange, started: float, error: LinkError | None, *, tells: bool = True
     ) -> None:
-        now = self.now()
+        now, unit = self.now(), exchange.unit
         seconds = now - started - self._note_pause()
         answered = unit != self.protocol.broadcast and tells
-        if answered and self.silences.note(unit, now, error, seconds):
+        is_stop = exchange.priority <= Priority.LOOK
+        if answered and self.silences.note(unit, now, error, seconds, is_stop=is_stop):
             self._report_mute(0.0)
         self._scheduler.took(seconds)
         if isinstance(error, PortError):

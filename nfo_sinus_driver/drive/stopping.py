@@ -38,8 +38,6 @@ _LOOK_AGAIN_PERIOD = 1.0
 _BLIND_STOPS = 2
 #: After how many attempts without an answer a stop is written without what it would read before.
 _READ_IN_VAIN = 2
-#: For how long after a damaged answer the line is taken for noisy, s.
-_NOISE_LASTS = 5.0
 #: How much longer than its own time-out a drive is left alone, s.
 _LEFT_ALONE_LONGER = 0.5
 #: How often an unconfirmed stop is reported, s.
@@ -121,8 +119,6 @@ class StopSequence:
         #: The present attempt has written something; and that was acknowledged, a word made without
         #: what is in the drive: what cannot be read before a stop cannot be read after it either.
         self._wrote = self._removed_blind = False
-        #: When an answer was damaged last, s.
-        self._damaged_at = -math.inf
         #: What has ended the last attempt; ``None``: it was answered.
         self._failure: Exception | None = None
         #: Its own time-out has had the time to stop the drive.
@@ -362,7 +358,7 @@ class StopSequence:
         own = timeout.shortest if timeout.stops_motor else 0.0
         if not own or self._may_write:
             pause = _LOST_RETRY_PERIOD if self._may_write else _LOOK_AGAIN_PERIOD
-            if now < self._damaged_at + _NOISE_LASTS:
+            if self._bus.silences.is_in_noise(now):
                 # in noise something is there
                 pause = drive_state.LOOK_PERIOD
             pause = self._state.pause_before_timeout(pause, own)
@@ -440,8 +436,6 @@ class StopSequence:
             heard = isinstance(error, NoData)
             outcome = _Outcome.UNCONFIRMED if heard else _Outcome.UNANSWERED
             self._unconfirmed, self._failure = report_of(error), error
-            if isinstance(error, DamagedAnswer):
-                self._damaged_at = self._bus.now()
         except Exception as error:
             # even an error in the driver must not end the tries
             outcome, self._unconfirmed = _Outcome.UNCONFIRMED, report_of(error)

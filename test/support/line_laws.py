@@ -15,10 +15,10 @@ each of which waits as long as the drive has ever taken to answer. One that is n
 twice.
 
 S3: or the motor is stopped by the time-out of the drive: whatever the driver still sends does not
-keep it from striking. One that answers is asked before its own does, whatever becomes of the
-others. A drive without one is looked for once a second, and stopped with its first
-answer. A port that needs a while after it was opened is opened more and more seldom, until it
-passes something.
+keep it from striking. In noise the drives share the time. One that answers is asked before its own
+does, whatever becomes of the others. A drive without one is looked for once a second, and stopped
+with its first answer. A port that needs a while after it was opened is opened more and more seldom,
+until it passes something.
 
 S4: no more goes to a drive before a stop that is due than a short look: what tells whether it is
 there, and the same.
@@ -50,7 +50,7 @@ _AFTER_LOSS, _AFTER_CALL, _OPENED = 0.5, 0.3, 0.6
 #: S3: how much longer than its time-out a drive is left in peace, and how seldom one is looked for
 #: that has none, s.
 _IN_PEACE, _LOOKED_FOR = 0.5, 1.0
-#: By what share of damaged bytes a motor is stopped after how long, s.
+#: By what share of damaged bytes the motor of one drive is stopped after how long, s.
 _IN_NOISE = {0.02: 2.0, 0.05: 4.0, 0.1: 8.0, 0.2: 20.0}
 #: S4: the firmware and a status of two words are three requests, and one may be repeated.
 _SHORT_LOOK = 4
@@ -359,7 +359,9 @@ class LineLaws:
         if self._line.plc is not None and not self._turns(number):
             # its program has taken the word of a driver away that it does not hear
             return
-        if self._clock.now > max(unit.again_by, self._there_since + _OPENED + _AFTER_LOSS):
+        # that it was sent is known when it is over
+        again_by = max(unit.again_by, self._there_since + _OPENED + _AFTER_LOSS)
+        if self._clock.now > again_by + self._under_way:
             self._break('S2', number, 'gets no second stop, due at', unit.again_by)
         if unit.due_since == math.inf:
             return
@@ -388,6 +390,9 @@ class LineLaws:
         """Judge S3."""
         own = self.own_timeout(number)
         asked_by = max(unit.answered_at, self._there_since + _OPENED) + (own or math.inf)
+        if self.noise:
+            # so many requests to others may be in vain before
+            asked_by += len(self._units) * self._under_way
         # one that is told as lost may be left in peace
         snapshot = self._rig.notes_of[number].snapshot
         told = snapshot is not None and snapshot.connected
@@ -404,7 +409,8 @@ class LineLaws:
         share = self.noise
         until = math.inf
         if share:
-            until = unit.to_stand_since + _IN_NOISE[share]
+            # all share the time, and each is repeated until its status is read whole
+            until = unit.to_stand_since + _IN_NOISE[share] * len(self._units)
         elif own is not None:
             until = unit.to_stand_since + _AFTER_LOSS + own + _IN_PEACE
         elif self._reaches_since < math.inf and not self._has_ended:

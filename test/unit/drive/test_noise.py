@@ -247,3 +247,21 @@ def test_a_stop_takes_effect_in_noise_that_has_gone_on_for_a_while(
         rig.drive.stop()
         rig.wait_until(lambda rig=rig: not rig.turns, longest)
         rig.kill()
+
+
+@pytest.mark.parametrize('connection', ['optimal', 'described'])
+def test_in_noise_no_stop_waits_for_those_of_drives_that_answer_more(connection: str) -> None:
+    drives, share = 4, 0.05
+    for seed in range(10):
+        rig = Rig(connection, drives=drives, line={'baud': 19200}, poll_rate=50.0)
+        rig.turn()
+        rig.line.damage_bytes(share, seed)
+        rig.pass_time(0.3)
+        for drive in rig.drives.values():
+            drive.stop()
+        for far in rig.fars.values():
+            rig.wait_until(
+                lambda far=far: not (far.motor.driven and far.motor.demand),
+                1.5 * IN_NOISE[share],
+            )
+        rig.kill()
