@@ -1301,6 +1301,14 @@ LAWS = (
     ),
     Mutant(
         3,
+        'in noise the stops of those that answer keep back those of the others',
+        SCHEDULER,
+        'if in_vain and (stops := self.stops_in_vain):',
+        'if False and (stops := self.stops_in_vain):',
+        ('test/unit/drive/test_noise.py', '-k', 'no_stop_waits'),
+    ),
+    Mutant(
+        3,
         'what is no stop goes between the stops of a silent line',
         SCHEDULER,
         '        if not self._is_line_silent():\n            return False\n        rounds',
