@@ -177,7 +177,13 @@ class InverterStatus:
 
     @property
     def may_run(self) -> bool:
-        """It runs, or it stands where a run command shows only while the motor turns."""
+        """
+        It runs, or it stands where a run command shows only while the motor turns.
+
+        One that waits for its start delay does not run yet, though its word may show a ramp before.
+        """
+        if self.means(Meaning.START_DELAY):
+            return False
         hidden = self.model.profile.status_word.runs_by_turning
         return self.runs or (hidden and self.state is State.READY_TO_SWITCH_ON)
 

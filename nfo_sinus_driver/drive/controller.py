@@ -581,7 +581,8 @@ class Controller:
         if await self.in_control(Priority.SERVICE):
             turns = status is not None and (status.runs_by_bus or abs(status.frequency) > 0)
             found = None
-            if turns and not self._control.stopping:
+            # the stop of a drive that was lost may be confirmed, and its ramp not be over
+            if turns and not (self._control.stopping or self._lost_in_use):
                 found = state.report(Cause.FOUND_RUNNING)
                 state.notify(Severity.WARNING, found)
             self._sequence.restart(found)

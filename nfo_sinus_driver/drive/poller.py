@@ -108,8 +108,12 @@ class _Failures:
 
     def end(self, what: str) -> None:
         """Note that a read was answered."""
-        self._since.pop(what, None)
+        self.forget(what)
         self._all_since = math.inf
+
+    def forget(self, what: str) -> None:
+        """Note that something is over that is no read: it ends no failures of reads."""
+        self._since.pop(what, None)
 
 
 class Poller:
@@ -286,7 +290,7 @@ class Poller:
                 if self._state.connected and not self._params.recognition.holds:
                     # it was silent for long, or this driver stood still: is it still the same?
                     await self._recogniser.recognise(retry=False)
-                self._failures.end(_POLL)
+                self._failures.forget(_POLL)
             except (LinkError, DriveError) as error:
                 self._on_poll_failed(error)
             except Exception as error:

@@ -119,6 +119,8 @@ class StopSequence:
         #: The present attempt has written something; and that was acknowledged, a word made without
         #: what is in the drive: what cannot be read before a stop cannot be read after it either.
         self._wrote = self._removed_blind = False
+        #: The stop of the last attempt was acknowledged: only its confirmation may be missing.
+        self._acknowledged = False
         #: What has ended the last attempt; ``None``: it was answered.
         self._failure: Exception | None = None
         #: Its own time-out has had the time to stop the drive.
@@ -331,7 +333,8 @@ class StopSequence:
         unanswered = isinstance(self._failure, LinkError) and not isinstance(
             self._failure, (Refused, PortError, NoData)
         )
-        if outcome is _Outcome.IGNORED or (unanswered and self._blind_left):
+        blind = unanswered and self._blind_left and not self._acknowledged
+        if outcome is _Outcome.IGNORED or blind:
             return
         if isinstance(self._failure, DriveError) and self._failure.report == self._not_known:
             # it may not be written to any more since the attempt began: it is looked for
@@ -358,8 +361,8 @@ class StopSequence:
         own = timeout.shortest if timeout.stops_motor else 0.0
         if not own or self._may_write:
             pause = _LOST_RETRY_PERIOD if self._may_write else _LOOK_AGAIN_PERIOD
-            if self._bus.silences.is_in_noise(now):
-                # in noise something is there
+            if self._bus.silences.is_in_noise(now) and not self._acknowledged:
+                # in noise something is there, and may not have the stop
                 pause = drive_state.LOOK_PERIOD
             pause = self._state.pause_before_timeout(pause, own)
             await self._bus.sleep(pause, or_opening=True)
@@ -428,7 +431,7 @@ class StopSequence:
         return silent >= settings.lost_after
 
     async def _attempt(self, before: _Outcome) -> _Outcome:
-        reasons = self._reasons
+        reasons, self._acknowledged = self._reasons, False
         try:
             outcome = await self._try_once(before)
         except (NoAnswer, DamagedAnswer) as error:
@@ -444,7 +447,7 @@ class StopSequence:
             self._failure = None
         if self._reasons > reasons:
             outcome, self._unconfirmed = _Outcome.UNANSWERED, _NO_ANSWER_YET
-            self._sent_at = math.inf
+            self._sent_at, self._acknowledged = math.inf, False
         self._tried_at = self._bus.now()
         blocked = outcome is _Outcome.BLOCKED_BY_FAULT
         self._control.dispatch(ControlEvent.FAULT_BLOCKS if blocked else ControlEvent.FAULT_OVER)
@@ -471,7 +474,7 @@ class StopSequence:
             )
             self._sent_at = min(self._sent_at, self._bus.now())
             self._refusals = self._unanswered = self._ignored = 0
-            self._removed_blind = is_blind
+            self._removed_blind, self._acknowledged = is_blind, True
         except Refused as error:
             self._unanswered = self._ignored = 0
             if error.code == Refused.BUSY and self._bus.now() < self._due:
@@ -554,7 +557,8 @@ class StopSequence:
             # the line may have come back only after the first one
             return self._ignored > 1
         shows_at = min(self._sent_at + _RAMP_SHOWS_BY, self._force_at)
-        if status.by_frequency and status.driven and not status.keeps_running:
+        ramps = status.driven and not status.ramp_hidden
+        if status.by_frequency and ramps and not status.keeps_running:
             # set-point 0 leads it to standstill, whatever the run command does
             shows_at = self._force_at
         if status.stands_running:

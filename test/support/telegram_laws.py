@@ -133,6 +133,8 @@ class Judge(abc.ABC):
     known: int
     run: int
     control = 1 << 9
+    #: What the PLC leaves of the word of a driver that it does not hear, and a begin goes on from.
+    left = 0
 
     def __init__(self) -> None:
         self._before: Exchange | None = None
@@ -146,9 +148,10 @@ class Judge(abc.ABC):
             return
         if before is not None and now.life == before.life:
             yield f'{shown}: the life counter stood still'
-        # the PLC removes the word of a driver that it does not hear
-        heard = before is not None and now.at - before.at < _PLC_TIME
-        stood = before.stw1 if before is not None and heard else 0
+        stood = before.stw1 if before is not None else 0
+        if before is not None and now.at - before.at >= _PLC_TIME:
+            # the PLC stops the motor of a driver that it does not hear
+            stood &= self.left
         if now.stw1 & ~self.known:
             yield f'{shown}: bits that are not known'
         if now.setpoint and not now.stw1 & self.run:
@@ -175,6 +178,8 @@ class OptimalJudge(Judge):
 
     known = 1 << 0 | 1 << 3 | 1 << 7 | 1 << 10
     run = 1 << 0
+    # "Switch on" alone is cleared (docs/plc.md): without Enable the motor would coast
+    left = 1 << 3 | 1 << 10
 
     def order(self, word: int, stood: int, zsw1: int) -> Iterator[str]:
         """Yield what is wrong with the order of the bits."""

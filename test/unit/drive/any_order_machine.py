@@ -114,6 +114,8 @@ class AnyOrder(RuleBasedStateMachine):
         # a drive without power does not answer, and is not noticed before it has started
         while not self.rig.far.listening and self.rig.line.whole:
             self.rig.pass_time(0.1)
+        while self.laws.shown.hides_stop_whole:
+            self.rig.pass_time(0.1)
         self.rig.pass_time(self.laws.noticed)
 
     # --- commands ---------------------------------------------------------------------------------

@@ -126,6 +126,11 @@ class Shown(abc.ABC):
         return False
 
     @property
+    def hides_stop_whole(self) -> bool:
+        """It does so, and its speed shows nothing of it either before the motor stands."""
+        return False
+
+    @property
     @abc.abstractmethod
     def by_bus(self) -> bool:
         """The bus controls the drive."""
@@ -293,6 +298,13 @@ class ShownDs402(ShownG2):
     def hides_stop(self) -> bool:
         # along its ramp
         return self._unit.state in ('DISABLE', 'SHUTDOWN') and self._far.motor.driven
+
+    @property
+    def hides_stop_whole(self) -> bool:
+        # docs/serial_line.md says so: a start delay alone shows a RUN input that is back by then
+        delayed = self._far.memory.number('control.run_dly') > 0
+        torque = self._control_modes[self._far.memory.raw('control.mode')] == 'Torque'
+        return torque and not delayed and self.hides_stop
 
     def facts(self) -> dict[str, Any]:
         facts = super().facts()

@@ -56,6 +56,38 @@ def test_a_run_input_that_is_back_before_the_motor_stands_does_not_start_it(
         assert not rig.turns and not rig.drive.following
 
 
+@pytest.mark.parametrize('mode', ['Speed', 'Torque'])
+@pytest.mark.parametrize('connection', UNREPORTED)
+def test_a_start_delay_shows_a_run_that_was_interrupted(connection: str, mode: str) -> None:
+    slow = {'control.accel': 0.3, 'control.retard': 100.0, 'control.run_dly': 1.0}
+    with Rig(connection, parameters={**slow, 'control.mode': mode}, poll_rate=50.0) as rig:
+        rig.connect()
+        rig.enable()
+        rig.send(600.0 if mode == 'Speed' else 50.0)
+        rig.pass_time(3.0)
+        assert rig.far.motor.frequency > 10.0
+        # too short for the speed to show it
+        rig.far.set_run_input(False)
+        rig.pass_time(0.1)
+        rig.far.set_run_input(True)
+        rig.pass_time(0.9)
+        assert rig.notes.said(Cause.STOPPED_BY_ITSELF)
+        rig.pass_time(1.0)
+        assert not rig.turns and not rig.drive.following
+
+
+def test_an_enable_waits_for_the_start_delay_of_a_motor_that_ramps_down() -> None:
+    slow = {'control.accel': 0.3, 'control.retard': 60.0, 'control.run_dly': 1.0}
+    with Rig('canopen, ds402', parameters=slow) as rig:
+        rig.turn()
+        rig.answer(rig.drive.stop())
+        rig.pass_time(1.0)
+        assert rig.far.motor.turning
+        rig.enable()
+        rig.pass_time(2.0)
+        assert rig.turns and rig.drive.following and not rig.notes.said(Cause.STOPPED_BY_ITSELF)
+
+
 @pytest.mark.parametrize('connection', UNREPORTED)
 @pytest.mark.parametrize('retard', [8.0, 20.0])
 def test_a_loaded_motor_that_ramps_down_does_not_stop_by_itself(

@@ -22,6 +22,8 @@ _SETTLED = 5.0
 #: How much longer than its reads alone the start of many drives may take.
 _START = 1.2
 _SLOW = {'baud': 19200}
+#: The function of Modbus by which a stop is written.
+_WRITE = 6
 #: Those on which the rig has several drives.
 SEVERAL = [name for name, connection in CONNECTIONS.items() if connection.protocol != 'telegram1']
 
@@ -196,6 +198,19 @@ def test_a_drive_that_hardly_answers_keeps_no_neighbour_from_the_line(connection
         pauses = [after - before for before, after in itertools.pairwise(asked_at)]
         assert max(pauses) < 1.0
         assert rig.drives[1].following
+
+
+def test_a_stop_that_is_acknowledged_and_never_confirmed_leaves_the_line_to_the_others() -> None:
+    with made(4) as rig:
+        begin(rig, runs=True)
+        before = polls(rig, 10.0)
+        # its writes are answered, and nothing that it is asked
+        rig.line.plan = lambda frame: 'damage' if frame[0] == 1 and frame[1] != _WRITE else None
+        rig.drives[1].stop()
+        rig.pass_time(_SETTLED)
+        seen = polls(rig, 10.0)
+        assert all(seen[address] > before[address] / 2 for address in range(2, 5)), seen
+        assert rig.drives[1].stop_unconfirmed
 
 
 @pytest.mark.parametrize('cut', [9.0, 10.3, 11.7])

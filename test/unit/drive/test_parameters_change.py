@@ -227,7 +227,7 @@ LINE_SETTINGS: dict[str, dict[str, Value]] = {
         'serial.address': 9, 'serial.si_baud': '9600bps', 'serial.si_prot': '8b Op 1s',
         'serial.bus_type': 'NFO', 'serial.auto_reset': True,
     },
-    'classic': {'serial.address': 9, 'serial.si_baud': '9600bps', 'serial.bus_type': 'ABCC'},
+    'classic': {'serial.address': 9, 'serial.si_baud': '19200bps', 'serial.bus_type': 'ABCC'},
     'movitrac': {'serial.inverter_address': 9, 'serial.response_time': 20},
 }
 

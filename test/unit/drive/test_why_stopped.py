@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import pytest
 from support.rig import CONNECTIONS, Rig
 from support.said import said
+from support.variants import ramps
 
 from nfo_sinus_driver.drive import Cause, Drive, Procedure, Report, StopReason
 from nfo_sinus_driver.drive.stop_reason import reason_of
@@ -135,6 +136,23 @@ def test_after_each_stop_it_is_known_why(connection: str, stop: str) -> None:
         STOPS[stop].happen(rig)
         rig.pass_time(STOPS[stop].seconds)
         assert rig.drive.snapshot.stop_reason in STOPS[stop].reasons, said(rig.drive.snapshot.stop)
+
+
+# the made-up drive has no ramp
+@pytest.mark.parametrize('connection', [one for one in CONNECTIONS if one != 'made up'])
+def test_a_ramp_that_a_lost_drive_was_given_is_no_run_of_an_earlier_session(
+    connection: str,
+) -> None:
+    one = CONNECTIONS[connection]
+    slow = {**ramps(one.model, 0.3, 20.0), **one.parameters}
+    with Rig(connection, setpoint_timeout=0.0, parameters=slow) as rig:
+        rig.turn()
+        rig.line.state = 'gone'
+        rig.pass_time(2.5)
+        rig.line.mend()
+        rig.pass_time(3.0)
+        assert rig.drive.snapshot.connected and not rig.notes.said(Cause.FOUND_RUNNING)
+        assert rig.drive.snapshot.stop_reason is _R.DRIVE_LOST
 
 
 def test_it_is_said_who_requested_a_stop() -> None:
