@@ -285,6 +285,18 @@ def test_parameters_of_profidrive_are_read_by_their_numbers() -> None:
         assert found == wanted
 
 
+@pytest.mark.parametrize(('connection', 'version'), [(G2, 41), (SINUS_H, 40)])
+def test_the_profile_is_the_high_byte_of_its_number_and_the_version_the_low_one(
+    connection: str, version: int
+) -> None:
+    with Rig(connection) as rig:
+        rig.connect()
+        number = int(rig.result(rig.drive.measure('profidrive.profile')))
+        # PROFIdrive is profile 3 [M0 table 8, M3 §8]
+        assert divmod(number, 0x100) == (3, version)
+        assert f'{number:04X}h' in rig.drive.state.model['profidrive.profile'].description
+
+
 #: Of what is measured slowly, where it stands [M0 table 9], and how much of it is 1 there.
 SLOW = {
     Role.MOTOR_TEMPERATURE: (1132, 0.1, 2),
