@@ -601,6 +601,9 @@ class Profile:
         the exception code of Modbus that means the same, and the text.
     :ivar keeps_run: it keeps its run command without power, and runs again when it is back;
         ``None``: no manual says.
+    :ivar line_words: what the driver's own settings of the line call what the drive shows of its.
+    :ivar cuts_off: the values by which a setting ends all communication until its keypad gives it
+        another one, by the parameter.
     """
 
     title: str
@@ -642,6 +645,8 @@ class Profile:
     resync_reads: Mapping[str, Sequence[str]] = field(default_factory=dict)
     why_refused: Callable[[Callable[[str], int], int | None], tuple[int, str]] | None = None
     keeps_run: bool | None = None
+    line_words: Mapping[Value, str] = field(default_factory=dict)
+    cuts_off: Mapping[str, Value] = field(default_factory=dict)
 
     def seen_by(self, method: str) -> Profile:
         """Return the same as one of its control methods sees it."""

@@ -587,6 +587,11 @@ class Cause(enum.Enum):
         'the driver may lose the drive'
     )
     """`ros2 param set /nfo_sinus allow_communication_changes true`, if you mean it"""
+    ENDS_COMMUNICATION = (
+        '{value} ends all communication with the drive, which its keypad alone can begin again: '
+        'set it at the keypad'
+    )
+    """BusType None of a G2, master-slave operation of a MOVITRAC. Use the keypad"""
     CODES_UNCERTAIN = (
         'what its codes mean in firmware {firmware:.2f} is not known for sure: change it at the '
         'keypad'

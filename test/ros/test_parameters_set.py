@@ -178,7 +178,7 @@ def test_a_name_that_is_none_is_answered_with_the_one_most_like_it(rig: Rig) -> 
     ('name', 'value'),
     [('serial.sio_tot', 2.0), ('serial.address', 2), ('serial.auto_stop', True),
      ('serial.si_baud', '1200bps'),
-     pytest.param('serial.bus_type', 'None', marks=needs('newer'))],
+     pytest.param('serial.bus_type', 'NFO', marks=needs('newer'))],
 )
 def test_communication_is_not_changed_without_permission(
     rig: Rig, name: str, value: Value

@@ -567,6 +567,9 @@ PROFILE = Profile(
         'BusType in the drive (NFO, which is classic, is the factory setting; MbusRtu or MbusAsc '
         'for Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity',
     ),
+    line_words=words.LINE_WORDS,
+    # [M0 §5.3.1]
+    cuts_off={'serial.bus_type': 'None'},
     # [M0 §6.4]
     holds_control={
         'canopen': 'the CANopen module holds the drive in bus mode from the first request on, '

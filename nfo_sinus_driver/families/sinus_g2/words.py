@@ -33,6 +33,23 @@ HOLDERS: Mapping[Value, Holder] = {
 }
 
 
+#: What this driver calls what BusType, SiBaud and SiProt show [M0 table 4]. ABCC is whatever module
+#: there is.
+LINE_WORDS: Mapping[Value, str] = {
+    'NFO': 'classic',
+    'MbusAsc': 'modbus_ascii',
+    'MbusRtu': 'modbus_rtu',
+    **{f'{rate}bps': str(rate) for rate in (1200, 2400, 4800, 9600, 19200)},
+    **{f'{rate} bps': str(rate) for rate in (38400, 57600)},
+    '7b Ep 1s': '7E1',
+    '7b Op 1s': '7O1',
+    '7b Np 2s': '7N2',
+    '8b Ep 1s': '8E1',
+    '8b Op 1s': '8O1',
+    '8b Np 2s': '8N2',
+}
+
+
 class Scmd(enum.IntEnum):
     """Start and stop commands under MODE = Bus [M0 table 18]."""
 

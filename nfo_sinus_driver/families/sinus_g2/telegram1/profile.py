@@ -146,6 +146,8 @@ PROFILE = Profile(
     mailbox='profibus',
     # it decides what a set-point means
     start_settings=frozenset({'control.mode'}),
+    # [M0 §5.3.1]
+    cuts_off={'serial.bus_type': 'None'},
     # a tenth above what a set-point may be, for a motor may be overhauled
     most={Role.ACTUAL_FREQUENCY: 165.0},
     # those of SpdSet and SpdAct, by the factory's SpdScl ([M0 §6.3 table 9, §8.3.2], [M2 table 2])
