@@ -94,6 +94,9 @@ def not_set(rig: Rig, ends: Ends) -> list[object]:
     select, sent_back = ('ad', 'ac') if ends.long else ('a9', 'c8')
     before = parameters.values[ends.name]
     two = [ends.high] if ends.name == ONE_WAY else [ends.low, ends.high]
+    # P880: On only by the keypad
+    cut_off = rig.drive.model.profile.cuts_off.get(ends.name)
+    two = [value for value in two if value != cut_off]
     # what is there already is not written
     for value in sorted(two, key=lambda one: one == before):
         if value == parameters.values[ends.name]:
