@@ -601,6 +601,7 @@ class Profile:
         the exception code of Modbus that means the same, and the text.
     :ivar keeps_run: it keeps its run command without power, and runs again when it is back;
         ``None``: no manual says.
+    :ivar inhibited: why none can take control while its control source says so.
     :ivar line_words: what the driver's own settings of the line call what the drive shows of its.
     :ivar cuts_off: the values by which a setting ends all communication until its keypad gives it
         another one, by the parameter.
@@ -645,6 +646,7 @@ class Profile:
     resync_reads: Mapping[str, Sequence[str]] = field(default_factory=dict)
     why_refused: Callable[[Callable[[str], int], int | None], tuple[int, str]] | None = None
     keeps_run: bool | None = None
+    inhibited: str = ''
     line_words: Mapping[Value, str] = field(default_factory=dict)
     cuts_off: Mapping[str, Value] = field(default_factory=dict)
 

@@ -638,10 +638,9 @@ class Cause(enum.Enum):
         'start the motor: press STOP at the drive first'
     )
     """Press STOP at the drive"""
-    CONTROL_INHIBITED = (
-        '{what}: control of the drive cannot be taken now ({status}; {name} is Inhibit)'
-    )
-    """The drive tunes already, perhaps by its keypad. Wait"""
+    CONTROL_INHIBITED = '{what}: control of the drive cannot be taken now ({status}; {why})'
+    """It tunes already, perhaps by its keypad: wait. Firmware before 4.28: release it where it is
+    controlled"""
     NO_STANDBY = '{what}: the drive does not stand by: {status}'
     """No standby within 2 s under bus control. Check the state that is named"""
     OTHER_METHOD_NEEDED = (

@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Iterator
 import contextlib
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Family, Holder, Procedure, Reset, Role
+from nfo_sinus_driver.catalog import Family, Holder, Procedure, Reset
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.control_state import ControlState
 from nfo_sinus_driver.drive.controller import Controller, required
@@ -119,8 +119,8 @@ class Procedures:
         require_no_fault(state, status)
         found = await carry_out(state, controller.method.holder(), Priority.SERVICE)
         if found is Holder.INHIBITED:
-            name = state.model[state.model.key(Role.CONTROL_SOURCE)].name
-            raise DriveError(state.report(Cause.CONTROL_INHIBITED, what=what, name=name))
+            why = state.model.profile.inhibited
+            raise DriveError(state.report(Cause.CONTROL_INHIBITED, what=what, why=why))
         if status.driven:
             raise DriveError(state.report(Cause.MOTOR_RUNS, what=what))
         if found not in (Holder.NOBODY, Holder.BUS):

@@ -120,7 +120,7 @@ _VALUE_FLAG = 1 << 10
 _SERIAL_FAULT, _FAULTS = 14, range(1, 24)
 #: The exception codes of Modbus for an address, a value and a state that do not allow a write.
 _ADDRESS, _VALUE, _FAILURE = 2, 3, 4
-_NOT_NOW = 'control of the drive cannot be taken now (MODE is Inhibit: tuning?)'
+_NOT_NOW = f'control of the drive cannot be taken now ({words.INHIBITED})'
 #: Why a serial fault is left that MODE = Stop would end.
 _CONTROLLED_ELSEWHERE = (
     'the serial fault is still active: keypad or terminals have control, which MODE = Stop, the '
@@ -224,7 +224,7 @@ class ModeScmd(_G2):
         No manual says that a drive forgets the run command of an earlier session when control is
         taken, so the stop is the very next frame.
 
-        :raises NotPossible: it is tuning.
+        :raises NotPossible: MODE is Inhibit.
         """
         mode = yield Read(MODE)
         if mode == Mode.INHIBIT:
@@ -361,7 +361,7 @@ class DriveControl(_G2):
         """
         Request control with bit 0 low, so that a run command is an edge later [C35].
 
-        :raises NotPossible: it is tuning.
+        :raises NotPossible: MODE is Inhibit.
         """
         if (yield Read(MODE)) == Mode.INHIBIT:
             raise NotPossible(_NOT_NOW)
@@ -567,6 +567,7 @@ PROFILE = Profile(
         'BusType in the drive (NFO, which is classic, is the factory setting; MbusRtu or MbusAsc '
         'for Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity',
     ),
+    inhibited=words.INHIBITED,
     line_words=words.LINE_WORDS,
     # [M0 §5.3.1]
     cuts_off={'serial.bus_type': 'None'},

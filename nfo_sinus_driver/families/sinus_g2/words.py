@@ -33,6 +33,10 @@ HOLDERS: Mapping[Value, Holder] = {
 }
 
 
+#: Why none can take control under Inhibit ([M0 table 17], [M2 §10]).
+INHIBITED = (
+    'MODE is Inhibit: it is tuning or, before firmware 4.28, controlled from another source'
+)
 #: What this driver calls what BusType, SiBaud and SiProt show [M0 table 4]. ABCC is whatever module
 #: there is.
 LINE_WORDS: Mapping[Value, str] = {
