@@ -561,6 +561,8 @@ class DriveState:
             return math.nan
         data = await self.params.read_data(key, priority, retry=retry)
         value = self.params.number(key, data)
+        if await self.is_cut_off(key, value, priority, retry=retry):
+            return math.nan
         if not self.params.is_odd(key):
             return self._signed(self.model.role_of.get(key), value, status)
         if key not in self._reported_impossible:
@@ -569,6 +571,25 @@ class DriveState:
             shown = f'{value:g} {unit}'.rstrip()
             self.notify(Severity.WARNING, Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
         return math.nan
+
+    async def is_cut_off(
+        self, key: str, value: float, priority: Priority, *, retry: bool
+    ) -> bool:
+        """
+        Return whether a value says nothing, for 16 bits do not hold what it may be.
+
+        Beyond them it stays at their end, or comes back with the other sign.
+        """
+        if key not in self.model.profile.narrow or not self.params.has_one_word(key):
+            return False
+        _, high, _ = self.params.limits(key)
+        if 0 <= value < high:
+            return False
+        bound, times = self.model.profile.narrow[key]
+        if not bound or value >= high:
+            return True
+        most = times * await self.params.read_number(bound, priority, retry=retry)
+        return not -value <= most < high
 
     def _signed(self, role: Role | None, value: float, status: InverterStatus | None) -> float:
         """Return a measured value with the sign that the drive reports, or that is commanded."""

@@ -567,6 +567,7 @@ PROFILE = Profile(
         'BusType in the drive (NFO, which is classic, is the factory setting; MbusRtu or MbusAsc '
         'for Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity',
     ),
+    narrow=words.NARROW,
     inhibited=words.INHIBITED,
     line_words=words.LINE_WORDS,
     # [M0 §5.3.1]

@@ -33,6 +33,12 @@ HOLDERS: Mapping[Value, Holder] = {
 }
 
 
+#: What has 16 bits on PROFIBUS or Classic ([M0 tables 2, 9], [C23]): no motor gives back more than
+#: twice its nominal power, kW, and the size of a current has no sign.
+NARROW: Mapping[str, tuple[str, float]] = {
+    'status.i_rms': ('', 0.0),
+    'status.p_out': ('motor.p_nom', 2000.0),
+}
 #: Why none can take control under Inhibit ([M0 table 17], [M2 §10]).
 INHIBITED = (
     'MODE is Inhibit: it is tuning or, before firmware 4.28, controlled from another source'

@@ -333,6 +333,48 @@ def test_temperatures_times_energy_and_versions_of_a_g2_come_by_the_mailbox_too(
         )
 
 
+#: Where current and power have 16 bits, and what is one there [M0 table 9], [M0 table 2].
+NARROW = {G2: ((1120, 0.001), (1121, 1.0)), 'classic': ((0x95, 0.01), (0xD9, 1.0))}
+
+
+@pytest.mark.parametrize('connection', NARROW)
+@pytest.mark.parametrize(('nominal', 'true', 'told'), [
+    # in range, in generator operation, at its end, and beyond it
+    (1.5, 21000, True), (1.5, -1800, True), (1.5, 0x7FFF, False), (1.5, 36000, False),
+    (22.0, 21000, True), (22.0, -1800, False), (22.0, 36000, False),
+])
+def test_current_and_power_of_16_bits_are_told_or_are_none(
+    connection: str, nominal: float, true: int, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (current, ampere), (power, watt) = NARROW[connection]
+    raw = (true + 0x8000) % 0x10000 - 0x8000
+    settings = {'motor.p_nom': nominal}
+    with Rig(connection, parameters=settings, measured=['status.p_out']) as rig:
+        # in generator operation a current is a current
+        there = {current: abs(true) if true < 0 else raw, power: raw}
+        if connection == G2:
+            entries = rig.line.plc.channels[1].server.parameters.entries
+            for pnu, number in there.items():
+                entries[pnu, 0] = ParameterEntry(lambda number=number: number, signed=True)
+        else:
+            enquiry = rig.far.servers['classic'].enquiry
+
+            def instead(id_: int) -> int:
+                return there[id_] & 0xFFFF if id_ in there else enquiry(id_)
+
+            monkeypatch.setattr(rig.far.servers['classic'], 'enquiry', instead)
+        rig.connect()
+        rig.wait_until(lambda: rig.notes.telemetry)
+        shown = rig.notes.telemetry[0]
+        amperes = abs(true) * ampere if told or true < 0 else math.nan
+        watts = true * watt if told else math.nan
+        found = shown.values[Role.OUTPUT_CURRENT], shown.values[Role.OUTPUT_POWER]
+        assert found == pytest.approx((amperes, watts), nan_ok=True)
+        assert shown.measured['status.p_out'] == pytest.approx(watts, nan_ok=True)
+        for key, value in (('status.i_rms', amperes), ('status.p_out', watts)):
+            assert rig.result(rig.drive.measure(key)) == pytest.approx(value, nan_ok=True)
+
+
 # --- parameters by a user's own addresses ---------------------------------------------------------
 
 

@@ -146,6 +146,7 @@ PROFILE = Profile(
     mailbox='profibus',
     # it decides what a set-point means
     start_settings=frozenset({'control.mode'}),
+    narrow=drivecontrol.NARROW,
     # [M0 §5.3.1]
     cuts_off={'serial.bus_type': 'None'},
     # a tenth above what a set-point may be, for a motor may be overhauled
