@@ -35,6 +35,7 @@ _UNHURRIED = frozenset(
         Role.FIRMWARE,
         Role.MOTOR_FIRMWARE,
         Role.CONTROL_MODE,
+        Role.ACTUAL_SPEED,
         Role.ACTUAL_TORQUE,
         Role.OUTPUT_VOLTAGE,
         Role.OUTPUT_CURRENT,

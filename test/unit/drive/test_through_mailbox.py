@@ -333,6 +333,48 @@ def test_temperatures_times_energy_and_versions_of_a_g2_come_by_the_mailbox_too(
         )
 
 
+@pytest.mark.parametrize(('scale', 'told'), [((1, 1), True), ((0, 0), True), ((3, 20), False)])
+def test_in_freque_the_speed_comes_by_the_mailbox(scale: tuple[int, int], told: bool) -> None:
+    with Rig(G2, telemetry_rate=2.0) as rig:
+        entries = rig.line.plc.channels[1].server.parameters.entries
+        speed = 1432
+        asked: list[int] = []
+
+        def read() -> int:
+            asked.append(speed)
+            return speed
+
+        # P1022 in rpm, by the factory's SpdScl (P1023) [M0 table 9, §8.3.2]
+        entries[1022, 0] = ParameterEntry(read, signed=True)
+        for sub, number in enumerate(scale):
+            entries[1023, sub] = ParameterEntry(lambda number=number: number, size=4)
+        rig.connect()
+        rig.drive.activate()
+        for speed in (1432, -1432, 0):
+            rig.pass_time(10.0)
+            shown = rig.drive.snapshot
+            assert shown.speed == pytest.approx(speed if told else math.nan, nan_ok=True)
+            assert rig.notes.telemetry[-1].values[Role.ACTUAL_SPEED] == pytest.approx(
+                shown.speed, nan_ok=True
+            )
+            assert shown.frequency == 0.0
+        # not with each poll: the mailbox is slow
+        asked.clear()
+        rig.pass_time(10.0)
+        assert 15 <= len(asked) <= 21
+        # what is not answered, or not asked for, is not known
+        entry = entries.pop((1022, 0))
+        rig.pass_time(10.0)
+        assert math.isnan(rig.drive.snapshot.speed)
+        entries[1022, 0] = entry
+        rig.connect()
+        rig.pass_time(10.0)
+        assert math.isnan(rig.drive.snapshot.speed) != told
+        rig.drive.settings = dataclasses.replace(rig.drive.settings, telemetry_rate=0.0)
+        rig.pass_time(2.0)
+        assert math.isnan(rig.drive.snapshot.speed)
+
+
 #: Where current and power have 16 bits, and what is one there [M0 table 9], [M0 table 2].
 NARROW = {G2: ((1120, 0.001), (1121, 1.0)), 'classic': ((0x95, 0.01), (0xD9, 1.0))}
 

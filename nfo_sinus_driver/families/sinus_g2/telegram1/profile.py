@@ -150,7 +150,7 @@ PROFILE = Profile(
     # [M0 §5.3.1]
     cuts_off={'serial.bus_type': 'None'},
     # a tenth above what a set-point may be, for a motor may be overhauled
-    most={Role.ACTUAL_FREQUENCY: 165.0},
+    most={Role.ACTUAL_FREQUENCY: 165.0, Role.ACTUAL_SPEED: 9900.0},
     # those of SpdSet and SpdAct, by the factory's SpdScl ([M0 §6.3 table 9, §8.3.2], [M2 table 2])
     speed_mode=SpeedMode(
         (method.ACTUAL, method.SETPOINT),
