@@ -49,6 +49,9 @@ _WRITTEN = frozenset(
     }
 )
 
+#: What takes values between its steps: the manual's own example is one ([M4 §3.1], [C70]).
+_BETWEEN_STEPS = frozenset({'setpoint.n2_offset'})
+
 #: What leaves the factory, in engineering units. But for terminal 43 [M4 §4] does not print these.
 _FACTORY: Mapping[str, Value] = {
     **{f'ramp.t{number}1_{way}': 1.0 for number in (1, 2) for way in ('up', 'down')},
@@ -176,7 +179,8 @@ class Server(movitrac.Server):
             raise Nack(ReturnCode.TOO_LARGE, f'{key} cannot be so large')
         if low is not None and value < low:
             raise Nack(ReturnCode.TOO_SMALL, f'{key} cannot be so small')
-        if not (value in codes if codes else parameter.on_step(float(value))):
+        fits = value in codes if codes else parameter.on_step(float(value))
+        if not fits and key not in _BETWEEN_STEPS:
             raise Nack(ReturnCode.INVALID_VALUE, f'{key} has no such value in between')
         if key == _KEYPAD_ONLY and not raw and self._memory.raw(key):
             raise Nack(ReturnCode.NOT_BY_THIS_INTERFACE, f'{key} is switched on by the keypad')

@@ -143,6 +143,14 @@ def test_both_ends_of_every_setting_are_written_and_read_as_the_manual_has_them(
         rig.line.frames.clear()
 
 
+def test_a_value_between_two_steps_is_read_as_it_is() -> None:
+    with Rig('movitrac') as rig:
+        rig.connect()
+        # P111 = -237.0 mV, the example of the manual [M4 §3.1]
+        rig.far.servers['movitrac'].select(98, bytes.fromhex('F0023700'))
+        assert rig.result(rig.drive.measure('setpoint.n2_offset')) == -237.0
+
+
 # --- what is only read ----------------------------------------------------------------------------
 
 
