@@ -96,7 +96,9 @@ def _machine(model: Family) -> Family:
         if isinstance(address.codec, SignedBcd):
             address = replace(address, codec=codec_of('sint32_be'))
         access = Access.READ_WRITE if key in _WRITTEN else parameter.access
-        own[key] = replace(parameter, access=access, addresses={_PROTOCOL: address})
+        steps = () if key in _BETWEEN_STEPS else parameter.steps
+        there = {_PROTOCOL: address}
+        own[key] = replace(parameter, access=access, steps=steps, addresses=there)
     return replace(model, parameters=own)
 
 
@@ -179,8 +181,7 @@ class Server(movitrac.Server):
             raise Nack(ReturnCode.TOO_LARGE, f'{key} cannot be so large')
         if low is not None and value < low:
             raise Nack(ReturnCode.TOO_SMALL, f'{key} cannot be so small')
-        fits = value in codes if codes else parameter.on_step(float(value))
-        if not fits and key not in _BETWEEN_STEPS:
+        if not (value in codes if codes else parameter.on_step(float(value))):
             raise Nack(ReturnCode.INVALID_VALUE, f'{key} has no such value in between')
         if key == _KEYPAD_ONLY and not raw and self._memory.raw(key):
             raise Nack(ReturnCode.NOT_BY_THIS_INTERFACE, f'{key} is switched on by the keypad')

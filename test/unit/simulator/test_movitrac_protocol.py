@@ -236,8 +236,8 @@ def test_the_example_of_the_manual_between_two_steps_is_taken():
     assert bench.say(select(N2_OFFSET, value)) == ACK
     assert bench.ask(N2_OFFSET) == value
     assert bench.drive.peek('setpoint.n2_offset') == -237.0
-    assert bench.write(N2_OFFSET, 12.34) == ACK
-    assert bench.drive.peek('setpoint.n2_offset') == 12.34
+    bench.drive.set_from_keypad('setpoint.n2_offset', 12.34)
+    assert bench.ask(N2_OFFSET) == bcd(12.34)
 
 
 def test_a_negative_number_has_its_sign_in_the_first_half_byte():
