@@ -285,6 +285,17 @@ def test_parameters_of_profidrive_are_read_by_their_numbers() -> None:
         assert found == wanted
 
 
+def test_status_words_of_a_g2_are_read_by_their_numbers() -> None:
+    with Rig(G2) as rig:
+        rig.connect()
+        entries = rig.line.plc.channels[1].server.parameters.entries
+        # DriveStatus has 32 bits, of which 16 are described [M0 table 10], [C24]
+        entries[1019, 0] = ParameterEntry(lambda: 0x00050231, size=4)
+        entries[1001, 0] = ParameterEntry(lambda: 0x0331)
+        words = 'fieldbus.drive_status', 'fieldbus.profidrive_status'
+        assert [rig.result(rig.drive.measure(key)) for key in words] == [0x0231, 0x0331]
+
+
 @pytest.mark.parametrize(('connection', 'version'), [(G2, 41), (SINUS_H, 40)])
 def test_the_profile_is_the_high_byte_of_its_number_and_the_version_the_low_one(
     connection: str, version: int
