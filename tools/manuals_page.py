@@ -30,9 +30,9 @@ _INTRODUCTION = """\
 # The manuals
 
 What each manual offers to the owner of a drive, where the driver serves it, or why it does not.
-`docs/manuals.csv` names the test that shows each row. Of those that are served, {skipped} rows rest on tests alone that
-are skipped where the text of the manuals is not beside the clone; {documented} rows are sentences of these pages, and
-rest on no test.
+`docs/manuals.csv` names the test that shows each row. Of those that are served, {skipped} rows rest
+on tests alone that are skipped where the text of the manuals is not beside the clone;
+{documented} rows are sentences of these pages, and rest on no test.
 
 """
 #: The tests that read the text of the manuals.
