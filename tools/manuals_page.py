@@ -64,7 +64,8 @@ def rows() -> list[Row]:
 def page() -> str:
     """Return the whole page in Markdown."""
     table = rows()
-    return _introduction(table) + _counts(table) + ''.join(_section(name, table) for name in MANUALS)
+    sections = ''.join(_section(name, table) for name in MANUALS)
+    return _introduction(table) + _counts(table) + sections
 
 
 def _introduction(table: Sequence[Row]) -> str:
