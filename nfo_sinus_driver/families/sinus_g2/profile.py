@@ -8,7 +8,7 @@ the generic state machine [M0 §7.1 tables 14 to 16].
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 import contextlib
 from fractions import Fraction
 from typing import ClassVar
@@ -22,12 +22,10 @@ from nfo_sinus_driver.catalog.profile import (
     Holder,
     NotPossible,
     OlderDialect,
-    Procedure,
     Profile,
     Read,
     Refusal,
     Removal,
-    Reset,
     SetpointTarget,
     Status,
     Steps,
@@ -196,17 +194,7 @@ class ModeScmd(_G2):
     means = 'SCMD'
     references = tuple(_COMMANDS)
     coasts = True
-    procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {
-        procedure: Write('fieldbus.scmd', command, retry=False, head=True)
-        for procedure, command in (
-            (Procedure.FULL, Scmd.FULL_TUNING),
-            (Procedure.BASIC, Scmd.BASIC_TUNING),
-            (Procedure.STATOR_RESISTANCE, Scmd.RS_MEASURE),
-            (Procedure.CALCULATE, Scmd.PAR_CALC),
-            (Reset.ERROR_LOG, Scmd.ERASE_E_LOG),
-            (Reset.ENERGY, Scmd.RESET_E_OUT),
-        )
-    }
+    procedures = words.PROCEDURES
     #: The parameter that takes the run command.
     _command: ClassVar[str] = 'fieldbus.scmd'
     #: What releases the motor soonest; SCMD = Stop would let it ramp down.

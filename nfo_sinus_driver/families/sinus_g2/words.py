@@ -10,7 +10,7 @@ import enum
 import functools
 
 from nfo_sinus_driver.catalog.parameter import Value
-from nfo_sinus_driver.catalog.profile import Holder
+from nfo_sinus_driver.catalog.profile import Holder, Procedure, Reset, Write
 from nfo_sinus_driver.catalog.status import Fact, State, StatusWord
 
 
@@ -89,6 +89,20 @@ class Scmd(enum.IntEnum):
     PAR_CALC = 0x501
     ERASE_E_LOG = 0x800
     RESET_E_OUT = 0x900
+
+
+#: What begins each procedure, whatever else commands the drive [M0 §7, table 18].
+PROCEDURES: Mapping[Procedure | Reset, Write] = {
+    procedure: Write('fieldbus.scmd', command, retry=False, head=True)
+    for procedure, command in (
+        (Procedure.FULL, Scmd.FULL_TUNING),
+        (Procedure.BASIC, Scmd.BASIC_TUNING),
+        (Procedure.STATOR_RESISTANCE, Scmd.RS_MEASURE),
+        (Procedure.CALCULATE, Scmd.PAR_CALC),
+        (Reset.ERROR_LOG, Scmd.ERASE_E_LOG),
+        (Reset.ENERGY, Scmd.RESET_E_OUT),
+    )
+}
 
 
 class ControlWord(enum.IntFlag):

@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 from support.rig import Rig
-from support.said import raises
+from support.said import raises, said
 from support.telegram_laws import COMMANDS, words
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Access, Role, load_family
-from nfo_sinus_driver.drive import Cause, DriveSettings, Severity
+from nfo_sinus_driver.drive import Cause, DriveSettings, Procedure, Severity
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.parameter_channel import ParameterEntry
 
@@ -94,14 +94,15 @@ def test_a_drive_in_a_mode_without_set_points_of_the_telegram_is_not_enabled() -
         rig.enable()
 
 
-def test_no_command_can_be_reached_by_the_mailbox() -> None:
+def test_no_command_can_be_reached_by_the_mailbox_but_what_begins_a_procedure() -> None:
     model = load_family('sinus_g2', 'telegram1')
+    assert not model['fieldbus.scmd'].is_setting
     written = {
         one.at('telegram1').index
         for one in model.values()
         if one.at('telegram1').space == 'pnu' and one.access is not Access.READ
     }
-    assert len(written) > 100 and not COMMANDS & written
+    assert len(written) > 100 and COMMANDS & written == {SCMD[0]}
 
 
 # --- faults and the error log ---------------------------------------------------------------------
@@ -426,6 +427,107 @@ def test_current_and_power_of_16_bits_are_told_or_are_none(
         assert shown.measured['status.p_out'] == pytest.approx(watts, nan_ok=True)
         for key, value in (('status.i_rms', amperes), ('status.p_out', watts)):
             assert rig.result(rig.drive.measure(key)) == pytest.approx(value, nan_ok=True)
+
+
+# --- procedures: by SCMD, P1035, alone [M0 §7, table 10] ------------------------------------------
+
+SCMD = (1035, 0)
+TUNINGS = {
+    Procedure.FULL: (0x201, '45 TuningOK'),
+    Procedure.BASIC: (0x301, '45 TuningOK'),
+    Procedure.STATOR_RESISTANCE: (0x401, '46 RsMeasOK'),
+    Procedure.CALCULATE: (0x501, '47 ParClcOK'),
+}
+
+
+def commands_of(rig: Rig) -> list[int]:
+    """Note what is written to SCMD from now on."""
+    given: list[int] = []
+    entries = rig.line.plc.channels[1].server.parameters.entries
+    write = entries[SCMD].write
+
+    def noted(raw: int) -> None:
+        given.append(raw)
+        write(raw)
+
+    entries[SCMD] = dataclasses.replace(entries[SCMD], write=noted)
+    return given
+
+
+@pytest.mark.parametrize('procedure', TUNINGS)
+def test_each_tuning_is_done_by_the_mailbox(procedure: Procedure) -> None:
+    command, text = TUNINGS[procedure]
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        given = commands_of(rig)
+        before = {key: rig.far.peek(key) for key in rig.far.settings}
+        result = rig.result(rig.drive.tune(procedure), 120.0)
+        assert result.success and text in said(result.how)
+        assert given == [command]
+        after = {key: rig.far.peek(key) for key in rig.far.settings}
+        changed = {key: (before[key], after[key]) for key in after if before[key] != after[key]}
+        assert changed
+        assert {one.key: (one.old, one.new) for one in result.changes} == changed
+        # and it can be enabled as before
+        rig.turn(20.0)
+
+
+def test_a_tuning_that_fails_is_told_with_the_name_of_its_fault() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        rig.far.control_unit.fail_tuning(16)
+        result = rig.result(rig.drive.tune(Procedure.FULL), 120.0)
+        assert not result.success and '16 TunFailP' in said(result.how)
+        rig.result(rig.drive.acknowledge())
+        rig.turn(20.0)
+
+
+def test_a_motor_that_is_tuned_is_not_told_to_be_stopped() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        future = rig.drive.tune(Procedure.FULL)
+        rig.wait_until(lambda: rig.far.control_unit.tuning is not None, 20.0)
+        rig.pass_time(1.0)
+        assert rig.drive.snapshot.text == 'Tuning'
+        stop = rig.drive.stop()
+        rig.wait_until(stop.done, 20.0)
+        # no manual says that the drive takes it
+        assert stop.exception() is not None and rig.far.control_unit.tuning is not None
+        assert 'is NOT confirmed' in said(stop.exception())
+        rig.wait_until(lambda: rig.far.control_unit.tuning is None, 60.0)
+        rig.wait_until(future.done, 20.0)
+        # then it is, and nothing turns before the next enable
+        rig.pass_time(5.0)
+        assert not rig.far.motor.driven
+        rig.turn(20.0)
+
+
+def test_log_and_counter_of_a_g2_are_cleared_by_the_mailbox() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        given = commands_of(rig)
+        rig.far.trip(5)
+        rig.pass_time(2.0)
+        rig.result(rig.drive.acknowledge())
+        rig.pass_time(2.0)
+        rig.far.control_unit.counters.energy = 1.25
+        rig.result(rig.drive.erase_error_log())
+        rig.result(rig.drive.reset_energy())
+        assert not rig.far.faults.log and rig.far.control_unit.counters.energy < 0.1
+        assert given == [0x800, 0x900]
+        assert not rig.far.motor.driven
+
+
+def test_without_a_mailbox_a_procedure_is_refused_with_that_reason() -> None:
+    with Rig('telegram1 g2') as rig:
+        rig.connect()
+        rig.asked.clear()
+        for begin in (
+            lambda: rig.drive.tune(Procedure.FULL), rig.drive.erase_error_log,
+            rig.drive.reset_energy,
+        ):
+            assert 'layout 1, which has no mailbox' in rig.answer(begin())
+        assert not [data for _, _, data in rig.asked if data is not None]
 
 
 # --- parameters by a user's own addresses ---------------------------------------------------------

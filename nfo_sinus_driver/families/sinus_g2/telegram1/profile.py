@@ -35,6 +35,7 @@ class G2Telegram1(Telegram1):
     """
 
     coasts = True
+    procedures = drivecontrol.PROCEDURES
     unfollowed_scale = _SPEED_SCALE
     ready = int(profidrive.OFF)
     runs = int(profidrive.ControlWord.ON)
@@ -82,6 +83,7 @@ class G2DriveControl(Telegram1):
     """Control by DriveControl: switched on, then enabled [C54]."""
 
     coasts = True
+    procedures = drivecontrol.PROCEDURES
     unfollowed_scale = _SPEED_SCALE
     ready = int(_READY)
     runs = int(
