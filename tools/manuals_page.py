@@ -30,9 +30,26 @@ _INTRODUCTION = """\
 # The manuals
 
 What each manual offers to the owner of a drive, where the driver serves it, or why it does not.
-`docs/manuals.csv` names the test that shows each row.
+`docs/manuals.csv` names the test that shows each row. Of those that are served, {skipped} rows rest
+on tests alone that are skipped where the text of the manuals is not beside the clone;
+{documented} rows are sentences of these pages, and rest on no test.
 
 """
+#: The tests that read the text of the manuals.
+NEEDS_MANUALS = frozenset(
+    {
+        'unit/catalog/test_manuals.py::test_the_tables_say_what_the_manual_prints',
+        'unit/drive/test_ends_on_classic.py'
+        '::test_the_ends_of_every_setting_go_there_and_back_and_nothing_beyond',
+        'unit/drive/test_every_setting.py'
+        '::test_every_setting_is_written_to_where_the_manual_has_it_and_read_from_there',
+        'unit/drive/test_movitrac_manual.py'
+        '::test_both_ends_of_every_setting_are_written_and_read_as_the_manual_has_them',
+        'unit/drive/test_movitrac_manual.py::test_no_row_of_the_list_is_left_out',
+        'unit/drive/test_older_firmware.py'
+        '::test_every_setting_that_its_manual_lists_is_written_and_read_back',
+    }
+)
 _HEAD = '| place | what | status | where, or why not |\n|---|---|---|---|\n'
 
 Row = Mapping[str, str]
@@ -47,7 +64,14 @@ def rows() -> list[Row]:
 def page() -> str:
     """Return the whole page in Markdown."""
     table = rows()
-    return _INTRODUCTION + _counts(table) + ''.join(_section(name, table) for name in MANUALS)
+    sections = ''.join(_section(name, table) for name in MANUALS)
+    return _introduction(table) + _counts(table) + sections
+
+
+def _introduction(table: Sequence[Row]) -> str:
+    tests = [set(shown_by(row)) for row in table if row['status'] != 'not']
+    skipped = sum(bool(named) and named <= NEEDS_MANUALS for named in tests)
+    return _INTRODUCTION.format(skipped=skipped, documented=sum(not named for named in tests))
 
 
 def _counts(table: Sequence[Row]) -> str:

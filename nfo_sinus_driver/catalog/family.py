@@ -35,6 +35,7 @@ _UNHURRIED = frozenset(
         Role.FIRMWARE,
         Role.MOTOR_FIRMWARE,
         Role.CONTROL_MODE,
+        Role.ACTUAL_SPEED,
         Role.ACTUAL_TORQUE,
         Role.OUTPUT_VOLTAGE,
         Role.OUTPUT_CURRENT,
@@ -49,6 +50,12 @@ _UNHURRIED = frozenset(
         Role.ENERGY,
         Role.TOTAL_ENERGY,
         Role.BUS_ADDRESS,
+        Role.NOMINAL_POWER,
+        Role.NOMINAL_VOLTAGE,
+        Role.NOMINAL_FREQUENCY,
+        Role.NOMINAL_SPEED,
+        Role.NOMINAL_CURRENT,
+        Role.NOMINAL_POWER_FACTOR,
     )
 )
 #: The message InvSt has one byte for a status code.
@@ -429,9 +436,13 @@ def _with_mailbox(own: Family, whole: Family, method: str) -> Family:
     """
     Return the family of a telegram with what the mailbox of the PLC reaches of the whole one.
 
-    That is settings and what is only read: no commands, whose words are those of the telegram.
+    That is settings, what is only read, and what begins a procedure: no other commands, whose words
+    are those of the telegram.
     """
     profile = own.profile
+    begins = {
+        write.key for one in profile.methods.values() for write in one.procedures.values()
+    }
     protocol, addressing = profile.mailbox, profile.methods[method].addressing
 
     def placed(parameter: Parameter) -> Parameter:
@@ -442,7 +453,7 @@ def _with_mailbox(own: Family, whole: Family, method: str) -> Family:
         key: placed(parameter)
         for key, parameter in whole.items()
         if protocol in parameter.addresses
-        and (parameter.is_setting or parameter.access is Access.READ)
+        and (parameter.is_setting or parameter.access is Access.READ or key in begins)
     }
     roles = {role: key for role, key in whole.roles.items() if key in reached}
     named = {Role.FAULT_CODE: roles[Role.STATUS_CODE]} if Role.STATUS_CODE in roles else {}

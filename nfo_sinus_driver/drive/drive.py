@@ -389,8 +389,12 @@ class Drive:
 
     @on_bus
     async def measure(self, key: str) -> Value:
-        """Read one parameter, connected or not."""
-        return await self.params.read(key, Priority.SERVICE)
+        """Read one parameter, connected or not; NaN where its bits do not hold what it may be."""
+        value = await self.params.read(key, Priority.SERVICE)
+        if isinstance(value, str):
+            return value
+        cut_off = await self.state.is_cut_off(key, value, Priority.SERVICE, retry=True)
+        return math.nan if cut_off else value
 
     @on_bus
     async def active_control_method(self) -> str:

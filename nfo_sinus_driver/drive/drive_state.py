@@ -155,6 +155,8 @@ class DriveState:
         self._measured: Mapping[str, float] = {}
         #: It is changing its parameters itself.
         self.tuning = False
+        #: The code that the drive reports beside its word, while a procedure needs it; 0: not read.
+        self._reported_code = 0
         #: The code of a fault or alarm that the status word does not name, and the one that does.
         self._resolved: tuple[int, int] | None = None
         self.control_mode = ''
@@ -228,6 +230,9 @@ class DriveState:
         code = code_of(word)
         if self._resolved is not None and self._resolved[0] == code:
             code = self._resolved[1]
+        elif Meaning.UNNAMED not in self.model.status_code(code).meanings:
+            # the name of a fault is found otherwise: this may be from before it
+            code = self._reported_code or code
         status = InverterStatus(at, word, code, self.model, code_at=at)
         return self._with_control_as_before(status)
 
@@ -254,6 +259,14 @@ class DriveState:
         key = self.model.key(Role.FAULT_CODE)
         number = await self.params.read_number(key, priority, retry=False)
         return self.model.profile.fault_code(int(number))
+
+    async def read_reported_code(self, priority: Priority) -> None:
+        """Read what the drive does, and show it with each status word until it is forgotten."""
+        self._reported_code = await self.read_fault_code(priority)
+
+    def forget_reported_code(self) -> None:
+        """Show again what the status word shows alone."""
+        self._reported_code = 0
 
     @property
     def unresolved_code(self) -> int:
@@ -561,6 +574,8 @@ class DriveState:
             return math.nan
         data = await self.params.read_data(key, priority, retry=retry)
         value = self.params.number(key, data)
+        if await self.is_cut_off(key, value, priority, retry=retry):
+            return math.nan
         if not self.params.is_odd(key):
             return self._signed(self.model.role_of.get(key), value, status)
         if key not in self._reported_impossible:
@@ -569,6 +584,25 @@ class DriveState:
             shown = f'{value:g} {unit}'.rstrip()
             self.notify(Severity.WARNING, Cause.IMPOSSIBLE_VALUE, key=key, value=shown)
         return math.nan
+
+    async def is_cut_off(
+        self, key: str, value: float, priority: Priority, *, retry: bool
+    ) -> bool:
+        """
+        Return whether a value says nothing, for 16 bits do not hold what it may be.
+
+        Beyond them it stays at their end, or comes back with the other sign.
+        """
+        if key not in self.model.profile.narrow or not self.params.has_one_word(key):
+            return False
+        _, high, _ = self.params.limits(key)
+        if 0 <= value < high:
+            return False
+        bound, times = self.model.profile.narrow[key]
+        if not bound or value >= high:
+            return True
+        most = times * await self.params.read_number(bound, priority, retry=retry)
+        return not -value <= most < high
 
     def _signed(self, role: Role | None, value: float, status: InverterStatus | None) -> float:
         """Return a measured value with the sign that the drive reports, or that is commanded."""

@@ -158,6 +158,9 @@ class ErrorLog:
         """Reset the kWh counter E-Out, from firmware 4.38 on [M0 table 18], and check it."""
         energy = self._state.model.key(Role.ENERGY)
         self._procedures.require(Reset.ENERGY)
+        if not self._params.reaches(energy):
+            # behind a PLC without a mailbox, which this says
+            await self._params.read_number(energy, Priority.SERVICE)
         if not self._state.nameplate.has(energy):
             since, identity = self._state.model[energy].since, self._state.nameplate.identity
             raise DriveError(

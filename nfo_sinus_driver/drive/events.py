@@ -587,6 +587,11 @@ class Cause(enum.Enum):
         'the driver may lose the drive'
     )
     """`ros2 param set /nfo_sinus allow_communication_changes true`, if you mean it"""
+    ENDS_COMMUNICATION = (
+        '{value} ends all communication with the drive, which its keypad alone can begin again: '
+        'set it at the keypad'
+    )
+    """BusType None of a G2, master-slave operation of a MOVITRAC. Use the keypad"""
     CODES_UNCERTAIN = (
         'what its codes mean in firmware {firmware:.2f} is not known for sure: change it at the '
         'keypad'
@@ -633,10 +638,9 @@ class Cause(enum.Enum):
         'start the motor: press STOP at the drive first'
     )
     """Press STOP at the drive"""
-    CONTROL_INHIBITED = (
-        '{what}: control of the drive cannot be taken now ({status}; {name} is Inhibit)'
-    )
-    """The drive tunes already, perhaps by its keypad. Wait"""
+    CONTROL_INHIBITED = '{what}: control of the drive cannot be taken now ({status}; {why})'
+    """It tunes already, perhaps by its keypad: wait. Firmware before 4.28: release it where it is
+    controlled"""
     NO_STANDBY = '{what}: the drive does not stand by: {status}'
     """No standby within 2 s under bus control. Check the state that is named"""
     OTHER_METHOD_NEEDED = (

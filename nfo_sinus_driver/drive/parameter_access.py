@@ -157,6 +157,10 @@ class ParameterAccess:
         """Return the value that bytes mean."""
         return self._parameter(key).decode(data, self.protocol)
 
+    def has_one_word(self, key: str) -> bool:
+        """Return whether a number has 16 bits on this line."""
+        return self.model[key].at(self.protocol).codec.size == 2
+
     def is_addressable(self, key: str) -> bool:
         """Return whether the tables have the address of a parameter on this line."""
         return key in self.model and self.protocol in self.model[key].addresses

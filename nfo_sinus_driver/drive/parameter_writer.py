@@ -387,8 +387,8 @@ def followers(model: Family) -> Mapping[str, str]:
     return {key: setting for key, setting in named.items() if key}
 
 
-def write_forbidden(key: str, state: DriveState) -> Report | None:
-    """Return why a setting may not be changed, ``None`` if it may."""
+def write_forbidden(key: str, value: Value, state: DriveState) -> Report | None:
+    """Return why a setting may not be changed to a value, ``None`` if it may."""
     settings = state.settings
     if settings.method == 'monitor':
         return Report(Cause.MONITOR_ONLY)
@@ -396,6 +396,8 @@ def write_forbidden(key: str, state: DriveState) -> Report | None:
         return Report(Cause.CHANGE_WHILE_TUNING)
     if key not in state.model.communication:
         return None
+    if state.model.profile.cuts_off.get(key) == value:
+        return Report(Cause.ENDS_COMMUNICATION, value=show(value))
     if not settings.allow_communication_changes:
         return Report(Cause.COMMUNICATION_PROTECTED)
     firmware = state.nameplate.identity.firmware if state.nameplate.identity else 0.0
@@ -406,6 +408,10 @@ def write_forbidden(key: str, state: DriveState) -> Report | None:
 
 def after_change(changed: Mapping[str, Value], model: Family) -> Report | None:
     """Return how to follow a drive to new settings of the line, ``None`` if none was changed."""
-    settings = followers(model)
-    follow = [f'{settings[key]} ({value})' for key, value in changed.items() if key in settings]
+    settings, ours = followers(model), model.profile.line_words
+    follow = [
+        f'{settings[key]} ({ours.get(value, value)})'
+        for key, value in changed.items()
+        if key in settings
+    ]
     return Report(Cause.FOLLOW_THE_LINE, settings=' and '.join(follow)) if follow else None

@@ -180,7 +180,7 @@ class Parameters:
     def validate(self, key: str, value: Value) -> Value:
         """Return the same, or raise why it may not be set; nothing is sent to the drive."""
         coerced = self.coerce(key, value)
-        reason = write_forbidden(key, self._state)
+        reason = write_forbidden(key, coerced, self._state)
         if reason is not None and self._values.get(key) != coerced:
             raise not_changed(key, reason)
         return coerced
@@ -305,7 +305,7 @@ class Parameters:
             coerced = {
                 key: value
                 for key, value in coerced.items()
-                if not write_forbidden(key, self._state)
+                if not write_forbidden(key, value, self._state)
             }
         data = {key: self._data_of(key, value) for key, value in coerced.items()}
         async with self._alone(data):
@@ -338,8 +338,8 @@ class Parameters:
 
         :param wrote: called with each on the bus; an exception of it ends the writing.
         """
-        for key in wanted:
-            reason = write_forbidden(key, self._state)
+        for key, data in wanted.items():
+            reason = write_forbidden(key, self._writer.value(key, data), self._state)
             if reason is not None:
                 raise not_changed(key, reason)
 

@@ -484,17 +484,21 @@ class Poller:
             self._rare_reads += 1
         actual = state.controlled
         steady = True
-        # the mailbox of a PLC is too slow for a poll
-        if actual is not None and not self._params.by_mailbox(state.model.key(actual)):
+        if actual is not None and not self._is_slow(actual):
             now = await self._measure(actual)
             steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
         for role in _BASIC:
             age = self._bus.now() - state.last_polled(role).at
-            if role is not actual and (age >= self._slow_period or not steady):
+            due = age >= self._slow_period or not steady
+            if role is not actual and due and not self._is_slow(role):
                 await self._measure(role)
         if self._bus.paused == self._status_paused:
             # else the status may be old: the next poll is due
             self._publish(status)
+
+    def _is_slow(self, role: Role) -> bool:
+        """Return whether a value comes by the mailbox of a PLC, which is too slow for a poll."""
+        return self._params.by_mailbox(self._state.model.key(role))
 
     async def _check_scales(self, *, all_of_them: bool) -> bool:
         """

@@ -20,6 +20,9 @@ from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.drive.steps import carry_out
 from nfo_sinus_driver.link import LinkError
 
+#: How often what the drive does is read by the mailbox of a PLC, s.
+_CODE_PERIOD = 0.2
+
 
 def require_known(procedure: Procedure | Reset, model: Family) -> None:
     """Raise a :class:`DriveError` if a model has no command for a procedure."""
@@ -87,15 +90,44 @@ class Procedures:
 
         :param ended: why the motor stops at the end, if it was energised.
         """
-        found = await self._take(access)
+        async with self._code_watched():
+            found = await self._take(access)
+            try:
+                yield
+            except Exception:
+                # the caller gets the first error; what follows from it is logged
+                with contextlib.suppress(DriveError, LinkError):
+                    await self._give_back(found, ended)
+                raise
+            await self._give_back(found, ended)
+
+    @contextlib.asynccontextmanager
+    async def _code_watched(self) -> AsyncIterator[None]:
+        """
+        Read again and again what the drive does, where the telegram of a PLC does not tell.
+
+        Until it is over, a motor that is tuned is energised, whatever the telegram shows.
+        """
+        state = self._state
+        key = state.model.key(Role.FAULT_CODE)
+        if not key or not state.params.by_mailbox(key):
+            yield
+            return
+        await state.read_reported_code(Priority.SERVICE)
+        task = self._bus.spawn(self._watch_code())
         try:
             yield
-        except Exception:
-            # the caller gets the first error; what follows from it is logged
-            with contextlib.suppress(DriveError, LinkError):
-                await self._give_back(found, ended)
-            raise
-        await self._give_back(found, ended)
+        finally:
+            self._bus.cancel(task)
+            state.forget_reported_code()
+
+    async def _watch_code(self) -> None:
+        state = self._state
+        while True:
+            await self._bus.sleep(_CODE_PERIOD)
+            # the poll reports it if the drive is lost
+            with contextlib.suppress(LinkError, DriveError):
+                await state.read_reported_code(Priority.POLL)
 
     async def abort(self) -> Report | None:
         """End the procedure that has exclusive access; stop nothing else."""
@@ -119,11 +151,12 @@ class Procedures:
         require_no_fault(state, status)
         found = await carry_out(state, controller.method.holder(), Priority.SERVICE)
         if found is Holder.INHIBITED:
-            name = state.model[state.model.key(Role.CONTROL_SOURCE)].name
-            raise DriveError(state.report(Cause.CONTROL_INHIBITED, what=what, name=name))
+            why = state.model.profile.inhibited
+            raise DriveError(state.report(Cause.CONTROL_INHIBITED, what=what, why=why))
         if status.driven:
             raise DriveError(state.report(Cause.MOTOR_RUNS, what=what))
-        if found not in (Holder.NOBODY, Holder.BUS):
+        # what keeps control of the drive keeps it from keypad and terminals
+        if found not in (Holder.NOBODY, Holder.BUS) and not controller.method.control_retained:
             raise DriveError(state.report(Cause.CONTROLLED_LOCALLY, what=what))
         access.require_wanted()
         control_mode = state.control_mode or await state.read_control_mode()

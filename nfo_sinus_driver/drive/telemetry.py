@@ -34,6 +34,8 @@ SLOW = (
     Role.ENERGY,
     Role.TOTAL_ENERGY,
 )
+#: Polled anyway, where the line is not too slow for that.
+_POLLED = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
 
 #: How a drive answers that does not have a parameter, and how often until that is believed.
 _NONE_SUCH = frozenset((Refused.ILLEGAL_ADDRESS, Refused.ILLEGAL_FUNCTION))
@@ -56,8 +58,11 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
     denied: Counter[str] = Counter()
     by_mailbox = [role for role in FAST if state.params.by_mailbox(key_of(role))]
     fast = [role for role in FAST if role not in by_mailbox]
+    # what is too slow for the polls
+    unpolled = [role for role in _POLLED if state.params.by_mailbox(key_of(role))]
+    scale = state.settings.method_class.unfollowed_scale if unpolled else ()
     # the first time all are read, so that the first message is whole
-    due = deque((*by_mailbox, *SLOW))
+    due = deque((*map(key_of, (*by_mailbox, *SLOW)), *scale))
     first = True
 
     async def measure(key: str) -> None:
@@ -74,20 +79,30 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
             # over Classic it refuses everything so while it tunes
             denied[key] += error.code in _NONE_SUCH and not state.tuning
 
+    def take_polled(role: Role) -> None:
+        above, below = map(values.get, scale, (NAN, NAN)) if scale else (1.0, 1.0)
+        # one that is impossible, or not known, is that of the factory [C114]
+        scaled = above != below and min(above, below) > 0
+        state.polled(role, NAN if scaled else values[key_of(role)])
+
     while True:
         started = state.bus.now()
         rate = state.settings.telemetry_rate
+        if not rate:
+            for role in unpolled:
+                state.polled(role, NAN)
         if rate and state.connected and state.responsive and not yields():
             try:
-                roles = (*fast, *due) if first else (*fast, due[0])
+                keys = map(key_of, (*fast, *unpolled))
                 named = state.measured_keys
-                for key in dict.fromkeys((*map(key_of, roles), *named)):
+                for key in dict.fromkeys((*keys, *(due if first else (due[0],)), *named)):
                     await measure(key)
+                for role in unpolled:
+                    take_polled(role)
                 due.rotate(-1)
                 first = False
                 by_role = {role: values.get(key_of(role), NAN) for role in (*FAST, *SLOW)}
-                # these two are polled anyway
-                for role in (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED):
+                for role in _POLLED:
                     by_role[role] = state.shown(role, state.last_polled(role).value)
                 by_key = {key: values[key] for key in named}
                 state.note_measured(by_key)
@@ -96,5 +111,7 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
                 # the poll reports it if the drive is lost, or has to be recognised anew
                 state.missed()
                 values.update(dict.fromkeys((*map(key_of, FAST), *state.measured_keys), NAN))
+                for role in unpolled:
+                    state.polled(role, NAN)
         period = 1 / rate if rate else _OFF_PERIOD
         await state.bus.sleep(period - (state.bus.now() - started))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import math
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import InverterStatus, Meaning, Procedure, Role
@@ -128,6 +129,7 @@ class Tuning:
         started = state.bus.now()
         begun = False
         reported_code, reported_at = -1, 0.0
+        faulted_at = math.inf
         while True:
             status = await state.read_status(Priority.POLL)
             elapsed = state.bus.now() - started
@@ -135,6 +137,11 @@ class Tuning:
                 reported_code, reported_at = status.code, elapsed
                 progress(status, elapsed)
             if status.faulted:
+                faulted_at = min(faulted_at, elapsed)
+                if status.means(Meaning.UNNAMED) and elapsed < faulted_at + drive_state.TIMEOUT:
+                    # a PLC tells the name later
+                    await state.bus.sleep(_LOOK_PERIOD)
+                    continue
                 return state.report(Cause.TUNING_FAILED, what=what, fault=status.listed)
             if status.means(Meaning.TUNED):
                 return state.report(Cause.TUNED, what=what)

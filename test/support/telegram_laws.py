@@ -78,6 +78,8 @@ def exchanges(frames: Iterable[Mapping[str, Any]], unit: int, start: int = 0) ->
 _MAILBOX = range(16, 28)
 #: The operation command of a Sinus H, by its address [M3 §7.2.1].
 _OPERATION_COMMAND = 0x0382
+#: What of SCMD goes by the mailbox, for it has no other way [M0 §7, table 18].
+PROCEDURES = frozenset((0x201, 0x301, 0x401, 0x501, 0x800, 0x900))
 #: MODE, SCMD, DriveControl with its mask, ProfidriveControl and the set-points of a G2
 #: [M0 tables 9, 10]: commands, which are the telegram's.
 COMMANDS = frozenset((1034, 1035, 1018, 1017, 1003, 1020, 1124, 1127, 1129))
@@ -110,7 +112,8 @@ def mailbox_complaints(
             asked, given = written, set()
             command, pnu, _, _, value = struct.unpack('>5H', asked)
             by_address = model == 'sinus_h' and pnu == 1000 and value == _OPERATION_COMMAND
-            if command == 2 and (pnu in COMMANDS if model != 'sinus_h' else by_address):
+            is_command = pnu in COMMANDS and not (pnu == 1035 and value in PROCEDURES)
+            if command == 2 and (by_address if model == 'sinus_h' else is_command):
                 yield f'PNU {pnu} is a command, and was written by the mailbox'
             continue
         if (place, count) != (16, 1):

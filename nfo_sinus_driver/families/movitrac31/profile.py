@@ -42,6 +42,8 @@ PROFILE = Profile(
         'status.motor_utilization_2',
         'status.terminals',
     ),
+    # [M4 §2.3.2]
+    cuts_off={'serial.master_slave': True},
     resync_reads={
         'movitrac': (
             'serial.inverter_address',

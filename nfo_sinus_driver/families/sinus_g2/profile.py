@@ -8,7 +8,7 @@ the generic state machine [M0 §7.1 tables 14 to 16].
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 import contextlib
 from fractions import Fraction
 from typing import ClassVar
@@ -22,12 +22,10 @@ from nfo_sinus_driver.catalog.profile import (
     Holder,
     NotPossible,
     OlderDialect,
-    Procedure,
     Profile,
     Read,
     Refusal,
     Removal,
-    Reset,
     SetpointTarget,
     Status,
     Steps,
@@ -120,7 +118,7 @@ _VALUE_FLAG = 1 << 10
 _SERIAL_FAULT, _FAULTS = 14, range(1, 24)
 #: The exception codes of Modbus for an address, a value and a state that do not allow a write.
 _ADDRESS, _VALUE, _FAILURE = 2, 3, 4
-_NOT_NOW = 'control of the drive cannot be taken now (MODE is Inhibit: tuning?)'
+_NOT_NOW = f'control of the drive cannot be taken now ({words.INHIBITED})'
 #: Why a serial fault is left that MODE = Stop would end.
 _CONTROLLED_ELSEWHERE = (
     'the serial fault is still active: keypad or terminals have control, which MODE = Stop, the '
@@ -196,17 +194,7 @@ class ModeScmd(_G2):
     means = 'SCMD'
     references = tuple(_COMMANDS)
     coasts = True
-    procedures: ClassVar[Mapping[Procedure | Reset, Write]] = {
-        procedure: Write('fieldbus.scmd', command, retry=False, head=True)
-        for procedure, command in (
-            (Procedure.FULL, Scmd.FULL_TUNING),
-            (Procedure.BASIC, Scmd.BASIC_TUNING),
-            (Procedure.STATOR_RESISTANCE, Scmd.RS_MEASURE),
-            (Procedure.CALCULATE, Scmd.PAR_CALC),
-            (Reset.ERROR_LOG, Scmd.ERASE_E_LOG),
-            (Reset.ENERGY, Scmd.RESET_E_OUT),
-        )
-    }
+    procedures = words.PROCEDURES
     #: The parameter that takes the run command.
     _command: ClassVar[str] = 'fieldbus.scmd'
     #: What releases the motor soonest; SCMD = Stop would let it ramp down.
@@ -224,7 +212,7 @@ class ModeScmd(_G2):
         No manual says that a drive forgets the run command of an earlier session when control is
         taken, so the stop is the very next frame.
 
-        :raises NotPossible: it is tuning.
+        :raises NotPossible: MODE is Inhibit.
         """
         mode = yield Read(MODE)
         if mode == Mode.INHIBIT:
@@ -361,7 +349,7 @@ class DriveControl(_G2):
         """
         Request control with bit 0 low, so that a run command is an edge later [C35].
 
-        :raises NotPossible: it is tuning.
+        :raises NotPossible: MODE is Inhibit.
         """
         if (yield Read(MODE)) == Mode.INHIBIT:
             raise NotPossible(_NOT_NOW)
@@ -567,6 +555,11 @@ PROFILE = Profile(
         'BusType in the drive (NFO, which is classic, is the factory setting; MbusRtu or MbusAsc '
         'for Modbus), jumper S5 (RS232 or RS485), the address, baud rate and parity',
     ),
+    narrow=words.NARROW,
+    inhibited=words.INHIBITED,
+    line_words=words.LINE_WORDS,
+    # [M0 §5.3.1]
+    cuts_off={'serial.bus_type': 'None'},
     # [M0 §6.4]
     holds_control={
         'canopen': 'the CANopen module holds the drive in bus mode from the first request on, '

@@ -10,7 +10,7 @@ import enum
 import functools
 
 from nfo_sinus_driver.catalog.parameter import Value
-from nfo_sinus_driver.catalog.profile import Holder
+from nfo_sinus_driver.catalog.profile import Holder, Procedure, Reset, Write
 from nfo_sinus_driver.catalog.status import Fact, State, StatusWord
 
 
@@ -30,6 +30,33 @@ HOLDERS: Mapping[Value, Holder] = {
     Mode.STOP: Holder.NOBODY,
     Mode.EXT: Holder.LOCAL,
     Mode.BUS: Holder.BUS,
+}
+
+
+#: What has 16 bits on PROFIBUS or Classic ([M0 tables 2, 9], [C23]): no motor gives back more than
+#: twice its nominal power, kW, and the size of a current has no sign.
+NARROW: Mapping[str, tuple[str, float]] = {
+    'status.i_rms': ('', 0.0),
+    'status.p_out': ('motor.p_nom', 2000.0),
+}
+#: Why none can take control under Inhibit ([M0 table 17], [M2 §10]).
+INHIBITED = (
+    'MODE is Inhibit: it is tuning or, before firmware 4.28, controlled from another source'
+)
+#: What this driver calls what BusType, SiBaud and SiProt show [M0 table 4]. ABCC is whatever module
+#: there is.
+LINE_WORDS: Mapping[Value, str] = {
+    'NFO': 'classic',
+    'MbusAsc': 'modbus_ascii',
+    'MbusRtu': 'modbus_rtu',
+    **{f'{rate}bps': str(rate) for rate in (1200, 2400, 4800, 9600, 19200)},
+    **{f'{rate} bps': str(rate) for rate in (38400, 57600)},
+    '7b Ep 1s': '7E1',
+    '7b Op 1s': '7O1',
+    '7b Np 2s': '7N2',
+    '8b Ep 1s': '8E1',
+    '8b Op 1s': '8O1',
+    '8b Np 2s': '8N2',
 }
 
 
@@ -62,6 +89,20 @@ class Scmd(enum.IntEnum):
     PAR_CALC = 0x501
     ERASE_E_LOG = 0x800
     RESET_E_OUT = 0x900
+
+
+#: What begins each procedure, whatever else commands the drive [M0 §7, table 18].
+PROCEDURES: Mapping[Procedure | Reset, Write] = {
+    procedure: Write('fieldbus.scmd', command, retry=False, head=True)
+    for procedure, command in (
+        (Procedure.FULL, Scmd.FULL_TUNING),
+        (Procedure.BASIC, Scmd.BASIC_TUNING),
+        (Procedure.STATOR_RESISTANCE, Scmd.RS_MEASURE),
+        (Procedure.CALCULATE, Scmd.PAR_CALC),
+        (Reset.ERROR_LOG, Scmd.ERASE_E_LOG),
+        (Reset.ENERGY, Scmd.RESET_E_OUT),
+    )
+}
 
 
 class ControlWord(enum.IntFlag):

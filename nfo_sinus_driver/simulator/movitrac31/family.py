@@ -49,6 +49,9 @@ _WRITTEN = frozenset(
     }
 )
 
+#: What takes values between its steps: the manual's own example is one ([M4 §3.1], [C70]).
+_BETWEEN_STEPS = frozenset({'setpoint.n2_offset'})
+
 #: What leaves the factory, in engineering units. But for terminal 43 [M4 §4] does not print these.
 _FACTORY: Mapping[str, Value] = {
     **{f'ramp.t{number}1_{way}': 1.0 for number in (1, 2) for way in ('up', 'down')},
@@ -93,7 +96,9 @@ def _machine(model: Family) -> Family:
         if isinstance(address.codec, SignedBcd):
             address = replace(address, codec=codec_of('sint32_be'))
         access = Access.READ_WRITE if key in _WRITTEN else parameter.access
-        own[key] = replace(parameter, access=access, addresses={_PROTOCOL: address})
+        steps = () if key in _BETWEEN_STEPS else parameter.steps
+        there = {_PROTOCOL: address}
+        own[key] = replace(parameter, access=access, steps=steps, addresses=there)
     return replace(model, parameters=own)
 
 

@@ -415,7 +415,7 @@ class TelegramServer(telegram1.Server):
             947: (lambda: faults.shown, *(_history(faults, n) for n in range(1, 8))),
             950: (8, 1),
             964: (_HMS, 0, firmware, 2013, 101),
-            965: (0x2903,),
+            965: (0x0329,),
             967: (lambda: self._word,),
             968: (lambda: int(self._zsw1(self._word)),),
         }

@@ -78,6 +78,10 @@ GOLDEN = {
         status.br_time 00DD.00DE uint32_ws[0:23] s 00000001 65536
         fieldbus.spd_scl_numerator 00E2.00E1 sint32_ws - 00010000 1
         fieldbus.drive_status 007D uint16_be - 0337 823
+        fieldbus.inv_st_with_ack 00E8 uint16_be - 0005 5
+        fieldbus.inv_st 00E9 uint16_be - 0025 37
+        serial.auto_reset 002F uint16_be - 0001 True
+        serial.auto_stop 00D8 uint16_be - 0000 False
     """,
     # types and units of CiA 402: [M0 table 11] prints names and indices
     ('sinus_g2', 'canopen'): """

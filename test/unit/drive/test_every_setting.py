@@ -45,7 +45,9 @@ def test_every_setting_is_written_to_where_the_manual_has_it_and_read_from_there
         for ends in sorted(rows.values(), key=lambda ends: ends.name in _LAST):
             before = parameters.values[ends.name]
             # and back, so that address and rate stay those of the line
-            wanted = ends.high if ends.low == before else ends.low
+            # what ends all communication is refused
+            cut_off = rig.drive.model.profile.cuts_off.get(ends.name)
+            wanted = ends.high if ends.low in (before, cut_off) else ends.low
             changes = rig.result(parameters.change({ends.name: wanted}))
             there = stands(rig, ends)
             done = (

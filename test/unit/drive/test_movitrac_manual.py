@@ -94,6 +94,9 @@ def not_set(rig: Rig, ends: Ends) -> list[object]:
     select, sent_back = ('ad', 'ac') if ends.long else ('a9', 'c8')
     before = parameters.values[ends.name]
     two = [ends.high] if ends.name == ONE_WAY else [ends.low, ends.high]
+    # P880: On only by the keypad
+    cut_off = rig.drive.model.profile.cuts_off.get(ends.name)
+    two = [value for value in two if value != cut_off]
     # what is there already is not written
     for value in sorted(two, key=lambda one: one == before):
         if value == parameters.values[ends.name]:
@@ -138,6 +141,14 @@ def test_both_ends_of_every_setting_are_written_and_read_as_the_manual_has_them(
         # an owner may set P841 as the driver itself never does
         assert all('another P841' in one for one in rig.violations())
         rig.line.frames.clear()
+
+
+def test_a_value_between_two_steps_is_read_as_it_is() -> None:
+    with Rig('movitrac') as rig:
+        rig.connect()
+        # P111 = -237.0 mV, the example of the manual [M4 §3.1]
+        rig.far.servers['movitrac'].select(98, bytes.fromhex('F0023700'))
+        assert rig.result(rig.drive.measure('setpoint.n2_offset')) == -237.0
 
 
 # --- what is only read ----------------------------------------------------------------------------

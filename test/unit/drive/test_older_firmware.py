@@ -190,7 +190,12 @@ def test_not_while_a_fault_is_active_or_others_tune_it(
     rig.result(rig.drive.acknowledge())
     rig.change(accel=5.0)
     monkeypatch.setattr(type(rig.far.control_unit), 'mode', property(lambda _: 0))
-    assert 'MODE is Inhibit' in rig.refusal()
+    # [M2 §10]
+    elsewhere = 'MODE is Inhibit: it is tuning or, before firmware 4.28, controlled from another'
+    assert elsewhere in rig.refusal()
+    for what in (rig.drive.erase_error_log, rig.drive.enable):
+        assert elsewhere in rig.answer(what())
+    assert not rig.energised
 
 
 @pytest.mark.parametrize('refused', [False, True])

@@ -217,7 +217,7 @@ def test_settings_of_the_line_are_changed_last_and_followed() -> None:
         changes = rig.result(parameters.change(wanted))
         assert changes[0].key == ACCEL
         assert far(rig, *wanted) == list(wanted.values())
-        hint = 'then start this driver with the address (9) and char_format (8b Op 1s) and baud_'
+        hint = 'then start this driver with the address (9) and char_format (8O1) and baud_'
         assert rig.notes.said(hint, Severity.WARNING)
 
 
@@ -281,16 +281,22 @@ def test_the_time_out_of_a_drive_can_be_set_while_its_motor_runs() -> None:
         assert far(rig, 'serial.sio_tot') == [2.0]
 
 
+#: The codes of BusType [M0 tables 2, 4], and the protocol of this driver for each.
+BUS_TYPES = {
+    'NFO': (1, 'classic'), 'MbusAsc': (2, 'modbus_ascii'), 'MbusRtu': (3, 'modbus_rtu'),
+    'ABCC': (4, 'ABCC'),
+}
+
+
 @pytest.mark.parametrize('connection', ['rtu', 'classic', 'canopen'])
 def test_the_protocol_of_the_drive_is_changed_with_permission_alone(connection: str) -> None:
-    # the codes of [M0 tables 2, 4]: of the line that it has it hears until the next power-on
-    codes = {'None': 0, 'NFO': 1, 'MbusAsc': 2, 'MbusRtu': 3, 'ABCC': 4}
+    # of the line that it has it hears until the next power-on
     for allowed in (False, True):
         with Rig(connection, allow_communication_changes=allowed) as rig:
             rig.connect(parameters=True)
             parameters = rig.drive.parameters
             before = rig.far.peek('serial.bus_type')
-            for name, code in codes.items():
+            for name, (code, _) in BUS_TYPES.items():
                 if not allowed and name != before:
                     answer = rig.answer(parameters.change({'serial.bus_type': name}))
                     assert 'communication settings are not changed unless allow_' in answer
@@ -298,6 +304,59 @@ def test_the_protocol_of_the_drive_is_changed_with_permission_alone(connection: 
                 elif allowed:
                     rig.result(parameters.change({'serial.bus_type': name}))
                     assert rig.far.memory.raw('serial.bus_type') == code
+
+
+#: By these the line is lost for good: [M0 §5.3.1], [M4 §2.3.2].
+CUT_OFF: dict[str, tuple[str, Value, tuple[str, Value]]] = {
+    'rtu': ('serial.bus_type', 'None', (ACCEL, 7.0)),
+    'classic': ('serial.bus_type', 'None', (ACCEL, 7.0)),
+    'telegram1 g2, mailbox': ('serial.bus_type', 'None', (ACCEL, 7.0)),
+    'movitrac': ('serial.master_slave', True, ('ramp.t11_up', 7.0)),
+}
+
+
+@pytest.mark.parametrize('connection', CUT_OFF)
+def test_what_ends_all_communication_is_left_to_the_keypad(connection: str) -> None:
+    key, value, (other, number) = CUT_OFF[connection]
+    for allowed in (False, True):
+        with Rig(connection, allow_communication_changes=allowed) as rig:
+            rig.connect(parameters=True)
+            parameters = rig.drive.parameters
+            before = rig.far.memory.raw(key)
+            answer = rig.answer(parameters.change({other: number, key: value}))
+            assert answer.startswith(f'{key}: '), answer
+            assert 'keypad' in answer and 'all communication' in answer
+            assert 'allow_communication_changes' not in answer
+            # a file that is loaded is written as bytes
+            data = rig.drive.params.encode(key, value)
+            assert rig.answer(parameters.write_each({key: data}, lambda _: None)) == answer
+            assert rig.far.memory.raw(key) == before and not rig.far.writes
+
+
+def test_the_driver_is_told_of_by_the_words_that_it_takes() -> None:
+    settings: dict[str, dict[str, str]] = {
+        'protocol': {name: ours for name, (_, ours) in BUS_TYPES.items()},
+        # [M0 table 4]
+        'baud_rate': {
+            '1200bps': '1200', '2400bps': '2400', '4800bps': '4800', '9600bps': '9600',
+            '38400 bps': '38400', '57600 bps': '57600', '19200bps': '19200',
+        },
+        'char_format': {
+            '7b Ep 1s': '7E1', '7b Op 1s': '7O1', '7b Np 2s': '7N2', '8b Ep 1s': '8E1',
+            '8b Op 1s': '8O1', '8b Np 2s': '8N2',
+        },
+    }
+    keys = {'protocol': 'bus_type', 'baud_rate': 'si_baud', 'char_format': 'si_prot'}
+    with Rig(allow_communication_changes=True) as rig:
+        rig.connect(parameters=True)
+        for setting, words in settings.items():
+            for shown, ours in words.items():
+                changed = rig.result(
+                    rig.drive.parameters.change({f'serial.{keys[setting]}': shown})
+                )
+                if changed:
+                    hint = f'then start this driver with the {setting} ({ours}) that it has'
+                    assert rig.notes.said(hint, Severity.WARNING), hint
 
 
 def test_a_new_address_that_counts_at_once() -> None:

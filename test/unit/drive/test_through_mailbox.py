@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 from support.rig import Rig
-from support.said import raises
+from support.said import raises, said
 from support.telegram_laws import COMMANDS, words
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Access, Role, load_family
-from nfo_sinus_driver.drive import Cause, DriveSettings, Severity
+from nfo_sinus_driver.drive import Cause, DriveSettings, Procedure, Severity
 from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.parameter_channel import ParameterEntry
 
@@ -94,14 +94,15 @@ def test_a_drive_in_a_mode_without_set_points_of_the_telegram_is_not_enabled() -
         rig.enable()
 
 
-def test_no_command_can_be_reached_by_the_mailbox() -> None:
+def test_no_command_can_be_reached_by_the_mailbox_but_what_begins_a_procedure() -> None:
     model = load_family('sinus_g2', 'telegram1')
+    assert not model['fieldbus.scmd'].is_setting
     written = {
         one.at('telegram1').index
         for one in model.values()
         if one.at('telegram1').space == 'pnu' and one.access is not Access.READ
     }
-    assert len(written) > 100 and not COMMANDS & written
+    assert len(written) > 100 and COMMANDS & written == {SCMD[0]}
 
 
 # --- faults and the error log ---------------------------------------------------------------------
@@ -285,6 +286,29 @@ def test_parameters_of_profidrive_are_read_by_their_numbers() -> None:
         assert found == wanted
 
 
+def test_status_words_of_a_g2_are_read_by_their_numbers() -> None:
+    with Rig(G2) as rig:
+        rig.connect()
+        entries = rig.line.plc.channels[1].server.parameters.entries
+        # DriveStatus has 32 bits, of which 16 are described [M0 table 10], [C24]
+        entries[1019, 0] = ParameterEntry(lambda: 0x00050231, size=4)
+        entries[1001, 0] = ParameterEntry(lambda: 0x0331)
+        words = 'fieldbus.drive_status', 'fieldbus.profidrive_status'
+        assert [rig.result(rig.drive.measure(key)) for key in words] == [0x0231, 0x0331]
+
+
+@pytest.mark.parametrize(('connection', 'version'), [(G2, 41), (SINUS_H, 40)])
+def test_the_profile_is_the_high_byte_of_its_number_and_the_version_the_low_one(
+    connection: str, version: int
+) -> None:
+    with Rig(connection) as rig:
+        rig.connect()
+        number = int(rig.result(rig.drive.measure('profidrive.profile')))
+        # PROFIdrive is profile 3 [M0 table 8, M3 §8]
+        assert divmod(number, 0x100) == (3, version)
+        assert f'{number:04X}h' in rig.drive.state.model['profidrive.profile'].description
+
+
 #: Of what is measured slowly, where it stands [M0 table 9], and how much of it is 1 there.
 SLOW = {
     Role.MOTOR_TEMPERATURE: (1132, 0.1, 2),
@@ -319,6 +343,191 @@ def test_temperatures_times_energy_and_versions_of_a_g2_come_by_the_mailbox_too(
         assert [*shown.measured.values()] == pytest.approx(
             [-345, 23.4, 4.38, 4018, 3, 20]
         )
+
+
+@pytest.mark.parametrize(('scale', 'told'), [((1, 1), True), ((0, 0), True), ((3, 20), False)])
+def test_in_freque_the_speed_comes_by_the_mailbox(scale: tuple[int, int], told: bool) -> None:
+    with Rig(G2, telemetry_rate=2.0) as rig:
+        entries = rig.line.plc.channels[1].server.parameters.entries
+        speed = 1432
+        asked: list[int] = []
+
+        def read() -> int:
+            asked.append(speed)
+            return speed
+
+        # P1022 in rpm, by the factory's SpdScl (P1023) [M0 table 9, §8.3.2]
+        entries[1022, 0] = ParameterEntry(read, signed=True)
+        for sub, number in enumerate(scale):
+            entries[1023, sub] = ParameterEntry(lambda number=number: number, size=4)
+        rig.connect()
+        rig.drive.activate()
+        for speed in (1432, -1432, 0):
+            rig.pass_time(10.0)
+            shown = rig.drive.snapshot
+            assert shown.speed == pytest.approx(speed if told else math.nan, nan_ok=True)
+            assert rig.notes.telemetry[-1].values[Role.ACTUAL_SPEED] == pytest.approx(
+                shown.speed, nan_ok=True
+            )
+            assert shown.frequency == 0.0
+        # not with each poll: the mailbox is slow
+        asked.clear()
+        rig.pass_time(10.0)
+        assert 15 <= len(asked) <= 21
+        # what is not answered, or not asked for, is not known
+        entry = entries.pop((1022, 0))
+        rig.pass_time(10.0)
+        assert math.isnan(rig.drive.snapshot.speed)
+        entries[1022, 0] = entry
+        rig.connect()
+        rig.pass_time(10.0)
+        assert math.isnan(rig.drive.snapshot.speed) != told
+        rig.drive.settings = dataclasses.replace(rig.drive.settings, telemetry_rate=0.0)
+        rig.pass_time(2.0)
+        assert math.isnan(rig.drive.snapshot.speed)
+
+
+#: Where current and power have 16 bits, and what is one there [M0 table 9], [M0 table 2].
+NARROW = {G2: ((1120, 0.001), (1121, 1.0)), 'classic': ((0x95, 0.01), (0xD9, 1.0))}
+
+
+@pytest.mark.parametrize('connection', NARROW)
+@pytest.mark.parametrize(('nominal', 'true', 'told'), [
+    # in range, in generator operation, at its end, and beyond it
+    (1.5, 21000, True), (1.5, -1800, True), (1.5, 0x7FFF, False), (1.5, 36000, False),
+    (22.0, 21000, True), (22.0, -1800, False), (22.0, 36000, False),
+])
+def test_current_and_power_of_16_bits_are_told_or_are_none(
+    connection: str, nominal: float, true: int, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (current, ampere), (power, watt) = NARROW[connection]
+    raw = (true + 0x8000) % 0x10000 - 0x8000
+    settings = {'motor.p_nom': nominal}
+    with Rig(connection, parameters=settings, measured=['status.p_out']) as rig:
+        # in generator operation a current is a current
+        there = {current: abs(true) if true < 0 else raw, power: raw}
+        if connection == G2:
+            entries = rig.line.plc.channels[1].server.parameters.entries
+            for pnu, number in there.items():
+                entries[pnu, 0] = ParameterEntry(lambda number=number: number, signed=True)
+        else:
+            enquiry = rig.far.servers['classic'].enquiry
+
+            def instead(id_: int) -> int:
+                return there[id_] & 0xFFFF if id_ in there else enquiry(id_)
+
+            monkeypatch.setattr(rig.far.servers['classic'], 'enquiry', instead)
+        rig.connect()
+        rig.wait_until(lambda: rig.notes.telemetry)
+        shown = rig.notes.telemetry[0]
+        amperes = abs(true) * ampere if told or true < 0 else math.nan
+        watts = true * watt if told else math.nan
+        found = shown.values[Role.OUTPUT_CURRENT], shown.values[Role.OUTPUT_POWER]
+        assert found == pytest.approx((amperes, watts), nan_ok=True)
+        assert shown.measured['status.p_out'] == pytest.approx(watts, nan_ok=True)
+        for key, value in (('status.i_rms', amperes), ('status.p_out', watts)):
+            assert rig.result(rig.drive.measure(key)) == pytest.approx(value, nan_ok=True)
+
+
+# --- procedures: by SCMD, P1035, alone [M0 §7, table 10] ------------------------------------------
+
+SCMD = (1035, 0)
+TUNINGS = {
+    Procedure.FULL: (0x201, '45 TuningOK'),
+    Procedure.BASIC: (0x301, '45 TuningOK'),
+    Procedure.STATOR_RESISTANCE: (0x401, '46 RsMeasOK'),
+    Procedure.CALCULATE: (0x501, '47 ParClcOK'),
+}
+
+
+def commands_of(rig: Rig) -> list[int]:
+    """Note what is written to SCMD from now on."""
+    given: list[int] = []
+    entries = rig.line.plc.channels[1].server.parameters.entries
+    write = entries[SCMD].write
+
+    def noted(raw: int) -> None:
+        given.append(raw)
+        write(raw)
+
+    entries[SCMD] = dataclasses.replace(entries[SCMD], write=noted)
+    return given
+
+
+@pytest.mark.parametrize('procedure', TUNINGS)
+def test_each_tuning_is_done_by_the_mailbox(procedure: Procedure) -> None:
+    command, text = TUNINGS[procedure]
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        given = commands_of(rig)
+        before = {key: rig.far.peek(key) for key in rig.far.settings}
+        result = rig.result(rig.drive.tune(procedure), 120.0)
+        assert result.success and text in said(result.how)
+        assert given == [command]
+        after = {key: rig.far.peek(key) for key in rig.far.settings}
+        changed = {key: (before[key], after[key]) for key in after if before[key] != after[key]}
+        assert changed
+        assert {one.key: (one.old, one.new) for one in result.changes} == changed
+        # and it can be enabled as before
+        rig.turn(20.0)
+
+
+def test_a_tuning_that_fails_is_told_with_the_name_of_its_fault() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        rig.far.control_unit.fail_tuning(16)
+        result = rig.result(rig.drive.tune(Procedure.FULL), 120.0)
+        assert not result.success and '16 TunFailP' in said(result.how)
+        rig.result(rig.drive.acknowledge())
+        rig.turn(20.0)
+
+
+def test_a_motor_that_is_tuned_is_not_told_to_be_stopped() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        future = rig.drive.tune(Procedure.FULL)
+        rig.wait_until(lambda: rig.far.control_unit.tuning is not None, 20.0)
+        rig.pass_time(1.0)
+        assert rig.drive.snapshot.text == 'Tuning'
+        stop = rig.drive.stop()
+        rig.wait_until(stop.done, 20.0)
+        # no manual says that the drive takes it
+        assert stop.exception() is not None and rig.far.control_unit.tuning is not None
+        assert 'is NOT confirmed' in said(stop.exception())
+        rig.wait_until(lambda: rig.far.control_unit.tuning is None, 60.0)
+        rig.wait_until(future.done, 20.0)
+        # then it is, and nothing turns before the next enable
+        rig.pass_time(5.0)
+        assert not rig.far.motor.driven
+        rig.turn(20.0)
+
+
+def test_log_and_counter_of_a_g2_are_cleared_by_the_mailbox() -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        given = commands_of(rig)
+        rig.far.trip(5)
+        rig.pass_time(2.0)
+        rig.result(rig.drive.acknowledge())
+        rig.pass_time(2.0)
+        rig.far.control_unit.counters.energy = 1.25
+        rig.result(rig.drive.erase_error_log())
+        rig.result(rig.drive.reset_energy())
+        assert not rig.far.faults.log and rig.far.control_unit.counters.energy < 0.1
+        assert given == [0x800, 0x900]
+        assert not rig.far.motor.driven
+
+
+def test_without_a_mailbox_a_procedure_is_refused_with_that_reason() -> None:
+    with Rig('telegram1 g2') as rig:
+        rig.connect()
+        rig.asked.clear()
+        for begin in (
+            lambda: rig.drive.tune(Procedure.FULL), rig.drive.erase_error_log,
+            rig.drive.reset_energy,
+        ):
+            assert 'layout 1, which has no mailbox' in rig.answer(begin())
+        assert not [data for _, _, data in rig.asked if data is not None]
 
 
 # --- parameters by a user's own addresses ---------------------------------------------------------

@@ -227,7 +227,7 @@ def test_procedures() -> None:
     }
     for procedure, command in commands.items():
         assert scmd().procedures[procedure] == Write(SCMD, command, retry=False, head=True)
-        assert G2.profile.methods_with(procedure) == ['mode_scmd']
+        assert G2.profile.methods_with(procedure) == ['mode_scmd', 'telegram1']
 
 
 # --- the control word -----------------------------------------------------------------------------

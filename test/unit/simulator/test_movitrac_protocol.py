@@ -229,6 +229,17 @@ def test_eight_bytes_are_half_bytes():
     assert bench.say(long_select(LIMIT_SWITCH_CW, bytes([0x10] * 8))) == nack(0x1D)
 
 
+def test_the_example_of_the_manual_between_two_steps_is_taken():
+    bench = MovitracBench()
+    # P111 = -237.0 mV [M4 §3.1], of which the list has steps of 10 mV [M4 §4]
+    value = bytes.fromhex('F0023700')
+    assert bench.say(select(N2_OFFSET, value)) == ACK
+    assert bench.ask(N2_OFFSET) == value
+    assert bench.drive.peek('setpoint.n2_offset') == -237.0
+    bench.drive.set_from_keypad('setpoint.n2_offset', 12.34)
+    assert bench.ask(N2_OFFSET) == bcd(12.34)
+
+
 def test_a_negative_number_has_its_sign_in_the_first_half_byte():
     bench = MovitracBench()
     value = bytes.fromhex('F0023000')

@@ -28,7 +28,7 @@ from nfo_sinus_driver.catalog.profile import (
 )
 from nfo_sinus_driver.catalog.status import Meaning, State, StatusCode
 from nfo_sinus_driver.families.sinus_g2.ds402 import words
-from nfo_sinus_driver.families.sinus_g2.words import HOLDERS, Mode
+from nfo_sinus_driver.families.sinus_g2.words import HOLDERS, INHIBITED, Mode
 
 CONTROL_WORD = 'fieldbus.control_word'
 STATUS_WORD = 'fieldbus.status_word'
@@ -105,10 +105,10 @@ class Ds402(ControlMethod):
         stands in the control word then counts from that moment on, and what is written before may
         not count at all: it is switched off by the very next frame, and again.
 
-        :raises NotPossible: it is tuning.
+        :raises NotPossible: MODE is Inhibit.
         """
         if (yield from self.holder()) is Holder.INHIBITED:
-            raise NotPossible('control of the drive cannot be taken now (MODE is Inhibit: tuning?)')
+            raise NotPossible(f'control of the drive cannot be taken now ({INHIBITED})')
         if not (yield from self.in_control()):
             yield Write(_MODE, Mode.BUS)
             yield from try_steps(one(Write(CONTROL_WORD, words.SHUTDOWN, head=True)))

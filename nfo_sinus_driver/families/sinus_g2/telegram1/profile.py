@@ -35,6 +35,7 @@ class G2Telegram1(Telegram1):
     """
 
     coasts = True
+    procedures = drivecontrol.PROCEDURES
     unfollowed_scale = _SPEED_SCALE
     ready = int(profidrive.OFF)
     runs = int(profidrive.ControlWord.ON)
@@ -82,6 +83,7 @@ class G2DriveControl(Telegram1):
     """Control by DriveControl: switched on, then enabled [C54]."""
 
     coasts = True
+    procedures = drivecontrol.PROCEDURES
     unfollowed_scale = _SPEED_SCALE
     ready = int(_READY)
     runs = int(
@@ -146,8 +148,11 @@ PROFILE = Profile(
     mailbox='profibus',
     # it decides what a set-point means
     start_settings=frozenset({'control.mode'}),
+    narrow=drivecontrol.NARROW,
+    # [M0 §5.3.1]
+    cuts_off={'serial.bus_type': 'None'},
     # a tenth above what a set-point may be, for a motor may be overhauled
-    most={Role.ACTUAL_FREQUENCY: 165.0},
+    most={Role.ACTUAL_FREQUENCY: 165.0, Role.ACTUAL_SPEED: 9900.0},
     # those of SpdSet and SpdAct, by the factory's SpdScl ([M0 §6.3 table 9, §8.3.2], [M2 table 2])
     speed_mode=SpeedMode(
         (method.ACTUAL, method.SETPOINT),
