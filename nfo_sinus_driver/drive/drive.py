@@ -507,7 +507,9 @@ class Drive:
             )
         name = '' if identity.model else self.model.name
         shown = ', '.join(part for part in (name, str(identity)) if part)
-        state.notify(Severity.INFO, Cause.CONNECTED, drive=shown)
+        known = self._recogniser.identifies
+        cause = Cause.CONNECTED if known else Cause.CONNECTED_UNIDENTIFIED
+        state.notify(Severity.INFO, cause, drive=shown)
 
     def _set_disconnected(self, why: Report) -> None:
         self.state.lost()

@@ -703,6 +703,10 @@ class Cause(enum.Enum):
 
     # --- Nothing is wrong, or the sentence is that of another
     CONNECTED = 'connected: {drive}'
+    CONNECTED_UNIDENTIFIED = (
+        'connected: {drive}, recognised by nothing of its own: any drive with the same registers '
+        'is taken for one'
+    )
     LINE_FAILED = '{error}'
     NOT_POSSIBLE = '{why}'
     ENABLED = 'enabled; it follows set-points that arrive from now on'
