@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+import re
 import shutil
 
 from cli_bench import MakeBench
@@ -49,6 +50,22 @@ def test_what_tells_a_drive_from_others_is_asked_for(
     for path, asked_for in ((V20, True), (str(known), False)):
         assert main(['family', 'check', path]) == 0
         assert ('add identify' in capsys.readouterr().out) is asked_for
+
+
+def test_what_is_asked_for_is_shown_as_a_line_of_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    delta = SHIPPED['delta_vfd_el'].read_text()
+    assert main(['family', 'check', 'delta_vfd_el']) == 0
+    said = capsys.readouterr().out
+    lines = re.findall(r'identify: \[.*\]|keeps_run: (?:true|false)', said)
+    assert len(lines) == 3
+    for first, second in (lines[:2], (lines[0], lines[2])):
+        path = tmp_path / 'mine.vfd.yaml'
+        path.write_text(f'{delta}{first}\n{second}\n')
+        assert main(['family', 'check', str(path)]) == 0
+        said = capsys.readouterr().out
+        assert 'add identify' not in said and 'keeps_run' not in said
 
 
 def test_a_forgotten_numbering_is_remarked(
