@@ -100,6 +100,19 @@ def test_a_drive_of_another_make_is_only_read(
     assert bench.writes() == [] and not bench.state()['run_command']
 
 
+def test_info_says_that_nothing_identifies_the_drive(
+    make_bench: MakeBench, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = tmp_path / 'known.vfd.yaml'
+    identify = 'identify: [{register: 40200, value: 1}]\ncontrol:'
+    known.write_text(Path(V20).read_text().replace('control:', identify))
+    bench = make_bench(model=str(known), serial_numbers=[])
+    for file, is_known in ((V20, False), (str(known), True)):
+        assert main(['--port', bench.simulator.port, '--family', file, 'info']) == 0
+        said = capsys.readouterr().err
+        assert ('recognised by nothing of its own' in said) is not is_known
+
+
 @pytest.mark.parametrize('typed', ['yaskawa_v1000', 'siemens_v20', './mine.vfd.yaml'])
 def test_the_file_of_a_scan_names_the_family_from_wherever_the_driver_is_started(
     make_bench: MakeBench,
