@@ -21,6 +21,7 @@ import importlib.util
 import logging
 import os
 from pathlib import Path
+import shlex
 
 from nfo_sinus_driver.catalog.family import DESCRIBED, folders, is_described, load_profile
 from nfo_sinus_driver.catalog.table import CatalogError
@@ -70,6 +71,9 @@ def find(text: str) -> str:
     for one in every():
         found.setdefault(one.name, []).append(one)
     if text not in found:
+        path = Path(text).absolute()
+        if path.is_file():
+            return _file(path, text)
         raise ValueError(
             f'there is no family {text!r}: choose one of {", ".join(sorted(found))}, the path of a '
             f'file NAME{DESCRIBED}, or package://PACKAGE/PATH'
@@ -113,10 +117,23 @@ def _usable(model: str) -> str:
 
 def _file(path: Path, text: str) -> str:
     if not is_described(path.name):
-        raise ValueError(f'{text}: the name of a file that describes a drive ends with {DESCRIBED}')
+        rename = _rename(path)
+        raise ValueError(
+            f'{text}: the name of a file that describes a drive ends with {DESCRIBED}{rename}'
+        )
     if not path.is_file():
         raise ValueError(f'{text}: there is no such file ({path})')
     return str(path)
+
+
+def _rename(path: Path) -> str:
+    """Return how a file is renamed that is there under another name."""
+    if not path.is_file():
+        return ''
+    name = path.name
+    for ending in ('.yml', '.yaml', '.vfd'):
+        name = name.removesuffix(ending)
+    return f'; rename it: {shlex.join(("mv", str(path), str(path.with_name(name + DESCRIBED))))}'
 
 
 def _prefixes() -> Iterator[Path]:

@@ -78,8 +78,9 @@ def notes(family: catalog.Family) -> list[str]:
         )
     if not profile.identify:
         found.append(
-            'nothing tells it from another drive with these registers: add identify, with a '
-            'register whose number its manual gives (type, size, software)'
+            'nothing tells it from another drive with these registers, and any such is written to: '
+            'add identify, with a register whose numbers its manual gives (type, size, software), '
+            'such as identify: [{register: 0x0000, values: [2, 4, 6]}]'
         )
     if not method.coasts:
         found.append('it has no coast: quick_stop is an ordinary stop, or a quick ramp')
@@ -88,7 +89,8 @@ def notes(family: catalog.Family) -> list[str]:
     if profile.keeps_run is None:
         found.append(
             'does its run command survive a power cycle? Look in the manual, or try it without the '
-            'motor, and add keeps_run: true or false; with true a silence of 0.4 s stops the motor'
+            'motor, and add keeps_run: true or keeps_run: false; with true a silence of 0.4 s '
+            'stops the motor'
         )
     addresses = [one.at('modbus') for one in family.values() if 'modbus' in one.addresses]
     registers = [one.index for one in addresses if one.space != 'coil']

@@ -21,6 +21,7 @@ from nfo_sinus_driver.cli.console import (
     progress,
     put,
     put_columns,
+    remark,
     require_yes,
     say,
     signals_noted,
@@ -59,6 +60,11 @@ class Info(Verb):
         with Session(options) as session:
             drive = session.drive()
             identity = drive.identify()
+            if not drive.identifies:
+                remark(
+                    'recognised by nothing of its own: any drive with the same registers is taken '
+                    'for one'
+                )
             status = drive.read_status()
             mode = _measure_roles(drive, [Role.CONTROL_MODE])
             nameplate = _measure_roles(drive, _NAMEPLATE)

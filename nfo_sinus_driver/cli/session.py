@@ -78,6 +78,11 @@ class OfflineDrive(Listener):
             other = Report(Cause.NOT_THE_MODEL, drive=str(self), model=model, why=why)
             raise DriveError(other) from error.__cause__
 
+    @property
+    def identifies(self) -> bool:
+        """Something tells its model from others that have all the registers which are read."""
+        return self._drive.identifies
+
     def read_status(self) -> InverterStatus:
         """Read the status, without acknowledging anything."""
         return self._drive.read_status().result()

@@ -164,6 +164,11 @@ class Drive:
         return self.state.nameplate.identity
 
     @property
+    def identifies(self) -> bool:
+        """Something tells its model from others that have all the registers which are read."""
+        return self._recogniser.identifies
+
+    @property
     def ever_responded(self) -> bool:
         """A drive has answered at its address at least once."""
         return self._bus.silences.last_frame_at(self._unit) > -math.inf
@@ -511,7 +516,8 @@ class Drive:
             )
         name = '' if identity.model else self.model.name
         shown = ', '.join(part for part in (name, str(identity)) if part)
-        state.notify(Severity.INFO, Cause.CONNECTED, drive=shown)
+        cause = Cause.CONNECTED if self.identifies else Cause.CONNECTED_UNIDENTIFIED
+        state.notify(Severity.INFO, cause, drive=shown)
 
     def _set_disconnected(self, why: Report) -> None:
         self.state.lost()

@@ -286,6 +286,14 @@ class Cause(enum.Enum):
         'master commands the drive'
     )
     """Nothing is stopped. Does the load drive the motor? Does another master command the drive?"""
+    OTHER_SCALE = (
+        'the motor turns at {now:.4g} {unit}, steadily {share} its set-point of {setpoint:g} '
+        '({status}): one of both has another scale in the drive. Check factor and unit of the '
+        'set-point and of what is measured, and least and greatest frequency of the drive'
+    )
+    """Nothing is stopped. Correct `factor` or `unit` in [the file of the
+    drive](your_own_drive.md#what-a-file-can-say). If both are right, a limit of the drive is that
+    speed"""
     CURRENT_LIMITED = 'the current limit holds the motor back ({status}). {limit.remedy}'
     """Nothing is stopped. Check the mechanics, use a longer ramp or a lower set-point"""
 
@@ -707,6 +715,10 @@ class Cause(enum.Enum):
 
     # --- Nothing is wrong, or the sentence is that of another
     CONNECTED = 'connected: {drive}'
+    CONNECTED_UNIDENTIFIED = (
+        'connected: {drive}, recognised by nothing of its own: any drive with the same registers '
+        'is taken for one'
+    )
     LINE_FAILED = '{error}'
     NOT_POSSIBLE = '{why}'
     ENABLED = 'enabled; it follows set-points that arrive from now on'

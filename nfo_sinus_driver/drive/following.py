@@ -35,6 +35,14 @@ _SHORT, _FALLEN = 1.0, 0.4
 #: How much faster than a set-point a motor turns at most that follows it: this share of it and this
 #: much, Hz. One that turns faster does so for another reason, such as a least frequency.
 _ABOVE, _ABOVE_BY = 1.1, 0.5
+#: A wrong factor or unit makes a number so many times greater, or smaller: decimals, and rpm for Hz
+#: of a motor of one to three pairs of poles.
+_MULTIPLES = (10, 20, 30, 60, 100, 1000)
+#: Slip takes a motor no further from a multiple than this share of it.
+_NEARLY = 0.05
+#: For how long a speed has to be steady, s, and within what, Hz: the slowest ramp, of 2000 s, is no
+#: such speed.
+_STEADY_FOR, _STEADY = 8.0, 0.1
 #: What is compared with set-points, and what one of its units is for 1 Hz of a four-pole motor.
 _COMPARED = {FREQUENCY.mode: (FREQUENCY.role, 1.0), SPEED.mode: (SPEED.role, 30.0)}
 
@@ -84,7 +92,9 @@ class FollowingCheck:
         self._stands_since = math.inf
         #: The speed from which the drive slows it down, below its set-points.
         self._falls_from = 0.0
-        self._reported = False
+        self._reported = self._scale_reported = False
+        #: A speed, and since when it has been that, s.
+        self._steady, self._steady_since = 0.0, math.inf
         #: What the newest status shows, and what that was that has to change, with the moment from
         #: which on; ``None``: it has changed, or need not.
         self._shown: _Shown | None = None
@@ -115,6 +125,7 @@ class FollowingCheck:
             cause = Cause.STOPPED_BY_ITSELF
         elif role is not None:
             self._check_overspeed(actual.value, measured.at, max(-least, most), unit)
+            self._check_scale(actual.value, measured.at, unit)
         turning = self._state.turning
         now = frequency / turning.hertz
         return cause and self._state.report(
@@ -231,3 +242,31 @@ class FollowingCheck:
         )
         self._state.notify(Severity.WARNING, report)
         self._setpoint.write_again()
+
+    def _check_scale(self, value: float, at: float, unit: float) -> None:
+        """Report, once, a motor that turns steadily at a multiple of its set-point."""
+        if not abs(value - self._steady) <= _STEADY * unit:
+            self._steady, self._steady_since = value, at
+        least, most = self._setpoint.range_since(self._steady_since)
+        status = self._state.status
+        limited = status is not None and status.means(Meaning.CURRENT_LIMIT)
+        moves = not at - self._steady_since > _STEADY_FOR or least != most
+        if self._scale_reported or moves or limited or not least:
+            return
+        share = _multiple(abs(value / most))
+        if share:
+            self._scale_reported = True
+            report = self._state.report(
+                Cause.OTHER_SCALE, now=value, setpoint=most, unit=self._state.unit, share=share
+            )
+            self._state.notify(Severity.WARNING, report)
+
+
+def _multiple(ratio: float) -> str:
+    """Return which multiple or part a ratio is; ``''``: none that a wrong scale would make."""
+    for times in _MULTIPLES:
+        if abs(ratio / times - 1) < _NEARLY:
+            return f'{times} times'
+        if abs(ratio * times - 1) < _NEARLY:
+            return f'1/{times} of'
+    return ''

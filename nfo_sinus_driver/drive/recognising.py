@@ -39,6 +39,13 @@ class Recogniser:
         #: The recognition that is under way for all that want to write.
         self._task: Task | None = None
 
+    @property
+    def identifies(self) -> bool:
+        """Something tells its drives from others that have all the registers which are read."""
+        profile = self._profile
+        told = profile.identify or profile.product or profile.vendor
+        return bool(told) or self._params.in_block
+
     async def recognise(self, *, retry: bool = True) -> bool:
         """
         Read all that tells whether it is a drive of this family.

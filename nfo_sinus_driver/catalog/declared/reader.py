@@ -54,6 +54,8 @@ _MODES = {one.unit: one.mode for one in (FREQUENCY, SPEED)}
 _FLAGS_FROM = 100
 _MOST_FAULTS = 64
 _OF_STATUS = ('register', 'block', 'table')
+#: What a drive cannot be at once; of the rest that holds at once the graver one counts.
+_EXCLUSIVE = (('ready', 'inhibited'), ('ready', 'fault'), ('running', 'inhibited'))
 
 
 def read(path: Path) -> Description:
@@ -98,6 +100,7 @@ class _Reader:
         status = self._map.status(conditions, root['status'].get('block'))
         facts = {name: one.in_place(status) for name, one in self._conditions.items()}
         self._require_apart(facts)
+        self._require_exclusive(facts, status)
         steps.use(status)
         codes = self._codes(root.get('faults'), status)
         setpoint = self._setpoint(settings)
@@ -189,6 +192,32 @@ class _Reader:
                     self._problems.add(
                         line, f'{name} is true whenever {seen[one]} is not: say one of both'
                     )
+
+    def _require_exclusive(self, facts: Mapping[str, Condition], status: StatusPlace) -> None:
+        """Make sure that no number of a status is two things that exclude each other."""
+        for pair in _EXCLUSIVE:
+            for name, other in (pair, pair[::-1]):
+                if not facts.keys() >= {name, other}:
+                    continue
+                fact, at_once = facts[name], facts[other]
+                within = not at_once.mask & ~fact.mask
+                shared = [one for one in fact.values if within and at_once.holds(one)]
+                if shared and fact.names_numbers:
+                    first, second = self._conditions[name], self._conditions[other]
+                    number = self._written(name, min(shared) >> status.shift(first.register))
+                    self._problems.add(
+                        first.line,
+                        f'{number} is {name}, and {other} (line {second.line}): remove it from '
+                        'one of both',
+                    )
+                    break
+
+    def _written(self, name: str, bits: int) -> str:
+        """Return a number of a condition as the file has it."""
+        node = self._root['status'][name]
+        low = int(node['bits'].items[0].scalar or 0) if 'bits' in node else 0
+        listed = [node['value']] if 'value' in node else node['values'].items
+        return next(one.written for one in listed if (int(one.scalar or 0) & WORD) << low == bits)
 
     def _require_one_holder(self, control: Node, settings: Settings) -> None:
         shown_by = [name for name in ('remote', 'local') if name in self._conditions]

@@ -407,6 +407,24 @@ BAD = {
         'address: 5', 'address: 5, protocol: modbus_ascii', 'write 7N1',
     ),
     'address 0': ('address: 5', 'address: 0', '1 at least'),
+    'a number that is ready and inhibited': (
+        '  running: {bit: 0}',
+        '  ready: {bits: [4, 6], value: 3}\n  inhibited: {bits: [4, 6], values: [3, 6]}\n'
+        '  running: {bit: 0}',
+        '3 is ready, and inhibited (line 16)',
+    ),
+    'a number that is ready and a fault': (
+        '  running: {bit: 0}\n  fault: {bit: 3}',
+        '  ready: {bits: [0, 3], values: [2, 9]}\n  running: {bits: [0, 3], value: 1}\n'
+        '  fault: {bit: 3}',
+        '9 is ready, and fault (line 17)',
+    ),
+    'a number that runs and is none of those in which it can': (
+        '  running: {bit: 0}',
+        '  running: {mask: 0x00F0, values: [0x10, 0x30]}\n'
+        '  inhibited: {mask: 0x0030, except: [0x10]}',
+        '0x30 is running, and inhibited (line 16)',
+    ),
     'an identity without a number': (
         'control:', 'identify: [{register: 1}]\ncontrol:', 'value or values',
     ),
@@ -561,6 +579,12 @@ def test_shipped_files_are_short_and_say_where_from() -> None:
         assert body.count('\n') <= 60, path
         assert 'not yet on a drive.' in text.splitlines()[0], path
         assert read(path).source
+
+
+def test_a_shipped_file_that_does_not_identify_its_drive_says_so_and_what_was_looked_for() -> None:
+    for path in SHIPPED.values():
+        (comment, *_) = path.read_text(encoding='utf-8').splitlines()
+        assert ('Nothing identifies it: ' in comment) is not bool(read(path).identify), path
 
 
 def test_a_shipped_file_without_a_time_out_says_where_the_drive_has_it() -> None:

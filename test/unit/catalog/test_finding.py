@@ -9,6 +9,7 @@ import importlib.metadata
 import os
 from pathlib import Path
 import shutil
+import subprocess
 
 import pytest
 from support.described import SHIPPED
@@ -133,6 +134,21 @@ def test_what_is_not_found_is_refused_with_what_to_do(
     monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
     with pytest.raises(ValueError, match=said):
         find(text)
+
+
+@pytest.mark.parametrize('name', ['mine.yaml', './mine.yaml', '{}/mine.yml', 'mine', './my.vfd'])
+def test_of_a_file_whose_name_ends_otherwise_is_said_how_it_is_renamed(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    given = name.format(tmp_path)
+    shutil.copy(DELTA, given)
+    with pytest.raises(ValueError, match='rename it: mv ') as refused:
+        find(given)
+    # and what it says is enough
+    _, _, command = str(refused.value).partition('rename it: ')
+    subprocess.run(command, shell=True, check=True)
+    assert find(command.split()[-1])
 
 
 def test_a_family_with_code_is_an_entry_point(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+import re
 import shutil
 
 from cli_bench import MakeBench
@@ -51,6 +52,22 @@ def test_what_tells_a_drive_from_others_is_asked_for(
         assert ('add identify' in capsys.readouterr().out) is asked_for
 
 
+def test_what_is_asked_for_is_shown_as_a_line_of_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    delta = SHIPPED['delta_vfd_el'].read_text()
+    assert main(['family', 'check', 'delta_vfd_el']) == 0
+    said = capsys.readouterr().out
+    lines = re.findall(r'identify: \[.*\]|keeps_run: (?:true|false)', said)
+    assert len(lines) == 3
+    for first, second in (lines[:2], (lines[0], lines[2])):
+        path = tmp_path / 'mine.vfd.yaml'
+        path.write_text(f'{delta}{first}\n{second}\n')
+        assert main(['family', 'check', str(path)]) == 0
+        said = capsys.readouterr().out
+        assert 'add identify' not in said and 'keeps_run' not in said
+
+
 def test_a_forgotten_numbering_is_remarked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -81,6 +98,19 @@ def test_a_drive_of_another_make_is_only_read(
     said = capsys.readouterr()
     assert 'another model' in said.err and 'is confirmed' not in said.err
     assert bench.writes() == [] and not bench.state()['run_command']
+
+
+def test_info_says_that_nothing_identifies_the_drive(
+    make_bench: MakeBench, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = tmp_path / 'known.vfd.yaml'
+    identify = 'identify: [{register: 40200, value: 1}]\ncontrol:'
+    known.write_text(Path(V20).read_text().replace('control:', identify))
+    bench = make_bench(model=str(known), serial_numbers=[])
+    for file, is_known in ((V20, False), (str(known), True)):
+        assert main(['--port', bench.simulator.port, '--family', file, 'info']) == 0
+        said = capsys.readouterr().err
+        assert ('recognised by nothing of its own' in said) is not is_known
 
 
 @pytest.mark.parametrize('typed', ['yaskawa_v1000', 'siemens_v20', './mine.vfd.yaml'])

@@ -5,11 +5,15 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import pytest
-from support.rig import CONNECTIONS, Rig
+from support.described import SHIPPED
+from support.rig import CONNECTIONS, Connection, Rig
 from support.variants import ramps
+import yaml
 
 from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.movitrac31.words import Bits
@@ -223,6 +227,73 @@ def test_a_motor_that_another_master_speeds_up_is_reported_and_set_back(connecti
         assert rig.notes.said(Cause.FASTER_THAN_SETPOINT)
         assert rig.far.motor.frequency == pytest.approx(20.0, abs=0.5)
         assert rig.drive.following
+
+
+# --- a scale that is wrong ------------------------------------------------------------------------
+
+
+def with_factor(folder: Path, place: str, factor: Any) -> str:
+    """Return the file of a VFD-EL whose set-point or measured frequency has another factor."""
+    file = yaml.safe_load(SHIPPED['delta_vfd_el'].read_text(encoding='utf-8'))
+    node = file['setpoint'] if place == 'setpoint' else file['measured']['actual_frequency']
+    node['factor'] = factor
+    if place == 'setpoint':
+        node['most'] = min(600, int(60000 * Fraction(str(factor))))
+    path = folder / 'rescaled.vfd.yaml'
+    path.write_text(yaml.safe_dump(file), encoding='utf-8')
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ('place', 'factor', 'value', 'said'),
+    [
+        ('setpoint', 0.1, 5.0, '10 times its set-point of 5'),
+        ('setpoint', 0.1, -4.0, '10 times its set-point of -4'),
+        ('setpoint', 0.001, 40.0, '1/10 of its set-point of 40'),
+        ('setpoint', '1/3000', 20.0, '1/30 of its set-point of 20'),
+        ('measured', 0.001, 20.0, '10 times its set-point of 20'),
+        ('measured', 1.0, 50.0, '1/100 of its set-point of 50'),
+    ],
+)
+def test_a_speed_that_is_a_multiple_of_the_set_point_names_the_scale_once(
+    tmp_path: Path, place: str, factor: Any, value: float, said: str
+) -> None:
+    # the drive has another factor than the file of the driver
+    file = with_factor(tmp_path, place, factor)
+    own = {'model': str(SHIPPED['delta_vfd_el'])}
+    with Rig(Connection('modbus_rtu', file, 'custom', driver=own)) as rig:
+        rig.connect()
+        rig.enable()
+        rig.send(value)
+        rig.pass_time(20.0)
+        assert rig.notes.said(said), rig.notes.events
+        assert sum('another scale' in one.text for one in rig.notes.events) == 1
+        assert rig.drive.following
+
+
+@pytest.mark.parametrize('connection', FOLLOWING)
+def test_no_motor_that_follows_has_a_wrong_scale(connection: str) -> None:
+    with Rig(connection) as rig:
+        rig.turn()
+        for value in (50.0, 5.0, 0.5, 0.0):
+            rig.send(value)
+            rig.pass_time(12.0)
+        assert rig.drive.following and not rig.notes.said(Cause.OTHER_SCALE)
+
+
+@pytest.mark.parametrize('ramp', [100.0, 600.0, 2000.0])
+@pytest.mark.parametrize(('first', 'second'), [(45.0, 4.4), (4.4, 45.0)])
+def test_a_ramp_that_passes_a_multiple_is_no_scale(
+    ramp: float, first: float, second: float
+) -> None:
+    with Rig('movitrac') as rig:
+        rig.turn(first)
+        rig.pass_time(5.0)
+        for key in ramps('movitrac31', 0.5, 0.5):
+            rig.far.set_from_keypad(key, ramp)
+        rig.send(second)
+        rig.pass_time(min(ramp, 200.0))
+        assert rig.drive.following and not rig.notes.said(Cause.OTHER_SCALE)
 
 
 @pytest.mark.parametrize('connection', FOLLOWING)

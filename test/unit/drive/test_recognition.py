@@ -320,6 +320,20 @@ def test_a_file_tells_its_drive_from_one_that_has_all_its_registers(tmp_path: Pa
         assert 'line.identity_1' in keys[:stop]
 
 
+@pytest.mark.parametrize('connection', KINDS)
+def test_the_connect_line_says_whether_anything_tells_the_drive_from_others(
+    connection: str, tmp_path: Path
+) -> None:
+    with Rig(connection) as rig:
+        rig.connect()
+        assert rig.notes.said('recognised by nothing of its own') is (connection == 'described')
+    known = with_identity(tmp_path, register=0, values=[2, 4])
+    with Rig(Connection('modbus_rtu', known, 'custom')) as rig:
+        rig.connect()
+        assert rig.notes.said('connected: known')
+        assert not rig.notes.said('recognised by nothing')
+
+
 def test_one_that_identifies_itself_as_another_after_a_loss_is_not_written_to(
     tmp_path: Path,
 ) -> None:
