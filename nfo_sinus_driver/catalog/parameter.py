@@ -171,8 +171,11 @@ class Parameter:
 
     @property
     def is_measured(self) -> bool:
-        """Whether it is a number that the drive reports of itself, and no setting."""
-        return self.is_readable and not self.is_kept and self.kind in (int, float)
+        """Whether the drive reports it of itself, by a number or a label, and it is no setting."""
+        if not self.is_readable or self.is_setting:
+            return False
+        by_label = bool(self.labels) and self.access is Access.READ
+        return by_label or self.kind in (int, float)
 
     @property
     def is_setting(self) -> bool:
@@ -229,6 +232,18 @@ class Parameter:
         if self.kind is int:
             return raw
         return raw * factor.numerator / factor.denominator
+
+    def number_of(self, value: Value) -> float:
+        """
+        Return one of its values as a number: of a label the code.
+
+        :raises ValueError: it is a text.
+        """
+        if not isinstance(value, str):
+            return float(value)
+        codes = {label: code for code, label in self.labels.items()}
+        # a code that has no label is shown as its number
+        return float(codes.get(value, value))
 
     def encode(self, value: Value, protocol: str = 'modbus') -> bytes:
         """
