@@ -252,21 +252,21 @@ def parse_value(parameter: Parameter, text: str) -> Value:
     """Turn what was typed for a parameter into its value; a ValueError says what can be."""
     if parameter.kind is bool and text.lower() in _SWITCH:
         return _SWITCH[text.lower()]
-    if parameter.labels:
+    choices = ', '.join(parameter.labels.values())
+    if parameter.labels and parameter.kind is not int:
         labels = {label.lower(): label for label in parameter.labels.values()}
         if text.lower() not in labels:
-            choices = ', '.join(parameter.labels.values())
             raise ValueError(f'{parameter.key}: {text!r} is none of {choices}')
-        label = labels[text.lower()]
-        return int(label) if parameter.kind is int else label
+        return labels[text.lower()]
     try:
         return int(text, 10)
     except ValueError:
         pass
     try:
-        return float(text)
+        return parameter.meant(float(text))
     except ValueError:
-        raise ValueError(f'{parameter.key}: {text!r} is not a number') from None
+        wanted = f'none of {choices}' if choices else 'not a number'
+        raise ValueError(f'{parameter.key}: {text!r} is {wanted}') from None
 
 
 def readable(model: Family) -> Mapping[str, Parameter]:

@@ -212,8 +212,7 @@ def _put_values(wanted: Mapping[str, Parameter], values: Mapping[str, Value]) ->
 def _spelled(drive: OfflineDrive, parameter: Parameter, value: Value) -> str:
     """Return a value with its unit, and as the display of the drive shows it."""
     text = shown(value, parameter.unit)
-    spell = drive.model.profile.spelled.get(parameter.key)
-    spelled = spell(int(value)) if spell is not None else ''
+    spelled = drive.model.spelled(parameter.key, value)
     return f'{text} ({spelled})' if spelled else text
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib import metadata
 import signal
@@ -94,8 +94,10 @@ class Load(Verb):
         """Put saved settings into the drive; only what differs is written."""
         file = read_file(options.file)
         # what another model has is refused before anything is asked of the drive
-        settings = {parameter.key for parameter in load_family(options.model).settings}
+        model = load_family(options.model)
+        settings = {parameter.key for parameter in model.settings}
         require_names(file.values, settings, options.model, _NOTHING)
+        file = _meant(file, model)
         with Session(options, writes=not options.dry_run) as session:
             drive = session.drive()
             identity = drive.identify()
@@ -120,6 +122,15 @@ class Load(Verb):
             Loading(drive, data, options).run()
         remark(f'{count} written and read back')
         return 0
+
+
+def _meant(file: ParameterFile, model: Family) -> ParameterFile:
+    """Return a file with its values as they were meant for a model."""
+    values = {
+        key: model[key].meant(value) if key in model else value
+        for key, value in file.values.items()
+    }
+    return replace(file, values=values)
 
 
 def _header(drive: OfflineDrive, identity: Identity) -> dict[str, str]:
@@ -361,12 +372,13 @@ class Diff(Verb):
 
 
 def _sides(options: argparse.Namespace) -> tuple[_Side, _Side]:
-    files, against = options.files, options.against
+    against = options.against
+    files = [_meant(read_file(name), load_family(options.model)) for name in options.files]
     if len(files) == 2 and against is None:
-        one, other = (read_file(name) for name in files)
+        one, other = files
         return _side(one), _side(other)
     if len(files) == 1 and against is None:
-        return _with_drive(read_file(files[0]), options)
+        return _with_drive(files[0], options)
     if not files and against is not None:
         if against == options.address:
             raise UsageError(f'--against {against}: that is the same drive')

@@ -69,6 +69,7 @@ PROFILE = Profile(
     holders={},
     methods={'telegram1': HTelegram1},
     setpoints=method.setpoints(327.67, forward_only=True),
+    bit_fields=method.BIT_FIELDS | {'telegram.alarm_info'},
     active_method=method.active_method,
     writes_and_reads=True,
     # the operation command and STW1 [M3 §7.2.1]

@@ -522,12 +522,14 @@ def test_a_movitrac_says_who_it_is_what_it_shows_and_what_its_faults_were(
     with bench.simulator.lock:
         bench.drive().memory.put('status.fieldbus_type', 200)
         bench.drive().trip(101)
-        word = bench.drive().peek('fieldbus.inverter_status')
+        word = int(bench.drive().peek('fieldbus.inverter_status'))
     shown = bench.run('info').out
     assert 'MOVITRAC 31C015-503-4-00' in shown and '821 123 4.11' in shown
     names = 'option_x20', 'fieldbus_type', 'stop_setpoint_1_n2', 'output_stage'
     done = bench.run('get', *(f'status.{name}' for name in names), 'fieldbus.inverter_status')
     shown = [line.split(None, 1)[1] for line in done.out.splitlines()]
-    assert shown == ['FF. (Fieldbus)', 'INTERBUS-S', '0', '31C015-503-4-00', str(word)]
+    bits = ', '.join(str(bit) for bit in range(32) if word >> bit & 1)
+    shown_word = f'{word} ({word:08X}h: bits {bits})'
+    assert shown == ['FF. (Fieldbus)', 'INTERBUS-S', '0', '31C015-503-4-00', shown_word]
     done = bench.run('errors')
     assert done.status == 0 and 'Overcurrent (DC link ' in done.out
