@@ -63,14 +63,18 @@ class Info(Verb):
             mode = _measure_roles(drive, [Role.CONTROL_MODE])
             nameplate = _measure_roles(drive, _NAMEPLATE)
             hours = _measure_roles(drive, _COUNTERS)
+            told = drive.model.profile.module
+            module = _measure(drive, filter(drive.params.reaches, told))
             facts = {
                 'address': str(drive.address),
                 'port': options.port,
                 'model': drive.model.name,
+                'family': drive.model.profile.title,
                 'product': identity.model,
                 'vendor': identity.vendor,
                 'firmware': identity.versions,
                 'serial number': identity.serial,
+                **({'module': ', '.join(told[key](module[key]) for key in module)} if told else {}),
                 'status': f'{drive.state.describe()} ({status.listed.description})',
                 'state': status.state.name.lower().replace('_', ' '),
                 'control mode': ''.join(mode.values()),
