@@ -372,13 +372,13 @@ class Diff(Verb):
 
 
 def _sides(options: argparse.Namespace) -> tuple[_Side, _Side]:
-    against = options.against
-    files = [_meant(read_file(name), load_family(options.model)) for name in options.files]
+    files, against = options.files, options.against
+    model = load_family(options.model)
     if len(files) == 2 and against is None:
-        one, other = files
+        one, other = (_meant(read_file(name), model) for name in files)
         return _side(one), _side(other)
     if len(files) == 1 and against is None:
-        return _with_drive(files[0], options)
+        return _with_drive(_meant(read_file(files[0]), model), options)
     if not files and against is not None:
         if against == options.address:
             raise UsageError(f'--against {against}: that is the same drive')
