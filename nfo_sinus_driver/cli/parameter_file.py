@@ -11,7 +11,7 @@ whose parameters these are; a file without one, such as ``ros2 param dump`` writ
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 import contextlib
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -25,7 +25,7 @@ from typing import Any
 
 import yaml
 
-from nfo_sinus_driver.catalog import Family, Parameter, Value
+from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
 from nfo_sinus_driver.cli.console import CliError, listed, put
 from nfo_sinus_driver.drive.parameter_writer import show
 
@@ -223,6 +223,8 @@ def _one_line(text: str) -> str:
     return ' '.join(''.join(c if c.isprintable() else ' ' for c in text).split())
 
 
+#: The end of what is said where nothing could be written.
+NOTHING = ', nothing was written'
 _SWITCH = {'on': True, 'true': True, 'off': False, 'false': False}
 #: Why a setting of the line is left alone.
 BARRED = (
@@ -274,17 +276,35 @@ def readable(model: Family) -> Mapping[str, Parameter]:
     return {parameter.key: parameter for parameter in model.values() if parameter.is_readable}
 
 
+def require_settings(names: Iterable[str], model: Family) -> Mapping[str, Parameter]:
+    """Return the settings of a model by name; ensure that all names are of these, to be written."""
+    settings = {parameter.key: parameter for parameter in model.settings}
+    strange = [name for name in dict.fromkeys(names) if name not in settings]
+    others = [model[name] for name in strange if name in model]
+    if others:
+        lines = (
+            f'{one.key} is only read: nfo-sinus get shows it'
+            if one.access is Access.READ
+            else f'{one.key} is no setting: the driver itself writes it'
+            for one in others
+        )
+        raise CliError(listed(f'nothing was written to the {model.name}:', lines))
+    require_names(names, settings, model.name, NOTHING)
+    return settings
+
+
 def require_names(names: Iterable[str], known: Iterable[str], whose: str, end: str = '') -> None:
     """Ensure that all names are known; those that are not are listed."""
     known = list(known)
     strange = [name for name in dict.fromkeys(names) if name not in known]
     if strange:
         what = 'no parameter of this name' if len(strange) == 1 else 'no parameters of these names'
-        lines = (f'{name}{_did_you_mean(name, known)}' for name in strange)
+        lines = (f'{name}{did_you_mean(name, known)}' for name in strange)
         raise CliError(listed(f'{whose} has {what}{end}:', lines))
 
 
-def _did_you_mean(name: str, known: list[str]) -> str:
+def did_you_mean(name: str, known: Collection[str]) -> str:
+    """Return a question for the known names that are close to one; ``''``: there is none."""
     bare = _bare(name)
     close = [key for key in known if _bare(key) == bare]
     close = close or difflib.get_close_matches(name.lower(), known, n=2)

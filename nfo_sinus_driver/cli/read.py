@@ -29,10 +29,12 @@ from nfo_sinus_driver.cli.control_session import control_session
 from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, change, count
 from nfo_sinus_driver.cli.parameter_file import (
     BARRED,
+    NOTHING,
     is_barred,
     parse_value,
     readable,
     require_names,
+    require_settings,
     same,
     shown,
 )
@@ -302,8 +304,7 @@ class Set(Verb):
             raise UsageError(f'{", ".join(twice)} is given twice')
         with Session(options, writes=True) as session:
             drive = session.drive()
-            settings = {parameter.key: parameter for parameter in drive.model.settings}
-            require_names(times, settings, drive.model.name, ', nothing was written')
+            settings = require_settings(times, drive.model)
             wanted, wrong = {}, []
             for name, text in options.changes:
                 try:
@@ -313,7 +314,7 @@ class Set(Verb):
             if not wrong:
                 drive.identify(thoroughly=False)
                 values = drive.read(wanted)
-                require_names(wanted, values, str(drive), ', nothing was written')
+                require_names(wanted, values, str(drive), NOTHING)
                 for name, value in wanted.items():
                     try:
                         exact = drive.parameters.coerce(name, value)

@@ -31,11 +31,13 @@ from nfo_sinus_driver.cli.console import (
 )
 from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, address, command_line
 from nfo_sinus_driver.cli.parameter_file import (
+    NOTHING,
     ParameterFile,
     format_file,
     is_barred,
     read_file,
     require_names,
+    require_settings,
     same,
     shown,
     write_file,
@@ -43,8 +45,6 @@ from nfo_sinus_driver.cli.parameter_file import (
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, Identity
 from nfo_sinus_driver.drive.parameter_writer import ParameterChange, ParameterError, shown_raw
-
-_NOTHING = ', nothing was written'
 
 
 class Dump(Verb):
@@ -95,8 +95,7 @@ class Load(Verb):
         file = read_file(options.file)
         # what another model has is refused before anything is asked of the drive
         model = load_family(options.model)
-        settings = {parameter.key for parameter in model.settings}
-        require_names(file.values, settings, options.model, _NOTHING)
+        require_settings(file.values, model)
         file = _meant(file, model)
         with Session(options, writes=not options.dry_run) as session:
             drive = session.drive()
@@ -104,7 +103,7 @@ class Load(Verb):
             for note in _notes(file, drive, identity):
                 remark(note)
             values = drive.read(file.values)
-            require_names(file.values, drive.parameters.data, str(drive), _NOTHING)
+            require_names(file.values, drive.parameters.data, str(drive), NOTHING)
             data = _differing(file, drive, options)
             for key in data:
                 # as bytes where they mean nothing
@@ -191,7 +190,7 @@ def _differing(
         else:
             found[key] = data
     if wrong:
-        raise CliError(listed(f'{file.name} has what this drive cannot have{_NOTHING}:', wrong))
+        raise CliError(listed(f'{file.name} has what this drive cannot have{NOTHING}:', wrong))
     if kept:
         remark(_left_as_it_is(file, drive, kept))
     return found
@@ -210,7 +209,7 @@ def _require_standstill(drive: OfflineDrive, data: Mapping[str, bytes]) -> None:
     """Ensure that what only a standing motor allows is not tried while it runs."""
     keys = [key for key in data if drive.model.needs_standstill(key)]
     if keys and drive.read_status().driven:
-        head = f'the motor runs ({drive.state.describe()}), and these need it stopped{_NOTHING}:'
+        head = f'the motor runs ({drive.state.describe()}), and these need it stopped{NOTHING}:'
         raise CliError(listed(head, keys))
 
 

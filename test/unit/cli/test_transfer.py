@@ -100,13 +100,14 @@ def test_set(nfo: Nfo, bench: Bench) -> None:
 @pytest.mark.parametrize(
     ('change', 'says'),
     [
+        ('status.frq_act=5', 'status.frq_act is only read: nfo-sinus get shows it'),
         ('control.retard=900', 'out of range, 0.2 to 500 s'),
         ('control.retard=soon', "'soon' is not a number"),
         ('control.retard=5.00001', 'between two steps'),
         ('control.mode=Sped', 'Freque, PI-Reg, Torque, Speed'),
         ('control.auto_start=1', 'OFF, ON'),
         ('control.retart=5', 'did you mean control.retard'),
-        ('fieldbus.mode=2', 'fieldbus.mode'),
+        ('fieldbus.mode=2', 'fieldbus.mode is no setting: the driver itself writes it'),
         ('serial.address=2', '--allow-communication-changes'),
     ],
 )

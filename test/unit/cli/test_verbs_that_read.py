@@ -162,7 +162,7 @@ def test_there_is_no_such_port(nfo: Nfo) -> None:
 @pytest.mark.parametrize(
     ('arguments', 'text'),
     [
-        (['scream'], 'invalid choice'),
+        (['scream'], 'there is no verb scream'),
         ([], 'VERB'),
         (['get'], 'NAME'),
         (['info', '--address', '248'], 'allowed are 0 to 247'),
@@ -298,6 +298,19 @@ def test_scan_writes_a_parameter_file_for_the_driver(
     assert nfo(*arguments, '--force').status == 0
     assert 'drive_2' in file.read_text()
     assert bench.writes() == []
+
+
+def test_scan_names_a_folder_for_a_file_before_it_asks_any_drive(
+    nfo: Nfo, bench: Bench, tmp_path: Path
+) -> None:
+    for more in ([], ['--force']):
+        done = nfo('scan', '--addresses', '1', '--params', tmp_path, *more)
+        assert done.status == 1
+        such = tmp_path / 'line.yaml'
+        assert f'{tmp_path} is a folder: name a file in it, such as {such}' in done.err
+    done = nfo('scan', '--addresses', '1', '--params', tmp_path / 'none' / 'line.yaml')
+    assert done.status == 1 and f'there is no folder {tmp_path}/none' in done.err
+    assert bench.requests() == []
 
 
 def test_scan_writes_the_file_to_the_standard_output_alone(nfo: Nfo) -> None:
