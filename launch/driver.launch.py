@@ -31,7 +31,9 @@ from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
 from nfo_sinus_driver.launch_arguments import (
+    exit_timeout,
     fail_with_driver,
+    log_level,
     number,
     parameter_file,
     written,
@@ -66,7 +68,11 @@ def generate_launch_description():
             ),
             declare('namespace', default_value='', description='namespace of all nodes'),
             *overrides,
-            declare('log_level', default_value='info', description='debug, info, warn or error'),
+            declare(
+                'log_level',
+                default_value='info',
+                description='debug, info, warn, error or fatal',
+            ),
             declare(
                 'exit_timeout',
                 default_value='15',
@@ -85,7 +91,8 @@ def _start_driver(context):
         return LaunchConfiguration(name).perform(context)
 
     # all of it before the driver is started
-    exit_timeout = str(number('exit_timeout', given('exit_timeout')))
+    longest_end = str(exit_timeout(given('exit_timeout')))
+    level = log_level(given('log_level'))
     share = FindPackageShare('nfo_sinus_driver').perform(context)
     params_file = parameter_file(given('params_file'), Path(share) / 'config')
     overrides = _overrides(context)
@@ -97,12 +104,12 @@ def _start_driver(context):
             # a launch that fails or is killed leaves no process that stops the motors
             arguments=['--end-with', str(os.getpid())],
             parameters=[params_file, *overrides],
-            ros_arguments=['--log-level', LaunchConfiguration('log_level')],
+            ros_arguments=['--log-level', level],
             output='screen',
             respawn=False,
             # launch sends SIGINT, then SIGTERM, then SIGKILL, this far apart
-            sigterm_timeout=exit_timeout,
-            sigkill_timeout=exit_timeout,
+            sigterm_timeout=longest_end,
+            sigkill_timeout=longest_end,
             on_exit=fail_with_driver,
         )
     ]

@@ -20,6 +20,10 @@ Sections = dict[str, dict[str, dict[str, Any]]]
 
 #: As many as a line with RS-485 has addresses for.
 MOST_DRIVES = 247
+#: How much longer than shutdown_timeout the end of a driver may take, s.
+LEAST_EXIT = 10.0
+#: The levels of a log, as ROS has them.
+LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 
 
 def number(name: str, given: str, *, whole: bool = False) -> float:
@@ -36,6 +40,33 @@ def number(name: str, given: str, *, whole: bool = False) -> float:
         kind = 'a whole number' if whole else 'a number'
         raise ValueError(f'{name}:={given}: write {kind}')
     return value
+
+
+def exit_timeout(given: str) -> float:
+    """
+    Return how long the driver may take to stop its motors, s.
+
+    :raises ValueError: that is no number, or less than the driver may need to answer; the message
+        says what to write.
+    """
+    seconds = number('exit_timeout', given)
+    if seconds < LEAST_EXIT:
+        raise ValueError(
+            f'exit_timeout:={given}: write at least {LEAST_EXIT:g} more than the parameter '
+            'shutdown_timeout: launch kills a driver that takes longer, and its motors run on'
+        )
+    return seconds
+
+
+def log_level(given: str) -> str:
+    """
+    Return a level of the log, or NAME:=LEVEL for one logger.
+
+    :raises ValueError: there is no such level; the message names those that there are.
+    """
+    if given.rpartition(':=')[2].lower() not in LEVELS:
+        raise ValueError(f'log_level:={given}: write {", ".join(LEVELS[:-1])} or {LEVELS[-1]}')
+    return given
 
 
 def parameter_file(given: str, config: Path) -> str:

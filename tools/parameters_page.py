@@ -45,6 +45,8 @@ parameters of its node, and what it measures and is controlled by, which are
 
 How to read the tables:
 
+- **ROS parameter** and **Parameter** are the names to type, for `nfo-sinus get` and, of what can
+  only be read, for the driver's parameter `measured`, too; **Display** is the maker's name.
 - **Values** are in the unit beside them, on every bus. Where an end is open, or no range is
   printed, it depends on the inverter, or the manual does not say: the drive decides.
 - A number in parentheses is the code of a value in its register; `false` is 0 and `true` is 1.
@@ -250,7 +252,8 @@ _SETTING_COLUMNS: tuple[_Column, ...] = (
     ('Option', lambda row: row.option),
 )
 _OTHER_COLUMNS: tuple[_Column, ...] = (
-    ('Name', lambda row: row.name),
+    ('Parameter', lambda row: f'`{row.key}`'),
+    ('Display', lambda row: row.name),
     ('Meaning', lambda row: row.description),
     ('Access', lambda row: _ACCESS[row.access]),
     ('Values', _values),

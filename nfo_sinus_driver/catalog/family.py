@@ -153,6 +153,26 @@ class Family(Mapping[str, Parameter]):
         """The roles of the parameters that have one, by key."""
         return {key: role for role, key in self.roles.items()}
 
+    def spelled(self, key: str, value: Value) -> str:
+        """
+        Return what a tool shows beside the value of a parameter; ``''``: nothing.
+
+        As the display of the drive has it; or, where its bits mean something each, which are set.
+        """
+        spell = self.profile.spelled.get(key)
+        if spell is not None:
+            return spell(int(value))
+        by_bits = key in self.profile.bit_fields or self.role_of.get(key) is Role.STATUS_WORD
+        if not by_bits or not isinstance(value, int):
+            return ''
+        sizes = sorted(8 * address.codec.size for address in self[key].addresses.values())
+        # another bus may have it in more bits
+        size = next((one for one in sizes if abs(value) < 2**one), sizes[-1])
+        word = value % 2**size
+        bits = [str(bit) for bit in range(size) if word >> bit & 1]
+        named = f': bit{"s" * (len(bits) > 1)} {", ".join(bits)}' if bits else ''
+        return f'{word:0{size // 4}X}h{named}'
+
     def status_code(self, code: int) -> StatusCode:
         """Return what an inverter status code means; an unknown code is shown as its number."""
         found = self.status_codes.get(code)

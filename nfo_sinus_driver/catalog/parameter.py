@@ -39,6 +39,9 @@ class Access(enum.Enum):
 #: The labels that a switch has, in capitals, and what they say.
 _SWITCH = {'OFF': False, 'ON': True, 'NO': False, 'YES': True}
 
+#: What YAML takes for false and for true, in small letters.
+_SWITCH_WORDS = (('off', 'no', 'false'), ('on', 'yes', 'true'))
+
 #: The groups of the tables that hold no settings: what a drive measures, and what controls it.
 NO_SETTINGS = frozenset({'Status', 'Fieldbus'})
 
@@ -171,8 +174,11 @@ class Parameter:
 
     @property
     def is_measured(self) -> bool:
-        """Whether it is a number that the drive reports of itself, and no setting."""
-        return self.is_readable and not self.is_kept and self.kind in (int, float)
+        """Whether the drive reports it of itself, by a number or a label, and it is no setting."""
+        if not self.is_readable or self.is_setting:
+            return False
+        by_label = bool(self.labels) and self.access is Access.READ
+        return by_label or self.kind in (int, float)
 
     @property
     def is_setting(self) -> bool:
@@ -229,6 +235,35 @@ class Parameter:
         if self.kind is int:
             return raw
         return raw * factor.numerator / factor.denominator
+
+    def number_of(self, value: Value) -> float:
+        """
+        Return one of its values as a number: of a label the code.
+
+        :raises ValueError: it is a text.
+        """
+        if not isinstance(value, str):
+            return float(value)
+        codes = {label: code for code, label in self.labels.items()}
+        # a code that has no label is shown as its number
+        return float(codes.get(value, value))
+
+    def meant(self, value: Value) -> Value:
+        """
+        Return what was meant by a value, in the type of the parameter where there is one.
+
+        YAML makes a boolean of OFF and of Yes, which may be labels; a whole number may have a
+        point. What cannot be meant is returned as it is.
+        """
+        if self.kind is str and isinstance(value, bool):
+            words = _SWITCH_WORDS[value]
+            labels = [label for label in self.labels.values() if label.lower() in words]
+            return labels[0] if len(labels) == 1 else value
+        if self.kind is float and type(value) is int:
+            return float(value)
+        if self.kind is int and isinstance(value, float) and value.is_integer():
+            return int(value)
+        return value
 
     def encode(self, value: Value, protocol: str = 'modbus') -> bytes:
         """

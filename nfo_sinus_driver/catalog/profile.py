@@ -594,6 +594,9 @@ class Profile:
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
     :ivar spelled: by parameter, what a tool shows beside a number that the display of the drive
         shows otherwise; ``''``: nothing.
+    :ivar bit_fields: the parameters whose bits mean something each, beside the status word.
+    :ivar module: the parameters by which its fieldbus module says what it is, each with how that is
+        put into words.
     :ivar resync_reads: parameters that every drive of it has and that are safe to read at any time,
         by the protocol; a protocol that is not there reads others.
     :ivar why_refused: finds out why it refused a write over a protocol that does not say it; by a
@@ -646,6 +649,8 @@ class Profile:
     after_write: Sequence[Write | Wait] = ()
     pole_pairs: int = 0
     spelled: Mapping[str, Callable[[int], str]] = field(default_factory=dict)
+    bit_fields: frozenset[str] = frozenset()
+    module: Mapping[str, Callable[[Value], str]] = field(default_factory=dict)
     resync_reads: Mapping[str, Sequence[str]] = field(default_factory=dict)
     why_refused: Callable[[Callable[[str], int], int | None], tuple[int, str]] | None = None
     keeps_run: bool | None = None

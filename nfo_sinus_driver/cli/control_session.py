@@ -171,7 +171,12 @@ class ControlSession(Listener):
     # --- stopping -----------------------------------------------------------------------------
 
     def stop(self, *, quick: bool = False) -> bool:
-        """Stop the motor; true when the drive has confirmed it, else the operator is warned."""
+        """
+        Stop the motor; true when the drive has confirmed it, else the operator is warned.
+
+        What a late confirmation says is left to the caller, as that of a stop in time.
+        """
+        asked_at = time.monotonic()
         try:
             self.answer = self.finish(self.drive.quick_stop() if quick else self.drive.stop())
         except DriveError as error:
@@ -180,23 +185,27 @@ class ControlSession(Listener):
             if error.cause is Cause.NOT_RECOGNISED and not self.drive.stop_owed:
                 # nothing was written to it, and no stop is on its way
                 return False
-            return self.confirmed_late()
+            return self.confirmed_late(asked_at)
         return True
 
-    def confirmed_late(self) -> bool:
-        """Let a stop be retried for a while; true when the drive has confirmed it."""
+    def confirmed_late(self, asked_at: float) -> bool:
+        """
+        Let a stop be retried for a while; true when the drive has confirmed it.
+
+        :param asked_at: when it was requested, s, monotonic: an earlier status confirms nothing.
+        """
         self._session.last_tries(_LAST_TRIES)
         self._wait_while(lambda: self.drive.stop_unconfirmed, _LAST_TRIES)
-        if self.drive.stop_unconfirmed or self.drive.stop_overdue:
+        status = self.drive.state.status
+        confirmed = status is not None and status.at > asked_at
+        if self.drive.stop_unconfirmed or self.drive.stop_overdue or not confirmed:
             self.screen.say(
                 'ending WITHOUT a confirmed stop, the motor may still run: use the enable input or '
                 'the emergency stop; nfo-sinus stop tries again'
             )
             return False
-        snapshot = self.drive.snapshot
-        status = f'{snapshot.status.code} {snapshot.text}' if snapshot.status is not None else ''
-        self.answer = Report(Cause.STOP_CONFIRMED_LATE, status=status)
-        self.screen.say(say(self.answer))
+        # a drive that was lost has a status before it is polled again
+        self.answer = self.drive.state.report(Cause.STOP_CONFIRMED_LATE)
         return True
 
     def give_back(self, patience: float = math.inf) -> bool:

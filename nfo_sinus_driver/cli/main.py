@@ -10,8 +10,10 @@ from collections.abc import Sequence
 import inspect
 import io
 import os
+import re
 import signal
 import sys
+from typing import NoReturn
 
 from nfo_sinus_driver.cli.console import (
     CliError,
@@ -33,6 +35,7 @@ from nfo_sinus_driver.cli.options import (
     add_setting,
     take_family,
 )
+from nfo_sinus_driver.cli.parameter_file import did_you_mean
 from nfo_sinus_driver.cli.read import Errors, Get, Info, List, Set
 from nfo_sinus_driver.cli.run import Run
 from nfo_sinus_driver.cli.scan import Scan
@@ -46,7 +49,7 @@ from nfo_sinus_driver.version import VERSION
 _USAGE = 2
 _INTERRUPTED = 130
 _EPILOG = """
-Options may stand before and after the verb; "nfo-sinus VERB --help" lists those of a verb.
+Options may stand before and after the verb; "nfo-sinus VERB --help" lists those of a verb alone.
 Reading never changes anything in a drive, and a motor that runs runs on; not so on canopen, where
 the first request gives the bus control, and a motor that the terminals run stops: it asks before.
 """
@@ -122,7 +125,14 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         # a shell asks how a line may go on; loaded for that alone
         import argcomplete
 
-        argcomplete.autocomplete(parser)
+        # those of the line are not in the help of each verb
+        argcomplete.autocomplete(parser, print_suppressed=True)
+    if not arguments:
+        parser.print_help(sys.stderr)
+        parser.exit(_USAGE)
+    if arguments[0] == 'help':
+        arguments = [*arguments[1:], '--help']
+    parser.require_options(arguments)
     options = parser.parse_args(arguments)
     try:
         take_family(options)
@@ -142,25 +152,69 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> _Parser:
     """Return the parser of the whole command."""
     # without a default the one behind the verb does not overrule the one in front of it
-    common = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
-    group = common.add_argument_group('line and drive, as the parameters of the driver')
-    for name in LINE_AND_DRIVE:
-        add_setting(group, name, f'--{name.replace("_", "-")}')
-    add_flag(group, '--yes', 'do it without asking')
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog='nfo-sinus', description='Looks after frequency inverters on a serial line.',
-        epilog=_EPILOG, parents=[common],
+        usage='nfo-sinus [OPTION]... VERB ...', epilog=_EPILOG, add_help=False,
+        argument_default=argparse.SUPPRESS,
     )
-    parser.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
-    verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True, title='verbs')
+    verbs = parser.add_subparsers(
+        dest='verb', metavar='VERB', required=True, title='verbs', prog=parser.prog
+    )
+    _add_line(parser)
+    others = parser.add_argument_group('other options')
+    others.add_argument('-h', '--help', action='help', help='show this help, and end')
+    others.add_argument('--version', action='version', version=f'nfo_sinus_driver {VERSION}')
+    common = _Parser(add_help=False, argument_default=argparse.SUPPRESS)
+    _add_line(common, help=argparse.SUPPRESS)
     for name, verb in VERBS.items():
         text = inspect.getdoc(verb) or ''
         short = text[:1].lower() + text[1:].removesuffix('.')
-        made = verbs.add_parser(name, help=short, description=text, parents=[common])
+        made = verbs.add_parser(
+            name, help=short, description=text, parents=[common],
+            epilog='The options of line and drive, such as --port: nfo-sinus --help',
+        )
         if verb.json:
             add_flag(made, '--json', 'print JSON, for a script')
         verb.add_arguments(made)
     return parser
+
+
+def _add_line(parser: argparse.ArgumentParser, **more: str) -> None:
+    """Add the options of line and drive; what more is given replaces what they have."""
+    group = parser.add_argument_group('line and drive, as the parameters of the driver')
+    for name in LINE_AND_DRIVE:
+        add_setting(group, name, f'--{name.replace("_", "-")}', **more)
+    add_flag(group, '--yes', more.get('help', 'do it without asking'))
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong, and what may have been meant."""
+
+    def error(self, message: str) -> NoReturn:
+        """End the program."""
+        wrong = re.search(r"VERB: invalid choice: '([^']*)'", message)
+        if wrong:
+            message = f'there is no verb {wrong[1]}{did_you_mean(wrong[1], VERBS)}; nfo-sinus help'
+        self.exit(_USAGE, f'{self.prog}: error: {message}\n')
+
+    @property
+    def options(self) -> set[str]:
+        """Every option of this parser and of the verbs."""
+        parsers: list[argparse.ArgumentParser] = [self]
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                parsers += action.choices.values()
+        return {option for one in parsers for option in one._option_string_actions}
+
+    def require_options(self, words: Sequence[str]) -> None:
+        """Make sure that there are all options that were typed, or shortened, as argparse does."""
+        known = self.options
+        for word in words:
+            name = word.partition('=')[0]
+            if word == '--':
+                return
+            if name.startswith('--') and not any(one.startswith(name) for one in known):
+                self.error(f'there is no option {name}{did_you_mean(name, known)}')

@@ -160,6 +160,8 @@ def addresses(text: str) -> tuple[int, ...]:
     found: set[int] = set()
     for part in text.split(','):
         first, dash, last = part.partition('-')
+        if not (first.isdecimal() and (last.isdecimal() or not dash)):
+            raise argparse.ArgumentTypeError(f'{text} is no list of addresses, such as 1-10,20')
         span = range(address(first), address(last if dash else first) + 1)
         if not span:
             raise argparse.ArgumentTypeError(f'{text} is no list of addresses, such as 1-10,20')

@@ -11,7 +11,7 @@ whose parameters these are; a file without one, such as ``ros2 param dump`` writ
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 import contextlib
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -25,7 +25,7 @@ from typing import Any
 
 import yaml
 
-from nfo_sinus_driver.catalog import Family, Parameter, Value
+from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
 from nfo_sinus_driver.cli.console import CliError, listed, put
 from nfo_sinus_driver.drive.parameter_writer import show
 
@@ -223,6 +223,8 @@ def _one_line(text: str) -> str:
     return ' '.join(''.join(c if c.isprintable() else ' ' for c in text).split())
 
 
+#: The end of what is said where nothing could be written.
+NOTHING = ', nothing was written'
 _SWITCH = {'on': True, 'true': True, 'off': False, 'false': False}
 #: Why a setting of the line is left alone.
 BARRED = (
@@ -252,26 +254,43 @@ def parse_value(parameter: Parameter, text: str) -> Value:
     """Turn what was typed for a parameter into its value; a ValueError says what can be."""
     if parameter.kind is bool and text.lower() in _SWITCH:
         return _SWITCH[text.lower()]
-    if parameter.labels:
+    choices = ', '.join(parameter.labels.values())
+    if parameter.labels and parameter.kind is not int:
         labels = {label.lower(): label for label in parameter.labels.values()}
         if text.lower() not in labels:
-            choices = ', '.join(parameter.labels.values())
             raise ValueError(f'{parameter.key}: {text!r} is none of {choices}')
-        label = labels[text.lower()]
-        return int(label) if parameter.kind is int else label
+        return labels[text.lower()]
     try:
         return int(text, 10)
     except ValueError:
         pass
     try:
-        return float(text)
+        return parameter.meant(float(text))
     except ValueError:
-        raise ValueError(f'{parameter.key}: {text!r} is not a number') from None
+        wanted = f'none of {choices}' if choices else 'not a number'
+        raise ValueError(f'{parameter.key}: {text!r} is {wanted}') from None
 
 
 def readable(model: Family) -> Mapping[str, Parameter]:
     """Return what this tool shows when asked for it by name: what can be read without effect."""
     return {parameter.key: parameter for parameter in model.values() if parameter.is_readable}
+
+
+def require_settings(names: Iterable[str], model: Family) -> Mapping[str, Parameter]:
+    """Return the settings of a model by name; ensure that all names are of these, to be written."""
+    settings = {parameter.key: parameter for parameter in model.settings}
+    strange = [name for name in dict.fromkeys(names) if name not in settings]
+    others = [model[name] for name in strange if name in model]
+    if others:
+        lines = (
+            f'{one.key} is only read: nfo-sinus get shows it'
+            if one.access is Access.READ
+            else f'{one.key} is no setting: the driver itself writes it'
+            for one in others
+        )
+        raise CliError(listed(f'nothing was written to the {model.name}:', lines))
+    require_names(names, settings, model.name, NOTHING)
+    return settings
 
 
 def require_names(names: Iterable[str], known: Iterable[str], whose: str, end: str = '') -> None:
@@ -280,11 +299,12 @@ def require_names(names: Iterable[str], known: Iterable[str], whose: str, end: s
     strange = [name for name in dict.fromkeys(names) if name not in known]
     if strange:
         what = 'no parameter of this name' if len(strange) == 1 else 'no parameters of these names'
-        lines = (f'{name}{_did_you_mean(name, known)}' for name in strange)
+        lines = (f'{name}{did_you_mean(name, known)}' for name in strange)
         raise CliError(listed(f'{whose} has {what}{end}:', lines))
 
 
-def _did_you_mean(name: str, known: list[str]) -> str:
+def did_you_mean(name: str, known: Collection[str]) -> str:
+    """Return a question for the known names that are close to one; ``''``: there is none."""
     bare = _bare(name)
     close = [key for key in known if _bare(key) == bare]
     close = close or difflib.get_close_matches(name.lower(), known, n=2)

@@ -30,10 +30,12 @@ from nfo_sinus_driver.cli.control_session import control_session
 from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, change, count
 from nfo_sinus_driver.cli.parameter_file import (
     BARRED,
+    NOTHING,
     is_barred,
     parse_value,
     readable,
     require_names,
+    require_settings,
     same,
     shown,
 )
@@ -69,14 +71,18 @@ class Info(Verb):
             mode = _measure_roles(drive, [Role.CONTROL_MODE])
             nameplate = _measure_roles(drive, _NAMEPLATE)
             hours = _measure_roles(drive, _COUNTERS)
+            told = drive.model.profile.module
+            module = _measure(drive, filter(drive.params.reaches, told))
             facts = {
                 'address': str(drive.address),
                 'port': options.port,
                 'model': drive.model.name,
+                'family': drive.model.profile.title,
                 'product': identity.model,
                 'vendor': identity.vendor,
                 'firmware': identity.versions,
                 'serial number': identity.serial,
+                **({'module': ', '.join(told[key](module[key]) for key in module)} if told else {}),
                 'status': f'{drive.state.describe()} ({status.listed.description})',
                 'state': status.state.name.lower().replace('_', ' '),
                 'control mode': ''.join(mode.values()),
@@ -218,8 +224,7 @@ def _put_values(wanted: Mapping[str, Parameter], values: Mapping[str, Value]) ->
 def _spelled(drive: OfflineDrive, parameter: Parameter, value: Value) -> str:
     """Return a value with its unit, and as the display of the drive shows it."""
     text = shown(value, parameter.unit)
-    spell = drive.model.profile.spelled.get(parameter.key)
-    spelled = spell(int(value)) if spell is not None else ''
+    spelled = drive.model.spelled(parameter.key, value)
     return f'{text} ({spelled})' if spelled else text
 
 
@@ -305,8 +310,7 @@ class Set(Verb):
             raise UsageError(f'{", ".join(twice)} is given twice')
         with Session(options, writes=True) as session:
             drive = session.drive()
-            settings = {parameter.key: parameter for parameter in drive.model.settings}
-            require_names(times, settings, drive.model.name, ', nothing was written')
+            settings = require_settings(times, drive.model)
             wanted, wrong = {}, []
             for name, text in options.changes:
                 try:
@@ -316,7 +320,7 @@ class Set(Verb):
             if not wrong:
                 drive.identify(thoroughly=False)
                 values = drive.read(wanted)
-                require_names(wanted, values, str(drive), ', nothing was written')
+                require_names(wanted, values, str(drive), NOTHING)
                 for name, value in wanted.items():
                     try:
                         exact = drive.parameters.coerce(name, value)

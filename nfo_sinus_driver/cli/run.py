@@ -21,7 +21,8 @@ from nfo_sinus_driver.cli.control_session import (
 )
 from nfo_sinus_driver.cli.options import SETTINGS, Verb, add_setting, duration, period, setpoint
 from nfo_sinus_driver.cli.screen import as_facts, as_line
-from nfo_sinus_driver.drive import Cause, DriveError
+from nfo_sinus_driver.drive import Cause, DriveError, Report
+from nfo_sinus_driver.drive.diagnosis import explain_fault
 from nfo_sinus_driver.drive.settings import REFERENCES
 from nfo_sinus_driver.drive.starting import read_limits
 
@@ -35,6 +36,8 @@ _LONGEST_STOP = 5.0
 _SHUTDOWN_TIMEOUT = 4.0
 #: Why a motor follows set-points no more.
 _ENDS = (Cause.STOPPED_BECAUSE, Cause.STOPPED_BECAUSE_OF_FAULT, Cause.LOST, Cause.LOST_IN_USE)
+#: What names the fault of a drive, and what to do.
+_NAMES_FAULT = (Cause.FAULT_APPEARED, Cause.STOPPED_BECAUSE_OF_FAULT)
 _FAILED = 1
 #: Settings of a drive that may be given for one run: how they are typed, and what they mean here.
 _SETTINGS: tuple[tuple[str, str, dict[str, Any]], ...] = (
@@ -253,11 +256,20 @@ class _Run:
                 confirmed = not self._drive.stop_waits
                 if given_back and control.answer != stop:
                     control.screen.say(say(control.answer))
+                self._name_fault()
         finally:
             if self._options.json:
                 facts = {'ended': why, 'stop_confirmed': confirmed, 'stop': say(control.answer)}
                 control.screen.put(as_json(facts))
         return confirmed
+
+    def _name_fault(self) -> None:
+        """Say which fault is active and what to do, where no poll came to report it."""
+        state = self._drive.state
+        reported = any(report.cause in _NAMES_FAULT for report in self._control.reported)
+        if state.status is not None and state.status.faulted and not reported:
+            fault = explain_fault(state, state.status)
+            self._control.screen.say(say(Report(Cause.FAULT_APPEARED, fault=fault)))
 
     def _show(self) -> None:
         now = time.monotonic()

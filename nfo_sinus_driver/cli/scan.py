@@ -262,7 +262,13 @@ _OF_A_DRIVE = ('control_method', 'block_address', 'telegram_words')
 
 
 def _require_new(name: str, *, force: bool) -> None:
-    """Ensure that no file is replaced that may have been edited since."""
+    """Ensure that it can be written, and replaces no file that may have been edited since."""
+    folder = os.path.dirname(name)
+    if os.path.isdir(name):
+        such = os.path.join(name, 'line.yaml')
+        raise CliError(f'{name} is a folder: name a file in it, such as {such}')
+    if folder and not os.path.isdir(folder):
+        raise CliError(f'{name} cannot be written: there is no folder {folder}')
     if name != STANDARD and not force and os.path.lexists(name):
         raise CliError(f'{name} exists already: choose another name, or say --force to replace it')
 

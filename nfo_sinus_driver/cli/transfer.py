@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib import metadata
 import signal
@@ -31,11 +31,13 @@ from nfo_sinus_driver.cli.console import (
 )
 from nfo_sinus_driver.cli.options import Verb, add_allow, add_flag, address, command_line
 from nfo_sinus_driver.cli.parameter_file import (
+    NOTHING,
     ParameterFile,
     format_file,
     is_barred,
     read_file,
     require_names,
+    require_settings,
     same,
     shown,
     write_file,
@@ -43,8 +45,6 @@ from nfo_sinus_driver.cli.parameter_file import (
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, Identity
 from nfo_sinus_driver.drive.parameter_writer import ParameterChange, ParameterError, shown_raw
-
-_NOTHING = ', nothing was written'
 
 
 class Dump(Verb):
@@ -94,15 +94,16 @@ class Load(Verb):
         """Put saved settings into the drive; only what differs is written."""
         file = read_file(options.file)
         # what another model has is refused before anything is asked of the drive
-        settings = {parameter.key for parameter in load_family(options.model).settings}
-        require_names(file.values, settings, options.model, _NOTHING)
+        model = load_family(options.model)
+        require_settings(file.values, model)
+        file = _meant(file, model)
         with Session(options, writes=not options.dry_run) as session:
             drive = session.drive()
             identity = drive.identify()
             for note in _notes(file, drive, identity):
                 remark(note)
             values = drive.read(file.values)
-            require_names(file.values, drive.parameters.data, str(drive), _NOTHING)
+            require_names(file.values, drive.parameters.data, str(drive), NOTHING)
             data = _differing(file, drive, options)
             for key in data:
                 # as bytes where they mean nothing
@@ -120,6 +121,15 @@ class Load(Verb):
             Loading(drive, data, options).run()
         remark(f'{count} written and read back')
         return 0
+
+
+def _meant(file: ParameterFile, model: Family) -> ParameterFile:
+    """Return a file with its values as they were meant for a model."""
+    values = {
+        key: model[key].meant(value) if key in model else value
+        for key, value in file.values.items()
+    }
+    return replace(file, values=values)
 
 
 def _header(drive: OfflineDrive, identity: Identity) -> dict[str, str]:
@@ -180,7 +190,7 @@ def _differing(
         else:
             found[key] = data
     if wrong:
-        raise CliError(listed(f'{file.name} has what this drive cannot have{_NOTHING}:', wrong))
+        raise CliError(listed(f'{file.name} has what this drive cannot have{NOTHING}:', wrong))
     if kept:
         remark(_left_as_it_is(file, drive, kept))
     return found
@@ -199,7 +209,7 @@ def _require_standstill(drive: OfflineDrive, data: Mapping[str, bytes]) -> None:
     """Ensure that what only a standing motor allows is not tried while it runs."""
     keys = [key for key in data if drive.model.needs_standstill(key)]
     if keys and drive.read_status().driven:
-        head = f'the motor runs ({drive.state.describe()}), and these need it stopped{_NOTHING}:'
+        head = f'the motor runs ({drive.state.describe()}), and these need it stopped{NOTHING}:'
         raise CliError(listed(head, keys))
 
 
@@ -362,11 +372,12 @@ class Diff(Verb):
 
 def _sides(options: argparse.Namespace) -> tuple[_Side, _Side]:
     files, against = options.files, options.against
+    model = load_family(options.model)
     if len(files) == 2 and against is None:
-        one, other = (read_file(name) for name in files)
+        one, other = (_meant(read_file(name), model) for name in files)
         return _side(one), _side(other)
     if len(files) == 1 and against is None:
-        return _with_drive(read_file(files[0]), options)
+        return _with_drive(_meant(read_file(files[0]), model), options)
     if not files and against is not None:
         if against == options.address:
             raise UsageError(f'--against {against}: that is the same drive')

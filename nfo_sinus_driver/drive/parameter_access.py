@@ -226,10 +226,8 @@ class ParameterAccess:
         return highest if highest < self.model[key].span(self.protocol)[1] else None
 
     def number(self, key: str, data: bytes) -> float:
-        """Return the number that bytes mean."""
-        value = self.value(key, data)
-        assert not isinstance(value, str), key
-        return float(value)
+        """Return the number that bytes mean; of a value with labels, its code."""
+        return self.model[key].number_of(self.value(key, data))
 
     async def read(self, key: str, priority: Priority, *, retry: bool = True) -> Value:
         """Read a parameter."""

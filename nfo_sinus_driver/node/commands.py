@@ -303,30 +303,33 @@ class TuningServices:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             requested_at = received_at()
             call = Call(self._node, name)
-            # it may take minutes, and its outcome is reported anyway
-            call.log()
-            tune = _and_find(
-                call,
-                lambda: self._managed.require_active().tune(procedure, requested_at=requested_at),
-            )
-            tuned = self._result(lambda: tune().result())
+            tuned = self._tune(call, procedure, requested_at)
             response.success = tuned.success
             response.message = self._managed.wording.say(tuned.report)
             return response
 
         return answer
 
-    def _result(self, tune: Callable[[], Tuned]) -> Tuned:
+    def _tune(
+        self,
+        call: Call,
+        procedure: Procedure,
+        requested_at: float,
+        goal: ServerGoalHandle | None = None,
+    ) -> Tuned:
+        """Tune, and log the call: as it begins, for it may take minutes, or why it does not."""
         try:
-            return tune()
+            return self._followed(call, procedure, requested_at, goal)
         except DriveError as error:
-            return Tuned(False, error.report, ())
+            why = error.report
         except NodeError as error:
-            return Tuned(False, Report(Cause.NOT_POSSIBLE, why=str(error)), ())
+            why = Report(Cause.NOT_POSSIBLE, why=str(error))
         except Exception as error:
             # an exception that leaves a callback would end the executor
             _log.exception('error in a tuning of %s', self._node.get_fully_qualified_name())
-            return Tuned(False, Report(Cause.DRIVER_ERROR, error=str(error)), ())
+            why = Report(Cause.DRIVER_ERROR, error=str(error))
+        call.log(self._managed.wording.say(why), success=False)
+        return Tuned(False, why, ())
 
     def _on_goal(self, request: Tune.Goal) -> GoalResponse:
         if request.procedure in _PROCEDURES:
@@ -342,7 +345,9 @@ class TuningServices:
         goal.execute(functools.partial(self._execute, time.monotonic()))
 
     def _execute(self, requested_at: float, goal: ServerGoalHandle) -> Tune.Result:
-        tuned = self._result(lambda: self._followed(goal, requested_at))
+        procedure = _PROCEDURES[goal.request.procedure]
+        call = Call(self._node, '~/tune/_action/send_goal', procedure.name.lower())
+        tuned = self._tune(call, procedure, requested_at, goal)
         if tuned.success:
             goal.succeed()
         elif goal.is_cancel_requested:
@@ -355,23 +360,34 @@ class TuningServices:
             changed=[str(change) for change in tuned.changes],
         )
 
-    def _followed(self, goal: ServerGoalHandle, requested_at: float) -> Tuned:
-        procedure = _PROCEDURES[goal.request.procedure]
-        call = Call(self._node, '~/tune/_action/send_goal', procedure.name.lower())
-        call.log()
-        call.find()
-        drive = self._managed.require_active()
+    def _followed(
+        self,
+        call: Call,
+        procedure: Procedure,
+        requested_at: float,
+        goal: ServerGoalHandle | None,
+    ) -> Tuned:
         # the bus reports progress, and must not be kept waiting
         reports: queue.SimpleQueue[tuple[Snapshot, float]] = queue.SimpleQueue()
-        future = drive.tune(procedure, lambda *report: reports.put(report), requested_at)
-        cancelling = False
+
+        def tune() -> tuple[Drive, Future[Tuned]]:
+            drive = self._managed.require_active()
+            return drive, drive.tune(procedure, lambda *report: reports.put(report), requested_at)
+
+        drive, future = _and_find(call, tune)()
+        begun = cancelling = False
         while True:
             ended = future.done()
             while not reports.empty():
-                self._report(goal, *reports.get())
+                report = reports.get()
+                if not begun:
+                    begun = True
+                    call.log()
+                if goal is not None:
+                    self._report(goal, *report)
             if ended:
                 return future.result()
-            if goal.is_cancel_requested and not cancelling:
+            if goal is not None and goal.is_cancel_requested and not cancelling:
                 cancelling = True
                 drive.cancel_tuning()
             with contextlib.suppress(FutureTimeoutError):

@@ -70,11 +70,17 @@ def _descriptor(one: Setting) -> ParameterDescriptor:
 
 
 def _coerced(one: Setting, given: object) -> SettingValue:
-    """Return a value in the type of its setting: 5 as 5.0, and 8E1, eighty in YAML, as text."""
+    """
+    Return a value in the type of its setting.
+
+    An integer for a double is taken, and so is 5.0 for 5; 8E1, eighty in YAML, is a text.
+    """
     value = given
     wanted = type(one.default)
     if type(given) is int and wanted is float:
         value = float(given)
+    elif isinstance(given, float) and wanted is int and given.is_integer():
+        value = int(given)
     elif type(given) is float and one.name == 'char_format':
         value = _FORMATS_THAT_ARE_NUMBERS.get(given, given)
     if type(value) is not wanted or not _only_strings(value):
@@ -103,8 +109,6 @@ def _as(wanted: type, given: object) -> str:
             return f'{given} without quotes' if given == plain else plain
     if wanted is str and type(given) in (int, float):
         return f"'{given}' with quotes"
-    if wanted is int and isinstance(given, float) and given.is_integer():
-        return f'{given:.0f}'
     return _TYPES[wanted][1]
 
 

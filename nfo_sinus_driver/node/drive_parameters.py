@@ -187,22 +187,19 @@ def in_time(future: Future[_T], seconds: float, what: str) -> _T:
 
 
 def coerce(parameter: CatalogParameter, given: object) -> Value:
-    """Return a value in the type of its parameter: 5 as 5.0, and the OFF of YAML as OFF."""
-    kind = parameter.kind
-    if kind is str and isinstance(given, bool):
-        switched = ('off', 'no') if not given else ('on', 'yes')
-        meant = [label for label in parameter.labels.values() if label.lower() in switched]
-        if meant:
-            return meant[0]
-    if kind is float and type(given) is int:
-        return float(given)
-    if type(given) is not kind:
-        wanted = _KINDS[kind]
-        if kind is str:
-            wanted = f'one of {", ".join(parameter.labels.values())}'
-        raise ValueError(f'{parameter.key}: {given!r} is given, but it takes {wanted}')
-    assert isinstance(given, (bool, int, float, str))
-    return given
+    """Return a value in the type of its parameter, as it was meant, or raise why not."""
+    meant = parameter.meant(given) if isinstance(given, Value) else given
+    if type(meant) is parameter.kind:
+        return meant
+    wanted = _KINDS[parameter.kind]
+    if _has_list(parameter):
+        wanted = f'one of {", ".join(parameter.labels.values())}'
+    raise ValueError(f'{parameter.key}: {given!r} is given, but it takes {wanted}')
+
+
+def _has_list(parameter: CatalogParameter) -> bool:
+    """Return whether a parameter takes some values alone; a switch is a boolean."""
+    return bool(parameter.labels) and parameter.kind is not bool
 
 
 def desired_config(node: Node, drive: Drive) -> dict[str, Value]:
@@ -258,7 +255,7 @@ def descriptor(drive: Drive, key: str, value: Value) -> ParameterDescriptor:
 
 
 def _constraints(parameter: CatalogParameter, model: Family) -> Iterator[str]:
-    if parameter.kind is str:
+    if _has_list(parameter):
         yield f'one of {", ".join(parameter.labels.values())}'
     if len(parameter.steps) > 1:
         yield f'steps of {parameter.shown_steps}'

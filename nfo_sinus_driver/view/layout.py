@@ -31,6 +31,8 @@ PERIOD = 0.25
 _PICTURES_A_COLUMN = 4
 _REMEMBERED = 600
 _MOST_NOTES = 50
+#: From here on it is said why a line is so busy, as a share of it.
+_FULL = 0.9
 #: From this width on the drive in full stands beside the table, which has so much of it.
 _WIDE = 120
 _TABLE_WIDTH = 79
@@ -381,7 +383,8 @@ def _figures(line: Figures) -> str:
     )
     parts = [f'{count} {what}' for count, what in counts if count]
     if not math.isnan(line.utilisation):
-        parts.append(f'{100 * line.utilisation:.0f} % used')
+        full = ' (polls fill the line by design)' if line.utilisation >= _FULL else ''
+        parts.append(f'{100 * line.utilisation:.0f} % used{full}')
     if not math.isnan(line.cycle_time):
         parts.append(f'cycle {1000 * line.cycle_time:.0f} ms')
     if not math.isnan(line.round_trip_median):

@@ -302,7 +302,7 @@ def untouched(
         (['-p', 'lost_after:="2e0"'], ["lost_after is '2e0' (a string): write 2.0\n"]),
         (['-p', 'address:=1_0'], ["address is '1_0' (a string): write 10\n"]),
         (['-p', 'lost_after:="2.0"'], ["lost_after is '2.0' (a string): write 2.0 without quotes"]),
-        (['-p', 'address:=2.0'], ['address is 2.0 (a double): write 2']),
+        (['-p', 'address:=2.5'], ['address is 2.5 (a double): write a whole number']),
         (['-p', 'frame_id:=7'], ["frame_id is 7 (an integer): write '7' with quotes"]),
         (['-p', 'rs485:="true"'], ["rs485 is 'true' (a string)", 'true without quotes']),
         (['-p', 'autostart:=1'], ['autostart is 1 (an integer): write true or false']),

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from bench import Bench, wait_until
 from connections import needs
+from nfo_sinus_msgs.action import Tune
 from std_srvs.srv import SetBool, Trigger
+from tuner import Tuner
 
 _TRIGGERS = (
     'stop', 'quick_stop', 'rapid_stop', 'fault_ack', 'refresh_parameters', 'erase_error_log',
@@ -31,6 +33,10 @@ def test_each_command_is_logged_once_with_the_name_of_its_client(bench: Bench) -
     simulator.inject('fault', 5)
     client.wait_for('inv_st', lambda inv_st: inv_st.code == 5, 'the fault')
     assert not client.call('enable', SetBool, data=True).success
+    # a tuning that does not begin is logged with the reason, by service and by action
+    assert not client.call('tune_full').success
+    tuner = Tuner(client)
+    assert not tuner.result(tuner.begin(Tune.Goal.BASIC))[1].success
     expected = [
         f'/nfo_sinus/enable (true) called by {name}',
         f'/nfo_sinus/enable (false) called by {name}',
@@ -38,6 +44,8 @@ def test_each_command_is_logged_once_with_the_name_of_its_client(bench: Bench) -
         *(f'/nfo_sinus_bus/{one} called by {other}' for one in ('stop_all', 'disable_all')),
         f'/nfo_sinus_bus/enable_all called by {other}',
         f'/nfo_sinus/enable (true) called by {name}: fault 5 ',
+        f'/nfo_sinus/tune_full called by {name}: fault 5 ',
+        f'/nfo_sinus/tune (basic) called by {name}: fault 5 ',
     ]
     wait_until(lambda: all(line in driver.text for line in expected), f'{expected}')
     assert driver.text.count(' called by ') == len(expected), driver.text

@@ -41,6 +41,11 @@ def test_measured_values_and_what_is_only_read(bench: Bench) -> None:
     client.wait_for('measured', lambda one: one.name == ['status.frequency'], 'the other')
     refused(client.set_parameters(measured=['status.no_such']), 'status.no_such', heat)
 
+    # between the ends of its range it takes some numbers alone
+    five = 'one of 50, 60, 87, 104, 120'
+    assert client.descriptor('frequency.f_base_1').additional_constraints.startswith(five)
+    refused(set_one(client, 'frequency.f_base_1', 55), five.removeprefix('one '))
+
     # only read: shown and refused; what was dumped can be loaded
     name = 'terminal.output_61'
     assert client.descriptor(name).read_only

@@ -107,6 +107,7 @@ def test_a_change_is_logged_once_from_what_to_what(rig: Rig) -> None:
         # what YAML makes of "control.auto_start: ON"
         pytest.param('control.auto_start', True, True, (1,), id='ON'),
         pytest.param('pi_reg.reg_amp', -1, -1, (0xFFFF,), id='one of two numbers'),
+        pytest.param('pi_reg.reg_amp', -1.0, -1, (0xFFFF,), id='a point that changes nothing'),
         # what a message of Float32 makes of 12.3
         pytest.param(
             'freque.f_fix1', 12.300000190734863, 12.3, (123,), id='a number of single precision'
@@ -127,7 +128,7 @@ _NOT_MEANT: tuple[tuple[str, Any, tuple[str, ...]], ...] = (
     ('control.accel', 'fast', ('a number',)),
     ('control.accel', True, ('a number',)),
     ('control.accel', [6.0], ('a number',)),
-    ('control.run_dly', 3.0, ('a whole number',)),
+    ('control.run_dly', 3.5, ('a whole number',)),
     ('control.run_dly', '3', ('a whole number',)),
     ('control.auto_start', 'ON', ('true or false',)),
     ('control.auto_start', 1, ('true or false',)),
@@ -135,8 +136,8 @@ _NOT_MEANT: tuple[tuple[str, Any, tuple[str, ...]], ...] = (
     ('control.st_mode', 'brake', ('Release', 'Brake')),
     # YAML makes false of OFF, and no label of this one means that
     ('control.st_mode', False, ('one of', 'Release', 'Brake')),
-    ('pi_reg.reg_amp', 1.0, ('a whole number',)),
-    ('pi_reg.reg_amp', True, ('a whole number',)),
+    ('pi_reg.reg_amp', 0.5, ('one of -1, 1',)),
+    ('pi_reg.reg_amp', True, ('one of -1, 1',)),
     ('control.accel', float('nan'), ('control.accel',)),
     ('control.accel', float('inf'), ('control.accel',)),
     ('control.accel', -(2**62), ('0.2', '500')),

@@ -194,6 +194,19 @@ def test_history_goes_on_through_the_branch(source: Path) -> None:
         )
 
 
+def test_what_is_no_branch_makes_none(source: Path) -> None:
+    tool = ROOT / 'tools' / 'release_branch'
+    before = run('git', 'branch', folder=source)
+    for word in ('--help', '-h'):
+        assert 'tools/release_branch [BRANCH [COMMIT]]' in run(tool, word, folder=source)
+    for word in ('--version', 'a b', ''):
+        done = subprocess.run(
+            [tool, word], cwd=source, check=False, capture_output=True, text=True
+        )
+        assert done.returncode == 1 and 'can be no branch' in done.stderr
+    assert run('git', 'branch', folder=source) == before
+
+
 def test_what_would_be_lost_is_refused(source: Path) -> None:
     tool = ROOT / 'tools' / 'release_branch'
     run('git', 'branch', 'other', folder=source)

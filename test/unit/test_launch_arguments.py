@@ -13,13 +13,33 @@ import yaml
 
 from nfo_sinus_driver.launch_arguments import (
     MOST_DRIVES,
+    exit_timeout,
     fail_with_driver,
+    log_level,
     number,
     parameter_file,
     require_packages,
     simulated_drives,
     written,
 )
+
+
+@pytest.mark.parametrize('given', ['loud', '', 'rcl:=loud'])
+def test_a_level_that_there_is_not_is_named_with_those_that_there_are(given: str) -> None:
+    with pytest.raises(ValueError, match=f'^log_level:={given}: write debug, info, warn, error'):
+        log_level(given)
+
+
+@pytest.mark.parametrize('given', ['info', 'WARN', 'rcl:=debug'])
+def test_a_level_of_ros_is_taken(given: str) -> None:
+    assert log_level(given) == given
+
+
+@pytest.mark.parametrize('given', ['3', '9.9', 'soon', '-1'])
+def test_an_end_has_the_time_that_the_driver_needs(given: str) -> None:
+    with pytest.raises(ValueError, match=f'^exit_timeout:={given}: write'):
+        exit_timeout(given)
+    assert exit_timeout('10') == 10.0
 
 
 def test_a_number_is_taken_and_what_is_none_refused_by_name() -> None:

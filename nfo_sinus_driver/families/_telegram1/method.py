@@ -43,6 +43,8 @@ NEXT = 'telegram.next'
 CLEAR = 'telegram.clear'
 SETPOINT = 'telegram.setpoint'
 
+#: What PROFIdrive has of bits, beside ZSW1.
+BIT_FIELDS = frozenset(('profidrive.control_word', 'profidrive.status_word'))
 #: What the PLC says of the data, above ZSW1.
 RELEASED = 1 << 17
 FAULT_ACK = 1 << 7

@@ -75,3 +75,16 @@ def part_number(word: int) -> str:
 
 #: P810 and P812.
 SPELLED = {_SOFTWARE: part_number, _FIELDBUS: part_number}
+#: What its display shows in bits or in hexadecimal, and what it keeps of such words with a fault.
+BIT_FIELDS = frozenset(
+    (
+        'fieldbus.function_bits',
+        'status.terminals',
+        'status.options',
+        'status.manual_control_word',
+        *(f'status.po{number}_setpoint' for number in (1, 2, 3)),
+        *(f'status.pi{number}_actual_value' for number in (1, 2, 3)),
+        *(f'status.fault_t{age}_inverter_status' for age in range(5)),
+        *(f'status.fault_t{age}_terminal_status' for age in range(5)),
+    )
+)

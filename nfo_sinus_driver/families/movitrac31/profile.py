@@ -10,7 +10,7 @@ from nfo_sinus_driver.catalog.status import Role
 from nfo_sinus_driver.families.movitrac31 import words
 from nfo_sinus_driver.families.movitrac31.function_bits import FunctionBits
 from nfo_sinus_driver.families.movitrac31.line import CONTROL_MODE, START_SETTINGS
-from nfo_sinus_driver.families.movitrac31.product import SPELLED, TYPE, read_product
+from nfo_sinus_driver.families.movitrac31.product import BIT_FIELDS, SPELLED, TYPE, read_product
 from nfo_sinus_driver.families.movitrac31.remote_setpoint import RemoteSetpoint
 
 
@@ -32,6 +32,7 @@ PROFILE = Profile(
     product=read_product,
     identified_by=TYPE,
     spelled=SPELLED,
+    bit_fields=BIT_FIELDS,
     start_settings=START_SETTINGS,
     measured=(
         'status.heat_sink_temperature',

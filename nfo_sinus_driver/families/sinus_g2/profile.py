@@ -520,6 +520,7 @@ PROFILE = Profile(
         'status.reg_set',
         'status.reg_act',
     ),
+    bit_fields=words.BIT_FIELDS,
     active_method=_active_method,
     # it works even on drives with a serial fault ([M0 §6.1.5], [C9])
     broadcast_stop=Write(MODE, Mode.STOP),

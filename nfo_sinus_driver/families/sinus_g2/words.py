@@ -194,3 +194,16 @@ STATUS_WORD = StatusWord(
     # bit 5 is undefined outside the driven states [M0 table 16]
     by_state={State.QUICK_STOP: Fact.QUICK_STOP_ACTIVE},
 )
+
+#: Its parameters whose bits mean something each.
+BIT_FIELDS = frozenset(
+    (
+        'fieldbus.drive_control',
+        'fieldbus.drive_status',
+        'fieldbus.profidrive_control',
+        'fieldbus.profidrive_status',
+        'fieldbus.control_word',
+        'fieldbus.status_word',
+        'fieldbus.supported_drive_modes',
+    )
+)

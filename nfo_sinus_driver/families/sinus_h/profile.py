@@ -16,6 +16,7 @@ from nfo_sinus_driver.catalog.status import Role, State
 from nfo_sinus_driver.families._telegram1 import method
 from nfo_sinus_driver.families._telegram1.method import Telegram1
 from nfo_sinus_driver.families._telegram1.profidrive import OFF, ON, RUN, ControlWord, state_of
+from nfo_sinus_driver.families.sinus_h.module import MODULE
 from nfo_sinus_driver.families.sinus_h.words import STATUS_WORD
 
 
@@ -69,6 +70,8 @@ PROFILE = Profile(
     holders={},
     methods={'telegram1': HTelegram1},
     setpoints=method.setpoints(327.67, forward_only=True),
+    module=MODULE,
+    bit_fields=method.BIT_FIELDS | {'telegram.alarm_info'},
     active_method=method.active_method,
     writes_and_reads=True,
     # the operation command and STW1 [M3 §7.2.1]

@@ -257,6 +257,7 @@ PROFILE = Profile(
         'status.control_freq',
         'status.control_speed',
     ),
+    bit_fields=frozenset((CONTROL_WORD, 'fieldbus.drive_status')),
     active_method=_active_method,
     # it has no function 43 [C57]: who answers it as another maker is none
     vendor='NFO',

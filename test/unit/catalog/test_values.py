@@ -9,13 +9,14 @@ from collections.abc import Callable, Iterator
 from fractions import Fraction
 import itertools
 import math
+import re
 import struct
 
 from hypothesis import given, settings, strategies as st
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.catalog import Parameter, Value, families, load_family
+from nfo_sinus_driver.catalog import Parameter, Value, families, load_family, load_profile
 
 G2 = load_family('sinus_g2')
 PLACES = [
@@ -219,3 +220,49 @@ def test_switches_are_booleans_and_an_unlisted_code_is_a_number() -> None:
 def test_wrong_number_of_bytes(size: int) -> None:
     with pytest.raises(ValueError, match='sint16_be takes 2 bytes'):
         G2['status.frq_act'].decode(bytes(size))
+
+
+#: What the tables say of a number whose bits mean something each, or that a display shows in hex.
+_OF_BITS = re.compile(
+    r'bit field|\bbits?\b|one bit each|\(hex\)|(control|status) word|[SZ][TS]W1', re.I
+)
+
+
+@pytest.mark.parametrize('name', families())
+def test_a_field_of_bits_is_shown_by_its_bits(name: str) -> None:
+    for method in load_profile(name).methods:
+        family = load_family(name, method)
+        for row in family.values():
+            of_bits = _OF_BITS.search(f'{row.name} {row.description}') and 'SCMD' not in row.name
+            by_display = row.key in family.profile.spelled
+            if row.is_readable and row.kind is int and not (row.labels or row.unit or by_display):
+                assert bool(of_bits) == bool(family.spelled(row.key, 0)), row.key
+    assert load_family('movitrac31').spelled('status.terminals', 1025) == '00000401h: bits 0, 10'
+
+
+def test_the_bits_of_a_negative_number_and_of_none() -> None:
+    assert G2.spelled('fieldbus.drive_status', 0) == '0000h'
+    assert G2.spelled('fieldbus.drive_status', -32768) == '8000h: bit 15'
+    assert G2.spelled('control.run_dly', 5) == ''
+
+
+@pytest.mark.parametrize(
+    ('key', 'given', 'meant'),
+    [
+        ('special.save_to_eeprom', True, 'On'),
+        ('monitoring.motor_protection_1', False, 'OFF'),
+        # no label of it means that
+        ('monitoring.motor_protection_1', True, True),
+        ('frequency.f_base_1', 50.0, 50),
+        ('frequency.f_base_1', 50.5, 50.5),
+        ('control.frs_master_gear_ratio', 400.0, 400),
+        ('control.frs_master_gear_ratio', True, True),
+        ('ramp.t11_up', 4, 4.0),
+        ('control.dc_braking_1', True, True),
+    ],
+)
+def test_what_yaml_makes_of_a_value_is_what_was_meant(
+    key: str, given: Value, meant: Value
+) -> None:
+    found = load_family('movitrac31')[key].meant(given)
+    assert (found, type(found)) == (meant, type(meant))

@@ -178,3 +178,11 @@ def test_a_parameter_file_is_of_the_family(tmp_path: Path) -> None:
     path = tmp_path / 'mine.vfd.yaml'
     shutil.copy(V20, path)
     assert parse(['--family', str(path), 'info']).model == str(path)
+
+
+def test_info_of_a_described_drive_has_its_title(make_bench: MakeBench) -> None:
+    bench = make_bench(model=V20, serial_numbers=[])
+    bench.options = ('--port', bench.simulator.port, '--family', V20)
+    done = bench.run('info')
+    assert done.status == 0, done.err
+    assert ' Siemens SINAMICS V20\n' in done.out and 'module' not in done.out

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future
 import fcntl
 import json
 import os
@@ -33,6 +34,7 @@ from cli_bench import (
 import pytest
 
 from nfo_sinus_driver.cli.control_session import ControlSession
+from nfo_sinus_driver.drive import Cause, DriveError, Report
 from nfo_sinus_driver.simulator.memory import Reason
 from nfo_sinus_driver.state_folder import StateFolder
 
@@ -465,8 +467,52 @@ def test_a_line_that_comes_back_carries_the_stop(bench: Bench) -> None:
         bench.simulator.inject('heal')
         err = process.stderr.read()
         assert process.wait(PATIENCE) == 1
-    assert 'the stop is confirmed now' in err and 'the drive answers again' in err
+    # it may be on its ramp yet
+    assert len(re.findall('the stop is confirmed now: (37 Bus Stby|40 Bus Ret)\n', err)) == 1
+    assert 'the drive answers again' in err and 'status is not known' not in err
     assert bench.stopped
+
+
+@pytest.mark.parametrize('until', ['CANNOT STOP', 'the stop is NOT confirmed'])
+def test_a_fault_that_came_while_the_line_was_silent_has_its_name(
+    bench: Bench, until: str
+) -> None:
+    with bench.running('--json', '--drive-timeout', 2) as process:
+        bench.simulator.inject('line-dead', 600)
+        assert process.stderr is not None and process.stdout is not None
+        err = read_until(process.stderr, until)
+        wait_until(lambda: not bench.state()['driven'])
+        bench.simulator.inject('heal')
+        err += process.stderr.read()
+        end = json.loads(process.stdout.read().splitlines()[-1])
+        assert process.wait(PATIENCE) == 1
+    assert 'status is not known' not in err
+    assert err.count('fault 14 Sio Fail: The serial line failed') == 1
+    assert 'then type nfo-sinus ack' in err
+    assert end['stop_confirmed'] and '14 Sio Fail' in end['stop']
+
+
+def test_a_status_from_before_confirms_no_stop() -> None:
+    lines: list[str] = []
+    session: Any = SimpleNamespace(
+        drive=lambda: None, on_mute=lambda call: None, last_tries=lambda seconds: None
+    )
+    signals: Any = None
+    control = ControlSession(session, SimpleNamespace(say=lines.append), signals, ())
+    refused: Future[Report] = Future()
+    refused.set_exception(DriveError(Cause.TOO_LATE, timeout=15.0))
+    before: Any = SimpleNamespace(at=time.monotonic() - 1.0)
+    for status in (None, before):
+        drive: Any = SimpleNamespace(
+            stop=lambda: refused,
+            stop_owed=False,
+            stop_unconfirmed=False,
+            stop_overdue=False,
+            state=SimpleNamespace(status=status),
+        )
+        control.drive = drive
+        assert not control.stop()
+        assert 'WITHOUT a confirmed stop' in lines[-1]
 
 
 def test_a_second_ctrl_c_says_that_the_motor_may_run(bench: Bench) -> None:
@@ -665,11 +711,13 @@ def test_the_last_tries_of_a_stop_open_a_mute_port_once_more() -> None:
         drive=lambda: None, on_mute=lambda call: None, last_tries=tries.append
     )
     screen: Any = SimpleNamespace(say=lines.append)
-    drive: Any = SimpleNamespace(stop_unconfirmed=False, stop_overdue=True)
+    drive: Any = SimpleNamespace(
+        stop_unconfirmed=False, stop_overdue=True, state=SimpleNamespace(status=None)
+    )
     signals: Any = None
     control = ControlSession(session, screen, signals, ())
     control.drive = drive
-    assert not control.confirmed_late()
+    assert not control.confirmed_late(0.0)
     # long enough for what starts after it
     assert len(tries) == 1 and tries[0] >= 8.0
     assert 'WITHOUT a confirmed stop' in lines[0]

@@ -135,3 +135,14 @@ def test_no_word_is_written_to_the_drive(nfo: Nfo, bench: Bench) -> None:
     with bench.simulator.lock:
         assert bench.simulator.plc is not None
         assert bench.simulator.plc.channels[1].block.ros_life == 0
+
+
+@pytest.mark.parametrize('layout', [1, 2])
+def test_info_of_a_sinus_h_has_what_its_module_tells(make_bench: MakeBench, layout: int) -> None:
+    # PNU 964 [M3 §8], by the mailbox alone
+    bench = behind_plc(make_bench, PlcSetting(layout=layout), model='sinus_h', serial_numbers=[])
+    done = bench.run('info')
+    assert done.status == 0, done.err
+    facts = dict(line.split(maxsplit=1) for line in done.out.splitlines())
+    told = 'manufacturer 849, PROFINET module, version 1.2, of 25 December, 2015'
+    assert facts['family'] == 'Sinus H' and facts['module'] == (told if layout == 2 else '-')

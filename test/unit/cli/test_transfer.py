@@ -100,13 +100,14 @@ def test_set(nfo: Nfo, bench: Bench) -> None:
 @pytest.mark.parametrize(
     ('change', 'says'),
     [
+        ('status.frq_act=5', 'status.frq_act is only read: nfo-sinus get shows it'),
         ('control.retard=900', 'out of range, 0.2 to 500 s'),
         ('control.retard=soon', "'soon' is not a number"),
         ('control.retard=5.00001', 'between two steps'),
         ('control.mode=Sped', 'Freque, PI-Reg, Torque, Speed'),
         ('control.auto_start=1', 'OFF, ON'),
         ('control.retart=5', 'did you mean control.retard'),
-        ('fieldbus.mode=2', 'fieldbus.mode'),
+        ('fieldbus.mode=2', 'fieldbus.mode is no setting: the driver itself writes it'),
         ('serial.address=2', '--allow-communication-changes'),
     ],
 )
@@ -564,3 +565,23 @@ def test_settings_of_a_movitrac_go_to_a_file_and_back(
     done = bench.run('load', path)
     assert done.status == 0, done.err
     assert has(bench, wanted)
+
+
+def test_a_label_that_yaml_takes_for_a_switch_and_a_whole_number_with_a_point(
+    make_bench: Callable[..., Bench], tmp_path: Path
+) -> None:
+    bench = make_bench(model='movitrac31', protocol='movitrac', serial_numbers=[])
+    protection = 'monitoring.motor_protection_1'
+    bench.set(protection, 'Warning')
+    path = parameter_file(tmp_path, {})
+    text = f'/**:\n  ros__parameters:\n    {protection}: OFF\n    frequency.f_base_1: 60.0\n'
+    path.write_text(text, encoding='utf-8')
+    done = bench.run('load', path)
+    assert done.status == 0, done.err
+    assert has(bench, {protection: 'OFF', 'frequency.f_base_1': 60})
+    assert bench.run('diff', path).status == 0
+    done = bench.run('set', 'frequency.f_base_1=87.0')
+    assert has(bench, {'frequency.f_base_1': 87}), done.err
+    for wrong in ('55', 'fast'):
+        done = bench.run('set', f'frequency.f_base_1={wrong}')
+        assert done.status == 1 and 'is none of 50, 60, 87, 104, 120' in done.err

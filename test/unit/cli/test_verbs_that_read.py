@@ -162,7 +162,7 @@ def test_there_is_no_such_port(nfo: Nfo) -> None:
 @pytest.mark.parametrize(
     ('arguments', 'text'),
     [
-        (['scream'], 'invalid choice'),
+        (['scream'], 'there is no verb scream'),
         ([], 'VERB'),
         (['get'], 'NAME'),
         (['info', '--address', '248'], 'allowed are 0 to 247'),
@@ -298,6 +298,19 @@ def test_scan_writes_a_parameter_file_for_the_driver(
     assert nfo(*arguments, '--force').status == 0
     assert 'drive_2' in file.read_text()
     assert bench.writes() == []
+
+
+def test_scan_names_a_folder_for_a_file_before_it_asks_any_drive(
+    nfo: Nfo, bench: Bench, tmp_path: Path
+) -> None:
+    for more in ([], ['--force']):
+        done = nfo('scan', '--addresses', '1', '--params', tmp_path, *more)
+        assert done.status == 1
+        such = tmp_path / 'line.yaml'
+        assert f'{tmp_path} is a folder: name a file in it, such as {such}' in done.err
+    done = nfo('scan', '--addresses', '1', '--params', tmp_path / 'none' / 'line.yaml')
+    assert done.status == 1 and f'there is no folder {tmp_path}/none' in done.err
+    assert bench.requests() == []
 
 
 def test_scan_writes_the_file_to_the_standard_output_alone(nfo: Nfo) -> None:
@@ -522,12 +535,14 @@ def test_a_movitrac_says_who_it_is_what_it_shows_and_what_its_faults_were(
     with bench.simulator.lock:
         bench.drive().memory.put('status.fieldbus_type', 200)
         bench.drive().trip(101)
-        word = bench.drive().peek('fieldbus.inverter_status')
+        word = int(bench.drive().peek('fieldbus.inverter_status'))
     shown = bench.run('info').out
     assert 'MOVITRAC 31C015-503-4-00' in shown and '821 123 4.11' in shown
     names = 'option_x20', 'fieldbus_type', 'stop_setpoint_1_n2', 'output_stage'
     done = bench.run('get', *(f'status.{name}' for name in names), 'fieldbus.inverter_status')
     shown = [line.split(None, 1)[1] for line in done.out.splitlines()]
-    assert shown == ['FF. (Fieldbus)', 'INTERBUS-S', '0', '31C015-503-4-00', str(word)]
+    bits = ', '.join(str(bit) for bit in range(32) if word >> bit & 1)
+    shown_word = f'{word} ({word:08X}h: bits {bits})'
+    assert shown == ['FF. (Fieldbus)', 'INTERBUS-S', '0', '31C015-503-4-00', shown_word]
     done = bench.run('errors')
     assert done.status == 0 and 'Overcurrent (DC link ' in done.out

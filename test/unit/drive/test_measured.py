@@ -6,12 +6,14 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
+from support.places import ROOT
 from support.rig import CONNECTIONS, Rig
 from support.said import says
 
-from nfo_sinus_driver.catalog import families, load_family, load_profile
+from nfo_sinus_driver.catalog import Access, families, load_family, load_profile
 from nfo_sinus_driver.drive import Cause, DriveSettings
 
 #: Where the drive shows the set-point that it was given [M0 table 4, M1].
@@ -60,6 +62,34 @@ def test_a_value_that_is_lost_is_nan_and_not_the_old_one() -> None:
         rig.pass_time(1.0)
         assert math.isnan(rig.notes.telemetry[-1].measured['status.reg_act'])
         assert rig.drive.following
+
+
+def test_a_value_with_labels_and_one_of_another_group_is_its_number() -> None:
+    software = 'special.software_system'
+    names = ['status.inverter_type', 'status.option_x20', 'terminal.output_61', software]
+    with Rig('movitrac', measured=names, telemetry_rate=2.0).turn() as rig:
+        codes = {'status.inverter_type': 3100, 'status.option_x20': 9, 'terminal.output_61': 1}
+        for key, code in codes.items():
+            rig.far.memory.set(key, rig.drive.model[key].labels[code])
+        rig.far.memory.set(software, 21123411)
+        rig.pass_time(1.5)
+        assert rig.notes.telemetry[-1].measured == {**codes, software: 21123411}
+
+
+@pytest.mark.parametrize('model', families())
+def test_all_that_is_only_read_and_is_a_number_or_a_label_can_be_named(model: str) -> None:
+    for method, chosen in load_profile(model).methods.items():
+        family = load_family(model, method)
+        read = [one.key for one in family.values() if one.access is Access.READ]
+        reference = chosen.references[0]
+        DriveSettings(model=model, control_method=method, reference=reference, measured=read)
+
+
+@pytest.mark.parametrize('model', ['sinus_g2', 'sinus_optimal', 'movitrac31'])
+def test_the_page_names_the_usual_ones_as_they_are_typed(model: str) -> None:
+    page = (ROOT / 'docs/messages.md').read_text(encoding='utf-8')
+    row = re.search(rf'^\| `{model}` \| (.*) \|$', page, re.MULTILINE)
+    assert row and tuple(re.findall('`(.*?)`', row[1])) == load_profile(model).measured
 
 
 @pytest.mark.parametrize('name', ['motor.p_nom', 'fieldbus.scmd', 'status.no_such', 'speed'])

@@ -78,6 +78,16 @@ def conveyor(count: int) -> list[DriveView]:
     return drives
 
 
+@pytest.mark.parametrize(
+    ('utilisation', 'shown'),
+    [(0.89, '89 % used, cycle'), (0.97, '97 % used (polls fill the line by design), cycle')],
+)
+def test_a_full_line_is_said_to_be_full_by_design(utilisation: float, shown: str) -> None:
+    view = View(_RUNS)
+    view.change(lines={'/bus': replace(_LINE, utilisation=utilisation)})
+    assert shown in view.text(160, 48)
+
+
 @pytest.mark.parametrize('size', [(80, 24), (120, 40), (160, 48)], ids=['80', '120', '160'])
 @pytest.mark.parametrize('count', [1, 8, 32])
 def test_every_drive_is_in_the_table_and_the_chosen_one_in_full(

@@ -143,6 +143,9 @@ PROFILE = Profile(
     holders={},
     methods={'telegram1': G2Telegram1},
     setpoints=method.setpoints(150.0),
+    bit_fields=drivecontrol.BIT_FIELDS.union(
+        method.BIT_FIELDS, ('profidrive.warning_word', 'profidrive.warning_word_2')
+    ),
     active_method=method.active_method,
     writes_and_reads=True,
     mailbox='profibus',
