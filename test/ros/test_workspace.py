@@ -29,7 +29,7 @@ WITHOUT_ROS = ('test/unit/catalog/test_family.py', 'test/unit/test_docs.py')
 TESTS = (*WITHOUT_ROS, 'test/unit/cli/test_completion.py', 'test/ros/test_calls_logged.py')
 
 
-def run(*command: object, folder: Path) -> str:
+def attempt(*command: object, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a command where ROS is sourced and nothing of this clone is."""
     built = str(ROOT / 'install')
     environment = {
@@ -38,11 +38,16 @@ def run(*command: object, folder: Path) -> str:
     }
     # set by tools/run for the processes of the tests
     environment.pop('PYTHONPATH', None)
-    done = subprocess.run(
+    return subprocess.run(
         [*map(str, command)],
         cwd=folder, env=environment, check=False, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
     )
+
+
+def run(*command: object, folder: Path) -> str:
+    """Run such a command that succeeds, and return what it says."""
+    done = attempt(*command, folder=folder)
     assert done.returncode == 0, done.stdout[-6000:]
     return done.stdout
 
@@ -84,6 +89,44 @@ def test_every_tool_finds_both_packages(workspace: Path) -> None:
     found = packages.find_packages(str(workspace / 'src'))
     assert {package.name for package in found.values()} == BOTH
     assert set(run('colcon', 'list', '--names-only', folder=workspace).split()) == BOTH
+
+
+@pytest.mark.parametrize('options', [(), ('--symlink-install',)], ids=['plain', 'links'])
+@pytest.mark.parametrize('place', ['src/nfo_sinus_driver', 'a folder/driver', 'elsewhere'])
+def test_a_build_without_the_messages_fails_and_its_last_line_mends_it(
+    tmp_path: Path, place: str, options: tuple[str, ...]
+) -> None:
+    workspace = tmp_path / 'workspace'
+    (workspace / 'src').mkdir(parents=True)
+    clone = tmp_path / 'clone' if place == 'elsewhere' else workspace / place
+    run('git', 'clone', '--quiet', ROOT, clone, folder=tmp_path)
+    if place == 'elsewhere':
+        (workspace / 'src' / 'driver').symlink_to(clone)
+    build = ('colcon', 'build', *options, '--packages-select', 'nfo_sinus_driver')
+    done = attempt('sh', '-c', 'cd "$0" && exec "$@"', workspace, *build, folder=tmp_path)
+    assert done.returncode != 0, done.stdout
+    (log,) = workspace.glob('log/build_*/nfo_sinus_driver/stderr.log')
+    said = log.read_text(encoding='utf-8').splitlines()
+    assert 'nfo_sinus_msgs' in said[-2] and said[-1].startswith('ln -s ')
+    assert said[-1] in done.stdout
+    # from wherever it is pasted
+    run('sh', '-c', said[-1], folder=tmp_path)
+    assert set(run('colcon', 'list', '--names-only', folder=workspace).split()) == BOTH
+
+
+@pytest.mark.parametrize('options', [(), ('--symlink-install',)], ids=['plain', 'links'])
+def test_a_build_with_the_messages_installed_needs_no_link(
+    tmp_path: Path, options: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    marker = tmp_path / 'installed/share/ament_index/resource_index/packages/nfo_sinus_msgs'
+    marker.parent.mkdir(parents=True)
+    marker.touch()
+    (tmp_path / 'installed/share/nfo_sinus_msgs').mkdir()
+    monkeypatch.setenv(
+        'AMENT_PREFIX_PATH', f'{tmp_path / "installed"}:{os.environ["AMENT_PREFIX_PATH"]}'
+    )
+    run('git', 'clone', '--quiet', ROOT, 'src/nfo_sinus_driver', folder=tmp_path)
+    run('colcon', 'build', *options, folder=tmp_path)
 
 
 @pytest.mark.slow
