@@ -159,8 +159,8 @@ def test_the_branch_of_a_release_has_the_packages_side_by_side(
     address = 'https://forge.example/team/nfo_sinus'
     for package in found:
         urls = {one.type: one.url for one in package.urls}
-        assert urls.pop('website') and urls == {
-            'repository': address, 'bugtracker': f'{address}/issues'
+        assert urls == {
+            'website': address, 'repository': address, 'bugtracker': f'{address}/issues'
         }
     # all else that was built and tested, and nothing more
     for name, old in (('nfo_sinus_driver', '.'), ('nfo_sinus_msgs', 'msg_defs')):
@@ -219,11 +219,34 @@ def test_the_address_of_a_forge_is_that_of_origin(
         run('git', 'remote', 'add', 'origin', origin, folder=source)
     branch = f'branch-{abs(hash(origin))}'
     said = run(ROOT / 'tools' / 'release_branch', branch, folder=source)
-    assert ('no forge' in said) is not bool(address)
+    assert ('a release waits for the address of the repository' in said) is not bool(address)
+    # one that takes no mail
+    assert said.count('a release waits for an address of the maintainer') == 2
     manifest = run('git', 'show', f'{branch}:nfo_sinus_msgs/package.xml', folder=source)
     found = re.findall(r'<url type="repository">(.*)</url>', manifest)
     assert found == ([address] if address else [])
     assert 'secret' not in manifest
+
+
+def test_an_address_that_package_xml_has_is_not_added_again(source: Path, tmp_path: Path) -> None:
+    run('git', 'clone', '--quiet', source, '.', folder=tmp_path)
+    run('git', 'config', 'user.name', 'A test', folder=tmp_path)
+    run('git', 'config', 'user.email', 'test@example.org', folder=tmp_path)
+    url = '<url type="repository">https://forge.example/own</url>'
+    for name in ('package.xml', 'msg_defs/package.xml'):
+        path = tmp_path / name
+        text = path.read_text(encoding='utf-8').replace('  <author>', f'  {url}\n  <author>')
+        text = re.sub('email=".*"', 'email="all@forge.org"', text)
+        path.write_text(text, encoding='utf-8')
+    run('git', 'commit', '--quiet', '--all', '--message', 'Addresses', folder=tmp_path)
+    for origin in ('../nowhere', FORGE):
+        run('git', 'remote', 'set-url', 'origin', origin, folder=tmp_path)
+        said = run(ROOT / 'tools' / 'release_branch', f'branch-{len(origin)}', folder=tmp_path)
+        assert 'waits' not in said
+        manifest = run(
+            'git', 'show', f'branch-{len(origin)}:nfo_sinus_msgs/package.xml', folder=tmp_path
+        )
+        assert re.findall('<url.*', manifest) == [url]
 
 
 def test_history_goes_on_through_the_branch(source: Path) -> None:

@@ -116,6 +116,18 @@ def test_what_the_ci_runs_is_there_and_is_shell() -> None:
     assert sorted(re.findall(r'\.ci/ros2 (\w+)', text)) == sorted(parts)
 
 
+def test_the_hooks_before_a_commit_check_what_make_checks() -> None:
+    (local,) = yaml.safe_load(read('.pre-commit-config.yaml'))['repos']
+    assert local['repo'] == 'local'
+    # whatever files are in a commit, and with the tools that were set up
+    assert all(one['language'] == 'system' for one in local['hooks'])
+    assert not any(one['pass_filenames'] for one in local['hooks'])
+    hooks = {one['entry'] for one in local['hooks']}
+    rules = re.findall(r'^(?:lint|types):.*\n((?:\t.*\n)+)', read('Makefile'), re.MULTILINE)
+    checks = re.findall(r'^\t@(\.venv/bin/[^\n>]+?)(?: >.*)?$', ''.join(rules), re.MULTILINE)
+    assert len(rules) == 2 and hooks == set(checks)
+
+
 def test_sros2_takes_the_policy() -> None:
     path = CONFIG / 'sros2_policy.xml'
     assert allowed(path)
