@@ -29,7 +29,8 @@ def require_messages():
     has been found it is built first, so that it is installed by now. Whoever else builds this
     package (pip without ROS, the build farm) needs no messages for that.
     """
-    if 'COLCON' not in os.environ or not {'develop', 'install'} & set(sys.argv):
+    builds = {'develop', 'install'} & set(sys.argv) and '--help' not in sys.argv
+    if 'COLCON' not in os.environ or not builds:
         return
     marker = 'share/ament_index/resource_index/packages/nfo_sinus_msgs'
     prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
@@ -37,11 +38,11 @@ def require_messages():
     here = Path(__file__).resolve().parent
     if any((Path(one) / marker).exists() for one in prefixes) or not (here / 'msg_defs').is_dir():
         return
-    beside = here.parent
-    # a clone that is itself a link in the workspace
-    workspace = Path(os.environ.get('PWD', os.sep)).resolve()
-    if workspace not in here.parents and (workspace / 'src').is_dir():
-        beside = workspace / 'src'
+    # in the workspace: a clone may be a link in it; in PWD colcon has a folder below it
+    below = Path(os.environ.get('PWD', os.sep)).resolve()
+    sources = [one / 'src' for one in (below, *below.parents) if (one / 'src').is_dir()]
+    inside = not sources or sources[0].parent in here.parents
+    beside = here.parent if inside else sources[0]
     messages = os.path.relpath(here / 'msg_defs', beside.resolve())
     raise SystemExit(
         f'{NAME} needs the package nfo_sinus_msgs, which is neither installed nor in this '
