@@ -73,6 +73,9 @@ def _coerced(one: Setting, given: object) -> SettingValue:
     """Return a value in the type of its setting: 5 as 5.0, and 8E1, eighty in YAML, as text."""
     value = given
     wanted = type(one.default)
+    # a list without elements has no type in ROS, and of a file rcl gives nothing for it
+    if one.default == [''] and given in (None, []):
+        value = one.default
     if type(given) is int and wanted is float:
         value = float(given)
     elif type(given) is float and one.name == 'char_format':

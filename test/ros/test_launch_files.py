@@ -79,7 +79,7 @@ def test_the_clock_and_who_configures_the_drives_are_arguments(bench: Bench) -> 
     arguments = (f'port:={port}', 'autostart:=false', 'use_sim_time:=true')
     process = launch(bench, 'driver.launch.py', *arguments)
     client = bench.client()
-    wait_until(lambda: client.lifecycle_state() == 'unconfigured', 'nothing configures it')
+    wait_until(lambda: client.state() == 'unconfigured', 'nothing configures it')
     assert client.parameter('use_sim_time') is True and client.parameter('autostart') is False
     process.signal(signal.SIGINT)
     assert process.wait() == 0, process.text

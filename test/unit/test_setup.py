@@ -17,7 +17,7 @@ from support.places import ROOT
 if not (ROOT / 'msg_defs').is_dir():
     pytest.skip('make works on main', allow_module_level=True)
 
-PYTHON = '''#!/bin/sh
+PYTHON = """#!/bin/sh
 echo "$*" >> "{log}"
 for last; do :; done
 case "$*" in
@@ -27,7 +27,7 @@ case "$*" in
   *ros-jazzy.txt*) mkdir -p .venv/share/ament_index ;;
   *'--packages-select'*) mkdir -p "build/$5" "install/$5" && touch install/setup.bash
 esac
-'''
+"""
 Make = Callable[..., list[str]]
 
 
