@@ -25,10 +25,15 @@ help: ## list the targets
 setup: ## set up .venv, and build into install
 	@tools/setup
 
-demo: setup ## a short run of a simulated drive, from enable to stop, recorded and drawn
+# Neither demo nor run sets up what only tests use.
+.PHONY: setup-run
+setup-run:
+	@tools/setup run
+
+demo: setup-run ## a short run of a simulated drive, from enable to stop, recorded and drawn
 	@tools/run python -m nfo_sinus_driver.demo
 
-run: setup ## driver and simulated drive, up until Ctrl-C, for ros2 topic pub
+run: setup-run ## driver and simulated drive, up until Ctrl-C, for ros2 topic pub
 	@tools/run python -m nfo_sinus_driver.demo.run
 
 # Tests that wait leave a third of two processors idle: one worker that computes has that.

@@ -1,7 +1,10 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
+import os
 from pathlib import Path
+import shlex
+import sys
 
 from setuptools import find_packages, setup
 
@@ -18,6 +21,37 @@ def share(*folders):
     return list(found.items())
 
 
+def require_messages():
+    """
+    End a colcon build that has left nfo_sinus_msgs out: only at run time would it be missed.
+
+    On main it is a folder inside this package, where colcon does not look without a link. Where it
+    has been found it is built first, so that it is installed by now. Whoever else builds this
+    package (pip without ROS, the build farm) needs no messages for that.
+    """
+    builds = {'develop', 'install'} & set(sys.argv) and '--help' not in sys.argv
+    if 'COLCON' not in os.environ or not builds:
+        return
+    marker = 'share/ament_index/resource_index/packages/nfo_sinus_msgs'
+    prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
+    # for --symlink-install this file is a link
+    here = Path(__file__).resolve().parent
+    if any((Path(one) / marker).exists() for one in prefixes) or not (here / 'msg_defs').is_dir():
+        return
+    # in the workspace: a clone may be a link in it; in PWD colcon has a folder below it
+    below = Path(os.environ.get('PWD', os.sep)).resolve()
+    sources = [one / 'src' for one in (below, *below.parents) if (one / 'src').is_dir()]
+    inside = not sources or sources[0].parent in here.parents
+    beside = here.parent if inside else sources[0]
+    messages = os.path.relpath(here / 'msg_defs', beside.resolve())
+    raise SystemExit(
+        f'{NAME} needs the package nfo_sinus_msgs, which is neither installed nor in this '
+        'workspace. colcon does not look for a package inside another one. Link it, then build '
+        f'again:\nln -s {shlex.quote(messages)} {shlex.quote(str(beside / "nfo_sinus_msgs"))}'
+    )
+
+
+require_messages()
 setup(
     name=NAME,
     version='0.9.0',

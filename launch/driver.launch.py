@@ -36,6 +36,7 @@ from nfo_sinus_driver.launch_arguments import (
     log_level,
     number,
     parameter_file,
+    switch,
     written,
 )
 
@@ -49,6 +50,14 @@ OVERRIDES = {
     'address': ('/**', int, 'address of the drive, where there is one'),
     'model': ('/**', str, 'family of the drives, such as movitrac31'),
     'family': ('/**', str, 'in place of model: a name, the path of a NAME.vfd.yaml, or package://'),
+    'autostart': ('/**', bool, 'false: an operator or a lifecycle manager configures the drives'),
+    'use_sim_time': ('/**', bool, 'true: stamps are of /clock'),
+}
+
+CONVERTED = {
+    bool: switch,
+    int: lambda name, given: number(name, given, whole=True),
+    str: lambda _, given: given,
 }
 
 
@@ -122,6 +131,5 @@ def _overrides(context):
         given = LaunchConfiguration(name).perform(context)
         if given:
             section = sections.setdefault(nodes, {'ros__parameters': {}})
-            value = number(name, given, whole=True) if type_ is int else given
-            section['ros__parameters'][name] = value
+            section['ros__parameters'][name] = CONVERTED[type_](name, given)
     return written(sections)

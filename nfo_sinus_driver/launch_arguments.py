@@ -69,22 +69,33 @@ def log_level(given: str) -> str:
     return given
 
 
+def switch(name: str, given: str) -> bool:
+    """
+    Return what a switch is, written as ``ros2 launch`` and YAML have it.
+
+    :raises ValueError: it is neither on nor off; the message names it.
+    """
+    if given.lower() not in ('true', 'false'):
+        raise ValueError(f'{name}:={given}: write true or false')
+    return given.lower() == 'true'
+
+
 def parameter_file(given: str, config: Path) -> str:
     """
-    Return the path of a parameter file; a bare name may be one of the package's own.
+    Return the path of a parameter file; a relative one may be one of the package's own.
 
-    :param config: the folder of those.
+    :param config: the folder of those, with folders in it.
     :raises ValueError: there is no such file; the message says where it was looked for.
     """
     path = Path(given).expanduser()
     if path.is_file():
         return str(path)
-    own = config / given
-    if path.name == given and own.is_file():
+    own = config / path
+    if own.is_file():
         return str(own)
     looked = [str(path.absolute())]
-    if path.name == given:
-        names = ', '.join(sorted(one.name for one in config.glob('*.yaml')))
+    if not path.is_absolute():
+        names = ', '.join(sorted(str(one.relative_to(config)) for one in config.rglob('*.yaml')))
         looked.append(f'{config}, which has {names}')
     raise ValueError(f'params_file:={given}: there is no such file; looked in {"; ".join(looked)}')
 

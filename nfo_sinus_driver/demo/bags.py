@@ -18,6 +18,8 @@ from typing import Any
 
 import yaml
 
+from nfo_sinus_driver.demo import cut_off
+
 #: Each imports its library; the first one that can be imported is taken.
 _MODULES = ('bags_rosbag2', 'bags_rosbags')
 _INFORMATION = 'rosbag2_bagfile_information'
@@ -53,7 +55,21 @@ def read(folder: Path, is_wanted: Callable[[str], bool]) -> Iterator[tuple[str, 
     """
     wanted = {topic for topic, _ in topics(folder) if is_wanted(topic)}
     with reading():
+        if cut_off.files(folder):
+            yield from _read_cut_off(folder, wanted)
+            return
         yield from _module().read(folder, wanted)
+
+
+def _read_cut_off(folder: Path, wanted: set[str]) -> Iterator[tuple[str, int, Any]]:
+    # here and not above: only a reader needs rclpy
+    from rclpy.serialization import deserialize_message
+
+    from nfo_sinus_driver.demo.type_definitions import class_of
+
+    for topic, type_, stamp, data in cut_off.messages(folder):
+        if topic in wanted:
+            yield topic, stamp, deserialize_message(data, class_of(type_))
 
 
 @contextlib.contextmanager
@@ -69,9 +85,15 @@ def reading() -> Iterator[None]:
 
 
 def metadata(folder: Path) -> dict[str, Any]:
-    """Return what a bag says of itself; a ValueError where it is none."""
+    """
+    Return what a bag says of itself, or is in it where it was cut off.
+
+    :raises ValueError: it is no bag.
+    """
     path = folder / 'metadata.yaml'
     with reading():
+        if cut_off.files(folder):
+            return cut_off.metadata(folder)
         found = yaml.safe_load(path.read_bytes()) if path.is_file() else None
     if not isinstance(found, dict) or _INFORMATION not in found:
         raise ValueError('it is no bag: a folder with a metadata.yaml is one')

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Set
 import contextlib
-import importlib
 from pathlib import Path
+import tempfile
 from typing import Any
 
 from rclpy.qos import QoSProfile
@@ -25,7 +25,7 @@ from rosbag2_py import (
 import yaml
 
 from nfo_sinus_driver.demo.bags import metadata
-from nfo_sinus_driver.demo.type_definitions import hash_of, name_of
+from nfo_sinus_driver.demo.type_definitions import class_of, hash_of, name_of
 
 _CDR = 'cdr'
 _AS_THEY_ARE = ConverterOptions(
@@ -33,6 +33,8 @@ _AS_THEY_ARE = ConverterOptions(
 )
 #: The version of the metadata in which profiles are written here: words, not numbers.
 _VERSION = 9
+#: A chunk is kept in memory until it is full: the factory setting holds minutes of a drive.
+_SETTINGS = 'chunkSize: 1024'
 _FOR_EVER = {'sec': 9223372036, 'nsec': 854775807}
 
 
@@ -42,8 +44,13 @@ class Writer:
     def __init__(self, folder: Path, remarks: dict[str, str]) -> None:
         self._count = 0
         self._writer = SequentialWriter()
-        options = StorageOptions(uri=str(folder), storage_id='mcap', custom_data=remarks)
-        with _writing():
+        with _writing(), tempfile.NamedTemporaryFile('w', suffix='.yaml') as settings:
+            settings.write(_SETTINGS)
+            settings.flush()
+            options = StorageOptions(
+                uri=str(folder), storage_id='mcap', custom_data=remarks,
+                storage_config_uri=settings.name,
+            )
             self._writer.open(options, _AS_THEY_ARE)
 
     def add_topic(self, topic: str, type_: type, offered: QoSProfile) -> None:
@@ -66,6 +73,9 @@ class Writer:
         with _writing():
             self._writer.write(topic, data, stamp)
 
+    def flush(self) -> None:
+        """Nothing: the small chunks are written as they fill."""
+
     def close(self) -> None:
         """Make the bag whole."""
         with _writing():
@@ -78,7 +88,7 @@ def read(folder: Path, wanted: Set[str]) -> Iterator[tuple[str, int, Any]]:
     reader = SequentialCompressionReader() if compressed else SequentialReader()
     reader.open(StorageOptions(uri=str(folder)), _AS_THEY_ARE)
     types = {
-        one.name: _class_of(one.type)
+        one.name: class_of(one.type)
         for one in reader.get_all_topics_and_types()
         if one.name in wanted
     }
@@ -94,15 +104,6 @@ def _writing() -> Iterator[None]:
         yield
     except RuntimeError as error:
         raise OSError(str(error)) from error
-
-
-def _class_of(name: str) -> type:
-    """Return the class of a type, such as ``std_srvs/srv/SetBool_Event``."""
-    package, kind, type_ = name.split('/')
-    try:
-        return getattr(importlib.import_module(f'{package}.{kind}'), type_)
-    except (AttributeError, ImportError) as error:
-        raise ValueError(f'its type {name} is not installed: {error}') from error
 
 
 def _as_recorded(qos: QoSProfile) -> str:

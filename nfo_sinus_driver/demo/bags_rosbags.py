@@ -33,6 +33,7 @@ class Writer:
 
     def __init__(self, folder: Path, remarks: dict[str, str]) -> None:
         self._connections: dict[str, Connection] = {}
+        self._unwritten = False
         try:
             self._writer = RosbagsWriter(
                 folder, version=RosbagsWriter.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP
@@ -57,6 +58,14 @@ class Writer:
     def write(self, topic: str, stamp: int, data: bytes) -> None:
         """Write a message as it came, with the time of its receipt, ns."""
         self._writer.write(self._connections[topic], stamp, data)
+        self._unwritten = True
+
+    def flush(self) -> None:
+        """Hand all that was written to the system: rosbags itself gathers a megabyte."""
+        if self._unwritten:
+            self._writer.storage.close_chunk()
+            self._writer.storage.bio.flush()
+            self._unwritten = False
 
     def close(self) -> None:
         """Make the bag whole."""

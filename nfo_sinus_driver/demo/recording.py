@@ -14,6 +14,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from nfo_sinus_msgs.msg import BusStatistics, DriveStatus, InvSt, Telemetry
 from rcl_interfaces.msg import Log
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32
@@ -27,6 +28,8 @@ _EVENT = '_service_event'
 _DEPTH = 1000
 #: How long what was sent before the end may be on its way, s.
 _ON_ITS_WAY = 0.5
+#: How long what came may be in memory alone, s.
+_FLUSH = 1.0
 
 
 def topics_of(*drives: str) -> dict[str, tuple[type, QoSProfile]]:
@@ -103,6 +106,8 @@ class Recorder(Node):
             raise RecordingError(f'no bag can be written to {folder}: {error}') from error
         for topic, (type_, qos) in topics_of(*drives).items():
             self._record(topic, type_, qos)
+        # not by the clock of a simulation, which may stand
+        self.create_timer(_FLUSH, self._flush, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
     def silent(self) -> list[str]:
@@ -156,6 +161,13 @@ class Recorder(Node):
         if drive in self._silent:
             del self._silent[drive]
             self._heard(drive)
+
+    def _flush(self) -> None:
+        """Have on disk what came, for a recorder that is killed."""
+        try:
+            self._bag.flush()
+        except OSError as error:
+            self._error = self._error or error
 
     def _write(self, topic: str, stamp: int, data: bytes) -> None:
         if stamp < self._until:

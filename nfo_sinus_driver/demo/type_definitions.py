@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from pathlib import Path
 import re
@@ -80,3 +81,12 @@ def _event_definition(name: str) -> str:
 def _file(name: str, suffix: str) -> Path:
     package, kind, type_ = name.split('/')
     return Path(get_package_share_directory(package)) / kind / f'{type_}{suffix}'
+
+
+def class_of(name: str) -> type:
+    """Return the class of a type, such as ``std_srvs/srv/SetBool_Event``."""
+    package, kind, type_ = name.split('/')
+    try:
+        return getattr(importlib.import_module(f'{package}.{kind}'), type_)
+    except (AttributeError, ImportError) as error:
+        raise ValueError(f'its type {name} is not installed: {error}') from error

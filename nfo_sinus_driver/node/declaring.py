@@ -77,6 +77,9 @@ def _coerced(one: Setting, given: object) -> SettingValue:
     """
     value = given
     wanted = type(one.default)
+    # a list without elements has no type in ROS, and of a file rcl gives nothing for it
+    if one.default == [''] and given in (None, []):
+        value = one.default
     if type(given) is int and wanted is float:
         value = float(given)
     elif isinstance(given, float) and wanted is int and given.is_integer():

@@ -10,6 +10,7 @@ import contextlib
 import importlib
 import importlib.util
 from pathlib import Path
+import struct
 import subprocess
 import sys
 from types import ModuleType
@@ -113,6 +114,57 @@ def test_what_cannot_be_written_is_an_error_of_the_system(
     for module in modules.values():
         with pytest.raises(OSError, match='/proc/none'):
             module.Writer(Path('/proc/none/bag'), {})
+
+
+def test_a_bag_that_was_cut_off_anywhere_has_what_came_before(
+    modules: dict[str, ModuleType], tmp_path: Path
+) -> None:
+    bag = modules['bags_rosbags'].Writer(tmp_path / 'bag', {})
+    for topic, message, offered in MESSAGES:
+        bag.add_topic(topic, type(message), offered)
+    (file,) = (tmp_path / 'bag').glob('*.mcap')
+    sizes = []
+    for number, (topic, message, _) in enumerate(MESSAGES):
+        bag.write(topic, (number + 1) * 10**9, serialize_message(message))
+        bag.flush()
+        # and nothing more where nothing came
+        sizes.append(file.stat().st_size)
+        bag.flush()
+        assert file.stat().st_size == sizes[-1]
+        assert [topic for topic, _, _ in bags.read(tmp_path / 'bag', lambda _: True)] == [
+            topic for topic, _, _ in MESSAGES[: number + 1]
+        ]
+    assert drives_in(tmp_path / 'bag') == ['/nfo_sinus']
+    data = file.read_bytes()
+    cut = tmp_path / 'cut'
+    cut.mkdir()
+    for length in range(0, len(data) + 1, 97):
+        (cut / 'cut_0.mcap').write_bytes(data[:length])
+        found = list(bags.read(cut, lambda _: True))
+        assert len(found) >= sum(size <= length for size in sizes)
+        assert [(topic, stamp) for topic, stamp, _ in found] == [
+            (topic, (number + 1) * 10**9)
+            for number, (topic, _, _) in enumerate(MESSAGES[: len(found)])
+        ]
+    bag.close()
+    # whole files beside no metadata.yaml are read, too
+    (cut / 'cut_0.mcap').write_bytes(file.read_bytes())
+    assert len(list(bags.read(cut, lambda _: True))) == len(MESSAGES)
+    assert bags.metadata(cut)['message_count'] == len(MESSAGES)
+
+
+def test_of_a_compressed_bag_that_was_cut_off_the_commands_are_named_that_mend_it(
+    tmp_path: Path,
+) -> None:
+    chunk = struct.pack('<QQQI', 0, 0, 100, 0) + struct.pack('<I', 4) + b'zstd' + bytes(20)
+    (tmp_path / 'x_0.mcap').write_bytes(
+        b'\x89MCAP0\r\n' + struct.pack('<BQ', 6, 1000) + chunk
+    )
+    with pytest.raises(ValueError, match=r'mcap recover .*x_0\.mcap .* ros2 bag reindex'):
+        bags.topics(tmp_path)
+    (tmp_path / 'x_0.mcap').write_bytes(b'SQLite format 3')
+    with pytest.raises(ValueError, match=r'x_0\.mcap is damaged'):
+        bags.topics(tmp_path)
 
 
 @pytest.mark.parametrize('text', ['', 'a: 1', '[]'])

@@ -71,3 +71,22 @@ def test_a_driver_that_is_killed_makes_launch_fail_and_ctrl_c_does_not(
     assert process.wait() == int(killed), process.text
     assert ('ended with status -9' in process.text) is killed
     wait_until(lambda: not port.exists(), 'the simulated drive has ended')
+
+
+@needs('own')
+def test_the_clock_and_who_configures_the_drives_are_arguments(bench: Bench) -> None:
+    port = Path(bench.folder) / 'line'
+    arguments = (f'port:={port}', 'autostart:=false', 'use_sim_time:=true')
+    process = launch(bench, 'driver.launch.py', *arguments)
+    client = bench.client()
+    wait_until(lambda: client.state() == 'unconfigured', 'nothing configures it')
+    assert client.parameter('use_sim_time') is True and client.parameter('autostart') is False
+    process.signal(signal.SIGINT)
+    assert process.wait() == 0, process.text
+
+
+@needs('own')
+def test_a_switch_that_is_none_starts_nothing(bench: Bench) -> None:
+    process = launch(bench, 'driver.launch.py', 'autostart:=never')
+    assert process.wait() == 1 and 'autostart:=never: write true or false' in process.text
+    assert 'process started' not in process.text

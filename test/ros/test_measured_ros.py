@@ -17,6 +17,7 @@ import pytest
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.demo.bench import own_domain
 from nfo_sinus_driver.node.qos import RELIABLE
+from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
 
 
 @pytest.fixture
@@ -52,3 +53,26 @@ def test_measured_values_and_what_is_only_read(bench: Bench) -> None:
     before = values(client, name)[name]
     assert set_one(client, name, before).successful
     refused(set_one(client, name, 'Rotating field on'), name, 'only read')
+
+
+def test_a_list_that_was_dumped_empty_is_taken_as_empty(bench: Bench, tmp_path: Path) -> None:
+    names = [name for name, one in DRIVE_SETTINGS.items() if isinstance(one.default, list)]
+    assert len(names) > 1
+    bench.simulator()
+    dumped = tmp_path / 'dumped.yaml'
+    # as `ros2 param dump` writes it
+    dumped.write_text(
+        '\n'.join(['/nfo_sinus:', '  ros__parameters:', *(f'    {one}: []' for one in names)]),
+        encoding='utf-8',
+    )
+    bench.driver('--params-file', str(dumped))
+    client: Client = bench.client().connected()
+    client.listen('measured', Measured, '/nfo_sinus/measured', RELIABLE)
+    usual = list(load_family('movitrac31').profile.measured)
+    client.wait_for('measured', lambda one: one.name == usual, 'the usual ones')
+    # and while it runs
+    assert client.set_parameters(measured=['status.frequency']).successful
+    client.wait_for('measured', lambda one: one.name == ['status.frequency'], 'the one')
+    result = client.set_parameters(measured=[])
+    assert result.successful, result.reason
+    client.wait_for('measured', lambda one: one.name == usual, 'the usual ones again')

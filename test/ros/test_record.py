@@ -179,6 +179,28 @@ def test_all_drives_are_recorded_and_it_is_explained_why_they_stopped(bench: Ben
 
 
 @needs('own')
+def test_of_a_recorder_that_was_killed_all_but_the_last_two_seconds_is_there(bench: Bench) -> None:
+    bench.simulator()
+    bench.driver('-r', '__node:=nfo_sinus')
+    client = bench.client().connected()
+    output = bench.folder / 'cut'
+    recorder = _recorder(bench, '--output', str(output))
+    wait_until(lambda: '/nfo_sinus is heard' in recorder.text, 'it records')
+    with client.run_at(20.0):
+        client.wait_for('status', lambda one: one.enabled, 'it runs')
+    client.call('stop')
+    # what a healthy machine has done in two seconds, a busy one may do later
+    wait_until(lambda: read(output / 'ride', ['/nfo_sinus'])[0].stops, 'it is on disk')
+    recorder.signal(signal.SIGKILL)
+    recorder.wait()
+    assert not (output / 'ride' / 'metadata.yaml').exists()
+    done = _run(*_PLOT, str(output), '--explain')
+    assert done.returncode == 0, done.stderr
+    assert 'STOPPED' in done.stdout and '/nfo_sinus/stop' in done.stdout
+    assert _run(*_PLOT, str(output)).returncode == 0 and _is_png(output / 'ride.png')
+
+
+@needs('own')
 def test_a_recorder_without_messages_says_what_to_check(bench: Bench) -> None:
     recorder = _recorder(bench, '--output', str(bench.folder / 'out'), '--for', '6')
     assert recorder.wait() == 1

@@ -29,7 +29,7 @@ WITHOUT_ROS = ('test/unit/catalog/test_family.py', 'test/unit/test_docs.py')
 TESTS = (*WITHOUT_ROS, 'test/unit/cli/test_completion.py', 'test/ros/test_calls_logged.py')
 
 
-def run(*command: object, folder: Path) -> str:
+def attempt(*command: object, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a command where ROS is sourced and nothing of this clone is."""
     built = str(ROOT / 'install')
     environment = {
@@ -38,11 +38,16 @@ def run(*command: object, folder: Path) -> str:
     }
     # set by tools/run for the processes of the tests
     environment.pop('PYTHONPATH', None)
-    done = subprocess.run(
+    return subprocess.run(
         [*map(str, command)],
         cwd=folder, env=environment, check=False, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
     )
+
+
+def run(*command: object, folder: Path) -> str:
+    """Run such a command that succeeds, and return what it says."""
+    done = attempt(*command, folder=folder)
     assert done.returncode == 0, done.stdout[-6000:]
     return done.stdout
 
@@ -86,6 +91,44 @@ def test_every_tool_finds_both_packages(workspace: Path) -> None:
     assert set(run('colcon', 'list', '--names-only', folder=workspace).split()) == BOTH
 
 
+@pytest.mark.parametrize('options', [(), ('--symlink-install',)], ids=['plain', 'links'])
+@pytest.mark.parametrize('place', ['src/nfo_sinus_driver', 'a folder/driver', 'elsewhere'])
+def test_a_build_without_the_messages_fails_and_its_last_line_mends_it(
+    tmp_path: Path, place: str, options: tuple[str, ...]
+) -> None:
+    workspace = tmp_path / 'workspace'
+    (workspace / 'src').mkdir(parents=True)
+    clone = tmp_path / 'clone' if place == 'elsewhere' else workspace / place
+    run('git', 'clone', '--quiet', ROOT, clone, folder=tmp_path)
+    if place == 'elsewhere':
+        (workspace / 'src' / 'driver').symlink_to(clone)
+    build = ('colcon', 'build', *options, '--packages-select', 'nfo_sinus_driver')
+    done = attempt('sh', '-c', 'cd "$0" && exec "$@"', workspace, *build, folder=tmp_path)
+    assert done.returncode != 0, done.stdout
+    (log,) = workspace.glob('log/build_*/nfo_sinus_driver/stderr.log')
+    said = log.read_text(encoding='utf-8').splitlines()
+    assert 'nfo_sinus_msgs' in said[-2] and said[-1].startswith('ln -s ')
+    assert said[-1] in done.stdout
+    # from wherever it is pasted
+    run('sh', '-c', said[-1], folder=tmp_path)
+    assert set(run('colcon', 'list', '--names-only', folder=workspace).split()) == BOTH
+
+
+@pytest.mark.parametrize('options', [(), ('--symlink-install',)], ids=['plain', 'links'])
+def test_a_build_with_the_messages_installed_needs_no_link(
+    tmp_path: Path, options: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    marker = tmp_path / 'installed/share/ament_index/resource_index/packages/nfo_sinus_msgs'
+    marker.parent.mkdir(parents=True)
+    marker.touch()
+    (tmp_path / 'installed/share/nfo_sinus_msgs').mkdir()
+    monkeypatch.setenv(
+        'AMENT_PREFIX_PATH', f'{tmp_path / "installed"}:{os.environ["AMENT_PREFIX_PATH"]}'
+    )
+    run('git', 'clone', '--quiet', ROOT, 'src/nfo_sinus_driver', folder=tmp_path)
+    run('colcon', 'build', *options, folder=tmp_path)
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_a_plain_build_makes_both_packages_and_their_tests_pass(workspace: Path) -> None:
@@ -116,8 +159,8 @@ def test_the_branch_of_a_release_has_the_packages_side_by_side(
     address = 'https://forge.example/team/nfo_sinus'
     for package in found:
         urls = {one.type: one.url for one in package.urls}
-        assert urls.pop('website') and urls == {
-            'repository': address, 'bugtracker': f'{address}/issues'
+        assert urls == {
+            'website': address, 'repository': address, 'bugtracker': f'{address}/issues'
         }
     # all else that was built and tested, and nothing more
     for name, old in (('nfo_sinus_driver', '.'), ('nfo_sinus_msgs', 'msg_defs')):
@@ -176,11 +219,34 @@ def test_the_address_of_a_forge_is_that_of_origin(
         run('git', 'remote', 'add', 'origin', origin, folder=source)
     branch = f'branch-{abs(hash(origin))}'
     said = run(ROOT / 'tools' / 'release_branch', branch, folder=source)
-    assert ('no forge' in said) is not bool(address)
+    assert ('a release waits for the address of the repository' in said) is not bool(address)
+    # one that takes no mail
+    assert said.count('a release waits for an address of the maintainer') == 2
     manifest = run('git', 'show', f'{branch}:nfo_sinus_msgs/package.xml', folder=source)
     found = re.findall(r'<url type="repository">(.*)</url>', manifest)
     assert found == ([address] if address else [])
     assert 'secret' not in manifest
+
+
+def test_an_address_that_package_xml_has_is_not_added_again(source: Path, tmp_path: Path) -> None:
+    run('git', 'clone', '--quiet', source, '.', folder=tmp_path)
+    run('git', 'config', 'user.name', 'A test', folder=tmp_path)
+    run('git', 'config', 'user.email', 'test@example.org', folder=tmp_path)
+    url = '<url type="repository">https://forge.example/own</url>'
+    for name in ('package.xml', 'msg_defs/package.xml'):
+        path = tmp_path / name
+        text = path.read_text(encoding='utf-8').replace('  <author>', f'  {url}\n  <author>')
+        text = re.sub('email=".*"', 'email="all@forge.org"', text)
+        path.write_text(text, encoding='utf-8')
+    run('git', 'commit', '--quiet', '--all', '--message', 'Addresses', folder=tmp_path)
+    for origin in ('../nowhere', FORGE):
+        run('git', 'remote', 'set-url', 'origin', origin, folder=tmp_path)
+        said = run(ROOT / 'tools' / 'release_branch', f'branch-{len(origin)}', folder=tmp_path)
+        assert 'waits' not in said
+        manifest = run(
+            'git', 'show', f'branch-{len(origin)}:nfo_sinus_msgs/package.xml', folder=tmp_path
+        )
+        assert re.findall('<url.*', manifest) == [url]
 
 
 def test_history_goes_on_through_the_branch(source: Path) -> None:

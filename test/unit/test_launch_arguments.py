@@ -20,6 +20,7 @@ from nfo_sinus_driver.launch_arguments import (
     parameter_file,
     require_packages,
     simulated_drives,
+    switch,
     written,
 )
 
@@ -51,6 +52,14 @@ def test_a_number_is_taken_and_what_is_none_refused_by_name() -> None:
     ):
         with pytest.raises(ValueError, match=f'{name}:={given}: write a .*number$'):
             number(name, given, whole=whole)
+
+
+def test_a_switch_is_taken_as_it_is_written_and_what_is_none_refused_by_name() -> None:
+    assert switch('autostart', 'true') and switch('autostart', 'True')
+    assert not switch('autostart', 'false')
+    for given in ('1', 'on', 'fals'):
+        with pytest.raises(ValueError, match=f'autostart:={given}: write true or false$'):
+            switch('autostart', given)
 
 
 def test_many_drives_have_names_and_addresses_of_their_own_and_one_the_default() -> None:
@@ -85,6 +94,12 @@ def test_a_parameter_file_is_found_by_path_or_is_one_of_the_package(
     with pytest.raises(ValueError, match=r'params_file:=conveyer\.yaml: there is no') as no:
         parameter_file('conveyer.yaml', config)
     assert 'conveyor.yaml, single.yaml' in str(no.value)
+    # in a folder of its own, too
+    (config / 'wheels').mkdir()
+    (config / 'wheels' / 'drives.yaml').touch()
+    assert parameter_file('wheels/drives.yaml', config) == str(config / 'wheels' / 'drives.yaml')
+    with pytest.raises(ValueError, match=r'which has conveyor\.yaml, .*, wheels/drives\.yaml$'):
+        parameter_file('drives.yaml', config)
     with pytest.raises(ValueError, match=r'looked in /nowhere/single\.yaml$'):
         parameter_file('/nowhere/single.yaml', config)
 

@@ -38,7 +38,7 @@ KEYS = {
 #: Of the keys of libraries and of ROS packages, those that rosdep has (rosdistro of 2026-08-22).
 ON_NOBLE = {
     *KEYS.values(), 'python3-pytest-timeout',
-    'action_msgs', 'ament_cmake', 'ament_cmake_pytest', 'ament_index_python',
+    'action_msgs', 'ament_cmake', 'ament_xmllint', 'ament_cmake_pytest', 'ament_index_python',
     'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros',
     'lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'ros2launch', 'rosbag2_py',
     'rosbag2_storage_mcap', 'rosgraph_msgs', 'rosidl_default_generators', 'rosidl_default_runtime',
@@ -138,11 +138,41 @@ def test_a_package_says_who_maintains_it_where_it_is_and_under_which_license(pac
     # an address that no one reads
     text = (package / 'package.xml').read_text(encoding='utf-8')
     assert not re.search(r'example\.(org|com|net)', text)
+    assert root.findtext('author') == 'The nfo_sinus_driver authors'
+    # of all pages that a reader could be sent to only those of the repository exist by then
     urls = {one.get('type'): str(one.text) for one in root.findall('url')}
-    assert str(root.findtext('name')) in urls['website']
+    assert not urls or urls['website'] == urls['repository']
+    address_known = urls and not str(first.get('email')).endswith('.example')
+    security = (ROOT / 'SECURITY.md').read_text(encoding='utf-8')
+    assert ('A release waits' in security) is not bool(address_known)
     (license,) = root.findall('license')
     given = (package / str(license.get('file'))).read_bytes()
     assert given == (ROOT / 'LICENSE').read_bytes()
+
+
+@BOTH
+def test_what_package_xml_says_is_in_the_order_of_rep_149(package: Path) -> None:
+    root = ElementTree.parse(package / 'package.xml').getroot()
+    order = ('name', 'version', 'description', 'maintainer', 'license', 'url', 'author')
+    late = ('group_depend', 'member_of_group', 'export')
+    places = [
+        order.index(one.tag) if one.tag in order
+        else len(order) + 1 + late.index(one.tag) if one.tag in late
+        else len(order)
+        for one in root
+    ]
+    assert places == sorted(places)
+
+
+def test_the_check_of_xml_that_the_build_farm_runs_passes(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    check = pytest.importorskip('ament_xmllint.main', reason='ament_xmllint is not installed')
+    found = check.main(argv=[str(ROOT / 'package.xml'), str(ROOT / 'config')])
+    said = ''.join(capfd.readouterr())
+    if 'failed to load' in said:
+        pytest.skip('the schema of package.xml is on the network')
+    assert not found, said
 
 
 @BOTH

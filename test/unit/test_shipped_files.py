@@ -104,6 +104,32 @@ def test_container_and_ci_make_a_workspace_as_the_readme_says() -> None:
         assert [one for one in commands if one not in read(name)] == [], name
 
 
+def test_an_edited_file_costs_the_image_no_new_download() -> None:
+    before, after = read('Dockerfile').split('\nCOPY . ')
+    # all that rosdep reads is there before, and nothing else
+    copied = re.findall(r'^COPY (\S+) ', before, re.MULTILINE)
+    assert copied == ['package.xml', 'msg_defs/package.xml']
+    for download in ('apt-get install', 'rosdep install'):
+        assert download in before and download not in after
+
+
+def test_udev_gives_an_adapter_that_is_plugged_in_what_the_rules_say() -> None:
+    text = read('config/99-nfo-sinus-serial.rules')
+    (command,) = re.findall(r'^#\s+(udevadm trigger.*)$', text, re.MULTILINE)
+    # its own default is `change`, to which a rule for `add` does not apply
+    for action in set(re.findall(r'^ACTION=="(\w+)"', text, re.MULTILINE)):
+        assert f'--action={action} ' in f'{command} '
+    for subsystem in set(re.findall(r'SUBSYSTEM=="([\w-]+)"', text)):
+        assert f'--subsystem-match={subsystem} ' in f'{command} '
+
+
+def test_what_is_typed_into_a_container_goes_through_its_entry_point() -> None:
+    (patched,) = re.findall(r'sed .* (/\w+\.sh)\n', read('Dockerfile'))
+    for name in ('README.md', 'Dockerfile', 'docs/container.md'):
+        typed = re.findall(r'docker exec -it \S+ (\S+) ros2 ', read(name))
+        assert typed and set(typed) == {patched}, name
+
+
 def test_what_the_ci_runs_is_there_and_is_shell() -> None:
     jobs: dict[str, Any] = yaml.safe_load(read(CI))['jobs']
     scripts = [step['run'] for job in jobs.values() for step in job['steps'] if 'run' in step]
@@ -114,6 +140,18 @@ def test_what_the_ci_runs_is_there_and_is_shell() -> None:
     assert paths and all((ROOT / path).exists() for path in paths)
     parts = re.findall(r'^check_(\w+)\(\)', read('.ci/ros2'), re.MULTILINE)
     assert sorted(re.findall(r'\.ci/ros2 (\w+)', text)) == sorted(parts)
+
+
+def test_the_hooks_before_a_commit_check_what_make_checks() -> None:
+    (local,) = yaml.safe_load(read('.pre-commit-config.yaml'))['repos']
+    assert local['repo'] == 'local'
+    # whatever files are in a commit, and with the tools that were set up
+    assert all(one['language'] == 'system' for one in local['hooks'])
+    assert not any(one['pass_filenames'] for one in local['hooks'])
+    hooks = {one['entry'] for one in local['hooks']}
+    rules = re.findall(r'^(?:lint|types):.*\n((?:\t.*\n)+)', read('Makefile'), re.MULTILINE)
+    checks = re.findall(r'^\t@(\.venv/bin/[^\n>]+?)(?: >.*)?$', ''.join(rules), re.MULTILINE)
+    assert len(rules) == 2 and hooks == set(checks)
 
 
 def test_sros2_takes_the_policy() -> None:

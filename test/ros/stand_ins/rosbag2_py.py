@@ -33,6 +33,7 @@ class StorageOptions:
     uri: str
     storage_id: str = ''
     custom_data: dict[str, str] = field(default_factory=dict)
+    storage_config_uri: str = ''
 
 
 @dataclass
@@ -76,6 +77,9 @@ def to_rclcpp_qos_vector(serialized: str, version: int) -> list[Qos]:
 class SequentialWriter:
     def open(self, storage: StorageOptions, converter: ConverterOptions, /) -> None:
         assert storage.storage_id == 'mcap'
+        # it is read now, and not later
+        options = yaml.safe_load(Path(storage.storage_config_uri).read_text(encoding='utf-8'))
+        assert set(options) <= {'chunkSize'}
         assert converter.input_serialization_format == converter.output_serialization_format
         self._connections = {}
         try:
