@@ -26,7 +26,7 @@ def require_messages():
     End a colcon build that has left nfo_sinus_msgs out: only at run time would it be missed.
 
     On main it is a folder inside this package, where colcon does not look without a link. Where it
-    has been found it is built first, so that it is installed by now. Whoever else builds this
+    has been found it is built first, so that it is installed by now. What else builds this
     package (pip without ROS, the build farm) needs no messages for that.
     """
     builds = {'develop', 'install'} & set(sys.argv) and '--help' not in sys.argv

@@ -32,6 +32,8 @@ _MOST_OWED = 0.07
 _MOST_SAVED = 0.005
 #: What takes no longer in vain is noise, s.
 _PASSING = 0.1
+#: A stop takes no more until the run command is taken away, with what it reads before.
+_FIRST_REQUESTS = 4
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
 #: What only reads, and can wait for a unit that does not answer.
 _READS = (Priority.POLL, *_BACKGROUND)
@@ -143,6 +145,18 @@ class Scheduler:
         ]
 
     @property
+    def _new_stop_waits(self) -> bool:
+        """A stop of a unit that answers waits for its first requests."""
+        return any(
+            isinstance(entry, Waiting)
+            and not self._is_silent(entry.exchange.unit)
+            and entry.task.stops
+            and entry.task.requests <= _FIRST_REQUESTS
+            for rank in _STOPS
+            for entry in self._queues[rank]
+        )
+
+    @property
     def waits(self) -> bool:
         """Anything waits that is not for a missing unit."""
         return any(queue for rank, queue in self._queues.items() if rank != _MISSING)
@@ -153,11 +167,11 @@ class Scheduler:
         """
         Take out what goes next, or ``None``; for a missing unit only with ``missing``.
 
-        :param in_vain: a stop that was in vain before goes ahead of everything else.
+        :param in_vain: a stop that was in vain before goes ahead of all but a new one.
         :param only_stops: everything but a stop has to wait.
         """
         self._release_found()
-        if in_vain and (stops := self.stops_in_vain):
+        if in_vain and not self._new_stop_waits and (stops := self.stops_in_vain):
             longest_ago = min(stops, key=lambda stop: self._asked_at(stop[1].exchange.unit))
             return self._take_out(*longest_ago)
         for rank in _STOPS if only_stops else self._order(missing):

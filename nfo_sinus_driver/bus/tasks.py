@@ -221,6 +221,8 @@ class Task:
         self._explain = explain
         #: It stops a motor.
         self.stops = stops
+        #: How many requests it has made.
+        self.requests = 0
         self.future: Future[Any] = Future()
         self.cancelled = False
         #: It is being stepped, so :class:`Cancelled` can only reach it where it awaits next.
@@ -284,6 +286,7 @@ class Task:
         else:
             assert isinstance(awaited, (Exchange, Pause))
             self.awaited = awaited
+            self.requests += isinstance(awaited, Exchange)
             return awaited
         finally:
             self.running = False

@@ -59,10 +59,19 @@ from nfo_sinus_driver.catalog.profile import (
     Reset,
     SetpointTarget,
 )
-from nfo_sinus_driver.catalog.status import Fact, Kind, Meaning, Role, State, StatusCode
+from nfo_sinus_driver.catalog.status import (
+    MOTOR_PLATE,
+    Fact,
+    Kind,
+    Meaning,
+    Role,
+    State,
+    StatusCode,
+)
 from nfo_sinus_driver.catalog.table import CatalogError
 
 __all__ = [
+    'MOTOR_PLATE',
     'Access',
     'Address',
     'CatalogError',

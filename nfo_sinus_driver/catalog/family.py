@@ -25,7 +25,7 @@ from nfo_sinus_driver.catalog.error_log import ErrorLogArea
 from nfo_sinus_driver.catalog.own_parameters import own_parameter
 from nfo_sinus_driver.catalog.parameter import Access, Address, Parameter, Value
 from nfo_sinus_driver.catalog.profile import Profile, SetpointTarget
-from nfo_sinus_driver.catalog.status import SPEED, Kind, Meaning, Role, StatusCode
+from nfo_sinus_driver.catalog.status import MOTOR_PLATE, SPEED, Kind, Meaning, Role, StatusCode
 
 _FAMILIES = 'nfo_sinus_driver.families'
 #: Roles of what is read beside the polls, and in no hurry: such parameters may take their time, as
@@ -50,12 +50,7 @@ _UNHURRIED = frozenset(
         Role.ENERGY,
         Role.TOTAL_ENERGY,
         Role.BUS_ADDRESS,
-        Role.NOMINAL_POWER,
-        Role.NOMINAL_VOLTAGE,
-        Role.NOMINAL_FREQUENCY,
-        Role.NOMINAL_SPEED,
-        Role.NOMINAL_CURRENT,
-        Role.NOMINAL_POWER_FACTOR,
+        *MOTOR_PLATE,
     )
 )
 #: The message InvSt has one byte for a status code.

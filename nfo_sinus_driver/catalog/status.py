@@ -289,6 +289,17 @@ class Role(_LookedUp):
     CHARACTER_FORMAT = 'character_format'
 
 
+#: What the motor plate says.
+MOTOR_PLATE = (
+    Role.NOMINAL_POWER,
+    Role.NOMINAL_VOLTAGE,
+    Role.NOMINAL_FREQUENCY,
+    Role.NOMINAL_SPEED,
+    Role.NOMINAL_CURRENT,
+    Role.NOMINAL_POWER_FACTOR,
+)
+
+
 class Quantity(NamedTuple):
     """
     What a drive controls in one control mode.

@@ -71,8 +71,9 @@ class Info(Verb):
             mode = _measure_roles(drive, [Role.CONTROL_MODE])
             nameplate = _measure_roles(drive, _NAMEPLATE)
             hours = _measure_roles(drive, _COUNTERS)
-            told = drive.model.profile.module
-            module = _measure(drive, filter(drive.params.reaches, told))
+            words = drive.model.profile.module
+            found = _measure(drive, filter(drive.params.reaches, words))
+            module = ', '.join(words[key](value) for key, value in found.items())
             facts = {
                 'address': str(drive.address),
                 'port': options.port,
@@ -82,7 +83,7 @@ class Info(Verb):
                 'vendor': identity.vendor,
                 'firmware': identity.versions,
                 'serial number': identity.serial,
-                **({'module': ', '.join(told[key](module[key]) for key in module)} if told else {}),
+                **({'module': module} if words else {}),
                 'status': f'{drive.state.describe()} ({status.listed.description})',
                 'state': status.state.name.lower().replace('_', ' '),
                 'control mode': ''.join(mode.values()),

@@ -43,8 +43,8 @@ class Recogniser:
     def identifies(self) -> bool:
         """Something tells its drives from others that have all the registers which are read."""
         profile = self._profile
-        told = profile.identify or profile.product or profile.vendor
-        return bool(told) or self._params.in_block
+        is_named = profile.identify or profile.product or profile.vendor
+        return bool(is_named) or self._params.in_block
 
     async def recognise(self, *, retry: bool = True) -> bool:
         """

@@ -517,7 +517,7 @@ class Setpoint:
             least = _TRIES if one.value else _TRIES_OF_0
             tried = is_held or max(one.tries, self._bus.writes_in_vain) >= least
             if not tried and one.tries <= (1 if one.value else 0):
-                # on a slow line it waits for its turn, or one try was lost in noise; not for ever
+                # on a slow line it waits for its turn, or one try was lost in noise; so long
                 rounds = _ROUNDS * self._bus.round_time()
                 if now < one.since + seconds + max(_TURNS_WITHIN, rounds):
                     continue

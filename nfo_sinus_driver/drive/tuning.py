@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import math
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import InverterStatus, Meaning, Procedure, Role
+from nfo_sinus_driver.catalog import MOTOR_PLATE, InverterStatus, Meaning, Procedure, Role
 from nfo_sinus_driver.drive import drive_state
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
@@ -26,16 +26,6 @@ _LOOK_PERIOD = 0.05
 _REPORT_PERIOD = 0.5
 #: Longer than any tuning takes; a drive that is still at it then is stopped, s.
 _LONGEST = 900.0
-#: What the motor plate says; a drive cannot tune without.
-_PLATE = (
-    Role.NOMINAL_POWER,
-    Role.NOMINAL_VOLTAGE,
-    Role.NOMINAL_FREQUENCY,
-    Role.NOMINAL_SPEED,
-    Role.NOMINAL_CURRENT,
-    Role.NOMINAL_POWER_FACTOR,
-)
-
 #: In standby the status does not show how it ended: a lost RUN input leads there, too, and a short
 #: procedure may be over before the first reading. What was measured decides.
 _UNDECIDED = (Cause.TUNING_WITHOUT_RESULT, Cause.TUNING_DOES_NOT_BEGIN)
@@ -117,7 +107,7 @@ class Tuning:
         return result
 
     async def _require_motor_plate(self, what: str) -> None:
-        for role in _PLATE:
+        for role in MOTOR_PLATE:
             key = self._state.model.key(role)
             if not await self._state.params.read_number(key, Priority.SERVICE) > 0:
                 raise DriveError(Cause.TUNING_NEEDS, what=what, key=key)

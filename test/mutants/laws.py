@@ -1302,10 +1302,18 @@ LAWS = (
     Mutant(
         3,
         'in noise the stops of those that answer keep back those of the others',
-        SCHEDULER,
-        'if in_vain and (stops := self.stops_in_vain):',
-        'if False and (stops := self.stops_in_vain):',
+        SILENCES,
+        'return self._stops_from if self.is_in_noise(now) else math.inf',
+        'return math.inf',
         ('test/unit/drive/test_noise.py', '-k', 'no_stop_waits'),
+    ),
+    Mutant(
+        3,
+        'in noise a stop in vain keeps back a new one of a drive that answers',
+        SCHEDULER,
+        'if in_vain and not self._new_stop_waits and',
+        'if in_vain and',
+        ('test/unit/bus/test_scheduler.py', '-k', 'all_but_a_new_stop'),
     ),
     Mutant(
         3,

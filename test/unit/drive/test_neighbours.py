@@ -208,8 +208,8 @@ def test_a_stop_that_is_acknowledged_and_never_confirmed_leaves_the_line_to_the_
         rig.line.plan = lambda frame: 'damage' if frame[0] == 1 and frame[1] != _WRITE else None
         rig.drives[1].stop()
         rig.pass_time(_SETTLED)
-        seen = polls(rig, 10.0)
-        assert all(seen[address] > before[address] / 2 for address in range(2, 5)), seen
+        after = polls(rig, 10.0)
+        assert all(after[address] > before[address] / 2 for address in range(2, 5)), after
         assert rig.drives[1].stop_unconfirmed
 
 
