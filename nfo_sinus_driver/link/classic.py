@@ -322,12 +322,14 @@ class ClassicLink(CodecLink):
     def _enquire(self, unit: int, address: Address, once: bool = False) -> tuple[int, float]:
         """Return the value of a parameter, and when it came."""
         number = address.index
+        asked_at = self._now()
         answer, arrived = self._ask(Enquiry(unit, number), once)
         if isinstance(answer, Nak):
             text = f'the drive has no parameter E{number:04X} that can be read (NAK)'
             raise Refused(Refused.ILLEGAL_ADDRESS, text)
         if number in self._resync_numbers.get(unit, ())[:1]:
-            self._status[unit] = answer.word, arrived
+            # it may have been in the port for long, if this program stood still
+            self._status[unit] = answer.word, asked_at
         return answer.word, arrived
 
     def _broadcast(self, request: Select) -> float:

@@ -80,6 +80,14 @@ LAWS = (
     ),
     Mutant(
         1,
+        'a status that waited in the port while the driver stood still shows that a fault is new',
+        'nfo_sinus_driver/link/classic.py',
+        'self._status[unit] = answer.word, asked_at',
+        'self._status[unit] = answer.word, arrived',
+        ('test/unit/drive/test_driver_stands_still.py', '-k', 'left_to_the_operator'),
+    ),
+    Mutant(
+        1,
         'the command line takes control of a drive unasked',
         'nfo_sinus_driver/cli/session.py',
         'if not options.may_take_control:',

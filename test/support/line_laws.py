@@ -60,6 +60,8 @@ _SAME = 3.0
 _CARRIED_OUT = 0.3
 #: How often is looked, s, and what a look may come too late.
 _LOOKS, _SLACK = 0.01, 0.02
+#: How long a set-point is tried again in noise before it has failed, s.
+_TRIED_AGAIN = 2.0
 #: A request and its gaps have no more characters than this.
 _CHARACTERS = 24
 #: How long a gateway waits for a drive, s, and what its answer takes.
@@ -436,7 +438,7 @@ class LineLaws:
         if self.noise:
             # before it is sent it waits for those of all others, many of which take all their time,
             # and for a stop, whose status goes ahead of them until it is read whole
-            patience += 2 * len(self._units) * self._under_way
+            patience += max(2 * len(self._units) * self._under_way, _TRIED_AGAIN) + self._under_way
         stopped = not (snapshot.enabled or drive.stop_owed or drive.stop_waits)
         claims = stopped and self._turns(number)
         unit.claims_since = min(unit.claims_since, now) if claims else math.inf

@@ -103,6 +103,9 @@ class RecognitionLaw:
             self._silent_since.setdefault(unit, now)
             return
         self._frame_at = now
+        if error is not None and now - self._silent_since.get(unit, now) > _EXCHANGE:
+            # something is there, and what is not known yet
+            return
         if now - self._silent_since.pop(unit, now) > _EXCHANGE:
             self._answers[unit] = 0
         # to what is known one stop may be written that nothing answers, and that may be answered

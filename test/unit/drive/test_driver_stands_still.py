@@ -14,6 +14,7 @@ import itertools
 from typing import Any
 
 import pytest
+from support.own_timeout import by_default
 from support.rig import CONNECTIONS, Rig
 
 from nfo_sinus_driver.link import Reply
@@ -65,6 +66,27 @@ def time_to_wire(rig: Rig, at: float) -> float:
     rig.line.later(at, stop)
     rig.wait_until(lambda: written)
     return written[0] - at
+
+
+@pytest.mark.parametrize('key', ['fieldbus.inv_st', 'fieldbus.drive_status', 'status.frq_act'])
+@pytest.mark.parametrize('connection', ['classic', 'classic, control word'])
+def test_the_serial_fault_by_which_a_drive_stopped_meanwhile_is_left_to_the_operator(
+    connection: str, key: str
+) -> None:
+    with by_default(connection, drives=2, poll_rate=50.0) as rig:
+        rig.turn()
+
+        def stand_still(asked: str, data: bytes | None) -> None:
+            if asked == key:
+                # its answer waits in the port meanwhile
+                rig.meet = lambda asked, data: None
+                rig.line.stand_still(rig.clock.now + 0.001, _SHORT)
+
+        rig.meet = stand_still
+        rig.pass_time(_SHORT + _WHILE)
+        for far in rig.fars.values():
+            assert _SIO_FAIL in far.faults.codes
+            assert far.control_unit.sio_err_reads == 0
 
 
 @pytest.mark.parametrize(('stood', 'most'), [(_SHORT, _AT_ONCE), (_STOOD, _RECOGNISED)])
