@@ -32,8 +32,6 @@ _MOST_OWED = 0.07
 _MOST_SAVED = 0.005
 #: What takes no longer in vain is noise, s.
 _PASSING = 0.1
-#: A stop takes no more until the run command is taken away, with what it reads before.
-_FIRST_REQUESTS = 4
 _BACKGROUND = (Priority.TELEMETRY, Priority.REFRESH)
 #: What only reads, and can wait for a unit that does not answer.
 _READS = (Priority.POLL, *_BACKGROUND)
@@ -131,8 +129,8 @@ class Scheduler:
         return bool(self._queues[_MISSING])
 
     @property
-    def stops_in_vain(self) -> list[tuple[_Rank, Waiting]]:
-        """The stops, and looks, of silent units beside others that answer, and of which rank."""
+    def stops(self) -> list[tuple[_Rank, Waiting]]:
+        """The stops that wait, with their looks, and of which rank; none on a silent line."""
         if self._is_line_silent():
             return []
         return [
@@ -141,20 +139,7 @@ class Scheduler:
             for entry in self._queues[rank]
             if isinstance(entry, Waiting)
             and entry.exchange.priority in _STOPS
-            and self._is_silent(entry.exchange.unit)
         ]
-
-    @property
-    def _new_stop_waits(self) -> bool:
-        """A stop of a unit that answers waits for its first requests."""
-        return any(
-            isinstance(entry, Waiting)
-            and not self._is_silent(entry.exchange.unit)
-            and entry.task.stops
-            and entry.task.requests <= _FIRST_REQUESTS
-            for rank in _STOPS
-            for entry in self._queues[rank]
-        )
 
     @property
     def waits(self) -> bool:
@@ -162,18 +147,18 @@ class Scheduler:
         return any(queue for rank, queue in self._queues.items() if rank != _MISSING)
 
     def take(
-        self, *, missing: bool = True, in_vain: bool = False, only_stops: bool = False
+        self, *, missing: bool = True, in_noise: bool = False, only_stops: bool = False
     ) -> LatestValue | Waiting | None:
         """
         Take out what goes next, or ``None``; for a missing unit only with ``missing``.
 
-        :param in_vain: a stop that was in vain before goes ahead of all but a new one.
+        :param in_noise: of the stops goes that of which the fewest requests were made, whether its
+            unit answers or not: those that answer more leave the others as much of the time.
         :param only_stops: everything but a stop has to wait.
         """
         self._release_found()
-        if in_vain and not self._new_stop_waits and (stops := self.stops_in_vain):
-            longest_ago = min(stops, key=lambda stop: self._asked_at(stop[1].exchange.unit))
-            return self._take_out(*longest_ago)
+        if in_noise and (stops := self.stops):
+            return self._take_out(*min(stops, key=self._requests_of))
         for rank in _STOPS if only_stops else self._order(missing):
             # most are empty, and this runs for every transaction
             entry = self._first(rank) if self._queues[rank] else None
@@ -184,6 +169,11 @@ class Scheduler:
         # no other unit waits
         self._unanswered = None
         return self.take(missing=missing, only_stops=only_stops)
+
+    def _requests_of(self, stop: tuple[_Rank, Waiting]) -> tuple[int, float]:
+        """Return how many requests a stop has made; of equals the longest ago goes first."""
+        _, (task, exchange) = stop
+        return task.requests, self._asked_at(exchange.unit)
 
     def _take_out(self, rank: _Rank, entry: LatestValue | Waiting) -> LatestValue | Waiting:
         del self._queues[rank][entry]

@@ -488,7 +488,7 @@ class Bus:
         missing_from = math.inf
         if self._scheduler.missing_wait:
             missing_from = self.silences.missing_from
-            if self._scheduler.stops_in_vain:
+            if self._scheduler.stops:
                 stops_from = self.silences.stops_in_vain_from(self.now())
                 missing_from = min(missing_from, stops_from)
         until = min(paced_until, missing_from, supervised_at, reopen_at)
@@ -528,6 +528,11 @@ class Bus:
     def paused(self) -> float:
         """For how long the worker has not run so far, s; for coroutines on it."""
         return self._clock.paused
+
+    @property
+    def resumed_at(self) -> float:
+        """When the worker last ran again after it had not, s; for coroutines on it."""
+        return self._clock.resumed_at
 
     def _note_pause(self) -> float:
         """Return for how long the worker has not run since the last call, s."""
@@ -605,7 +610,7 @@ class Bus:
         now = self.now()
         entry = self._scheduler.take(
             missing=now >= self.silences.missing_from,
-            in_vain=now >= self.silences.stops_in_vain_from(now),
+            in_noise=now >= self.silences.stops_in_vain_from(now),
             only_stops=only_stops or now < self._paced_until,
         )
         if isinstance(entry, LatestValue):

@@ -244,13 +244,18 @@ class Loading:
     def _write(
         self, what: str, data: Mapping[str, bytes], written: dict[str, ParameterChange]
     ) -> None:
-        """Write, and keep account of it; a signal ends it after the parameter on its way."""
+        """
+        Write, and keep account of it; a signal ends it after the parameter on its way.
+
+        It does not end the putting back, which would leave the drive with a half of each.
+        """
+        puts_back = written is not self._written
         with signals_noted() as came, progress(f'{what} {self._drive}', len(data)) as step:
 
             def wrote(change: ParameterChange) -> None:
                 written[change.key] = change
                 step()
-                if came() and len(written) < len(data):
+                if came() and not puts_back and len(written) < len(data):
                     raise Interrupted
 
             self._drive.parameters.write_each(data, wrote).result()
@@ -280,7 +285,7 @@ class Loading:
         back: dict[str, ParameterChange] = {}
         try:
             self._write('putting back', {key: self._before[key] for key in stained}, back)
-        except (DriveError, Interrupted) as error:
+        except DriveError as error:
             if back:
                 remark(listed('put back:', map(str, back.values())))
             lost = (key for key in stained if key not in back)

@@ -715,7 +715,8 @@ class Poller:
         if self._task is None:
             return
         if state.connected:
-            is_old = self._bus.paused != self._status_paused
+            # a stop may have read it since
+            is_old = state.status is not None and state.status.at < self._bus.resumed_at
             # on a slow line one may be enabled before it is measured for the first time
             is_shown = self.snapshot.connected or state.control.enabled
             if is_old or not is_shown:
@@ -745,6 +746,12 @@ class Poller:
             if waits and known and self._task is not None:
                 self._publish(self._state.status)
 
+    def _measured(self, role: Role | None, *, polled: bool) -> Measured:
+        """Return what was measured last; nothing from before a pause, until a poll has passed."""
+        last = self._state.last_polled(role)
+        polled |= self._bus.paused == self._status_paused
+        return last if polled or last.at >= self._bus.resumed_at else NOT_MEASURED
+
     def _publish(self, status: InverterStatus | None) -> None:
         self._show(self._snapshot(status))
 
@@ -758,8 +765,9 @@ class Poller:
         if status is not None and state.status is not None and state.status.at > status.at:
             # a command has read a newer one: the drive may be enabled since, its fault acknowledged
             status = state.status
-        frequency, speed = (state.last_polled(role) for role in _BASIC)
-        actual = state.shown(state.controlled, state.last_polled(state.controlled).value)
+        measured = (*_BASIC, state.controlled)
+        frequency, speed, controlled = (self._measured(role, polled=polled) for role in measured)
+        actual = state.shown(state.controlled, controlled.value)
         stop = None if self._controller is None else self._controller.stopped_for
         return take_snapshot(
             state, self._setpoint, status, frequency, speed, actual, stop, polled=polled

@@ -459,21 +459,21 @@ def test_the_first_stop_of_a_missing_unit_goes_ahead_and_its_repetitions_wait() 
     assert scheduler.take(missing=False) is again
 
 
-@pytest.mark.parametrize('is_new', [True, False])
-def test_in_noise_a_stop_in_vain_goes_ahead_of_all_but_a_new_stop(is_new: bool) -> None:
-    async def stop() -> None:
-        for _ in range(1 if is_new else 20):
-            await Exchange(1, Write(register(1), b'\0\0'), Priority.STOP)
+@pytest.mark.parametrize(('answers', 'silent', 'first'), [(1, 9, 1), (9, 1, 2), (9, 8, 2)])
+def test_in_noise_the_stop_with_the_fewest_requests_goes_first(
+    answers: int, silent: int, first: int
+) -> None:
+    async def stop(unit: int) -> None:
+        while True:
+            await Exchange(unit, Write(register(1), packed(0)), Priority.STOP)
 
     scheduler = Scheduler(lambda unit: unit == 2, lambda unit: unit == 2)
-    task = Task(stop(), stops=True)
-    exchange = task.step(None, None)
-    for _ in range(0 if is_new else 10):
-        exchange = task.step(None, None)
-    scheduler.add(Waiting(task, cast(Exchange, exchange)))
-    scheduler.add(stop_of(2))
-    first = scheduler.take(in_vain=True)
-    assert isinstance(first, Waiting) and first.exchange.unit == (1 if is_new else 2)
+    for unit, requests in ((1, answers), (2, silent)):
+        task = Task(stop(unit), stops=True)
+        awaited = [task.step(None, None) for _ in range(requests)]
+        scheduler.add(Waiting(task, cast(Exchange, awaited[-1])))
+    taken = scheduler.take(in_noise=True)
+    assert isinstance(taken, Waiting) and taken.exchange.unit == first
 
 
 def test_what_a_task_waits_for_can_be_withdrawn() -> None:

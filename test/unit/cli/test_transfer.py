@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
+import itertools
 import json
 import os
 from pathlib import Path
@@ -478,6 +479,22 @@ def test_a_second_ctrl_c_keeps_nothing_from_being_put_back(
     monkeypatch.setattr(transfer, 'remark', impatient)
     done = nfo('load', some, '--put-back')
     assert (done.status, 'all that was written is put back' in done.err) == (1, True)
+    assert has(bench, BEFORE)
+
+
+def test_a_second_ctrl_c_while_it_is_put_back_leaves_no_half(
+    nfo: Nfo, bench: Bench, some: Path, interrupt: Callable[[int], None]
+) -> None:
+    bench.refuse('freque.f_fix2')
+    writes = itertools.count()
+
+    def write() -> None:
+        if next(writes):
+            interrupt(signal.SIGINT)
+
+    bench.on_write('control.accel', write)
+    done = nfo('load', some, '--put-back')
+    assert (done.status, 'all that was written is put back' in done.err) == (1, True), done.err
     assert has(bench, BEFORE)
 
 

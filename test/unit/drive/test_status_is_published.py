@@ -10,6 +10,7 @@ Measured values alone wait for the next poll.
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 
 import pytest
 from support.chosen import KINDS
@@ -159,6 +160,22 @@ def test_nothing_from_before_a_pause_of_the_driver_is_published_with_what_change
         rig.pass_time(4.0)
         read_at = [one.status.at for one in rig.notes.snapshots if one.status is not None]
         assert read_at and min(read_at) >= resumed[0]
+
+
+def test_a_stop_after_a_pause_of_the_driver_is_shown_before_the_next_poll_is_over() -> None:
+    # on a slow line that takes a while
+    with Rig(drives=16, line={'baud': 19200}, drive_timeout=0.0, setpoint_timeout=0.0) as rig:
+        rig.turn()
+        at = rig.clock.now + 0.05
+        rig.line.stand_still(at, 1.0)
+        rig.pass_time(1.2)
+        rig.notes.snapshots.clear()
+        assert 'stop' in rig.answer(rig.drive.stop())
+        rig.pass_time(0.1)
+        assert not rig.drive.snapshot.enabled and rig.drive.snapshot.status is not None
+        # what was measured before is not shown with it
+        for one in rig.notes.snapshots:
+            assert one.frequency_at >= at + 1.0 or math.isnan(one.frequency)
 
 
 @pytest.mark.parametrize('connection', ['classic', 'movitrac'])
