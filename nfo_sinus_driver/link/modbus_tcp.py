@@ -44,6 +44,7 @@ from nfo_sinus_driver.link.late_replies import LATEST_REPLY, longer_than
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, read_of, understand
 from nfo_sinus_driver.link.other_values import OtherValues
+from nfo_sinus_driver.link.pauses import Pauses
 from nfo_sinus_driver.link.protocols import MODBUS_TCP
 from nfo_sinus_driver.link.tcp_connection import CLOSED_HINT, Connection, TcpConnection
 from nfo_sinus_driver.link.thread_clock import ThreadClock
@@ -120,6 +121,7 @@ class TcpLink(ModbusLink):
 
     :param response_timeout: from a request sent to its answer, s.
     :param connection: makes what carries the bytes, of host and port.
+    :param request_gap: the least time from an answer to the next request, s.
     """
 
     protocol = MODBUS_TCP
@@ -131,6 +133,7 @@ class TcpLink(ModbusLink):
         response_timeout: float,
         connection: Callable[[str, int], Connection] = TcpConnection,
         now: Clock = time.monotonic,
+        request_gap: float = 0.0,
     ) -> None:
         self.clock = self._now = ThreadClock(now)
         self.stop_waits: Callable[[], bool] = lambda: False
@@ -157,6 +160,9 @@ class TcpLink(ModbusLink):
         self._closings = 0
         self._blocks = telegram.Blocks(self.exchange, now)
         self.remarks = Remarks()
+        #: When the last message was sent, or came.
+        self._line_end = -math.inf
+        self.pauses = Pauses(self.remarks.add, lambda: self._line_end, request_gap)
         self.last_byte_at = -math.inf
 
     def wait_at_most(self, seconds: float) -> None:
@@ -169,8 +175,12 @@ class TcpLink(ModbusLink):
 
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> TcpLink:
-        """Return the link to a gateway; of the settings only the ``response_timeout`` counts."""
-        return cls(*_host_and_port(port), settings.response_timeout)
+        """Return the link to a gateway; of the settings only those of time count."""
+        return cls(
+            *_host_and_port(port),
+            settings.response_timeout,
+            request_gap=settings.request_gap,
+        )
 
     def open(self) -> None:
         """
@@ -187,6 +197,7 @@ class TcpLink(ModbusLink):
         """Close the connection; harmless when it is closed already."""
         self._drop_begun()
         connection, self._connection = self._connection, None
+        self.pauses.forget_failures()
         if connection is not None:
             connection.close(discard=self._unanswered)
 
@@ -342,11 +353,17 @@ class TcpLink(ModbusLink):
 
     def _exchange(self, request: Request[_T]) -> tuple[_T, float]:
         connection = self._usable()
+        while self._now() < (ready_at := self.pauses.ready_at(request.unit)):
+            # usually the bus has waited for that already; what comes is late
+            self._reader.feed(connection.read(self._now.until(ready_at)))
         self._number = self._number % 0xFFFF + 1
         self._unanswered = True
+        writes = isinstance(request, (Write, WriteAndRead))
+        self.pauses.sent(request.unit, self._now(), writes=writes)
         connection.write(encode(request, self._number))
         self._others.sent(request, self._now())
-        sent_at, unit = self._now(), request.unit
+        self._line_end = sent_at = self._now()
+        unit = request.unit
         most = max(self._patience, longer_than(self._longest_ever.get(unit, math.inf)))
         deadline = sent_at + min(self._response_timeout, most)
         others: list[int] = []
@@ -354,10 +371,11 @@ class TcpLink(ModbusLink):
             data = connection.read(self._now.until(deadline))
             now = self._now()
             if data:
-                self.last_byte_at = now
+                self.last_byte_at = self._line_end = now
             for number, message in self._reader.feed(data):
                 if number == self._number:
                     self._note_answer()
+                    self._note_for_pauses(request, message, now)
                     if self._now.resumed_at <= sent_at:
                         longest = self._longest_ever.get(unit, 0.0)
                         self._longest_ever[unit] = max(longest, now - sent_at)
@@ -374,6 +392,8 @@ class TcpLink(ModbusLink):
             if now >= deadline:
                 break
         error = self._missing(request, others)
+        if isinstance(error, GatewaySilent) and self._now.resumed_at <= sent_at:
+            self.pauses.unanswered(unit, type(request))
         self._given_up.append(self._number)
         raise error
 
@@ -383,6 +403,14 @@ class TcpLink(ModbusLink):
         self._answers += 1
         if self._answers > 1:
             self._closings = 0
+
+    def _note_for_pauses(self, request: Request[object], message: bytes, now: float) -> None:
+        code = message[2] if message.startswith(modbus_pdu.refusal_head(request)) else 0
+        if code == Refused.NO_ANSWER:
+            self.pauses.unanswered(request.unit, type(request))
+            self.pauses.heard(now)
+        elif code != Refused.NO_PATH:
+            self.pauses.answered(request.unit, type(request), now)
 
     def _missing(self, request: Request[object], others: Sequence[int]) -> LinkError:
         """Return the error when no answer to a request came, but perhaps others."""
