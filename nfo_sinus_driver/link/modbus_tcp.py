@@ -423,7 +423,10 @@ class TcpLink(ModbusLink):
                 'to pass bytes on and use socket:// with modbus_rtu'
             )
         if self._reader.received:
-            return DamagedAnswer(f'unit {unit}: only a part of the answer came')
+            return GatewayFault(
+                f'unit {unit}: only a part of the answer came, by the length in its header: update '
+                'or replace the gateway, or raise response_timeout where the network is slow'
+            )
         if others:
             return GatewayLate(
                 f'the answer of the gateway for unit {unit} came after response_timeout: set it '

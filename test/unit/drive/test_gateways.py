@@ -134,6 +134,21 @@ def test_a_wrong_answer_of_a_gateway_is_named(
         assert 'number' not in said or 'update or replace the gateway' in text
 
 
+@pytest.mark.parametrize('length', [-3, -1, 1, 2, 50])
+def test_a_wrong_length_over_tcp_is_not_blamed_on_a_serial_line(length: int) -> None:
+    def changed(data: bytes) -> bytes:
+        wrong = int.from_bytes(data[4:6], 'big') + length
+        return data[:4] + wrong.to_bytes(2, 'big') + data[6:]
+
+    with Rig('tcp') as rig:
+        send = rig.line.send
+        rig.line.send = lambda data: send(changed(data))
+        text = str(rig.answer(rig.drive.connect()))
+        for blamed in ('baud', 'parity', 'BusType', 'S5'):
+            assert blamed not in text
+        assert 'gateway' in text or 'protocol' in text
+
+
 def test_a_gateway_that_closes_after_each_answer_is_used_all_the_same() -> None:
     with Rig('tcp') as rig:
         rig.line.closes = True
