@@ -34,6 +34,7 @@ from nfo_sinus_driver.link.interface import (
     NoAnswer,
     NoPath,
     NotReady,
+    NotSent,
     PortError,
     Refused,
     Remarks,
@@ -117,7 +118,8 @@ class TcpLink(ModbusLink):
     Before the other is used the mute one is closed so that nothing that was handed over to it
     arrives later.
 
-    A gateway that closes the connection after each answer gets another one for each request.
+    A gateway that closes the connection after each answer gets another one for each request. One
+    that closes it twice at a function that it has never answered is not asked that any more.
 
     :param response_timeout: from a request sent to its answer, s.
     :param connection: makes what carries the bytes, of host and port.
@@ -158,6 +160,10 @@ class TcpLink(ModbusLink):
         self._unanswered = False
         #: How many connections in a row the gateway has closed after one answer.
         self._closings = 0
+        #: The functions that the gateway has answered, and how often in a row it has closed a
+        #: connection at another one.
+        self._known: set[int] = set()
+        self._closed_at: dict[int, int] = {}
         self._blocks = telegram.Blocks(self.exchange, now)
         self.remarks = Remarks()
         #: When the last message was sent, or came.
@@ -327,9 +333,13 @@ class TcpLink(ModbusLink):
 
     def _ask(self, request: Request[_T], once: bool = False) -> tuple[_T, float]:
         """Return the answer to a request, and when it came."""
+        if self._closed_at.get(request.function, 0) >= _CLOSINGS:
+            raise _unknown(request)
         try:
             return self._exchange(request)
         except ConnectionError as error:
+            if self._may_not_know(request):
+                return self._ask_again(request, error, once=once)
             first = not self._closes_after_one(request)
             if first or once or isinstance(request, (Write, WriteAndRead)):
                 raise self._lost(error) from error
@@ -343,6 +353,31 @@ class TcpLink(ModbusLink):
             return self._exchange(request)
         except OSError as error:
             raise self._lost(error) from error
+
+    def _may_not_know(self, request: Request[object]) -> bool:
+        """Return whether the gateway has closed the connection at a function that is new to it."""
+        # a plain write is never given up: it may be a stop
+        is_plain_write = isinstance(request, Write)
+        return bool(self._known) and request.function not in self._known and not is_plain_write
+
+    def _ask_again(
+        self, request: Request[_T], why: ConnectionError, *, once: bool
+    ) -> tuple[_T, float]:
+        """Return the answer to what the gateway has closed the connection at, if it may be sent."""
+        function = request.function
+        self._closed_at[function] = 1 + self._closed_at.get(function, 0)
+        has_effect = once or isinstance(request, WriteAndRead)
+        if self._closed_at[function] < _CLOSINGS:
+            if has_effect:
+                raise self._lost(why) from why
+            self._connect_again()
+            return self._ask(request)
+        self.remarks.add(
+            f'{self._name} closes the connection at function {function}, which it does not know: '
+            'the driver goes on without it'
+        )
+        self._connect_again()
+        raise _unknown(request)
 
     def _closes_after_one(self, request: Request[object]) -> bool:
         """Return whether the gateway seems to close after each answer: it has just done so."""
@@ -376,6 +411,8 @@ class TcpLink(ModbusLink):
                 if number == self._number:
                     self._note_answer()
                     self._note_for_pauses(request, message, now)
+                    self._known.add(request.function)
+                    self._closed_at.pop(request.function, None)
                     if self._now.resumed_at <= sent_at:
                         longest = self._longest_ever.get(unit, 0.0)
                         self._longest_ever[unit] = max(longest, now - sent_at)
@@ -478,6 +515,13 @@ def _host_and_port(port: str) -> tuple[str, int]:
             f'port {port!r} is no gateway: modbus_tcp wants host:port, such as 192.0.2.1:502'
         )
     return host, number
+
+
+def _unknown(request: Request[Any]) -> NotSent:
+    return NotSent(
+        Refused.ILLEGAL_FUNCTION,
+        f'the gateway closes the connection at function {request.function}, which it does not know',
+    )
 
 
 def _of_gateway(request: Request[Any], refusal: Refused) -> LinkError:
