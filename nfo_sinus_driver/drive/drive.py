@@ -498,10 +498,10 @@ class Drive:
 
     def _report_long_pauses(self) -> None:
         state, seconds = self.state, self._bus.pauses_time()
-        limit = min(self.settings.lost_after, state.timeout.seconds / 2 or math.inf)
-        if seconds > limit and not self._long_pauses_reported:
+        most = min(self.settings.lost_after, state.timeout.seconds / 2 or math.inf)
+        if seconds > most and not self._long_pauses_reported:
             self._long_pauses_reported = True
-            state.notify(Severity.WARNING, Cause.PAUSES_TOO_LONG, seconds=seconds, limit=limit)
+            state.notify(Severity.WARNING, Cause.PAUSES_TOO_LONG, seconds=seconds, most=most)
 
     def _report_identity(self) -> None:
         state, profile, identity = self.state, self.model.profile, self.identity

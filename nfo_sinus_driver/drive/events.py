@@ -72,7 +72,7 @@ class Cause(enum.Enum):
     no time to ask it again before. Raise the baud rate, or `lost_after`"""
     PAUSES_TOO_LONG = (
         'the pauses before requests take {seconds:.2f} s for one round of the drives of this line, '
-        'longer than lost_after or half of a time-out ({limit:g} s): lower request_gap, or line: '
+        'longer than lost_after or half of a time-out ({most:g} s): lower request_gap, or line: '
         'gap in the files of the drives; or raise lost_after and drive_timeout'
     )
     """`request_gap`, `line: {gap: S}` of a described drive and pauses that were learnt add up over
