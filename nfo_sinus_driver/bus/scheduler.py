@@ -63,6 +63,10 @@ class Waiting(NamedTuple):
     exchange: Exchange
 
 
+def _unit_of(entry: LatestValue | Waiting) -> int:
+    return entry.unit if isinstance(entry, LatestValue) else entry.exchange.unit
+
+
 class Scheduler:
     """
     What waits for the line, the next one in front.
@@ -83,6 +87,9 @@ class Scheduler:
     are waited for briefly (:meth:`is_brief`). Then they go once more, ahead of all but requests to
     units that may answer.
 
+    A unit that rests after its last answer lets all others go; where the line has to be silent for
+    longer before a request, what is less urgent than that waits, too.
+
     Units that have been silent for long are missing. Reads from them, set-points, and stops that
     did not reach them, wait until :meth:`take` may give them out, and then go ahead of other polls.
 
@@ -90,6 +97,8 @@ class Scheduler:
     :param is_missing: whether it has been silent for long.
     :param is_line_silent: whether no unit of the line answers.
     :param asked_at: when a unit was last sent anything, s.
+    :param rests: whether a unit is to be asked nothing yet.
+    :param needs_silence: whether the line has to be silent for longer before a request to it.
     """
 
     def __init__(
@@ -98,11 +107,15 @@ class Scheduler:
         is_missing: Callable[[int], bool] = lambda unit: False,
         is_line_silent: Callable[[], bool] = lambda: False,
         asked_at: Callable[[int], float] = lambda unit: -math.inf,
+        rests: Callable[[int], bool] = lambda unit: False,
+        needs_silence: Callable[[int], bool] = lambda unit: False,
     ) -> None:
         self._is_silent = is_silent
         self._is_missing = is_missing
         self._is_line_silent = is_line_silent
         self._asked_at = asked_at
+        self._rests = rests
+        self._needs_silence = needs_silence
         #: In order; the values are not used.
         self._queues: dict[_Rank, dict[LatestValue | Waiting, None]] = {
             rank: {} for rank in (*Priority, _SLOT, _RETRY, _MISSING)
@@ -130,7 +143,7 @@ class Scheduler:
 
     @property
     def stops(self) -> list[tuple[_Rank, Waiting]]:
-        """The stops that wait, with their looks, and of which rank; none on a silent line."""
+        """The stops that may go, with their looks, and of which rank; none on a silent line."""
         if self._is_line_silent():
             return []
         return [
@@ -139,6 +152,7 @@ class Scheduler:
             for entry in self._queues[rank]
             if isinstance(entry, Waiting)
             and entry.exchange.priority in _STOPS
+            and not self._is_resting(entry)
         ]
 
     @property
@@ -158,10 +172,16 @@ class Scheduler:
         """
         self._release_found()
         if in_noise and (stops := self.stops):
-            return self._take_out(*min(stops, key=self._requests_of))
+            rank, stop = min(stops, key=self._requests_of)
+            return None if self._needs_silence(stop.exchange.unit) else self._take_out(rank, stop)
         for rank in _STOPS if only_stops else self._order(missing):
             # most are empty, and this runs for every transaction
             entry = self._first(rank) if self._queues[rank] else None
+            if entry is not None and self._needs_silence(_unit_of(entry)):
+                # what is less urgent would end the silence, and this never had its turn
+                entry = self._other_stop(rank)
+                if entry is None:
+                    return None
             if entry is not None:
                 return self._take_out(rank, entry)
         if self._unanswered is None:
@@ -170,10 +190,12 @@ class Scheduler:
         self._unanswered = None
         return self.take(missing=missing, only_stops=only_stops)
 
-    def _requests_of(self, stop: tuple[_Rank, Waiting]) -> tuple[int, float]:
+    def _requests_of(self, stop: tuple[_Rank, Waiting]) -> tuple[int, bool, float]:
         """Return how many requests a stop has made; of equals the longest ago goes first."""
         _, (task, exchange) = stop
-        return task.requests, self._asked_at(exchange.unit)
+        unit = exchange.unit
+        # none waits for another's silence but after its turn
+        return task.requests, self._needs_silence(unit), self._asked_at(unit)
 
     def _take_out(self, rank: _Rank, entry: LatestValue | Waiting) -> LatestValue | Waiting:
         del self._queues[rank][entry]
@@ -194,21 +216,35 @@ class Scheduler:
         """Return what goes next of one rank; what is for a unit that is silent by now is behind."""
         queue = self._queues[rank]
         while True:
-            others = queue if self._unanswered is None else itertools.filterfalse(
-                self._gives_way, queue
-            )
-            entry = next(iter(others), None)
+            others = itertools.filterfalse(self._is_held, queue)
+            entry = next(others, None)
             if entry is None or rank == _MISSING:
                 return entry
             if rank in _STOPS and self._unanswered_stops:
                 # those that answer come first
                 news = itertools.filterfalse(self._was_in_vain, queue)
-                entry = next(itertools.filterfalse(self._gives_way, news), entry)
+                news = itertools.filterfalse(self._gives_way, news)
+                entry = next(itertools.filterfalse(self._is_resting, news), entry)
             behind = self._rank(entry)
             if behind == rank or behind not in (_RETRY, _MISSING):
                 return entry
             del queue[entry]
             self._queues[behind][entry] = None
+
+    def _is_held(self, entry: LatestValue | Waiting) -> bool:
+        """Return whether another goes first."""
+        gives_way = self._unanswered is not None and self._gives_way(entry)
+        return gives_way or self._is_resting(entry)
+
+    def _is_resting(self, entry: LatestValue | Waiting) -> bool:
+        return self._rests(_unit_of(entry))
+
+    def _other_stop(self, rank: _Rank) -> LatestValue | Waiting | None:
+        """Return a stop for which the line is silent long enough: none waits for another."""
+        for entry in self._queues[rank] if rank == Priority.STOP else ():
+            if not self._is_held(entry) and not self._needs_silence(_unit_of(entry)):
+                return entry
+        return None
 
     def is_brief(self, exchange: Exchange) -> bool:
         """

@@ -126,7 +126,13 @@ class Bus:
             lambda unit: self.silences.is_missing(unit, self.now()),
             lambda: self.silences.is_line_silent,
             self.silences.asked_at,
+            lambda unit: self._is_held_until(self._rests_until(unit)),
+            lambda unit: self._is_held_until(link.pauses.silent_until(unit)),
         )
+        #: When the first of those that wait for a pause may go, s.
+        self._held_until = math.inf
+        #: Until when each unit is asked nothing, s.
+        self._resting: dict[int, float] = {}
         self._sleepers = Sleepers()
         self._stopping = False
         self._closed = False
@@ -232,7 +238,11 @@ class Bus:
     def round_time(self) -> float:
         """Return how long it takes to ask each drive of the line once, s; NaN: not known yet."""
         mean = self.recorder.statistics(None).round_trip_mean
-        return len(self._watches) * max(mean, self._request_period)
+        return len(self._watches) * max(mean, self._request_period) + self.pauses_time()
+
+    def pauses_time(self) -> float:
+        """Return how long the pauses are in a round in which each drive is asked once, s."""
+        return self._link.pauses.round(self._watches)
 
     @property
     def port_error(self) -> PortError | None:
@@ -247,6 +257,10 @@ class Bus:
     def remarks(self) -> tuple[str, ...]:
         """What the link has noticed about the line, in sentences that say what to do."""
         return self._link.remarks.texts
+
+    def require_gap(self, unit: int, seconds: float) -> None:
+        """Have the line silent for so long, s, before each request to a unit."""
+        self.call(lambda: self._link.pauses.require(unit, seconds))
 
     def require_sign_of_life(self, unit: int, seconds: float) -> None:
         """Open the port again when no unit has answered for ``seconds``, the longest of all."""
@@ -291,6 +305,11 @@ class Bus:
     def is_quiet(self) -> bool:
         """Nothing but stops is sent on the line."""
         return self._line_quiet_until() > 0.0
+
+    def rest(self, unit: int, seconds: float) -> None:
+        """Ask a unit nothing for so long from now on, s, no stop either; others are asked."""
+        if seconds:
+            self._resting[unit] = self.now() + seconds
 
     def keep_alive(self, unit: int, address: Address) -> Awaitable[Reply]:
         """Have a unit hear something soon (to be awaited), by reading a parameter of it."""
@@ -484,16 +503,9 @@ class Bus:
             return self._clock.until(min(self._sleepers.next_moment, self._port.reopen_at))
         if self._send_next(only_stops=bool(quiet_until)):
             return -math.inf
-        paced_until = self._paced_until if self._scheduler.waits else math.inf
-        missing_from = math.inf
-        if self._scheduler.missing_wait:
-            missing_from = self.silences.missing_from
-            if self._scheduler.stops:
-                stops_from = self.silences.stops_in_vain_from(self.now())
-                missing_from = min(missing_from, stops_from)
-        until = min(paced_until, missing_from, supervised_at, reopen_at)
+        until = min(self._held_until, supervised_at, reopen_at)
         if quiet_until:
-            until = quiet_until
+            until = min(quiet_until, self._held_until)
         return self._clock.until(min(self._sleepers.next_moment, self._lost_at, until))
 
     def _look_for_losses(self) -> float:
@@ -608,16 +620,36 @@ class Bus:
 
     def _send_next(self, *, only_stops: bool) -> bool:
         now = self.now()
-        entry = self._scheduler.take(
-            missing=now >= self.silences.missing_from,
-            in_noise=now >= self.silences.stops_in_vain_from(now),
-            only_stops=only_stops or now < self._paced_until,
+        self._held_until = math.inf
+        scheduler, silences = self._scheduler, self.silences
+        is_paced, missing = now < self._paced_until, now >= silences.missing_from
+        in_noise_from = silences.stops_in_vain_from(now)
+        entry = scheduler.take(
+            missing=missing,
+            in_noise=now >= in_noise_from,
+            only_stops=only_stops or is_paced,
         )
+        if is_paced and (scheduler.waits or (missing and scheduler.missing_wait)):
+            self._held_until = min(self._held_until, self._paced_until)
+        if scheduler.missing_wait and not missing:
+            self._held_until = min(self._held_until, silences.missing_from)
+            if now < in_noise_from < math.inf and scheduler.stops:
+                self._held_until = min(self._held_until, in_noise_from)
         if isinstance(entry, LatestValue):
             self._write_slot(entry)
         elif entry is not None:
             self._exchange(*entry)
         return entry is not None
+
+    def _rests_until(self, unit: int) -> float:
+        return max(self._link.pauses.rests_until(unit), self._resting.get(unit, -math.inf))
+
+    def _is_held_until(self, moment: float) -> bool:
+        """Return whether a moment has not come yet, and note it."""
+        if moment <= self.now():
+            return False
+        self._held_until = min(self._held_until, moment)
+        return True
 
     def _write_slot(self, slot: LatestValue) -> None:
         written = slot.take()

@@ -590,6 +590,8 @@ class Profile:
         there is none, the motor stops.
     :ivar fault_code: gives the status code of what the parameter reports that names a fault.
     :ivar after_write: what makes settings take effect that were written, or keeps them.
+    :ivar gap: the least silence of the line before each request to it, s; 0: that of the protocol.
+    :ivar rest_after_write: for how long it is asked nothing after a parameter was written, s.
     :ivar pole_pairs: of the motor, where no parameter reports them; 0: not known.
     :ivar holds_control: why the first request gives the bus control for good, by the protocol.
     :ivar spelled: by parameter, what a tool shows beside a number that the display of the drive
@@ -647,6 +649,8 @@ class Profile:
     timeout_conditions: Mapping[str, Sequence[Value]] = field(default_factory=dict)
     fault_code: Callable[[int], int] = int
     after_write: Sequence[Write | Wait] = ()
+    gap: float = 0.0
+    rest_after_write: float = 0.0
     pole_pairs: int = 0
     spelled: Mapping[str, Callable[[int], str]] = field(default_factory=dict)
     bit_fields: frozenset[str] = frozenset()

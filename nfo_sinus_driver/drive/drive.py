@@ -118,7 +118,7 @@ class Drive:
             self.state, self.parameters, procedures, self._watchdog.ensure_set
         )
         #: Once a session: with each reconnect it would be said again.
-        self._slow_line_reported = False
+        self._slow_line_reported = self._long_pauses_reported = False
         #: Stops the drives that stop with this one.
         self._on_stop: Callable[[Report], None] = lambda why: None
         # what follows in one part of it from what happens in another
@@ -503,6 +503,14 @@ class Drive:
             state.notify(
                 Severity.WARNING, Cause.LINE_TOO_SLOW, seconds=seconds, lost_after=longest
             )
+        self._report_long_pauses()
+
+    def _report_long_pauses(self) -> None:
+        state, seconds = self.state, self._bus.pauses_time()
+        most = min(self.settings.lost_after, state.timeout.seconds / 2 or math.inf)
+        if seconds > most and not self._long_pauses_reported:
+            self._long_pauses_reported = True
+            state.notify(Severity.WARNING, Cause.PAUSES_TOO_LONG, seconds=seconds, most=most)
 
     def _report_identity(self) -> None:
         state, profile, identity = self.state, self.model.profile, self.identity

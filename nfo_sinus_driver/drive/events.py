@@ -70,6 +70,13 @@ class Cause(enum.Enum):
     )
     """A drive counts as lost that was asked in vain and sent nothing for `lost_after`, and there is
     no time to ask it again before. Raise the baud rate, or `lost_after`"""
+    PAUSES_TOO_LONG = (
+        'the pauses before requests take {seconds:.2f} s for one round of the drives of this line, '
+        'longer than lost_after or half of a time-out ({most:g} s): lower request_gap, or line: '
+        'gap in the files of the drives; or raise lost_after and drive_timeout'
+    )
+    """`request_gap`, `line: {gap: S}` of a described drive and pauses that were learnt add up over
+    the drives of a line. Lower them, spread the drives over more lines, or raise what is named"""
     # --- Another drive than expected
     OTHER_MODEL = '{error}: every {model} has {what}; is this another model? {call.set_model}'
     """The drive refuses what every drive of `model` has. In unconfigured: `ros2 param set

@@ -107,6 +107,7 @@ class ParameterAccess:
             return ask(lambda key: read(Read(self.address(key), self._acknowledges(key))), before)
 
         bus.use_resync_reads(unit, tuple(map(self.address, reads)), ask and why)
+        bus.require_gap(unit, model.profile.gap)
 
     def address(self, key: str) -> Address:
         """Return the address of a parameter."""
@@ -321,7 +322,14 @@ class ParameterAccess:
         self, key: str, data: bytes, priority: Priority, *, retry: bool = True
     ) -> None:
         """Write the bytes of a parameter, whatever its range."""
-        await self._ask(Write(self.address(key), data), priority, retry)
+        try:
+            await self._ask(Write(self.address(key), data), priority, retry)
+        finally:
+            self.rest()
+
+    def rest(self) -> None:
+        """Have the drive asked nothing for as long as it wants after a parameter was written."""
+        self._bus.rest(self._unit, self.model.profile.rest_after_write)
 
     async def read_from(self, address: Address, priority: Priority, *, retry: bool = True) -> bytes:
         """Read the bytes at an address."""

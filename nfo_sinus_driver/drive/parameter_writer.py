@@ -233,6 +233,7 @@ class ParameterWriter:
                 continue
             with contextlib.suppress(LinkError, DriveError):
                 await self._params.write(step, _SERVICE)
+            self._params.rest()
 
     async def _send(self, key: str, data: bytes) -> LinkError | DriveError | None:
         """Write; return why the drive may not have taken it, which only reading back shows."""

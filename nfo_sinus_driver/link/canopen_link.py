@@ -40,6 +40,7 @@ from nfo_sinus_driver.link.interface import (
 )
 from nfo_sinus_driver.link.late_replies import LISTENING_STEP, STOP_WAITS, LateReplies
 from nfo_sinus_driver.link.lawicel import LawicelPort
+from nfo_sinus_driver.link.pauses import Pauses
 from nfo_sinus_driver.link.port import port_of
 from nfo_sinus_driver.link.protocols import CANOPEN
 from nfo_sinus_driver.link.sdo import SECOND, Download, Kind, ObjectShapes, Transfer, Upload
@@ -203,6 +204,8 @@ class CanopenLink:
         self._port = port
         self._settings = settings
         self.remarks = Remarks()
+        # frames have no gaps of this kind: each node takes them as they come
+        self.pauses = Pauses(self.remarks.add, lambda: -math.inf)
         self.last_byte_at = -math.inf
         self._late: LateReplies[Transfer, Kind] = LateReplies(
             settings.response_timeout, lambda transfer: transfer.kinds

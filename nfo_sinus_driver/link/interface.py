@@ -11,6 +11,7 @@ import functools
 import re
 from typing import NamedTuple, Protocol, TypeVar
 
+from nfo_sinus_driver.link.pauses import Pauses
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 #: The baud rates of serial lines to drives, bit/s.
@@ -277,12 +278,14 @@ class Link(Protocol):
     :ivar remarks: what it has noticed.
     :ivar last_byte_at: when the last byte has come, whatever it was, s; on CAN the last frame.
     :ivar clock: the clock of that thread, for what else it waits for, too.
+    :ivar pauses: how long line and units are left alone before a request.
     """
 
     protocol: LineProtocol
     remarks: Remarks
     last_byte_at: float
     clock: ThreadClock
+    pauses: Pauses
 
     def wait_at_most(self, seconds: float) -> None:
         """
@@ -578,6 +581,7 @@ class LineSettings:
     :ivar char_format: data bits, parity and stop bits, such as ``8E1``.
     :ivar response_timeout: from the last byte sent to the first byte of the answer, s.
     :ivar rs485: let the port itself switch the transmitter, where it can.
+    :ivar request_gap: the least silence before each request, s; 0: that of the protocol.
     :raises ValueError: a setting that no drive has; the message says which ones are possible.
     """
 
@@ -585,6 +589,7 @@ class LineSettings:
     char_format: str = '8E1'
     response_timeout: float = 0.2
     rs485: bool = False
+    request_gap: float = 0.0
 
     def __post_init__(self) -> None:
         if self.baud_rate <= 0:

@@ -34,6 +34,7 @@ from nfo_sinus_driver.link.interface import (
     NoAnswer,
     NoPath,
     NotReady,
+    NotSent,
     PortError,
     Refused,
     Remarks,
@@ -44,6 +45,7 @@ from nfo_sinus_driver.link.late_replies import LATEST_REPLY, longer_than
 from nfo_sinus_driver.link.modbus_link import ModbusLink
 from nfo_sinus_driver.link.modbus_pdu import Request, Write, WriteAndRead, read_of, understand
 from nfo_sinus_driver.link.other_values import OtherValues
+from nfo_sinus_driver.link.pauses import Pauses
 from nfo_sinus_driver.link.protocols import MODBUS_TCP
 from nfo_sinus_driver.link.tcp_connection import CLOSED_HINT, Connection, TcpConnection
 from nfo_sinus_driver.link.thread_clock import ThreadClock
@@ -116,10 +118,12 @@ class TcpLink(ModbusLink):
     Before the other is used the mute one is closed so that nothing that was handed over to it
     arrives later.
 
-    A gateway that closes the connection after each answer gets another one for each request.
+    A gateway that closes the connection after each answer gets another one for each request. One
+    that closes it twice at a function that it has never answered is not asked that any more.
 
     :param response_timeout: from a request sent to its answer, s.
     :param connection: makes what carries the bytes, of host and port.
+    :param request_gap: the least time from an answer to the next request, s.
     """
 
     protocol = MODBUS_TCP
@@ -131,6 +135,7 @@ class TcpLink(ModbusLink):
         response_timeout: float,
         connection: Callable[[str, int], Connection] = TcpConnection,
         now: Clock = time.monotonic,
+        request_gap: float = 0.0,
     ) -> None:
         self.clock = self._now = ThreadClock(now)
         self.stop_waits: Callable[[], bool] = lambda: False
@@ -155,8 +160,15 @@ class TcpLink(ModbusLink):
         self._unanswered = False
         #: How many connections in a row the gateway has closed after one answer.
         self._closings = 0
+        #: The functions that the gateway has answered, and how often in a row it has closed a
+        #: connection at another one.
+        self._known: set[int] = set()
+        self._closed_at: dict[int, int] = {}
         self._blocks = telegram.Blocks(self.exchange, now)
         self.remarks = Remarks()
+        #: When the last message was sent, or came.
+        self._line_end = -math.inf
+        self.pauses = Pauses(self.remarks.add, lambda: self._line_end, request_gap)
         self.last_byte_at = -math.inf
 
     def wait_at_most(self, seconds: float) -> None:
@@ -169,8 +181,12 @@ class TcpLink(ModbusLink):
 
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> TcpLink:
-        """Return the link to a gateway; of the settings only the ``response_timeout`` counts."""
-        return cls(*_host_and_port(port), settings.response_timeout)
+        """Return the link to a gateway; of the settings only those of time count."""
+        return cls(
+            *_host_and_port(port),
+            settings.response_timeout,
+            request_gap=settings.request_gap,
+        )
 
     def open(self) -> None:
         """
@@ -187,6 +203,7 @@ class TcpLink(ModbusLink):
         """Close the connection; harmless when it is closed already."""
         self._drop_begun()
         connection, self._connection = self._connection, None
+        self.pauses.forget_failures()
         if connection is not None:
             connection.close(discard=self._unanswered)
 
@@ -316,9 +333,13 @@ class TcpLink(ModbusLink):
 
     def _ask(self, request: Request[_T], once: bool = False) -> tuple[_T, float]:
         """Return the answer to a request, and when it came."""
+        if self._closed_at.get(request.function, 0) >= _CLOSINGS:
+            raise _unknown(request)
         try:
             return self._exchange(request)
         except ConnectionError as error:
+            if self._may_not_know(request):
+                return self._ask_again(request, error, once=once)
             first = not self._closes_after_one(request)
             if first or once or isinstance(request, (Write, WriteAndRead)):
                 raise self._lost(error) from error
@@ -333,6 +354,31 @@ class TcpLink(ModbusLink):
         except OSError as error:
             raise self._lost(error) from error
 
+    def _may_not_know(self, request: Request[object]) -> bool:
+        """Return whether the gateway has closed the connection at a function that is new to it."""
+        # a plain write is never given up: it may be a stop
+        is_plain_write = isinstance(request, Write)
+        return bool(self._known) and request.function not in self._known and not is_plain_write
+
+    def _ask_again(
+        self, request: Request[_T], why: ConnectionError, *, once: bool
+    ) -> tuple[_T, float]:
+        """Return the answer to what the gateway has closed the connection at, if it may be sent."""
+        function = request.function
+        self._closed_at[function] = 1 + self._closed_at.get(function, 0)
+        has_effect = once or isinstance(request, WriteAndRead)
+        if self._closed_at[function] < _CLOSINGS:
+            if has_effect:
+                raise self._lost(why) from why
+            self._connect_again()
+            return self._ask(request)
+        self.remarks.add(
+            f'{self._name} closes the connection at function {function}, which it does not know: '
+            'the driver goes on without it'
+        )
+        self._connect_again()
+        raise _unknown(request)
+
     def _closes_after_one(self, request: Request[object]) -> bool:
         """Return whether the gateway seems to close after each answer: it has just done so."""
         if self._answers != 1 or self._reader.received:
@@ -342,11 +388,17 @@ class TcpLink(ModbusLink):
 
     def _exchange(self, request: Request[_T]) -> tuple[_T, float]:
         connection = self._usable()
+        while self._now() < (ready_at := self.pauses.ready_at(request.unit)):
+            # usually the bus has waited for that already; what comes is late
+            self._reader.feed(connection.read(self._now.until(ready_at)))
         self._number = self._number % 0xFFFF + 1
         self._unanswered = True
+        writes = isinstance(request, (Write, WriteAndRead))
+        self.pauses.sent(request.unit, self._now(), writes=writes)
         connection.write(encode(request, self._number))
         self._others.sent(request, self._now())
-        sent_at, unit = self._now(), request.unit
+        self._line_end = sent_at = self._now()
+        unit = request.unit
         most = max(self._patience, longer_than(self._longest_ever.get(unit, math.inf)))
         deadline = sent_at + min(self._response_timeout, most)
         others: list[int] = []
@@ -354,10 +406,13 @@ class TcpLink(ModbusLink):
             data = connection.read(self._now.until(deadline))
             now = self._now()
             if data:
-                self.last_byte_at = now
+                self.last_byte_at = self._line_end = now
             for number, message in self._reader.feed(data):
                 if number == self._number:
                     self._note_answer()
+                    self._note_for_pauses(request, message, now)
+                    self._known.add(request.function)
+                    self._closed_at.pop(request.function, None)
                     if self._now.resumed_at <= sent_at:
                         longest = self._longest_ever.get(unit, 0.0)
                         self._longest_ever[unit] = max(longest, now - sent_at)
@@ -374,6 +429,8 @@ class TcpLink(ModbusLink):
             if now >= deadline:
                 break
         error = self._missing(request, others)
+        if isinstance(error, GatewaySilent) and self._now.resumed_at <= sent_at:
+            self.pauses.unanswered(unit, type(request))
         self._given_up.append(self._number)
         raise error
 
@@ -383,6 +440,14 @@ class TcpLink(ModbusLink):
         self._answers += 1
         if self._answers > 1:
             self._closings = 0
+
+    def _note_for_pauses(self, request: Request[object], message: bytes, now: float) -> None:
+        code = message[2] if message.startswith(modbus_pdu.refusal_head(request)) else 0
+        if code == Refused.NO_ANSWER:
+            self.pauses.unanswered(request.unit, type(request))
+            self.pauses.heard(now)
+        elif code != Refused.NO_PATH:
+            self.pauses.answered(request.unit, type(request), now)
 
     def _missing(self, request: Request[object], others: Sequence[int]) -> LinkError:
         """Return the error when no answer to a request came, but perhaps others."""
@@ -395,7 +460,10 @@ class TcpLink(ModbusLink):
                 'to pass bytes on and use socket:// with modbus_rtu'
             )
         if self._reader.received:
-            return DamagedAnswer(f'unit {unit}: only a part of the answer came')
+            return GatewayFault(
+                f'unit {unit}: only a part of the answer came, by the length in its header: update '
+                'or replace the gateway, or raise response_timeout where the network is slow'
+            )
         if others:
             return GatewayLate(
                 f'the answer of the gateway for unit {unit} came after response_timeout: set it '
@@ -447,6 +515,13 @@ def _host_and_port(port: str) -> tuple[str, int]:
             f'port {port!r} is no gateway: modbus_tcp wants host:port, such as 192.0.2.1:502'
         )
     return host, number
+
+
+def _unknown(request: Request[Any]) -> NotSent:
+    return NotSent(
+        Refused.ILLEGAL_FUNCTION,
+        f'the gateway closes the connection at function {request.function}, which it does not know',
+    )
 
 
 def _of_gateway(request: Request[Any], refusal: Refused) -> LinkError:

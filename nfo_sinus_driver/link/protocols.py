@@ -191,6 +191,13 @@ class BusSettings:
         0, 10000, unit='Hz', zero='no limit',
         change=FIXED,
     )
+    request_gap: float = setting(
+        0.0,
+        'least silence before each request, a stop, too, for a gateway or drive that loses what '
+        'follows too soon; not with canopen',
+        0, 1, unit='s', zero='that of the protocol',
+        change=FIXED,
+    )
     rs485: bool = setting(
         False,
         'let the port itself switch the RS-485 transmitter; most adapters do it by themselves',
@@ -211,6 +218,7 @@ class BusSettings:
             self.char_format or usual.char_format,
             self.response_timeout,
             self.rs485,
+            self.request_gap,
         )
 
     def open(self) -> Link:

@@ -44,6 +44,7 @@ from nfo_sinus_driver.link.interface import (
     silent,
 )
 from nfo_sinus_driver.link.late_replies import LISTENING_STEP, LateReplies
+from nfo_sinus_driver.link.pauses import Pauses
 from nfo_sinus_driver.link.port import Port, port_of
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 
@@ -153,6 +154,12 @@ class RequestLink(ABC, Generic[_Request]):
         self._port = port
         self._settings = settings
         self.remarks = Remarks()
+        self.pauses = Pauses(
+            self.remarks.add,
+            lambda: self._line_end,
+            settings.request_gap,
+            self.protocol.broadcast,
+        )
         self.last_byte_at = -math.inf
         self._echo = Echo()
         #: When the last known byte was on the line.
@@ -190,6 +197,7 @@ class RequestLink(ABC, Generic[_Request]):
         self._port.close()
         self._late.clear()
         self._another.clear()
+        self.pauses.forget_failures()
         self._echo = Echo()
 
     def read_then_write(self, unit: int, source: Address, address: Address, data: bytes) -> Reply:
@@ -259,6 +267,16 @@ class RequestLink(ABC, Generic[_Request]):
     def _gap_before(self, request: _Request) -> float:
         """Return how long the line is silent before a request if nothing unrequested comes, s."""
         return self._gap
+
+    @property
+    @abstractmethod
+    def _writes(self) -> tuple[type[Any], ...]:
+        """The requests that write."""
+
+    def _note_missing(self, request: Any, error: LinkError) -> None:
+        """Note that no answer to a request came, or one that is damaged."""
+        if isinstance(error, NoAnswer) and self._has_run:
+            self.pauses.unanswered(request.unit, type(request))
 
     def _note_unrequested(self, data: bytes, request: _Request) -> None:
         """Note bytes of no known exchange."""
@@ -345,10 +363,12 @@ class RequestLink(ABC, Generic[_Request]):
         """
         wait = self._write_wait if is_write else self._settings.response_timeout
         give_up = self._now() + wait
-        gap = self._gap_before(request)
+        # usually the bus has waited for that already, in favour of others
+        gap = max(self._gap_before(request), self.pauses.ready_at(request.unit) - self._line_end)
+        least = max(self._gap, self.pauses.silence(request.unit))
         stray = False
         while True:
-            data, now, silent = self._await_silence(gap, wait, is_write)
+            data, now, silent = self._await_silence(gap, wait, is_write, least)
             if data and not self._another.hear(data, now):
                 stray = True
                 self._note_unrequested(data, request)
@@ -362,18 +382,19 @@ class RequestLink(ABC, Generic[_Request]):
             # requests of another master are answered first
             if data := self._read_line(until) if is_write else self._listen(until):
                 self._another.hear(data, self._now())
-                gap = self._gap
+                gap = least
         self._take_late(request, now)
         return stray
 
     def _await_silence(
-        self, gap: float, wait: float, is_write: bool
+        self, gap: float, wait: float, is_write: bool, least: float
     ) -> tuple[bytes, float, bool]:
         """
         Wait for silence on the line.
 
         :param gap: how long it has to last, s.
         :param wait: how much longer than that to wait for it, s.
+        :param least: how long it has to last where bytes come, s.
         :returns: all bytes that came meanwhile, the moment, and whether silence came, too.
         """
         give_up = max(self._line_end + gap, self._now()) + wait
@@ -383,16 +404,18 @@ class RequestLink(ABC, Generic[_Request]):
             now = self._now()
             if data:
                 came += data
-                gap = self._gap
+                gap = least
                 self._line_end = max(self._line_end, now)
                 if now > give_up or (not is_write and self.stop_waits()):
                     return came, now, False
             elif now >= self._line_end + gap:
                 return came, now, True
 
-    def _send(self, request: _Request, frame: bytes) -> float:
+    def _send(self, request: Any, frame: bytes) -> float:
         """Hand a request to the port; return when its last byte will have left."""
         self._late.sent(request)
+        writes = isinstance(request, self._writes)
+        self.pauses.sent(request.unit, self._now(), writes=writes)
         self._echo.sent(frame)
         self._line_end = self._now() + len(frame) * self._settings.char_time
         self._sent_at = self._line_end
@@ -498,6 +521,10 @@ class CodecLink(RequestLink[Any]):
         yield from ()
         return Identification()
 
+    @property
+    def _writes(self) -> tuple[type[Any], ...]:
+        return (self._codec.select,)
+
     def _read_request(self, unit: int, address: Address) -> Any:
         return self._codec.enquiry(unit, address.index)
 
@@ -566,7 +593,8 @@ class CodecLink(RequestLink[Any]):
             early = arrived < sent + length - char_time
             self._again = early and before is not None and before[1] == answer
             self._confirm(request, answer, arrived, sent + delay + length)
-        except (NoAnswer, DamagedAnswer):
+        except (NoAnswer, DamagedAnswer) as error:
+            self._note_missing(request, error)
             self._late.expect(request, self._now())
             if self._echo.give_up():
                 # the adapter does not echo any more; if it does, the next echo will show it
@@ -574,6 +602,7 @@ class CodecLink(RequestLink[Any]):
             raise
         # units answer in order: late answers of it have come before this
         self._late.release(request.unit)
+        self.pauses.answered(request.unit, type(request), arrived)
         if self._has_run:
             self._took(request.unit, arrived - sent - length)
         self._last = request, answer, arrived

@@ -152,6 +152,10 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         if self._doubtful:
             raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
 
+    @property
+    def _writes(self) -> tuple[type[Any], ...]:
+        return (Write, WriteAndRead)
+
     def _read_request(self, unit: int, address: Address) -> Request[Any]:
         return read_of(unit, address)
 
@@ -264,14 +268,15 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         reader = self._reader(request)
         try:
             answer, arrived = self._receive(request, reader, frame)
-        except (NoAnswer, DamagedAnswer):
+        except (NoAnswer, DamagedAnswer) as error:
+            self._note_missing(request, error)
             self._late.expect(request, self._now())
             raise
         except AnotherValue:
-            self._late.release(request.unit)
+            self._note_answer(request)
             raise
         except Refused:
-            self._late.release(request.unit)
+            self._note_answer(request)
             length = len(reader.frame) * self._settings.char_time
             self._late.note(request, reader.frame, self._now(), length)
             raise
@@ -299,6 +304,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self._others.took(request)
         length = len(reader.frame) * self._settings.char_time
         self._late.note(request, reader.frame, arrived, length)
+        self.pauses.answered(request.unit, type(request), arrived)
         late = request.answer_head in self._late.quarantined(request.unit, arrived)
         if not late:
             # units answer in order: late answers have come before this
@@ -315,6 +321,10 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             # it may answer an earlier write of the same, or answer twice: one more may come
             self._late.note_unrequested(self._now())
         return answer, arrived
+
+    def _note_answer(self, request: Request[Any]) -> None:
+        self._late.release(request.unit)
+        self.pauses.answered(request.unit, type(request), self._now())
 
     def _receive(
         self, request: Request[_T], reader: AnswerReader[_T], frame: bytes

@@ -104,6 +104,7 @@ class Line:
         options: Mapping[str, Any],
         baud: int | None = None,
         response_timeout: float = 0.2,
+        request_gap: float = 0.0,
         gateway_timeout: float = 0.1,
         turnaround: float = 0.002,
         echo: bool = False,
@@ -138,6 +139,7 @@ class Line:
             protocol=self._protocol.name,
             baud_rate=end.timing.baud,
             response_timeout=response_timeout,
+            request_gap=request_gap,
         ).line
         # a damaged frame of CAN is no frame
         self._damage = 'drop' if protocol == 'canopen' else 'damage'
@@ -168,8 +170,8 @@ class Line:
         """Return a link on this line, as a driver that begins makes it."""
         now = self.clock.monotonic
         if self._protocol.name == 'modbus_tcp':
-            timeout = self.settings.response_timeout
-            return TcpLink('gateway', 502, timeout, self._connect, now)
+            timeout, gap = self.settings.response_timeout, self.settings.request_gap
+            return TcpLink('gateway', 502, timeout, self._connect, now, gap)
         if self._protocol.name == 'canopen':
             rate = self.settings.baud_rate
             return CanopenLink(LawicelPort(self, rate, now), self.settings, now)

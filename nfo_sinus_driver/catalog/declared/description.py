@@ -197,6 +197,8 @@ class LineDefaults:
 
     :ivar write: the functions by which it takes writes.
     :ivar exceptions: what its exception codes mean; :ivar busy: those that mean to try again.
+    :ivar gap: the least silence of the line before each request to it, s.
+    :ivar after_write: for how long it is asked nothing after one of its parameters was written, s.
     """
 
     protocol: str = 'modbus_rtu'
@@ -208,6 +210,8 @@ class LineDefaults:
     most_registers: int = 123
     exceptions: Mapping[int, str] = field(default_factory=dict)
     busy: frozenset[int] = frozenset()
+    gap: float = 0.0
+    after_write: float = 0.0
 
     @property
     def factory(self) -> Mapping[str, int | str]:

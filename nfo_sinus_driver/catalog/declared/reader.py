@@ -155,6 +155,7 @@ class _Reader:
             node.integer('most_registers', 123),
             {code: str(text.scalar).rstrip(' .;:') for code, text in texts},
             frozenset(one for one in busy if isinstance(one, int)),
+            float(node.number('gap') or 0), float(node.number('after_write') or 0),
         )
 
     def _require_format(self) -> None:

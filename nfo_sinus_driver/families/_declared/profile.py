@@ -261,6 +261,8 @@ def profile_of(drive: Description) -> Profile:
         keeps_run=drive.keeps_run,
         fault_code=int if drive.codes is None else drive.codes.code,
         after_write=drive.after_write,
+        gap=drive.line.gap,
+        rest_after_write=drive.line.after_write,
         line_check=dict.fromkeys(('modbus_rtu', 'modbus_ascii', 'modbus_tcp'), drive.line.shown)
         if drive.line.shown
         else {},

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from support.addresses import packed
 
 from nfo_sinus_driver.link import PROTOCOLS, Address, NoAnswer, Remarks, Reply, Supervision, Why
+from nfo_sinus_driver.link.pauses import Pauses
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 #: No honest wait takes this long, on any machine, s.
@@ -62,6 +63,7 @@ class FakeLink:
         self.done: list[Done] = []
         self.time: Callable[[], float] = time.monotonic
         self.clock = ThreadClock(self.now)
+        self.pauses = Pauses(lambda text: None, lambda: -math.inf)
         self.answer: Callable[[Done], bytes] = lambda done: packed(done.number)
         self.opening: Callable[[], None] = lambda: None
         self.closing: Callable[[], None] = lambda: None

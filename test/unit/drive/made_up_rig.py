@@ -24,6 +24,7 @@ from nfo_sinus_driver.link import (
     Reply,
     Why,
 )
+from nfo_sinus_driver.link.pauses import Pauses
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 #: How long an access takes, s.
@@ -43,6 +44,7 @@ class FarEnd:
 
     def __init__(self, registers: dict[int, int]) -> None:
         self.clock = ThreadClock(lambda: self.rig.clock.now)
+        self.pauses = Pauses(lambda text: None, lambda: -math.inf)
         self.registers = registers
         #: What becomes of the next access to a register.
         self.fates: dict[int, LinkError] = {}

@@ -11,11 +11,12 @@ words, with what to do.
 from __future__ import annotations
 
 from collections.abc import Callable
+import contextlib
 
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.drive import Cause, DriveError
 from nfo_sinus_driver.link.tcp_connection import Connection
 
 
@@ -134,6 +135,21 @@ def test_a_wrong_answer_of_a_gateway_is_named(
         assert 'number' not in said or 'update or replace the gateway' in text
 
 
+@pytest.mark.parametrize('length', [-3, -1, 1, 2, 50])
+def test_a_wrong_length_over_tcp_is_not_blamed_on_a_serial_line(length: int) -> None:
+    def changed(data: bytes) -> bytes:
+        wrong = int.from_bytes(data[4:6], 'big') + length
+        return data[:4] + wrong.to_bytes(2, 'big') + data[6:]
+
+    with Rig('tcp') as rig:
+        send = rig.line.send
+        rig.line.send = lambda data: send(changed(data))
+        text = str(rig.answer(rig.drive.connect()))
+        for blamed in ('baud', 'parity', 'BusType', 'S5'):
+            assert blamed not in text
+        assert 'gateway' in text or 'protocol' in text
+
+
 def test_a_gateway_that_closes_after_each_answer_is_used_all_the_same() -> None:
     with Rig('tcp') as rig:
         rig.line.closes = True
@@ -145,6 +161,44 @@ def test_a_gateway_that_closes_after_each_answer_is_used_all_the_same() -> None:
         rig.answer(rig.drive.stop())
         rig.pass_time(1.0)
         assert rig.far.motor.frequency == 0
+
+
+@pytest.mark.parametrize('connection', ['tcp', 'telegram1 g2'])
+@pytest.mark.parametrize('functions', [{43}, {17}, {23}, {17, 23, 43}], ids=str)
+def test_a_gateway_that_closes_at_a_function_that_it_does_not_know_is_used(
+    connection: str, functions: set[int]
+) -> None:
+    with Rig(connection) as rig:
+        closed: list[int] = []
+
+        def plan(frame: bytes) -> str | None:
+            if frame[7] not in functions:
+                return None
+            closed.append(frame[7])
+            rig.line.sessions[-1]._hung_up = True
+            return 'unheard'
+
+        rig.line.plan = plan
+        rig.wait_until(lambda: connected(rig), 20.0)
+        rig.drive.activate()
+        rig.send(20.0)
+        rig.wait_until(lambda: 'enabled' in rig.answer(rig.drive.enable()), 20.0)
+        rig.pass_time(2.0)
+        if not rig.drive.following:
+            rig.wait_until(lambda: 'enabled' in rig.answer(rig.drive.enable()), 20.0)
+        rig.pass_time(10.0)
+        assert rig.drive.following and rig.far.motor.frequency > 19
+        assert all(closed.count(function) <= 2 for function in functions)
+        assert not any('closes the connection after each' in text for text in rig.bus.remarks)
+        assert all(f'at function {function}' in ' '.join(rig.bus.remarks) for function in closed)
+        assert 'stop' in rig.answer(rig.drive.stop())
+
+
+def connected(rig: Rig) -> bool:
+    with contextlib.suppress(DriveError):
+        rig.result(rig.drive.connect())
+        return True
+    return False
 
 
 def test_a_connection_that_is_closed_once_is_no_habit() -> None:
