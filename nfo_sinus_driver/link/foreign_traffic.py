@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 import math
 from typing import Any, NamedTuple
 
@@ -76,23 +75,8 @@ def message_lengths(beginning: bytes) -> set[int]:
     return set()
 
 
-@dataclass(frozen=True)
-class _OpenRequest:
-    """A request of another master to a unit, and until when it may be answered."""
-
-    unit: int
-    function: int
-    answer_head: bytes
-    until: float
-
-    def is_answered_by(self, message: bytes) -> bool:
-        if message[:2] == bytes((self.unit, self.function | _EXCEPTION)):
-            return len(message) == REFUSAL_LENGTH
-        return _has_head(message, self.answer_head)
-
-
 def _answer_head(message: bytes) -> bytes:
-    """Return the beginning of the answer to a request; empty if a message is no request."""
+    """Return the beginning of the answer to a message if it may be a request; else nothing."""
     function, length = message[1], len(message)
     count = int.from_bytes(message[4:6], 'big')
     if function in _READS and length == 6:
@@ -111,9 +95,31 @@ def _answer_head(message: bytes) -> bytes:
     return b''
 
 
-def _has_head(message: bytes, answer_head: bytes) -> bool:
-    """Return whether an answer begins like this; a request of function 17 does, too."""
-    return message.startswith(answer_head) and len(message) > _REPORT_LENGTH
+def _refusal_head(message: bytes) -> bytes:
+    """Return the beginning of the refusal of a request."""
+    return bytes((message[0], message[1] | _EXCEPTION))
+
+
+def _kinds(request: bytes) -> tuple[bytes, bytes]:
+    """Return how the answer to a request begins, and its refusal."""
+    return _answer_head(request), _refusal_head(request)
+
+
+def _answers(message: bytes, request: bytes) -> bool:
+    """Return whether a message can only be the answer to a request, or the request once more."""
+    if message.startswith(_refusal_head(request)):
+        return len(message) == REFUSAL_LENGTH
+    if request[1] in _SINGLE:
+        return message == request
+    # a request may begin as an answer does: 0264h is read by the first bytes of an answer of two
+    return message.startswith(_answer_head(request)) and not _answer_head(message)
+
+
+class _OpenRequest(NamedTuple):
+    """A request of another master, and until when its answer is waited for."""
+
+    message: bytes
+    until: float
 
 
 class Sightings:
@@ -256,6 +262,7 @@ class ForeignModbus:
 
     :param messages: yields the whole frames in some bytes: where each begins and ends, and its
         message.
+    :param patience: returns how long the answer of a unit is waited for, s.
     """
 
     def __init__(
@@ -263,20 +270,41 @@ class ForeignModbus:
         remarks: Remarks,
         response_timeout: float,
         messages: Callable[[bytes], Iterator[tuple[int, int, bytes]]],
+        patience: Callable[[int], float],
     ) -> None:
         self._sightings = Sightings(remarks)
         self._response_timeout = response_timeout
+        self._patience = patience
         self._messages = messages
-        #: What may become a frame, and what came between the frames of another master.
+        #: What may become a frame, how much of it was taken as no frame, and when it came; and what
+        #: came between the frames of another master.
         self._buffer = b''
+        self._taken = 0
+        self._heard_at = -math.inf
         self._rest = b''
         self._own: deque[bytes] = deque(maxlen=_OWN)
         #: In the order in which they came, which is that of their answers.
         self._open_requests: dict[int, list[_OpenRequest]] = {}
+        #: How the answers to those may begin that came since our last request.
+        self._meanwhile: set[bytes] = set()
 
     def sent(self, frame: bytes) -> None:
         """Note a request of ours: it may come back, and is not of another master."""
         self._own.append(frame)
+        self._meanwhile.clear()
+
+    def may_be_answered_by(self, kind: bytes) -> bool:
+        """
+        Return whether what came since our last request may be answered by an answer of a kind.
+
+        Bytes of no frame may be of such a request, too.
+        """
+        return kind in self._meanwhile or self.has_rest
+
+    @property
+    def has_rest(self) -> bool:
+        """Bytes came that are of no whole frame, and were not taken."""
+        return bool(self._rest) or len(self._buffer) > self._taken
 
     def is_there(self, now: float) -> bool:
         """Return whether another master has sent anything recently."""
@@ -287,33 +315,41 @@ class ForeignModbus:
         requests = self._open_requests.get(unit)
         return max(one.until for one in requests) if requests else 0.0
 
-    def take_late(self, unit: int, now: float) -> list[bytes]:
-        """Return the beginnings of the answers that are overdue and may come late."""
-        requests = self._open_requests.get(unit)
-        if not requests:
-            return []
-        self._open_requests[unit] = [one for one in requests if now < one.until]
-        return [one.answer_head for one in requests if now >= one.until]
+    def take_open(self, unit: int) -> list[bytes]:
+        """Return how answers and refusals begin that may still come, for a request goes before."""
+        requests = self._open_requests.pop(unit, ())
+        return [kind for one in requests for kind in _kinds(one.message)]
 
     def hear(self, data: bytes, now: float) -> bool:
         """Take bytes that are no answer to us; those of no frame are kept for a while."""
-        buffer = (self._buffer + data)[-_MOST:]
+        if now > self._heard_at + self._response_timeout:
+            self._rest += self._take_buffer()
+            self._buffer, self._taken = b'', 0
+        self._heard_at = now
+        buffer = self._buffer + data
         behind = 0
         for start, end, message in self._messages(buffer):
             # an answer comes behind its request
             if start >= behind and self._is_foreign(buffer[start:end], message, now):
-                self._rest += buffer[behind:start]
+                self._rest += buffer[max(behind, self._taken) : start]
                 behind = end
-        self._buffer = buffer[behind:]
+        behind = max(behind, len(buffer) - _MOST)
+        self._buffer, self._taken = buffer[behind:], max(0, self._taken - behind)
         return False
+
+    def _take_buffer(self) -> bytes:
+        """Return what has become no frame yet, once."""
+        taken, self._taken = self._taken, len(self._buffer)
+        return self._buffer[taken:]
 
     def was_answered_in(self, data: bytes) -> bool:
         """Return whether another master's request and the answer to it are in some bytes."""
-        head = b''
+        request = b''
         for _, _, message in self._messages(data):
-            if head and _has_head(message, head):
+            if request and _answers(message, request):
                 return True
-            head = _answer_head(message) or head
+            if _answer_head(message):
+                request = message
         return False
 
     def take_rest(self, unit: int) -> bytes:
@@ -321,12 +357,13 @@ class ForeignModbus:
         if self._open_requests.get(unit):
             # the beginning of the answer, perhaps
             return b''
-        rest, self._rest, self._buffer = self._rest + self._buffer, b'', b''
+        rest, self._rest = self._rest + self._take_buffer(), b''
         return rest
 
     def clear(self) -> None:
         """Forget what came: the port is closed."""
         self._buffer = self._rest = b''
+        self._taken = 0
         self._open_requests.clear()
 
     def _is_own(self, frame: bytes, message: bytes, now: float) -> bool:
@@ -337,18 +374,18 @@ class ForeignModbus:
         return frame in [*self._own][-1:] and not self.is_there(now)
 
     def _is_foreign(self, frame: bytes, message: bytes, now: float) -> bool:
-        unit, function = message[:2]
         if self._is_own(frame, message, now):
             return False
-        requests = self._open_requests.setdefault(unit, [])
+        requests = self._open_requests.setdefault(message[0], [])
         for number, request in enumerate(requests, start=1):
-            if request.is_answered_by(message):
-                # those before it were lost
-                del requests[:number]
+            if _answers(message, request.message):
+                # those before it were lost; a write that comes again may have been, too
+                again = [request._replace(until=now)] if message == request.message else []
+                requests[:number] = again
                 return True
-        head = _answer_head(message)
-        if not head:
+        if not _answer_head(message):
             return False
         self._sightings.add(now, _ANOTHER_MODBUS_MASTER)
-        requests.append(_OpenRequest(unit, function, head, now + self._response_timeout))
+        self._meanwhile.update(_kinds(message))
+        requests.append(_OpenRequest(message, now + self._patience(message[0])))
         return True

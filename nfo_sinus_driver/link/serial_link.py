@@ -63,6 +63,10 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
     A read answer does not name its register, so its kind is its shape; the answer to a write names
     what was written.
 
+    So a request of another master that was not answered when ours is sent leaves the kinds of its
+    answer and of its refusal in quarantine, and one that comes during an exchange makes an answer
+    of these kinds doubtful.
+
     For the same reason an answer with the same bytes as the one before is not believed at once: it
     may be the one before, sent twice. The line is read for as long as the right one may take. After
     unrequested bytes the line is trusted less for a while: then it is believed only after a request
@@ -77,7 +81,9 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self._late: LateReplies[Request[Any], bytes] = LateReplies(
             settings.response_timeout, answer_kinds
         )
-        self._another = ForeignModbus(self.remarks, settings.response_timeout, self._messages)
+        self._another = ForeignModbus(
+            self.remarks, settings.response_timeout, self._messages, self._answer_time
+        )
         self._resync_addresses: dict[int, tuple[Address, ...]] = {}
         #: How long a pause within an answer may be on this line, s, by the answers so far.
         self._pause = 0.0
@@ -150,6 +156,9 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
     def _require_ours(self, request: Request[Any]) -> None:
         """Make sure that the last answer is to us (DamagedAnswer: perhaps not)."""
         if self._doubtful:
+            if self._another.has_rest:
+                # a request of which nothing is known
+                self._late.expect(request, self._now())
             raise DamagedAnswer(f'unit {request.unit}: {DOUBTFUL}')
 
     @property
@@ -194,6 +203,10 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             self._late.expect(request, now)
             self._resync(request)
 
+    def _resync_read(self, request: Request[Any]) -> None:
+        super()._resync_read(request)
+        self._require_ours(request)
+
     def _resync(self, request: Request[Any]) -> None:
         """Have a unit answer another request: a second answer would come before."""
         if self.stop_waits():
@@ -237,6 +250,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         stray = bool(self._another.take_rest(request.unit)) and (came or there)
         if stray:
             self._late.note_unrequested(now)
+        if stray and there:
+            self._late.expect(request, now)
         if stray and there and not is_write:
             # a request of another master may be in it, and its answer still to come
             until = now + self._late.longest(request.unit)
@@ -250,8 +265,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         return
 
     def _take_late(self, request: Request[Any], now: float) -> None:
-        if late := self._another.take_late(request.unit, now):
-            self._late.quarantine(request.unit, late, now)
+        if still_open := self._another.take_open(request.unit):
+            self._late.quarantine(request.unit, still_open, now)
 
     @property
     def _write_wait(self) -> float:
@@ -266,65 +281,92 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self._others.sent(request, self._now())
         self._send(request, frame)
         reader = self._reader(request)
+        asked_too = False
         try:
-            answer, arrived = self._receive(request, reader, frame)
+            try:
+                answer, arrived = self._receive(request, reader, frame)
+            finally:
+                late = request.answer_head in self._late.quarantined(request.unit, self._now())
+                asked_too = self._take_others(request, reader, frame)
         except (NoAnswer, DamagedAnswer) as error:
             self._note_missing(request, error)
             self._late.expect(request, self._now())
             raise
-        except AnotherValue:
-            self._note_answer(request)
+        except (AnotherValue, Refused) as error:
+            refused = isinstance(error, Refused)
+            self._doubtful = refused and self._is_doubtful(refusal_head(request))
+            self._release(request, asked_too=asked_too)
+            self.pauses.answered(request.unit, type(request), self._now())
+            if refused:
+                length = len(reader.frame) * self._settings.char_time
+                self._late.note(request, reader.frame, self._now(), length)
             raise
-        except Refused:
-            self._note_answer(request)
-            length = len(reader.frame) * self._settings.char_time
-            self._late.note(request, reader.frame, self._now(), length)
-            raise
-        finally:
-            other = reader.other
-            now = self._now()
-            # what comes back before the answer to a write may be its answer, and another master may
-            # send the same request
-            there = self._another.is_there(now)
-            came_back = frame in other and not isinstance(request, Write)
-            alone = not there
-            if alone and came_back:
-                self._echo.present = True
-            stray = self._echo.before + other.replace(frame, b'', 1)
-            if self._has_other_value:
-                # it is the unit's, and not of another master
-                stray = b''
-            self._stray = bool(stray)
-            if stray:
-                self._another.hear(stray, now)
-                there = self._another.is_there(now)
-            self._doubtful = there and (
-                self._stray or now < self._another.open_until(request.unit)
-            )
+        self._doubtful = self._is_doubtful(request.answer_head, late)
         self._others.took(request)
         length = len(reader.frame) * self._settings.char_time
         self._late.note(request, reader.frame, arrived, length)
         self.pauses.answered(request.unit, type(request), arrived)
-        late = request.answer_head in self._late.quarantined(request.unit, arrived)
-        if not late:
-            # units answer in order: late answers have come before this
-            self._late.release(request.unit)
+        self._release(request, late=late, asked_too=asked_too)
         if not late and self._late.repeated is None:
             # and the request has left, even where the port is faster than its settings say
             self._line_end = arrived
         if self._has_run and not self._doubtful:
             self._late.took(request.unit, arrived - self._sent_at - length)
-        if came_back and not alone:
-            # another master has sent the same request, which is answered, too
-            self._late.quarantine(request.unit, (request.answer_head,), arrived)
         if late or (reader.received and not self._doubtful):
             # it may answer an earlier write of the same, or answer twice: one more may come
             self._late.note_unrequested(self._now())
         return answer, arrived
 
-    def _note_answer(self, request: Request[Any]) -> None:
-        self._late.release(request.unit)
-        self.pauses.answered(request.unit, type(request), self._now())
+    def _take_others(
+        self, request: Request[_T], reader: AnswerReader[_T], frame: bytes
+    ) -> bool:
+        """Take all that came beside the answer; return whether another master asks the same."""
+        other = reader.other
+        now = self._now()
+        # what comes back before the answer to a write may be its answer, and another master may
+        # send the same request
+        came_back = frame in other and not isinstance(request, Write)
+        alone = not self._another.is_there(now)
+        if alone and came_back:
+            self._echo.present = True
+        stray = self._echo.before + other.replace(frame, b'', 1)
+        if self._has_other_value:
+            # it is the unit's, and not of another master
+            stray = b''
+        self._stray = bool(stray)
+        if stray:
+            self._another.hear(stray, now)
+        return came_back and not alone
+
+    def _is_doubtful(self, kind: bytes, late: bool = False) -> bool:
+        """
+        Return whether the last answer, of a kind, may be to another master.
+
+        :param late: one of its kind might have come from before.
+        """
+        there = self._another.is_there(self._now())
+        return there and (late or self._another.may_be_answered_by(kind))
+
+    def _answer_time(self, unit: int) -> float:
+        """Return how long the answer of a unit to another master is waited for, s."""
+        recently = self._late.longest(unit)
+        most = self._settings.response_timeout
+        length = self._frame_length(_TWO_REGISTERS) * self._settings.char_time
+        return min(recently + length + self._gap, most) if recently else most
+
+    def _release(
+        self, request: Request[Any], *, late: bool = False, asked_too: bool = False
+    ) -> None:
+        """
+        Expect no late answer any more: units answer in order, so they have come before the last.
+
+        :param late: the last may be such a one itself.
+        :param asked_too: another master has sent the same request, which is answered, too.
+        """
+        if not (late or self._doubtful):
+            self._late.release(request.unit)
+        if asked_too:
+            self._late.expect(request, self._now())
 
     def _receive(
         self, request: Request[_T], reader: AnswerReader[_T], frame: bytes
@@ -398,6 +440,9 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         """Raise what it means if the unit alone has answered, and another value."""
         messages = [message for _, _, message in self._messages(came)]
         if len(messages) != 1 or self._frame_length(len(messages[0])) != len(came):
+            return
+        if messages[0] in self._late.quarantined(request.unit, self._now()):
+            # it answers another master
             return
         if (error := self._others.error_of(request, messages[0])) is not None:
             self._has_other_value = True
