@@ -384,7 +384,7 @@ class ClassicLink(CodecLink):
 
     def _note_unrequested(self, data: bytes, request: Any) -> None:
         # answers to requests without one are expected anyway
-        if self._last is not None:
+        if self._last is not None and not self._is_second(data):
             self._late.expect(self._last[0], self._now())
 
     def _ask_once(self, request: Any, once: bool) -> tuple[Any, float]:
@@ -422,7 +422,6 @@ class ClassicLink(CodecLink):
         return self._another.is_there(now) and any(
             isinstance(one, Value) and one.unit == request.unit and one.number not in quarantined
             for one in messages
-            if not answers(one, request)
         )
 
     def _deadline(self, deadline: float, now: float) -> float:

@@ -263,6 +263,7 @@ class ForeignModbus:
     :param messages: yields the whole frames in some bytes: where each begins and ends, and its
         message.
     :param patience: returns how long the answer of a unit is waited for, s.
+    :param is_second: returns whether a frame, with its message, is a second answer to us.
     """
 
     def __init__(
@@ -271,8 +272,10 @@ class ForeignModbus:
         response_timeout: float,
         messages: Callable[[bytes], Iterator[tuple[int, int, bytes]]],
         patience: Callable[[int], float],
+        is_second: Callable[[bytes, bytes], bool],
     ) -> None:
         self._sightings = Sightings(remarks)
+        self._is_second = is_second
         self._response_timeout = response_timeout
         self._patience = patience
         self._messages = messages
@@ -330,7 +333,7 @@ class ForeignModbus:
         behind = 0
         for start, end, message in self._messages(buffer):
             # an answer comes behind its request
-            if start >= behind and self._is_foreign(buffer[start:end], message, now):
+            if start >= behind and self._is_known(buffer[start:end], message, now):
                 self._rest += buffer[max(behind, self._taken) : start]
                 behind = end
         behind = max(behind, len(buffer) - _MOST)
@@ -372,6 +375,11 @@ class ForeignModbus:
             return frame in self._own
         # another master that is there may send the same
         return frame in [*self._own][-1:] and not self.is_there(now)
+
+    def _is_known(self, frame: bytes, message: bytes, now: float) -> bool:
+        if not self.is_there(now) and self._is_second(frame, message):
+            return True
+        return self._is_foreign(frame, message, now)
 
     def _is_foreign(self, frame: bytes, message: bytes, now: float) -> bool:
         if self._is_own(frame, message, now):

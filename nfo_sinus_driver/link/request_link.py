@@ -43,9 +43,10 @@ from nfo_sinus_driver.link.interface import (
     Why,
     silent,
 )
-from nfo_sinus_driver.link.late_replies import LISTENING_STEP, LateReplies
+from nfo_sinus_driver.link.late_replies import LATEST_REPLY, LISTENING_STEP, LateReplies
 from nfo_sinus_driver.link.pauses import Pauses
 from nfo_sinus_driver.link.port import Port, port_of
+from nfo_sinus_driver.link.second_answers import SecondAnswers
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 
 #: How long a write waits at least for a line that is not silent, s.
@@ -59,6 +60,8 @@ _IN_PIECES = (
 #: reported, and their count decays: on a busy machine there is one now and then.
 LONG_PAUSE = 0.03
 _MANY_PAUSES = 3
+#: For so many silences at most a line is heard that is not silent.
+_SILENCES = 3
 _KEPT_OF_PAUSES = 0.9
 
 _Request = TypeVar('_Request')
@@ -160,6 +163,8 @@ class RequestLink(ABC, Generic[_Request]):
             settings.request_gap,
             self.protocol.broadcast,
         )
+        timeout = settings.response_timeout
+        self._seconds = SecondAnswers(self.remarks.add, timeout, LATEST_REPLY * timeout)
         self.last_byte_at = -math.inf
         self._echo = Echo()
         #: When the last known byte was on the line.
@@ -197,6 +202,7 @@ class RequestLink(ABC, Generic[_Request]):
         self._port.close()
         self._late.clear()
         self._another.clear()
+        self._seconds.clear()
         self.pauses.forget_failures()
         self._echo = Echo()
 
@@ -267,6 +273,31 @@ class RequestLink(ABC, Generic[_Request]):
     def _gap_before(self, request: _Request) -> float:
         """Return how long the line is silent before a request if nothing unrequested comes, s."""
         return self._gap
+
+    def _silence_before(self, request: Any, is_write: bool) -> float:
+        """Return how long the line has to be silent before a request, s; 0: as usual."""
+        silence = self.pauses.silence(request.unit)
+        if is_write:
+            # no stop waits for an answer that comes twice
+            return silence
+        return max(silence, self._seconds.silence(request.unit, self._now()))
+
+    def _hear_out(self, silence: float, least: float = 0.0) -> tuple[bytes, bool]:
+        """
+        Take what comes until the line is silent, or a stop waits; return it, and whether it is.
+
+        :param silence: how long it has to be, s.
+        :param least: until when at least.
+        """
+        came = b''
+        until = max(least, self._line_end + silence)
+        give_up = until + _SILENCES * silence
+        while data := self._listen(until):
+            came += data
+            until = min(max(least, self._line_end + silence), give_up)
+        if came:
+            self._another.hear(came, self._now())
+        return came, self._now() >= until
 
     @property
     @abstractmethod
@@ -365,7 +396,8 @@ class RequestLink(ABC, Generic[_Request]):
         give_up = self._now() + wait
         # usually the bus has waited for that already, in favour of others
         gap = max(self._gap_before(request), self.pauses.ready_at(request.unit) - self._line_end)
-        least = max(self._gap, self.pauses.silence(request.unit))
+        silence = self._silence_before(request, is_write)
+        gap, least = max(gap, silence), max(self._gap, silence)
         stray = False
         while True:
             data, now, silent = self._await_silence(gap, wait, is_write, least)
@@ -400,16 +432,19 @@ class RequestLink(ABC, Generic[_Request]):
         give_up = max(self._line_end + gap, self._now()) + wait
         came = b''
         while True:
-            data = self._take(self._line_end + gap)
+            look = self._line_end + gap
+            if not is_write and gap > LISTENING_STEP:
+                look = min(look, self._now() + LISTENING_STEP)
+            data = self._take(look)
             now = self._now()
             if data:
                 came += data
                 gap = least
                 self._line_end = max(self._line_end, now)
-                if now > give_up or (not is_write and self.stop_waits()):
-                    return came, now, False
             elif now >= self._line_end + gap:
                 return came, now, True
+            if (data and now > give_up) or (not is_write and self.stop_waits()):
+                return came, now, False
 
     def _send(self, request: Any, frame: bytes) -> float:
         """Hand a request to the port; return when its last byte will have left."""
@@ -543,6 +578,19 @@ class CodecLink(RequestLink[Any]):
         if late := self._another.take_late(now):
             self._late.expect(late, now)
 
+    def _note_unrequested(self, data: bytes, request: Any) -> None:
+        if not self._is_second(data):
+            super()._note_unrequested(data, request)
+
+    def _is_second(self, data: bytes) -> bool:
+        """Return whether the last answer has come again, and silences see to that."""
+        now, unit = self._now(), self._seconds.last_unit
+        if self._another.is_there(now):
+            # an answer to that one may be the same
+            return False
+        is_second = self._seconds.take(unit, data, self._line_end)
+        return is_second and self._seconds.silence(unit, now) > 0.0
+
     def _longest_delay(self, unit: int) -> float:
         """Return how late an answer may begin, s."""
         return 0.0
@@ -595,6 +643,7 @@ class CodecLink(RequestLink[Any]):
             self._confirm(request, answer, arrived, sent + delay + length)
         except (NoAnswer, DamagedAnswer) as error:
             self._note_missing(request, error)
+            self._seconds.unanswered(request, self._now())
             self._late.expect(request, self._now())
             if self._echo.give_up():
                 # the adapter does not echo any more; if it does, the next echo will show it
@@ -608,8 +657,13 @@ class CodecLink(RequestLink[Any]):
         self._last = request, answer, arrived
         # and the request has left, even where the port is faster than its settings say
         self._line_end = arrived
+        self._seconds.answered(request, self._codec.encode(answer), arrived)
         if behind:
             self._note_unrequested(behind, request)
+        if silence := self._seconds.silence(request.unit, arrived):
+            came, _ = self._hear_out(silence)
+            if came:
+                self._note_unrequested(came, request)
         return answer, arrived
 
     def _receive(self, request: Any, due: float) -> tuple[Any, float, bytes]:
@@ -643,12 +697,15 @@ class CodecLink(RequestLink[Any]):
             last = now
             came += len(data)
             messages = reader.feed(data)
+            passed_over = []
             for number, message in enumerate(messages, start=1):
                 if not codec.answers(message, request):
                     if message == request:
                         came -= len(codec.encode(request))
                         # or another master sends the same
                         self._echo.present |= not self._another.is_there(now)
+                    elif not self._is_second(codec.encode(message)):
+                        passed_over.append(message)
                     continue
                 stray = len(self._echo.before) + came - len(codec.encode(message))
                 doubtful = self._another.doubts(message, request, now, stray)
@@ -661,7 +718,7 @@ class CodecLink(RequestLink[Any]):
                     raise _Ambiguous(f'unit {unit} answered, but perhaps to an earlier request')
                 if doubtful:
                     raise DamagedAnswer(f'unit {unit}: {DOUBTFUL}')
-            lost = self._was_passed_over(messages, request, quarantined, now)
+            lost = self._was_passed_over(passed_over, request, quarantined, now)
             if lost or self._another.was_answered:
                 raise DamagedAnswer(f'unit {unit}: {DOUBTFUL}')
             deadline = self._deadline(min(max(deadline, now + longest), last_chance), now)

@@ -39,6 +39,7 @@ from nfo_sinus_driver.link.modbus_pdu import (
 from nfo_sinus_driver.link.other_values import OtherValues
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.request_link import LONG_PAUSE, WRITE_WAIT, RequestLink
+from nfo_sinus_driver.link.second_answers import DIFFERENT
 
 _T = TypeVar('_T')
 
@@ -82,7 +83,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             settings.response_timeout, answer_kinds
         )
         self._another = ForeignModbus(
-            self.remarks, settings.response_timeout, self._messages, self._answer_time
+            self.remarks, settings.response_timeout, self._messages, self._answer_time,
+            self._is_second,
         )
         self._resync_addresses: dict[int, tuple[Address, ...]] = {}
         #: How long a pause within an answer may be on this line, s, by the answers so far.
@@ -93,6 +95,10 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self._stray = False
         #: The last answer may be to another master.
         self._doubtful = False
+        #: A second answer has come since the last silence that was waited for.
+        self._second_came = False
+        #: The frame of the last answer, or refusal.
+        self._answer = b''
         #: What units answer in place of what was written, and whether the last answer is such.
         self._others = OtherValues(LATEST_REPLY * settings.response_timeout)
         self._has_other_value = False
@@ -114,6 +120,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self._await_gap(request, is_write=True)
         quarantined = self._late.quarantined(request.unit, self._now())
         doubted = not quarantined.isdisjoint(answer_kinds(request))
+        doubted |= self._seconds.silence(request.unit, self._now()) > 0.0
         if doubted or self._another.is_there(self._now()):
             return None
         return self._believed(request)
@@ -146,12 +153,36 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         except Refused:
             # it names a function, and nothing else
             self._require_ours(request)
-            self._confirm(request)
+            self._require_certain(request)
             raise
-        if not names_it:
+        if names_it:
+            self._confirm(request, names_it=True)
+            if silence := self._seconds.silence(request.unit, self._now()):
+                self._hear_out(silence)
+        else:
             self._require_ours(request)
-        self._confirm(request, names_it=names_it)
+            self._require_certain(request)
         return answer
+
+    def _require_certain(self, request: Request[Any]) -> None:
+        """Make sure that the answer is not one before again, nor one of two (DamagedAnswer)."""
+        if silence := self._seconds.silence(request.unit, self._now()):
+            self._require_same(request, silence)
+        else:
+            self._confirm(request)
+
+    def _require_same(self, request: Request[Any], silence: float) -> None:
+        """Take what comes until the line is silent: the answer once more, and nothing else."""
+        length = self._frame_length(request.answer_length) * self._settings.char_time
+        least = self._sent_at + self._late.longest(request.unit) + length
+        came, is_silent = self._hear_out(silence, least)
+        self._another.take_rest(request.unit)
+        if not is_silent:
+            self._late.expect(request, self._now())
+            raise DamagedAnswer(f'unit {request.unit}: {STOP_WAITS}')
+        refused = self._seconds.is_refused(request.unit, self._now())
+        if refused or came.replace(self._answer, b''):
+            raise DamagedAnswer(f'unit {request.unit}: {DIFFERENT}')
 
     def _require_ours(self, request: Request[Any]) -> None:
         """Make sure that the last answer is to us (DamagedAnswer: perhaps not)."""
@@ -231,7 +262,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
     def _require_one(self, request: Request[Any]) -> None:
         """Wait as long as the right answer may take, in case this was the one before again."""
         length = self._frame_length(request.answer_length) * self._settings.char_time
-        until = self._sent_at + self._late.longest(request.unit) + length
+        # the right one comes behind it, where it was on the line when that was to begin
+        until = self._sent_at + self._late.longest(request.unit) + 2 * length + self._gap
         if self._listen(until):
             self._late.note_unrequested(self._now())
             raise DamagedAnswer(f'unit {request.unit}: an answer came twice')
@@ -240,6 +272,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             raise DamagedAnswer(f'unit {request.unit}: {STOP_WAITS}')
 
     def _await_gap(self, request: Request[Any], *, is_write: bool = False) -> bool:
+        self._second_came = False
         try:
             came = super()._await_gap(request, is_write=is_write)
         except NeverSilent:
@@ -248,8 +281,12 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         now = self._now()
         there = self._another.is_there(now)
         stray = bool(self._another.take_rest(request.unit)) and (came or there)
-        if stray:
+        second = self._second_came
+        if stray or (second and not self._seconds.silence(request.unit, now)):
             self._late.note_unrequested(now)
+        if second and not is_write:
+            # for as long as is known by now
+            super()._await_gap(request)
         if stray and there:
             self._late.expect(request, now)
         if stray and there and not is_write:
@@ -258,7 +295,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             while data := self._listen(until):
                 self._another.hear(data, self._now())
             super()._await_gap(request)
-        return stray
+        return stray or second
 
     def _note_unrequested(self, data: bytes, request: Request[Any]) -> None:
         # whether it is a frame of another master is known when the line is silent
@@ -285,11 +322,17 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         try:
             try:
                 answer, arrived = self._receive(request, reader, frame)
+            except Refused:
+                self._note_answer(request, refusal_head(request), reader.frame)
+                raise
+            else:
+                self._note_answer(request, request.answer_head, reader.frame)
             finally:
                 late = request.answer_head in self._late.quarantined(request.unit, self._now())
                 asked_too = self._take_others(request, reader, frame)
         except (NoAnswer, DamagedAnswer) as error:
             self._note_missing(request, error)
+            self._seconds.unanswered(request, self._now())
             self._late.expect(request, self._now())
             raise
         except (AnotherValue, Refused) as error:
@@ -312,10 +355,21 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             self._line_end = arrived
         if self._has_run and not self._doubtful:
             self._late.took(request.unit, arrived - self._sent_at - length)
-        if late or (reader.received and not self._doubtful):
+        twice = self._seconds.silence(request.unit, arrived) > 0.0
+        if late or (reader.received and not self._doubtful and not twice):
             # it may answer an earlier write of the same, or answer twice: one more may come
             self._late.note_unrequested(self._now())
         return answer, arrived
+
+    def _is_second(self, frame: bytes, message: bytes) -> bool:
+        # it came when the line was last in use, and not when it had been silent since
+        is_second = self._seconds.take(message[0], frame, self._line_end, message)
+        self._second_came |= is_second
+        return is_second
+
+    def _note_answer(self, request: Request[Any], head: bytes, frame: bytes) -> None:
+        self._answer = frame
+        self._seconds.answered(request, frame, self._now(), head)
 
     def _take_others(
         self, request: Request[_T], reader: AnswerReader[_T], frame: bytes

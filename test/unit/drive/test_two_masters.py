@@ -10,11 +10,11 @@ from random import Random
 from typing import Any
 
 import pytest
+from support.belief import Judge
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.link import classic, modbus_ascii, rtu
-from nfo_sinus_driver.link.interface import Refused, Reply
 from nfo_sinus_driver.link.modbus_link import ReportSlaveId
 from nfo_sinus_driver.link.modbus_pdu import Read, ReadInput, Write
 
@@ -39,7 +39,7 @@ class Hub:
     :param deaf: for so long the drive hears nothing after a request, but for what ends by its
         answer, s.
     :param split: the other's frames come in two pieces, with such a pause between, s.
-    :ivar false: what this end believes and the drive has not said.
+    :ivar false: what this end believes and the drive has not said to it.
     """
 
     def __init__(
@@ -53,64 +53,17 @@ class Hub:
         deaf: float = 0.1,
         split: float = 0.0,
     ) -> None:
-        self.false: list[str] = []
+        self.false = Judge(rig).false
         self._clock, self._line = rig.clock, rig.line
         self._frames = [ENCODE[connection](request) for request in requests]
         self._random = random
         self._period, self._deaf, self._split = period, deaf, split
         self._recovery = RECOVERY[connection]
         self._busy_until = -1.0
-        #: What the drive has said: when, to what, and the data, or nothing where it refused.
-        self._said: list[tuple[float, tuple[bool, int], bytes | None]] = []
         wire = rig.line.wire
         self._receive, self._send = wire.receive, rig.line.send
         wire.receive, rig.line.send = self._take, self._answer  # type: ignore[method-assign]
-        self._note = self._note_classic if connection == 'classic' else self._note_modbus
-        answer, self._unwrap = wire.protocol.answer, wire.protocol.unwrap
-
-        def noted(station: Any, request: Any) -> bytes:
-            frame: bytes = answer(station, request)
-            if frame:
-                self._note(request.body, frame)
-            return frame
-
-        wire.protocol.answer = noted
-        for name in ('read', 'write'):
-            setattr(rig.link, name, self._judged(getattr(rig.link, name), name == 'read'))
         self._ask()
-
-    def _note_modbus(self, asked: bytes, frame: bytes) -> None:
-        said = self._unwrap(frame).body
-        key = asked[0] in (3, 4), int.from_bytes(asked[1:3], 'big')
-        self._said.append((self._clock.now, key, None if said[0] & 0x80 else said[2:]))
-
-    def _note_classic(self, asked: bytes, frame: bytes) -> None:
-        (request,), (said,) = classic.Reader().feed(asked), classic.Reader().feed(frame)
-        key = isinstance(request, classic.Enquiry), request.number  # type: ignore[union-attr]
-        data = said.word.to_bytes(2, 'big') if isinstance(said, classic.Value) else b''
-        self._said.append((
-            self._clock.now, key, None if isinstance(said, classic.Nak) else data,
-        ))
-
-    def _judged(self, call: Callable[..., Reply], reads: bool) -> Callable[..., Reply]:
-        def judge(unit: int, address: Any, *more: Any) -> Reply:
-            begun = self._clock.now
-
-            def said() -> list[bytes | None]:
-                place = reads, address.index
-                return [data for at, to, data in self._said if to == place and at >= begun]
-
-            try:
-                reply = call(unit, address, *more)
-            except Refused as error:
-                if None not in said():
-                    self.false.append(f'{begun:.3f} {address.index:04X}h: {error}')
-                raise
-            if not said() or (reads and reply.data not in said()):
-                self.false.append(f'{begun:.3f} {address.index:04X}h: {reply.data.hex()}')
-            return reply
-
-        return judge
 
     def _take(self, frame: bytes, now: float) -> None:
         if now < self._busy_until:

@@ -409,13 +409,21 @@ def test_second_answer_is_not_taken_for_the_next_one(
             assert bench.read(address).data in answers(bench, address, before)
 
 
+def silences(bench: Rtu) -> tuple[float, float]:
+    """How long the line was silent before the last request, and after its answer until now."""
+    sent, _ = bench.wire.sent[-1]
+    heard = [at for at, _ in bench.wire.seen]
+    return sent - max(at for at in heard if at < sent), bench.wire.now - max(heard)
+
+
 @pytest.mark.parametrize('lump', [False, True])
 @of_modbus
-def test_after_a_second_answer_another_question_goes_first(way: Way, lump: bool) -> None:
+def test_after_a_second_answer_readings_come_between_two_silences(way: Way, lump: bool) -> None:
     bench = way(Fate(what='double', lump=lump), trusted=True)
     assert bench.read(A).data == bench.answer_of()
     assert bench.read(B).data == bench.answer_of()
-    assert bench.asked == [A.index, TWO.index, B.index]
+    assert bench.asked == [A.index, B.index]
+    assert min(silences(bench)) > bench.wire.gap + 0.0009
 
 
 @of_modbus
@@ -597,7 +605,8 @@ def test_same_words_cost_no_request_and_hardly_any_time() -> None:
         bench.read(address)
         took.append(bench.wire.now - began)
     assert bench.asked == [A.index, B.index, A.index]
-    assert took[1] == pytest.approx(took[0], rel=0.1)
+    # the right one may come behind it: a frame more
+    assert took[0] < took[1] + 0.0025
 
 
 @pytest.mark.parametrize('again', [0.05, 0.1, 0.15])
@@ -620,11 +629,12 @@ def test_line_with_an_answer_sent_twice_is_not_trusted_for_a_while(lump: bool) -
     bench.drive = SameWords(bench.wire)
     bench.read(A)
     bench.read(B)
-    assert bench.asked[-1] not in (A.index, B.index), 'nothing confirmed it'
+    assert min(silences(bench)) > bench.wire.gap + 0.0009, 'nothing confirmed it'
     bench.wire.now += SUSPECT_FOR + 1.0
     bench.read(A)
     bench.read(B)
     assert bench.asked[-2:] == [A.index, B.index]
+    assert min(silences(bench)) < bench.wire.gap + 0.0001
 
 
 def test_one_slow_answer_does_not_slow_the_others_for_ever() -> None:

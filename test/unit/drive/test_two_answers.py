@@ -1,0 +1,145 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Each request is answered twice: by a repeater, or by two drives at one address."""
+
+from __future__ import annotations
+
+import math
+from random import Random
+from typing import Any
+
+import pytest
+from support.belief import Judge
+from support.rig import Rig
+
+from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.simulator.family import simulated_drive
+
+LINES = ('rtu', 'ascii', 'classic', 'movitrac', 'optimal', 'described')
+
+
+def repeat(rig: Rig, *seconds: float) -> None:
+    """Have each answer come again so long after its end, s; one of these, by chance."""
+    line = rig.line
+    alter, send = line.wire.faults.alter, line.send
+    random = Random(0)
+    expected: list[bytes] = []
+    came = b''
+
+    def noted(address: int, frame: bytes, instead: Any) -> list[Any]:
+        replies: list[Any] = alter(address, frame, instead)
+        expected.extend(one.data for one in replies)
+        return replies
+
+    def sent(data: bytes) -> None:
+        nonlocal came
+        send(data)
+        came += data
+        if expected and came.endswith(expected[0]):
+            frame, came = expected.pop(0), b''
+            end = random.choice(seconds) + line.settings.frame_gap
+            end += len(frame) * line.settings.char_time
+            line.later(rig.clock.now + end, lambda: again(frame))
+
+    def again(frame: bytes) -> None:
+        if came:
+            # the drive is answering
+            line.later(rig.clock.now + 0.0005, lambda: again(frame))
+        else:
+            send(frame)
+
+    line.wire.faults.alter = noted
+    line.send = sent  # type: ignore[method-assign]
+
+
+class Told:
+    """
+    What is believed, and when it is told that answers come twice.
+
+    :ivar at: when it was; infinity: it was not.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self.judge = Judge(rig)
+        self.at = math.inf
+        self.looked = rig.looked
+        rig.looked = self.look
+
+    def look(self) -> None:
+        self.looked()
+        if any('twice' in one for one in self._rig.bus.remarks):
+            self.at = min(self.at, self._rig.clock.now)
+
+    @property
+    def false(self) -> list[tuple[float, str]]:
+        """What was false from then on."""
+        return [one for one in self.judge.false if one[0] > self.at]
+
+
+def running(connection: str, *seconds: float) -> tuple[Rig, Told]:
+    """Return a drive that turns, whose answers come twice from then on."""
+    rig = Rig(connection, poll_rate=20.0)
+    rig.turn()
+    rig.notes.snapshots.clear()
+    told = Told(rig)
+    repeat(rig, *seconds)
+    return rig, told
+
+
+@pytest.mark.parametrize('seconds', [0.0, 0.0007, 0.004, 0.011, 0.03, 0.06, 0.09, 0.3, 0.7])
+@pytest.mark.parametrize('connection', LINES)
+def test_nothing_is_believed_that_was_not_said(connection: str, seconds: float) -> None:
+    rig, told = running(connection, seconds, 1.1 * seconds)
+    rig.pass_time(20.0)
+    assert not told.false
+    assert told.at < math.inf or not told.judge.false
+    assert not rig.notes.said(Cause.CHANGED_AT_DRIVE)
+    if seconds < 0.1:
+        # none is so late that no silence helps: the motor runs on
+        shown = [one for one in rig.notes.snapshots if abs(one.frequency - 20) < 0.3]
+        assert len(shown) > 15
+        assert rig.turns
+    assert_stopped(rig)
+
+
+def assert_stopped(rig: Rig) -> None:
+    """Have it stopped: the stop waits for no second answer."""
+    called = rig.clock.now
+    stop = rig.drive.stop()
+    rig.wait_until(lambda: rig.line.sent_at > called or not rig.turns, 0.35)
+    rig.wait_until(lambda: not rig.turns, 3.0)
+    rig.answer(stop)
+    rig.kill()
+
+
+@pytest.mark.parametrize('seconds', [0.0, 0.004, 0.03, 0.09])
+@pytest.mark.parametrize('connection', LINES)
+def test_a_drive_is_connected_read_and_enabled(connection: str, seconds: float) -> None:
+    rig = Rig(connection, poll_rate=20.0)
+    told = Told(rig)
+    repeat(rig, seconds, 1.1 * seconds)
+    rig.connect(parameters=seconds < 0.05)
+    rig.wait_until(lambda: 'enabled' in rig.answer(rig.drive.enable()), 30.0)
+    rig.send(20.0)
+    rig.pass_time(3.0)
+    assert rig.turns
+    assert not told.false
+    assert_stopped(rig)
+
+
+@pytest.mark.parametrize('connection', LINES)
+def test_of_two_drives_at_one_address_nothing_is_believed(connection: str) -> None:
+    rig = Rig(connection, poll_rate=20.0)
+    rig.turn()
+    told = Told(rig)
+    other = simulated_drive(rig.connection.model, 1, boot_time=0.0)
+    other.step = 0.02
+    other.control_unit.set_to([(rig.line._end.spoken, rig.line._end.timing)])
+    other.advance_to(rig.clock.now)
+    rig.line.wire.stations.append(other)
+    rig.pass_time(20.0)
+    assert told.at < math.inf
+    assert not told.false
+    assert_stopped(rig)
