@@ -157,6 +157,8 @@ class Session:
 
     def __exit__(self, *_: object) -> None:
         self._bus.close()
+        for text in self._bus.remarks:
+            remark(text)
 
     def drive(self, address: int | None = None) -> OfflineDrive:
         """Return the drive at an address, or at the one that the options name; nothing is sent."""

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
 
+from nfo_sinus_driver.link.interface import DamagedAnswer
 from nfo_sinus_driver.link.late_replies import SUSPECT_FOR, Request, longer_than
 
 #: So often in a row it is no chance, and one between may be lost.
@@ -31,10 +32,13 @@ _SHORT = 0.03
 #: How many of the last answers of a unit may come again.
 _RECENT = 4
 
-DIFFERENT = (
-    'each request is answered twice, and not alike: two drives at one address, or a repeater? What '
-    'it reports is not believed'
-)
+
+def different(unit: int) -> DamagedAnswer:
+    """Return the error of a reading that is not the only answer."""
+    return DamagedAnswer(
+        f'unit {unit}: each request is answered twice, and not alike: two drives at one address, '
+        'or a repeater? What it reports is not believed'
+    )
 
 
 def _twice(unit: int) -> str:

@@ -39,7 +39,7 @@ from nfo_sinus_driver.link.modbus_pdu import (
 from nfo_sinus_driver.link.other_values import OtherValues
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.request_link import LONG_PAUSE, WRITE_WAIT, RequestLink
-from nfo_sinus_driver.link.second_answers import DIFFERENT
+from nfo_sinus_driver.link.second_answers import different
 
 _T = TypeVar('_T')
 
@@ -182,7 +182,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             raise DamagedAnswer(f'unit {request.unit}: {STOP_WAITS}')
         refused = self._seconds.is_refused(request.unit, self._now())
         if refused or came.replace(self._answer, b''):
-            raise DamagedAnswer(f'unit {request.unit}: {DIFFERENT}')
+            raise different(request.unit)
 
     def _require_ours(self, request: Request[Any]) -> None:
         """Make sure that the last answer is to us (DamagedAnswer: perhaps not)."""

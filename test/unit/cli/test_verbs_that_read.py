@@ -212,6 +212,27 @@ def test_scan_finds_who_answers(nfo: Nfo, bench: Bench) -> None:
     assert bench.writes() == []
 
 
+def test_an_address_where_each_request_is_answered_twice_is_named(
+    nfo: Nfo, bench: Bench, tmp_path: Path
+) -> None:
+    once = nfo('dump', tmp_path / 'once.yaml')
+    assert once.status == 0, once.err
+    bench.simulator.inject('noise-rate', 'double', 1)
+    done = nfo('scan', '--addresses', '1')
+    assert done.status == 0, done.err
+    assert 'unit 1 answers each request twice: two drives at one address' in done.err
+    twice = nfo('dump', tmp_path / 'twice.yaml')
+    assert twice.status == 0, twice.err
+    assert 'unit 1 answers each request twice' in twice.err
+    saved = [(tmp_path / f'{name}.yaml').read_text() for name in ('once', 'twice')]
+    assert settings_of(saved[0]) == settings_of(saved[1])
+
+
+def settings_of(text: str) -> list[str]:
+    """The lines that are no comments."""
+    return [line for line in text.splitlines() if not line.startswith('#')]
+
+
 @pytest.mark.parametrize(
     ('protocol', 'first', 'last'),
     [('modbus_rtu', 1, 247), ('classic', 1, 94), ('movitrac', 0, 63)],
