@@ -147,7 +147,7 @@ def number(
     return read
 
 
-address = number(int, lambda value: 0 <= value <= 247, 'not possible: 1 to 247')
+address = number(int, lambda value: 0 <= value <= 255, 'not possible: 1 to 255')
 count = number(int, lambda value: value >= 0, 'not possible: 0 or more')
 times = number(int, lambda value: value >= 1, 'not possible: 1 or more')
 period = number(float, lambda value: 0.01 <= value <= 3600, 'not possible: 0.01 s at least')

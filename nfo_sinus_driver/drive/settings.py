@@ -119,7 +119,7 @@ class DriveSettings:
     address: int = setting(
         1,
         'the address of the drive on its line; no two drives on a line share one',
-        0, 247, also=ADDRESSES, change=UNCONFIGURED,
+        0, 255, also=ADDRESSES, change=UNCONFIGURED,
     )
     block_address: int = setting(
         0,
@@ -300,6 +300,20 @@ class DriveSettings:
             if name != self.method and protocol.reaches_by(method.addressing)
         )
 
+    def _require_no_broadcast(self, protocol: LineProtocol) -> None:
+        """Make sure that no write to one drive reaches all that are behind a gateway."""
+        if protocol is not PROTOCOLS['modbus_tcp'] or self.address:
+            return
+        if self.model != AUTO:
+            through_plc = self.method_class.addressing in protocol.carries
+            if through_plc or load_profile(self.model).line.get('protocol') == protocol.name:
+                return
+        raise ValueError(
+            'address 0: behind a gateway that is all drives of its line; set address to that of '
+            'the drive (0 is for a drive that is at the network itself: line: {protocol: '
+            'modbus_tcp} in the file that describes it; and for a PLC)'
+        )
+
     def require_line(self, protocol: LineProtocol) -> None:
         """
         Make sure that the drive can be reached over a line.
@@ -307,6 +321,7 @@ class DriveSettings:
         :raises ValueError: it cannot; the message says what to set.
         """
         protocol.require_unit(self.address)
+        self._require_no_broadcast(protocol)
         if self.model == AUTO:
             return
         needed = self.method_class.addressing

@@ -187,7 +187,7 @@ class LineProtocol:
     :ivar name: as in the driver's parameter ``protocol``.
     :ivar link: its module and class in this folder, such as ``rtu.RtuLink``.
     :ivar addressing: the addresses of the catalog by which it reaches parameters.
-    :ivar units: the addresses that a drive may have.
+    :ivar units: the addresses that a drive may have, in order.
     :ivar baud_rate: of the factory, bit/s.
     :ivar char_format: of the factory, such as ``8E1``.
     :ivar baud_rates: those of the protocol.
@@ -209,7 +209,7 @@ class LineProtocol:
     name: str
     link: str
     addressing: str
-    units: range
+    units: Sequence[int]
     baud_rate: int
     char_format: str
     baud_rates: Sequence[int] = BAUD_RATES
@@ -242,8 +242,15 @@ class LineProtocol:
         :raises ValueError: it may not; the message says which it may.
         """
         if address not in self.units:
-            name = self.addressing.title()
-            raise ValueError(f'address {address}: {name} has {self.units[0]} to {self.units[-1]}')
+            raise ValueError(f'address {address}: {self.addressing.title()} has {self.unit_spans}')
+
+    @property
+    def unit_spans(self) -> str:
+        """The addresses that a drive may have, such as ``0 to 247, 255``."""
+        last = [one for one in self.units if one + 1 not in self.units]
+        first = [one for one in self.units if one - 1 not in self.units]
+        spans = zip(first, last, strict=True)
+        return ', '.join(f'{low}' if low == high else f'{low} to {high}' for low, high in spans)
 
     def require_baud_rate(self, baud_rate: int) -> None:
         """

@@ -19,6 +19,9 @@ from nfo_sinus_driver.setting import FIXED, setting
 
 #: The addresses of drives on Modbus [M0 §6.2.2].
 _MODBUS_UNITS = range(1, 248)
+#: Modbus TCP: a device that is no gateway answers as this one, or as 0 [Modbus Messaging on TCP/IP
+#: Implementation Guide §4.4.2.2]. Behind a gateway 0 is all drives of its line.
+_NO_GATEWAY = 255
 #: Classic: the address at which a drive that is alone on its line answers, whatever its own is.
 POINT_TO_POINT = 0
 #: Classic: the address that all drives obey and none answers.
@@ -54,7 +57,8 @@ MODBUS_TCP = LineProtocol(
     name='modbus_tcp',
     link='modbus_tcp.TcpLink',
     addressing='modbus',
-    units=_MODBUS_UNITS,
+    units=(0, *_MODBUS_UNITS, _NO_GATEWAY),
+    point_to_point=0,
     # the line behind a gateway is set in the gateway
     baud_rate=19200,
     char_format='8E1',
@@ -63,6 +67,9 @@ MODBUS_TCP = LineProtocol(
     writes_and_reads=True,
     most_requests=50.0,
     carries=frozenset(('telegram1',)),
+    check='the address in the drive (a drive or PLC that is at the network itself may answer as '
+    'unit 255 alone: set address to that, or to 0), and in the gateway: protocol, RS232 or RS485, '
+    'baud rate and parity of its line',
 )
 CLASSIC = LineProtocol(
     name='classic',
@@ -114,7 +121,7 @@ BIT_RATES = tuple(sorted({rate for each in PROTOCOLS.values() for rate in each.b
 #: Which addresses a drive may have, as text.
 ADDRESSES = '; '.join(
     dict.fromkeys(
-        f'{one.addressing} {one.units[0]} to {one.units[-1]}'
+        f'{one.name if one is MODBUS_TCP else one.addressing} {one.unit_spans}'
         + f' ({one.point_to_point}: alone on its line)' * (one.point_to_point is not None)
         for one in PROTOCOLS.values()
     )

@@ -295,7 +295,7 @@ def untouched(
         pytest.param(
             ['-p', 'address:=95'], ['nfo_sinus: address 95', '0 to 94'], marks=needs('classic')
         ),
-        (['-p', 'address:=248'], ['nfo_sinus: address 248', '0 to 247']),
+        (['-p', 'address:=256'], ['nfo_sinus: address 256', '0 to 255']),
         (['-p', 'address:=one'], ["address is 'one' (a string)", 'write a whole number']),
         (['-p', 'address:="1"'], ["address is '1' (a string)", 'write 1 without quotes']),
         # texts although the operator wrote no quotes: 2e0 by launch, 1_0 by ROS

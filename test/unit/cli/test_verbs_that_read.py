@@ -165,7 +165,7 @@ def test_there_is_no_such_port(nfo: Nfo) -> None:
         (['scream'], 'there is no verb scream'),
         ([], 'VERB'),
         (['get'], 'NAME'),
-        (['info', '--address', '248'], 'allowed are 0 to 247'),
+        (['info', '--address', '256'], 'allowed are 0 to 255'),
         (['info', '--address', '0'], 'address 0: Modbus has 1 to 247'),
         (['info', '--protocol', 'classic', '--address', '95'], 'Classic has 0 to 94'),
         (['scan', '--protocol', 'classic', '--addresses', '90-95'], 'Classic has 0 to 94'),

@@ -235,7 +235,7 @@ def test_the_default_is_what_the_drive_and_lost_after_allow(
 
 
 NO_SENSE: list[tuple[dict[str, Any], str]] = [
-    ({'address': 248}, 'allowed are 0 to 247'),
+    ({'address': 256}, 'allowed are 0 to 255'),
     ({'model': 'sinus_x'}, "'sinus_g2', "),
     ({'control_method': 'profidrive'}, "choose one of 'mode_scmd', 'drive_control', 'ds402'"),
     (

@@ -71,12 +71,14 @@ def test_a_value_whose_first_register_is_apart_is_read_whole(
 
 @given(st.sampled_from(list(PROTOCOLS.values())), st.integers(-1, 300))
 def test_addresses(protocol: LineProtocol, address: int) -> None:
-    ends = {'classic': (0, 94), 'movitrac': (0, 63), 'canopen': (1, 127)}
+    ends = {'classic': (0, 94), 'movitrac': (0, 63), 'canopen': (1, 127), 'modbus_tcp': (0, 247)}
     lowest, highest = ends.get(protocol.name, (1, 247))
-    if lowest <= address <= highest:
+    beside = 255 if protocol.name == 'modbus_tcp' else None
+    if lowest <= address <= highest or address == beside:
         protocol.require_unit(address)
     else:
-        with pytest.raises(ValueError, match=f'^address {address}: .* has {lowest} to {highest}$'):
+        spans = f'{lowest} to {highest}' + f', {beside}' * (beside is not None)
+        with pytest.raises(ValueError, match=f'^address {address}: .* has {spans}$'):
             protocol.require_unit(address)
 
 
