@@ -121,7 +121,8 @@ class _Learner:
         if self.between:
             sent = sent._replace(line=max(sent.line, usual - _STEPS[0]))
         self.stage = self._next(max(self.stage, _LONGEST_OWN * self.between) + 1, sent)
-        if self.stage == (len(_STAGES) if self.between else _LONGEST_OWN + 1):
+        # it may have been silent for longer than all pauses that are left
+        if self.stage > (len(_STAGES) - 1 if self.between else _LONGEST_OWN):
             self.stage, self.in_vain = self.kept, True
 
     def count_answer(self, sent: _Sent) -> bool:
