@@ -295,10 +295,6 @@ class Pauses:
             learner = one.learners[one.wrote, own > line]
             one.sent = learner, _Sent(own, line)
 
-    def heard(self, now: float) -> None:
-        """Note that a gateway has said something of its own."""
-        self._answered_at = now
-
     def answered(self, unit: int, kind: type[object], now: float) -> None:
         """Note that a unit has answered the last request to it."""
         one = self._of(unit)
