@@ -262,9 +262,13 @@ class Pauses:
         """Return how long the line is silent before a request to a unit, s; 0: as usual."""
         return max(self._least, *(one.gap for one in self._heard_by(unit)))
 
+    def kept_silent(self, unit: int) -> float:
+        """Return how long a request to a unit keeps the line silent before it, s; 0: as usual."""
+        return max(self.silence(unit), self._learnt(unit))
+
     def silent_until(self, unit: int) -> float:
         """Return until when the line has to be silent for a request to a unit, if for longer."""
-        learnt = max(one.learnt() for one in self._heard_by(unit))
+        learnt = self._learnt(unit)
         silence = self.silence(unit)
         until = self._line_end() + silence if silence else -math.inf
         return max(until, self._answered_at + learnt) if learnt else until
@@ -338,6 +342,9 @@ class Pauses:
         if unit not in self._units:
             self._units[unit] = _Unit()
         return self._units[unit]
+
+    def _learnt(self, unit: int) -> float:
+        return max(one.learnt() for one in self._heard_by(unit))
 
     def _heard_by(self, unit: int) -> Iterable[_Unit]:
         if unit == self._broadcast and self._units:
