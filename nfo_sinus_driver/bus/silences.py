@@ -123,12 +123,14 @@ class Silences:
         now: float,
         error: LinkError | None,
         seconds: float = 0.0,
+        silence: float = 0.0,
         *,
         is_stop: bool = False,
     ) -> bool:
         """
         Note the outcome of a request that took ``seconds``; return whether the port carries.
 
+        :param silence: how long the line was kept silent for it before, s.
         :param is_stop: it was a stop, or the look before it.
         """
         if isinstance(error, NotSent):
@@ -150,9 +152,9 @@ class Silences:
             self._in_vain.clear()
             self._in_vain_since = math.inf
         elif self.is_missing(unit, now):
-            self._pause_ends = now + seconds * (1 / _MISSING_SHARE - 1)
+            self._pause_ends = now + (silence + seconds) * (1 / _MISSING_SHARE - 1)
         if is_stop and unit in self._since:
-            self._stops_from = now + seconds * (1 / _STOPS_IN_NOISE - 1)
+            self._stops_from = now + (silence + seconds) * (1 / _STOPS_IN_NOISE - 1)
         if error is not None and not isinstance(error, (PortError, Refused)):
             # by then a drive has answered
             failed_at = now - max(seconds - _ANSWERED_WITHIN, 0.0)

@@ -695,6 +695,7 @@ class Bus:
         What was read while the worker paused may be old: it is read again, once.
         """
         started = self._clock()
+        silence = self._link.pauses.kept_silent(exchange.unit)
         paced_until = self._paced_until
         self._paced_until = started + self._request_period
         self._link.wait_at_most(self._patience(exchange, started))
@@ -703,13 +704,13 @@ class Bus:
             if self._clock.resumed_at > started:
                 reply = exchange.without_old(reply)
         except InProgress:
-            self._account(exchange, started, None)
+            self._account(exchange, started, silence, None)
             raise
         except NotReady:
             self._paced_until = paced_until
             raise
         except LinkError as error:
-            self._account(exchange, started, error, tells=exchange.is_for_all)
+            self._account(exchange, started, silence, error, tells=exchange.is_for_all)
             self._count_write(exchange, error)
             raise
         except BaseException as error:
@@ -718,7 +719,7 @@ class Bus:
             raise LinkError(f'error in the link: {error!r}') from error
         if not reply.requests:
             self._paced_until = paced_until
-        self._account(exchange, started, None)
+        self._account(exchange, started, silence, None)
         self._count_write(exchange, None)
         return reply
 
@@ -739,15 +740,21 @@ class Bus:
         return _ALONE_OF_A_LOSS * self.silences.soonest_loss
 
     def _account(
-        self, exchange: Exchange, started: float, error: LinkError | None, *, tells: bool = True
+        self,
+        exchange: Exchange,
+        started: float,
+        silence: float,
+        error: LinkError | None,
+        *,
+        tells: bool = True,
     ) -> None:
         now, unit = self.now(), exchange.unit
         seconds = now - started - self._note_pause()
         answered = unit != self.protocol.broadcast and tells
         is_stop = exchange.priority <= Priority.LOOK
-        if answered and self.silences.note(unit, now, error, seconds, is_stop=is_stop):
+        if answered and self.silences.note(unit, now, error, seconds, silence, is_stop=is_stop):
             self._report_mute(0.0)
-        self._scheduler.took(seconds)
+        self._scheduler.took(silence + seconds)
         if isinstance(error, PortError):
             self._port.mark_lost(error, now + REOPEN_PERIOD)
         else:

@@ -48,6 +48,8 @@ _READ_WRITE = 23
 #: The lengths of the requests for the identity of a unit.
 _REPORT_LENGTH = 2
 _DEVICE_LENGTH = 5
+#: No message is longer.
+_LONGEST_ANSWER = 254
 _EXCEPTION = 0x80
 
 
@@ -93,6 +95,14 @@ def _answer_head(message: bytes) -> bytes:
     if function == _READ_WRITE and length > 11 and 0 < count < 126:
         return message[:2] + bytes((2 * count,))
     return b''
+
+
+def _answer_length(request: bytes) -> int:
+    """Return how long the answer to a request is at most."""
+    head = _answer_head(request)
+    if request[1] in (REPORT_SLAVE_ID, ENCAPSULATED_INTERFACE):
+        return _LONGEST_ANSWER
+    return len(head) + head[2] if len(head) == 3 else len(head)
 
 
 def _refusal_head(message: bytes) -> bytes:
@@ -262,7 +272,7 @@ class ForeignModbus:
 
     :param messages: yields the whole frames in some bytes: where each begins and ends, and its
         message.
-    :param patience: returns how long the answer of a unit is waited for, s.
+    :param patience: returns how long an answer of a unit, and of a length, is waited for, s.
     :param is_second: returns whether a frame, with its message, is a second answer to us.
     """
 
@@ -271,7 +281,7 @@ class ForeignModbus:
         remarks: Remarks,
         response_timeout: float,
         messages: Callable[[bytes], Iterator[tuple[int, int, bytes]]],
-        patience: Callable[[int], float],
+        patience: Callable[[int, int], float],
         is_second: Callable[[bytes, bytes], bool],
     ) -> None:
         self._sightings = Sightings(remarks)
@@ -395,5 +405,6 @@ class ForeignModbus:
             return False
         self._sightings.add(now, _ANOTHER_MODBUS_MASTER)
         self._meanwhile.update(_kinds(message))
-        requests.append(_OpenRequest(message, now + self._patience(message[0])))
+        patience = self._patience(message[0], _answer_length(message))
+        requests.append(_OpenRequest(message, now + patience))
         return True

@@ -444,8 +444,8 @@ class TcpLink(ModbusLink):
     def _note_for_pauses(self, request: Request[object], message: bytes, now: float) -> None:
         code = message[2] if message.startswith(modbus_pdu.refusal_head(request)) else 0
         if code == Refused.NO_ANSWER:
+            # it has waited so long that nothing comes too soon after its own word
             self.pauses.unanswered(request.unit, type(request))
-            self.pauses.heard(now)
         elif code != Refused.NO_PATH:
             self.pauses.answered(request.unit, type(request), now)
 

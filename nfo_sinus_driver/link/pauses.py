@@ -121,7 +121,8 @@ class _Learner:
         if self.between:
             sent = sent._replace(line=max(sent.line, usual - _STEPS[0]))
         self.stage = self._next(max(self.stage, _LONGEST_OWN * self.between) + 1, sent)
-        if self.stage == (len(_STAGES) if self.between else _LONGEST_OWN + 1):
+        # it may have been silent for longer than all pauses that are left
+        if self.stage > (len(_STAGES) - 1 if self.between else _LONGEST_OWN):
             self.stage, self.in_vain = self.kept, True
 
     def count_answer(self, sent: _Sent) -> bool:
@@ -261,9 +262,13 @@ class Pauses:
         """Return how long the line is silent before a request to a unit, s; 0: as usual."""
         return max(self._least, *(one.gap for one in self._heard_by(unit)))
 
+    def kept_silent(self, unit: int) -> float:
+        """Return how long a request to a unit keeps the line silent before it, s; 0: as usual."""
+        return max(self.silence(unit), self._learnt(unit))
+
     def silent_until(self, unit: int) -> float:
         """Return until when the line has to be silent for a request to a unit, if for longer."""
-        learnt = max(one.learnt() for one in self._heard_by(unit))
+        learnt = self._learnt(unit)
         silence = self.silence(unit)
         until = self._line_end() + silence if silence else -math.inf
         return max(until, self._answered_at + learnt) if learnt else until
@@ -293,10 +298,6 @@ class Pauses:
             own = now - one.answered_at
             learner = one.learners[one.wrote, own > line]
             one.sent = learner, _Sent(own, line)
-
-    def heard(self, now: float) -> None:
-        """Note that a gateway has said something of its own."""
-        self._answered_at = now
 
     def answered(self, unit: int, kind: type[object], now: float) -> None:
         """Note that a unit has answered the last request to it."""
@@ -341,6 +342,9 @@ class Pauses:
         if unit not in self._units:
             self._units[unit] = _Unit()
         return self._units[unit]
+
+    def _learnt(self, unit: int) -> float:
+        return max(one.learnt() for one in self._heard_by(unit))
 
     def _heard_by(self, unit: int) -> Iterable[_Unit]:
         if unit == self._broadcast and self._units:

@@ -401,12 +401,12 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         there = self._another.is_there(self._now())
         return there and (late or self._another.may_be_answered_by(kind))
 
-    def _answer_time(self, unit: int) -> float:
-        """Return how long the answer of a unit to another master is waited for, s."""
+    def _answer_time(self, unit: int, length: int) -> float:
+        """Return how long an answer of a length to another master is waited for, s."""
         recently = self._late.longest(unit)
         most = self._settings.response_timeout
-        length = self._frame_length(_TWO_REGISTERS) * self._settings.char_time
-        return min(recently + length + self._gap, most) if recently else most
+        on_line = self._frame_length(length) * self._settings.char_time
+        return min(recently + on_line + self._gap, most) if recently else most
 
     def _release(
         self, request: Request[Any], *, late: bool = False, asked_too: bool = False

@@ -650,8 +650,8 @@ LAWS = (
         8,
         'the echo of a write is its answer',
         'nfo_sinus_driver/link/serial_link.py',
-        '                self._echo.present = True',
-        '                pass',
+        '            self._echo.present = True',
+        '            pass',
         (LINE, '-k', 'rtu and echo'),
     ),
     Mutant(
@@ -682,8 +682,8 @@ LAWS = (
         8,
         'an answer to the last of several requests of another master answers all of them',
         'nfo_sinus_driver/link/foreign_traffic.py',
-        '                del requests[:number]',
-        '                requests.clear()',
+        '                requests[:number] = again',
+        '                requests[:] = again',
         ('test/unit/link/test_another_master_on_a_line.py',),
     ),
     Mutant(
@@ -1319,8 +1319,8 @@ LAWS = (
         3,
         'in noise the stop of a drive that answers more goes first',
         SCHEDULER,
-        '        return task.requests, self._asked_at(exchange.unit)',
-        '        return 0, self._asked_at(exchange.unit)',
+        '        return task.requests, self._needs_silence(unit), self._asked_at(unit)',
+        '        return 0, self._needs_silence(unit), self._asked_at(unit)',
         ('test/unit/bus/test_scheduler.py', '-k', 'fewest_requests'),
     ),
     Mutant(

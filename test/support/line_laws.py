@@ -133,6 +133,8 @@ class LineLaws:
         #: that frame came, and whom it was in vain for since.
         self._asked_at, self._frame_at = math.inf, rig.clock.now
         self._in_vain: set[int] = set()
+        #: When a silence ended in which each drive may have become another one.
+        self._back_at = -math.inf
         #: Since when the port is there, and since when answers come.
         self._there_since = self._whole_since = -math.inf
         #: What the program gives, Hz, and how many events were seen of each drive.
@@ -205,6 +207,8 @@ class LineLaws:
             unit.longest = max(unit.longest, asked.ended - asked.sent)
             unit.answered_at = asked.sent
             unit.asked_at = self._asked_at = math.inf
+            if asked.ended - self._frame_at > _SAME:
+                self._back_at = asked.ended
             self._frame_at = asked.ended
             self._in_vain.clear()
             for each in self._units.values():
@@ -334,10 +338,13 @@ class LineLaws:
     @property
     def _under_way(self) -> float:
         """How long the request under way may take, s."""
-        settings = self._line.settings
-        return (
-            _CHARACTERS * settings.char_time + settings.response_timeout + self._waits_longer
-        )
+        return self._frame + self._line.settings.response_timeout + self._waits_longer
+
+    @property
+    def _frame(self) -> float:
+        """How long a request takes, s, with the silence that the drives want before it."""
+        gap = max(drive.model.profile.gap for drive in self._rig.drives.values())
+        return _CHARACTERS * self._line.settings.char_time + gap
 
     def _round(self, looks: int, since: float) -> float:
         """
@@ -347,9 +354,8 @@ class LineLaws:
         :param since: those that were sent since then are of the same round.
         """
         least = _GATEWAY if self._rig.connection.protocol == 'modbus_tcp' else 0.0
-        frame = _CHARACTERS * self._line.settings.char_time
         return sum(
-            (1 + looks) * (frame + (max(each.longest, least) if each.longest > 0 else 0.2))
+            (1 + looks) * (self._frame + (max(each.longest, least) if each.longest > 0 else 0.2))
             for each in self._units.values()
             if each.due_since < math.inf or each.stop_at >= since
         )
@@ -368,7 +374,9 @@ class LineLaws:
         if unit.due_since == math.inf:
             return
         since = max(unit.due_since, self._there_since + _OPENED)
-        looks = _SHORT_LOOK if since - self._frame_at > _SAME else 0
+        # the first answer of one drive tells nothing of the others
+        may_be_others = since - self._frame_at > _SAME or self._back_at >= since
+        looks = _SHORT_LOOK if may_be_others else 0
         until = since + unit.due_within + self._under_way + self._round(looks, unit.due_since)
         if self.noise:
             # what is damaged is waited for until the line is silent, and may be any of the others

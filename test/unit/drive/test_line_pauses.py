@@ -108,7 +108,8 @@ def test_a_drive_that_hears_nothing_just_after_an_answer_is_used(
         assert all(abs(far.motor.frequency) > 19.0 for far in rig.fars.values())
         assert len(deaf.lost) <= 3
         texts = ' '.join(rig.bus.remarks)
-        assert 'unit 1 loses' in texts
+        # the file of a described drive may have a pause that is long enough from the start
+        assert ('unit 1 loses' in texts) == (rig.drive.model.profile.gap < seconds)
         for drive in rig.drives.values():
             assert 'stop' in rig.answer(drive.stop(), 2.0)
 
