@@ -62,9 +62,15 @@ class Tally:
         self._round_trips: deque[float] = deque(maxlen=round_trips)
         self._busy: deque[tuple[float, float]] = deque()
 
-    def transaction(self, now: float, seconds: float, error: LinkError | None) -> None:
-        """Count a transaction that kept the line busy until ``now``, and how it ended."""
-        self._busy.append((now, seconds))
+    def transaction(
+        self, now: float, seconds: float, error: LinkError | None, silence: float
+    ) -> None:
+        """
+        Count a transaction that kept the line busy until ``now``, and how it ended.
+
+        :param silence: for how long the line was kept silent for it before, s.
+        """
+        self._busy.append((now, silence + seconds))
         while self._busy[0][0] < now - _WINDOW:
             self._busy.popleft()
         if error is None or isinstance(error, Refused):
@@ -126,10 +132,17 @@ class Recorder:
         """Count that a unit was connected to."""
         self._of(unit).opened()
 
-    def transaction(self, unit: int, now: float, seconds: float, error: LinkError | None) -> None:
-        """Count a transaction that kept the line busy until ``now``, and how it ended."""
+    def transaction(
+        self,
+        unit: int,
+        now: float,
+        seconds: float,
+        error: LinkError | None,
+        silence: float = 0.0,
+    ) -> None:
+        """Count a transaction as :meth:`Tally.transaction`."""
         for tally in (self._line, self._of(unit)):
-            tally.transaction(now, seconds, error)
+            tally.transaction(now, seconds, error, silence)
 
     def retry(self, unit: int) -> None:
         """Count a request to a unit that is sent again."""

@@ -758,7 +758,7 @@ class Bus:
         if isinstance(error, PortError):
             self._port.mark_lost(error, now + REOPEN_PERIOD)
         else:
-            self.recorder.transaction(unit, now, seconds, error)
+            self.recorder.transaction(unit, now, seconds, error, silence)
 
     def _count_write(self, exchange: Exchange, error: LinkError | None) -> None:
         if not exchange.writes or exchange.unit == self.protocol.broadcast:

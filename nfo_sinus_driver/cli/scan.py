@@ -49,7 +49,8 @@ class Scan(Verb):
         """Add what may be typed."""
         parser.add_argument(
             '--addresses', type=addresses, default=(), metavar='LIST',
-            help='such as 1-10,20 (default: 1-247, modbus_tcp: 255, too; classic: 1-94; movitrac: 0-63; canopen: 1-127)',
+            help='such as 1-10,20 (default: 1-247; modbus_tcp: 255, too; classic: 1-94; movitrac: '
+            '0-63; canopen: 1-127)',
         )
         add_flag(
             parser, '--all-settings', 'try every baud rate and parity; takes long; not for canopen',

@@ -252,3 +252,10 @@ def test_pauses_that_add_up_to_a_loss_are_told() -> None:
     with Rig('rtu', drives=4, lost_after=1.0, line={'request_gap': 0.01}) as rig:
         connect(rig)
         assert not told_of_too_long_pauses(rig)
+
+
+def test_a_line_whose_drives_want_silence_is_shown_as_full() -> None:
+    with Rig(drives=4, poll_rate=100.0, line={'request_gap': 0.02}) as rig:
+        rig.connect()
+        rig.pass_time(4.0)
+        assert rig.bus.statistics().utilisation > 0.9
