@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
+import itertools
 import math
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator, MultipleLocator
-from matplotlib.transforms import Transform, blended_transform_factory
+from matplotlib.transforms import BboxBase, Transform, blended_transform_factory
 
 from nfo_sinus_driver.demo.recorded import Curve, Recording, Span, read
 
@@ -30,6 +31,8 @@ _OF_DRIVE = 2.6
 _LEFT, _RIGHT = 0.075, 0.98
 #: A text is made smaller rather than left out.
 _SPAN_SIZES = (13, 12, 11, 10)
+#: How much of the length of a span its name may take.
+_OF_SPAN = 0.96
 
 # the colours of Okabe and Ito, which are distinct without seeing red or green
 _ORANGE = '#E69F00'
@@ -67,6 +70,15 @@ _STYLE = {
 }
 #: What a unit is of.
 _QUANTITIES = {'Hz': 'frequency', 'rpm': 'speed', '%': 'torque', 'm/s': 'speed'}
+#: Drawn in place of several states that are each too short for their names; these never are.
+_SEVERAL = '…'
+_ALWAYS_DRAWN = ('fault', 'lost')
+#: How long a set-point stands that is named: s, and as a part of the picture; and how many are.
+_STANDS_FOR, _STANDS_FOR_SHARE = 1.0, 1 / 40
+_MOST_SETPOINTS = 10
+#: The names of faults: how high each is of a panel, and how many there are one above the other.
+_FAULT_HEIGHT, _MOST_FAULTS = 0.27, 3
+_BOX = {'facecolor': 'white', 'alpha': 0.85, 'linewidth': 0, 'pad': 1.0}
 #: Between publications that are further apart nothing was asked, s.
 _SILENCE = 0.5
 
@@ -111,6 +123,7 @@ def _picture_of(run: Recording) -> Figure:
     _draw_quantity(current, run.current, 'output current (A)', _PURPLE, marker='o')
     current.set_ylim(bottom=0.0)
     _name_faults(frequency, run)
+    _name_unknown(frequency, run)
     _name_stops(speed, run)
     figure.align_ylabels([frequency, speed, current])
     title, name = run.remarks.get('title', 'A test run'), run.remarks.get('drive', run.drive)
@@ -183,7 +196,7 @@ def _draw_states(axes: Axes, run: Recording) -> None:
     _set_bars(axes, {0.48: 'display', 1.52: 'motor'})
     _draw_phases(axes, run, 1.04)
     faulty = {span.what for span in run.faults}
-    for span in run.texts:
+    for span in _merged(axes, run.texts, faulty):
         fault = span.what in faulty
         _draw_span(axes, span, 0.0, '#F9DCCB' if fault else '#F0F0F0', _INK, bold=fault)
 
@@ -196,9 +209,32 @@ def _set_bars(axes: Axes, names: dict[float, str]) -> None:
 
 
 def _draw_phases(axes: Axes, run: Recording, bottom: float) -> None:
-    for span in run.phases:
-        colour, ink = _PHASES[span.what]
+    for span in _merged(axes, run.phases, _ALWAYS_DRAWN):
+        colour, ink = _PHASES.get(span.what, ('#F0F0F0', _INK))
         _draw_span(axes, span, bottom, colour, ink, bold=True)
+
+
+def _merged(axes: Axes, spans: Sequence[Span], kept: Collection[str]) -> Iterator[Span]:
+    """Yield spans; neighbours that are too short for their names become one, but for some."""
+    widths = {what: _width_of(axes, what) for what in {span.what for span in spans}}
+
+    def is_short(span: Span) -> bool:
+        return span.what not in kept and _OF_SPAN * (span.end - span.begin) < widths[span.what]
+
+    for short, group in itertools.groupby(spans, is_short):
+        neighbours = list(group)
+        if short and len(neighbours) > 1:
+            yield Span(neighbours[0].begin, neighbours[-1].end, _SEVERAL)
+        else:
+            yield from neighbours
+
+
+def _width_of(axes: Axes, what: str) -> float:
+    """Return how wide the name of a state is at least, in units of the axis of time."""
+    text = axes.text(0.0, 0.0, what, size=_SPAN_SIZES[-1])
+    width = _width(text)
+    text.remove()
+    return width
 
 
 def _draw_span(
@@ -215,7 +251,7 @@ def _draw_span(
     )
     for size in _SPAN_SIZES:
         text.set_size(size)
-        if _width(text) < 0.96 * length:
+        if _width(text) < _OF_SPAN * length:
             return
     # the colour has to do
     text.remove()
@@ -291,7 +327,7 @@ def _name_stops(axes: Axes, run: Recording) -> None:
     named = [(stop.time, f'■ {stop.reason}') for stop in run.stops]
     for text in _name_moments(axes, named, 0.04, 0.13):
         text.set(color=_DARK_RED, weight='bold', zorder=8)
-        text.set_bbox({'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0, 'pad': 1.0})
+        text.set_bbox(_BOX)
 
 
 def _name_moments(
@@ -312,28 +348,83 @@ def _name_moments(
 
 
 def _name_setpoints(axes: Axes, followed: Curve, unit: str) -> None:
-    named = math.nan
-    for time, value in zip(followed.times, followed.values, strict=True):
-        # NaN, where nothing is followed, is neither near nor far
-        if value == value and value not in (named, 0.0):
-            axes.annotate(
-                f'{value:+g} {unit}'.replace('-', '\N{MINUS SIGN}'), (time, value),
-                (4, 5 if value >= 0 else -5), textcoords='offset points', ha='left',
-                va='bottom' if value >= 0 else 'top', color=_DARK_ORANGE, weight='bold', zorder=6,
-            )
-        if value == value:
-            named = value
+    """Name the values that stand for a while, the longest of them, where there is room."""
+    left, right = axes.get_xlim()
+    least = max(_STANDS_FOR, _STANDS_FOR_SHARE * (right - left))
+    standing = [span for span in _standing(followed, unit) if span.end - span.begin >= least]
+    standing.sort(key=lambda span: span.begin - span.end)
+    boxes: list[BboxBase] = []
+    for span in standing[:_MOST_SETPOINTS]:
+        value = followed.values[followed.times.index(span.begin)]
+        text = axes.annotate(
+            span.what.replace('-', '\N{MINUS SIGN}'), (span.begin, value),
+            (4, 5 if value >= 0 else -5), textcoords='offset points', ha='left',
+            va='bottom' if value >= 0 else 'top', color=_DARK_ORANGE, weight='bold', zorder=6,
+        )
+        box = text.get_window_extent()
+        if any(box.overlaps(other) for other in boxes):
+            text.remove()
+        else:
+            boxes.append(box)
+
+
+def _standing(followed: Curve, unit: str) -> Iterator[Span]:
+    """Yield the set-points but 0, rounded, and from when to when each was followed."""
+    points = zip(followed.times, followed.values, strict=True)
+    # NaN, where nothing is followed, is a value of its own
+    groups = [
+        (next(group)[0], what)
+        for what, group in itertools.groupby(points, lambda one: f'{one[1]:+.3g}')
+    ]
+    ends = [*(time for time, _ in groups[1:]), followed.times[-1] if groups else 0.0]
+    for (begin, what), end in zip(groups, ends, strict=True):
+        if what not in ('+nan', '+0', '-0'):
+            yield Span(begin, end, f'{what} {unit}')
 
 
 def _name_faults(axes: Axes, run: Recording) -> None:
+    """Name faults, one below the other where they would overlap, as long as there is room."""
+    left, right = axes.get_xlim()
+    rows: list[float] = []
     for span in run.faults:
-        offset = {'textcoords': 'offset points', 'xycoords': _at_height(axes), 'zorder': 6}
-        where = (span.begin, 0.985)
-        axes.annotate(
-            span.what, where, (8, 0), va='top', size=18, weight='bold', color=_VERMILION, **offset
+        detail = f'fault {span.code}, {span.begin:.1f} s\nmotor released'
+        texts = [
+            axes.annotate(
+                text, (span.begin, 0.0), (8, 0), textcoords='offset points',
+                xycoords=_at_height(axes), va='top', size=size, weight=weight, color=colour,
+                zorder=8, bbox=_BOX,
+            )
+            for text, size, weight, colour in (
+                (span.what, 18, 'bold', _VERMILION), (detail, 11.5, 'normal', _INK),
+            )
+        ]
+        width = max(map(_width, texts)) + 0.012 * (right - left)
+        begin = span.begin
+        if begin + width > right:
+            begin -= width
+            for text in texts:
+                text.set(ha='right', position=(-8, 0))
+        row = next((row for row, end in enumerate(rows) if end < begin), len(rows))
+        if row >= _MOST_FAULTS:
+            # the line stays, and its name in the row of states
+            for text in texts:
+                text.remove()
+            continue
+        rows[row : row + 1] = [begin + width]
+        top = 0.985 - _FAULT_HEIGHT * row
+        for text, below in zip(texts, (0.0, 0.115), strict=True):
+            text.xy = span.begin, top - below
+
+
+def _name_unknown(axes: Axes, run: Recording) -> None:
+    """Say where the speed is not known, if there is room: after a fault, or STOP at the keypad."""
+    for span in run.unknown:
+        text = axes.text(
+            (span.begin + span.end) / 2, 0.03, span.what, transform=_at_height(axes), ha='center',
+            va='bottom', size=11.5, color=_SOFT, zorder=6, bbox=_BOX,
         )
-        text = f'fault {span.code}, {span.begin:.1f} s\nmotor released,\nspeed unknown'
-        axes.annotate(text, where, (8, -26), va='top', size=11.5, color=_INK, **offset)
+        if _width(text) > span.end - span.begin:
+            text.remove()
 
 
 def _at_height(axes: Axes) -> Transform:

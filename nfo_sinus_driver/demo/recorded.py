@@ -106,6 +106,7 @@ class Recording:
     :ivar phases: what the motor did: standby, running, stopping or fault; lost: not known.
     :ivar texts: what the drive's display said.
     :ivar faults: of the texts, those that name a fault.
+    :ivar unknown: when the drive answered, and did not tell how fast the motor turned.
     :ivar enabled: when the driver followed set-points.
     :ivar calls: which services were called, and when.
     :ivar logged: what the log says of calls, with who called.
@@ -127,6 +128,7 @@ class Recording:
     phases: list[Span]
     texts: list[Span]
     faults: list[Span]
+    unknown: list[Span]
     enabled: list[Span]
     calls: list[Call]
     logged: list[Call]
@@ -223,6 +225,7 @@ class _Reader:
                 for span in shown
                 if span.what in faults
             ],
+            unknown=self._unknown(length),
             enabled=self._while('enabled', length),
             calls=sorted(self._calls(), key=lambda call: call.time),
             logged=list(self._logged()),
@@ -252,6 +255,13 @@ class _Reader:
     def _while(self, flag: str, end: float) -> list[Span]:
         """Return when a field of the status was true."""
         points = [(time, flag * bool(getattr(m, flag))) for time, m in self._statuses]
+        return [span for span in _spans(points, end) if span.what]
+
+    def _unknown(self, end: float) -> list[Span]:
+        points = [
+            (time, 'speed unknown' * (m.connected and math.isnan(m.actual)))
+            for time, m in self._statuses
+        ]
         return [span for span in _spans(points, end) if span.what]
 
     def _calls(self) -> Iterator[Call]:
