@@ -199,10 +199,7 @@ class ControlSession(Listener):
         status = self.drive.state.status
         confirmed = status is not None and status.at > asked_at
         if self.drive.stop_unconfirmed or self.drive.stop_overdue or not confirmed:
-            self.screen.say(
-                'ending WITHOUT a confirmed stop, the motor may still run: use the enable input or '
-                'the emergency stop; nfo-sinus stop tries again'
-            )
+            self.screen.say(f'{self.drive.end_unconfirmed}; nfo-sinus stop tries again')
             return False
         # a drive that was lost has a status before it is polled again
         self.answer = self.drive.state.report(Cause.STOP_CONFIRMED_LATE)

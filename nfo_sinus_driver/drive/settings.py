@@ -300,14 +300,18 @@ class DriveSettings:
             if name != self.method and protocol.reaches_by(method.addressing)
         )
 
+    def goes_through_plc(self, protocol: LineProtocol) -> bool:
+        """Return whether a PLC is between the line and the drive."""
+        return self.model != AUTO and self.method_class.addressing in protocol.carries
+
     def _require_no_broadcast(self, protocol: LineProtocol) -> None:
         """Make sure that no write to one drive reaches all that are behind a gateway."""
         if protocol is not PROTOCOLS['modbus_tcp'] or self.address:
             return
-        if self.model != AUTO:
-            through_plc = self.method_class.addressing in protocol.carries
-            if through_plc or load_profile(self.model).line.get('protocol') == protocol.name:
-                return
+        if self.goes_through_plc(protocol):
+            return
+        if self.model != AUTO and load_profile(self.model).line.get('protocol') == protocol.name:
+            return
         raise ValueError(
             'address 0: behind a gateway that is all drives of its line; set address to that of '
             'the drive (0 is for a drive that is at the network itself: line: {protocol: '

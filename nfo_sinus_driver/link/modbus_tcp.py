@@ -102,7 +102,7 @@ _SLICE = 0.02
 _CLOSINGS = 2
 #: For how many of the last requests given up an answer is recognised as late.
 _GIVEN_UP = 64
-_HINT = f'is the gateway switched on and its address right? If so, {CLOSED_HINT}'
+_HINT = f'is the gateway or PLC switched on and its address right? If so, {CLOSED_HINT}'
 
 
 class TcpLink(ModbusLink):

@@ -157,10 +157,7 @@ class DriverProcess:
             node for node, release in _as_they_end(releases, left) if not _released(node, release)
         ]
         for node in unconfirmed:
-            node.get_logger().error(
-                'ending WITHOUT a confirmed stop, the motor may still run: use the enable input or '
-                'the emergency stop'
-            )
+            node.get_logger().error(node.managed.drive.end_unconfirmed)
         return not unconfirmed
 
     def _may_be_there(self, node: DriveNode) -> bool:

@@ -11,7 +11,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from cli_bench import Bench, Done, MakeBench
+from cli_bench import PATIENCE, Bench, Done, MakeBench
 import pytest
 import yaml
 
@@ -146,3 +146,12 @@ def test_info_of_a_sinus_h_has_what_its_module_tells(make_bench: MakeBench, layo
     facts = dict(line.split(maxsplit=1) for line in done.out.splitlines())
     told = 'manufacturer 849, PROFINET module, version 1.2, of 25 December, 2015'
     assert facts['family'] == 'Sinus H' and facts['module'] == (told if layout == 2 else '-')
+
+
+def test_an_end_whose_plc_is_gone_says_what_stops_the_motor(bench: Bench) -> None:
+    with bench.running() as process:
+        bench.simulator.inject('line-dead', 600)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert 'ending WITHOUT a stop that the PLC has confirmed: the program of this driver' in err
+    assert 'may still run' not in err
