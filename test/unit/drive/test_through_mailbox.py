@@ -502,6 +502,23 @@ def test_a_motor_that_is_tuned_is_not_told_to_be_stopped() -> None:
         rig.turn(20.0)
 
 
+@pytest.mark.parametrize('state', ['silent', 'deaf', 'gone'])
+def test_nothing_turns_by_a_tuning_whose_plc_was_lost(state: str) -> None:
+    with Rig(G2) as rig:
+        rig.connect(parameters=True)
+        future = rig.drive.tune(Procedure.FULL)
+        rig.wait_until(lambda: rig.far.control_unit.tuning is not None, 20.0)
+        rig.line.state = state
+        rig.wait_until(future.done, 20.0)
+        assert future.exception() is not None
+        rig.pass_time(5.0)
+        rig.line.mend()
+        rig.wait_until(lambda: rig.far.control_unit.tuning is None, 60.0)
+        rig.pass_time(5.0)
+        assert not rig.turns
+        rig.turn(20.0)
+
+
 def test_log_and_counter_of_a_g2_are_cleared_by_the_mailbox() -> None:
     with Rig(G2) as rig:
         rig.connect(parameters=True)
