@@ -20,7 +20,7 @@ import tempfile
 
 _ROOT = Path(__file__).resolve().parents[1]
 #: Where the tests are that have a virtual rig.
-_TESTS = ('test/unit/drive', 'test/unit/families')
+_TESTS = ('test/unit/drive', 'test/unit/families', 'test/unit/link')
 #: What a test had on its lines: how many frames, and their hash.
 Traces = Mapping[str, tuple[str, str]]
 

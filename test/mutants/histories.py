@@ -8,25 +8,15 @@ from __future__ import annotations
 from mutant import (
     ANY_ORDER,
     CONTROL_TAKEN,
-    CONTROLLER,
-    DRIVE,
-    G2,
     G2_CONTROL,
     G2_SCMD,
     LAW_2,
-    MAIN,
     NO_STOP_FORGOTTEN,
     NO_TURN,
     OPTIMAL_SCMD,
-    PROFILE,
-    SEQUENCE,
-    SETPOINT,
-    STARTING,
     STOP_CONFIRMED,
-    TABLE,
     TERMINALS_KEEP,
     TUNING_BEGINS,
-    WATCH,
     Mutant,
 )
 
@@ -36,7 +26,7 @@ HISTORIES = (
         Mutant(
             2,
             f'{what} does not end the following of set-points ({tests[-1]})',
-            CONTROLLER,
+            'Controller.on_status',
             '        if reason is not None:\n            self._sequence.start(reason)',
             f'        if {new}:\n            self._sequence.start(reason)',
             tests,
@@ -57,7 +47,7 @@ HISTORIES = (
     Mutant(
         2,
         'in any order: a lost line does not end the enable',
-        WATCH,
+        'Poller._mark_lost',
         'self._controller is not None and self._controller.lost(why)\n',
         'False\n',
         G2_SCMD,
@@ -65,17 +55,21 @@ HISTORIES = (
     Mutant(
         2,
         'in any order: a driver that begins lets run what runs',
-        CONTROLLER,
+        'Controller.stop_unexpected_run',
         '        if await self.in_control(Priority.SERVICE):\n            turns',
         '        self._control.since = float("inf")\n        if False:\n            turns',
         G2_CONTROL,
         # a poll would find it, too
-        ((CONTROLLER, '            return Report(Cause.RUNS_UNASKED)\n', '            pass\n'),),
+        ((
+            'Controller._why_stopped_again',
+            '            return Report(Cause.RUNS_UNASKED)\n',
+            '            pass\n',
+        ),),
     ),
     Mutant(
         2,
         'in any order: no set-point 0 before a run command',
-        PROFILE,
+        'SetpointTarget.set_to_zero',
         '        yield from self.zero(retry=True)\n',
         '',
         G2_CONTROL,
@@ -83,7 +77,7 @@ HISTORIES = (
     Mutant(
         2,
         'in any order: a set-point from before enable is taken over',
-        SETPOINT,
+        'Setpoint.follow',
         '        self.following_since = self._bus.now()\n',
         '        self.following_since = 0.0\n        self._bus.request(self._slot)\n',
         OPTIMAL_SCMD,
@@ -91,7 +85,7 @@ HISTORIES = (
     Mutant(
         2,
         'in any order: a refused enable leaves its run command standing',
-        CONTROLLER,
+        'Controller._start',
         'a run command may be active by now\n'
         '            self._sequence.start(Report(Cause.ENABLE_FAILED, why=report_of(error)))',
         'a run command may be active by now',
@@ -100,7 +94,7 @@ HISTORIES = (
     Mutant(
         2,
         'in any order: what ends a run leaves the run command standing',
-        CONTROLLER,
+        'Controller.on_status',
         '            self._sequence.start(reason)\n            self._report_stop(reason)',
         '            self._control.dispatch(ControlEvent.STOP)\n'
         '            self._report_stop(reason)',
@@ -109,7 +103,7 @@ HISTORIES = (
     Mutant(
         2,
         'in any order: a stop that a fault holds is forgotten',
-        SEQUENCE,
+        'StopSequence._try_once',
         '            return _Outcome.BLOCKED_BY_FAULT\n',
         '            return _Outcome.CONFIRMED\n',
         G2_SCMD,
@@ -117,31 +111,31 @@ HISTORIES = (
     Mutant(
         2,
         'in any order: a start that the RUN input ended waits for it',
-        STARTING,
+        '_StepTime._is_late',
         'return forgotten or ',
         'return ',
-        ('test/unit/drive/test_any_order_found.py',),
+        ('test_any_order_found.py',),
     ),
     Mutant(
         3,
         'in any order: a stop that a fault has refused waits for measured values',
-        SEQUENCE,
+        'StopSequence._try_once',
         'self._method.remove(control_mode),\n                Priority.STOP,',
         'self._method.remove(control_mode),\n                Priority.SERVICE,',
-        ('test/unit/drive/test_any_order_found.py',),
+        ('test_any_order_found.py',),
     ),
     Mutant(
         3,
         'in any order: a stop waits although the fault that refused it is over',
-        SEQUENCE,
+        'StopSequence._try_once',
         'return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED',
         'return _Outcome.UNCONFIRMED',
-        ('test/unit/drive/test_any_order_found.py',),
+        ('test_any_order_found.py',),
     ),
     Mutant(
         3,
         'in any order: an old set-point is followed for ever',
-        SETPOINT,
+        'Setpoint._watch_age',
         'left = last + timeout - self._bus.now() if timeout else math.inf',
         'left = math.inf',
         OPTIMAL_SCMD,
@@ -149,14 +143,14 @@ HISTORIES = (
     Mutant(
         3,
         'in any order: a stop is answered before it is confirmed',
-        SEQUENCE,
+        'StopSequence.wait_confirmed',
         '        while task is not None and not await',
         '        while False and not await',
         G2_SCMD,
         # which must not wait instead, in the only thread
         (
             (
-                SEQUENCE,
+                'StopSequence.wait_confirmed',
                 'task is not None and task.future.e',
                 'task is not None and task.future.done() and task.future.e',
             ),
@@ -165,7 +159,7 @@ HISTORIES = (
     Mutant(
         3,
         'in any order: a motor that cannot be stopped is not said to be',
-        SEQUENCE,
+        'StopSequence._keep_trying',
         '            if self._bus.now() >= self._complain_at or (stood and not stands):',
         '            if False:',
         G2_SCMD,
@@ -173,7 +167,7 @@ HISTORIES = (
     Mutant(
         3,
         'in any order: deactivate does not stop the motor',
-        DRIVE,
+        'Drive._deactivate',
         '        return await self._controller.stop(why, patience)\n',
         '        return None\n',
         G2_CONTROL,
@@ -181,15 +175,15 @@ HISTORIES = (
     Mutant(
         3,
         'a clean-up does not stop the motor',
-        DRIVE,
+        'Drive.disconnect',
         '            answer = await self._controller.release(timeout, why, self._watchdog.undo)\n',
         '            answer = Report(Cause.ONLY_WATCHED)\n',
-        ('test/unit/drive/test_laws.py', '-k', 'way_out'),
+        ('test_laws.py', '-k', 'way_out'),
     ),
     Mutant(
         3,
         'in any order: a drive that is lost is still reported as connected',
-        WATCH,
+        'Poller._mark_lost',
         '        state.lost()\n        why =',
         '        why =',
         G2_CONTROL,
@@ -197,7 +191,7 @@ HISTORIES = (
     Mutant(
         7,
         'in any order: the status of a fault is not reported',
-        WATCH,
+        'Poller._poll',
         '        self._publish(status)',
         '        status.faulted or self._publish(status)',
         (ANY_ORDER, '-k', 'OptimalMonitor'),
@@ -205,7 +199,7 @@ HISTORIES = (
     Mutant(
         1,
         'in any order: polling acknowledges faults',
-        'nfo_sinus_driver/drive/drive_state.py',
+        'DriveState._read_int',
         'read_reply(key, priority, retry=retry',
         "read_reply('fieldbus.inv_st_with_ack', priority, retry=retry",
         (ANY_ORDER, '-k', 'G2Monitor'),
@@ -213,7 +207,7 @@ HISTORIES = (
     Mutant(
         4,
         'in any order: a monitor writes',
-        DRIVE,
+        'Drive.__init__',
         "        if settings.method != 'monitor':",
         '        if True:',
         (ANY_ORDER, '-k', 'G2Monitor'),
@@ -221,7 +215,7 @@ HISTORIES = (
     Mutant(
         6,
         'in any order: both directions at once',
-        G2,
+        'DriveControl.run',
         'switched_on | ControlWord.ENABLE_OP,',
         'switched_on | ControlWord.ENABLE_OP | ControlWord.ENABLE_REV_OP,',
         G2_CONTROL,
@@ -229,7 +223,7 @@ HISTORIES = (
     Mutant(
         6,
         'in any order: the register of the other method is written',
-        G2,
+        'DriveControl.stop',
         '        yield from self._stop_by(self._change_or_write(~_RUN, ControlWord(0)), *zeroes)\n',
         '        yield from self._stop_by(self._change_or_write(~_RUN, ControlWord(0)), *zeroes)\n'
         "        yield Write('fieldbus.scmd', 0)\n",
@@ -238,7 +232,7 @@ HISTORIES = (
     Mutant(
         3,
         'a tuning that refuses the stop is taken for a motor that stands',
-        SEQUENCE,
+        'StopSequence._why_unconfirmed',
         '        if status.tuning and refusal:\n',
         '        if refusal and status.tuning:\n            return None\n        if False:\n',
         STOP_CONFIRMED,
@@ -246,7 +240,7 @@ HISTORIES = (
     Mutant(
         2,
         'an enable waits for a stop and then runs',
-        TABLE,
+        '_TABLE',
         'ENABLE        .         ENABLING  .        .        .         .        .',
         'ENABLE        .         ENABLING  .        .        .         ENABLING .',
         LAW_2,
@@ -254,7 +248,7 @@ HISTORIES = (
     Mutant(
         3,
         'a stop that was lost is not repeated at once',
-        SEQUENCE,
+        'StopSequence._rest',
         '        elif outcome is not _Outcome.UNANSWERED:\n',
         '        else:\n',
         STOP_CONFIRMED,
@@ -262,7 +256,7 @@ HISTORIES = (
     Mutant(
         2,
         'a fault is acknowledged with the run command still there',
-        G2,
+        'ModeScmd._acknowledge_by_reading',
         '        if ours and (yield from self.remove(control_mode)) is not Removal.COMMAND:\n',
         '        if False:\n',
         NO_TURN,
@@ -270,7 +264,7 @@ HISTORIES = (
     Mutant(
         2,
         'nothing follows the acknowledgement of a drive that refuses everything',
-        G2,
+        'ModeScmd._acknowledge_by_reading',
         '                yield AcknowledgeThenWrite(INV_ST_WITH_ACK, self._soonest)\n',
         '                yield Acknowledge(INV_ST_WITH_ACK)\n',
         NO_TURN,
@@ -278,7 +272,7 @@ HISTORIES = (
     Mutant(
         2,
         'control is taken with the set-point of an earlier session',
-        STARTING,
+        'StartSequence.take_control',
         '        if not self._state.nameplate.is_older:\n',
         '        if False:\n',
         CONTROL_TAKEN,
@@ -286,7 +280,7 @@ HISTORIES = (
     Mutant(
         2,
         'no stop follows MODE = Bus',
-        G2,
+        'ModeScmd.take_control',
         '                yield stop\n                return\n',
         '                return\n',
         CONTROL_TAKEN,
@@ -294,7 +288,7 @@ HISTORIES = (
     Mutant(
         2,
         'a tuning that waits for the line is sent after a stop',
-        'nfo_sinus_driver/drive/procedure.py',
+        'Procedures.command',
         '.params.write(write, Priority.STOP, access.require_wanted)',
         '.params.write(write, Priority.STOP)',
         TUNING_BEGINS,
@@ -302,13 +296,13 @@ HISTORIES = (
     Mutant(
         3,
         'a stop is confirmed by what was seen before its reason',
-        SEQUENCE,
+        'StopSequence._attempt',
         '        if self._reasons > reasons:\n',
         '        if False:\n',
         STOP_CONFIRMED,
         # a status from before the stop is waited out, too
         ((
-            SEQUENCE,
+            'StopSequence.restart',
             '            self._sent_at = self._forced_at = math.inf\n'
             '            self._measured = None\n',
             '',
@@ -317,7 +311,7 @@ HISTORIES = (
     Mutant(
         2,
         'a quick stop ends what keeps others from enabling',
-        SEQUENCE,
+        'StopSequence.external_stop',
         '            self._external -= 1\n',
         '            self._external = 0\n',
         STOP_CONFIRMED,
@@ -325,7 +319,7 @@ HISTORIES = (
     Mutant(
         2,
         'the acknowledgement of a serial fault takes control from the terminals',
-        G2,
+        'ModeScmd.acknowledge',
         '        if not elsewhere:\n            yield from self._remove_control()\n',
         '        yield from self._remove_control()\n',
         TERMINALS_KEEP,
@@ -333,14 +327,14 @@ HISTORIES = (
     Mutant(
         3,
         'an exit does not count a drive that is just being connected to',
-        MAIN,
+        'DriverProcess._stop_motors',
         '            if self._may_be_there(node) and not',
         '            if node.managed.drive.identity is not None and not',
-        ('test/ros/test_no_false_success.py', '-k', 'only_answer'),
+        ('test_no_false_success.py', '-k', 'only_answer'),
         # who does not release the drive does not learn it either
         (
             (
-                MAIN,
+                'DriverProcess._stop_motors',
                 '            elif node.managed.drive.ever_responded and',
                 '            elif node.managed.drive.identity is not None and',
             ),
@@ -350,7 +344,7 @@ HISTORIES = (
     Mutant(
         3,
         'a drive that is left alone while it runs is not stopped',
-        CONTROLLER,
+        'Controller.disconnected',
         '        if self._control.stopping:\n            self._sequence.start()\n',
         '',
         NO_STOP_FORGOTTEN,
@@ -358,7 +352,7 @@ HISTORIES = (
     Mutant(
         3,
         'an attempt that fails at once confirms the stop',
-        SEQUENCE,
+        'StopSequence',
         '\n        return outcome\n\n    def _report_end',
         '\n        self._control.dispatch(ControlEvent.STOPPED)\n'
         '        return outcome\n\n    def _report_end',
@@ -367,7 +361,7 @@ HISTORIES = (
     Mutant(
         2,
         'a drive is enabled while it is waited for that its motor stands',
-        CONTROLLER,
+        'Controller.release',
         '        with self._sequence.external_stop(why):\n'
         '            stop = self._stopped if ended',
         '        if True:\n            stop = self._stopped if ended',
@@ -376,9 +370,9 @@ HISTORIES = (
     Mutant(
         3,
         'a loss in use leads to where nothing is stopped',
-        TABLE,
+        '_TABLE',
         'LOST          .         OFFLINE   STOPPING STOPPING',
         'LOST          .         OFFLINE   STOPPING OFFLINE ',
-        ('test/unit/drive/test_control_table.py',),
+        ('test_control_table.py',),
     ),
 )

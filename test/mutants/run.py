@@ -50,17 +50,18 @@ def _try(mutant: Mutant) -> str:
     with tempfile.TemporaryDirectory(prefix='nfo_sinus_mutant_') as folder:
         copy = Path(folder) / 'copy'
         _copy_project(copy)
-        for name, old, new in ((mutant.file, mutant.old, mutant.new), *mutant.also):
-            text = (copy / name).read_text(encoding='utf-8')
-            if old not in text:
-                return f'NOT TRIED ({name} does not say any more: {old!r})'
-            (copy / name).write_text(text.replace(old, new), encoding='utf-8')
+        try:
+            for file, text in mutant.changes(_ROOT):
+                (copy / file.relative_to(_ROOT)).write_text(text, encoding='utf-8')
+            tests = mutant.arguments(_ROOT)
+        except ValueError as error:
+            return f'NOT TRIED ({error})'
         # the processes that a test starts import the copy, too
         path = os.pathsep.join((str(copy), os.environ.get('PYTHONPATH', '')))
         # judged by what runs before every commit
         environment = {name: value for name, value in os.environ.items() if name != 'FULL'}
         done = subprocess.run(
-            (*_PYTEST, *mutant.tests),
+            (*_PYTEST, *tests),
             cwd=copy,
             env={**environment, 'PYTHONPATH': path, 'PYTHONDONTWRITEBYTECODE': '1'},
             capture_output=True,

@@ -35,7 +35,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     _lines.clear()
     result = yield
     if _lines:
-        digest = hashlib.sha256(json.dumps(_lines).encode()).hexdigest()
+        digest = hashlib.sha256(json.dumps(_lines, default=bytes.hex).encode()).hexdigest()
         frames = sum(map(len, _lines))
         with open(_FILE, 'a', encoding='utf-8') as stream:
             stream.write(f'{item.nodeid}\t{frames}\t{digest}\n')

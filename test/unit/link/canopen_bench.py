@@ -12,6 +12,7 @@ from typing import Any
 
 from canopen_far_end import Server
 import line_bench
+from support import golden
 from virtual_wire import DROP, GOOD, Asked, Fate
 
 from nfo_sinus_driver.link.can import Frame
@@ -60,6 +61,7 @@ class Bus:
             for unit in (UNIT, 6)
         }
         self.sent: list[tuple[int, bytes]] = []
+        golden.keep(self.sent)
         self.other: list[tuple[float, Frame]] = []
         self.begun: list[tuple[int, int, int, bool, str]] = []
         self.begun_at: list[float] = []

@@ -13,6 +13,7 @@ import itertools
 from typing import NamedTuple
 
 import pymodbus_opinion as opinion
+from support import golden
 
 from nfo_sinus_driver.link.interface import LineSettings
 
@@ -40,6 +41,7 @@ class Wire:
         self.gap = settings.frame_gap
         self.now = 1000.0
         self.sent: list[tuple[float, bytes]] = []
+        golden.keep(self.sent)
         self.seen: list[tuple[float, int]] = []
         self.far_end: Callable[[bytes, float], None] = lambda frame, end: None
         self.is_open = False
