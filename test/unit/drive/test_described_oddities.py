@@ -694,7 +694,7 @@ def test_a_run_command_that_survives_starts_no_motor_when_the_power_is_back(
 ) -> None:
     # the ramp is so short that no poll finds the motor slower than before
     file = described(tmp_path, keeps_run=True)
-    for number, off in enumerate((0.3, 0.4, 0.5, 0.7, 0.95, 2.0)):
+    for number, off in enumerate((0.4, 0.45, 0.5, 0.7, 0.95, 2.0)):
         with DescribedRig(file, drives=drives, poll_rate=poll_rate) as rig:
             rig.turn()
             rig.pass_time(0.037 * number)
