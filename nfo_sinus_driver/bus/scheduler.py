@@ -221,10 +221,9 @@ class Scheduler:
             if entry is None or rank == _MISSING:
                 return entry
             if rank in _STOPS and self._unanswered_stops:
-                # those that answer come first
-                news = itertools.filterfalse(self._was_in_vain, queue)
-                news = itertools.filterfalse(self._gives_way, news)
-                entry = next(itertools.filterfalse(self._is_resting, news), entry)
+                # those that answer come first, then those of which the least was in vain
+                others = itertools.filterfalse(self._is_held, queue)
+                entry = min(others, key=self._in_vain)
             behind = self._rank(entry)
             if behind == rank or behind not in (_RETRY, _MISSING):
                 return entry
@@ -267,9 +266,11 @@ class Scheduler:
             for entry in self._queues[Priority.STOP]
         )
 
-    def _was_in_vain(self, entry: LatestValue | Waiting) -> bool:
-        """Return whether it is a stop that was not answered before, or its read."""
-        return isinstance(entry, Waiting) and self._is_repeated(entry.exchange)
+    def _in_vain(self, entry: LatestValue | Waiting) -> tuple[int, int]:
+        """Return how often the like of it was in vain, and how many requests its stop has made."""
+        assert isinstance(entry, Waiting)
+        task, exchange = entry
+        return self._unanswered_stops.get((exchange.unit, exchange.writes), 0), task.requests
 
     def _gives_way(self, entry: LatestValue | Waiting) -> bool:
         """Return whether it is for the unit that has just not answered, or for one like it."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+import functools
 from typing import Any, cast
 
 import pytest
@@ -23,12 +24,22 @@ _READ = 0.0064
 _TURNS = 4000
 
 
+class _Named(str):
+    """A task in name alone."""
+
+    requests = 0
+
+
+#: The same each time.
+named = functools.cache(_Named)
+
+
 def entry(kind: object, name: str = '') -> LatestValue | Waiting:
     """Something that waits; a name stands for its task."""
     if kind == _SLOT:
         return LatestValue(1, lambda: None, lambda written, error: None)
     exchange = Exchange(1, Read(register(1)), cast(Priority, kind))
-    return Waiting(cast(Task, name), exchange)
+    return Waiting(cast(Task, named(name)), exchange)
 
 
 def kind_of(taken: LatestValue | Waiting | None) -> object:
@@ -94,7 +105,7 @@ def test_a_stop_goes_before_a_look_whether_a_motor_stops() -> None:
     look = entry(Priority.LOOK, 'look')
     write = Write(register(1), packed(0))
     stops = [
-        Waiting(cast(Task, name), Exchange(1, write, Priority.STOP))
+        Waiting(cast(Task, named(name)), Exchange(1, write, Priority.STOP))
         for name in ('1', '2')
     ]
     for waiting in (look, *stops):
@@ -137,7 +148,7 @@ def test_polls_of_units_that_do_not_answer_have_half_the_time() -> None:
     scheduler = Scheduler(silent.__contains__)
     polls = {unit: Exchange(unit, Read(register(1)), Priority.POLL) for unit in (1, 2, 7, 8)}
     for exchange in polls.values():
-        scheduler.add(Waiting(cast(Task, ''), exchange))
+        scheduler.add(Waiting(cast(Task, named('')), exchange))
     took: Counter[int] = Counter()
     gaps, gap = [], 0.0
     while sum(took.values()) < 60.0:
@@ -282,7 +293,7 @@ def test_set_point_that_was_not_sent_had_no_turn() -> None:
 def stop_of(unit: int) -> Waiting:
     """A stop that waits."""
     exchange = Exchange(unit, Write(register(1), packed(0)), Priority.STOP)
-    return Waiting(cast(Task, f'stop {unit}'), exchange)
+    return Waiting(cast(Task, named(f'stop {unit}')), exchange)
 
 
 def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
@@ -313,7 +324,7 @@ def test_between_two_stops_without_an_answer_the_most_urgent_has_its_turn(
 ) -> None:
     scheduler = Scheduler({2, 4}.__contains__)
     urgent, silent = entry(kind), stop_of(2)
-    retry = Waiting(cast(Task, 'retry'), Exchange(4, Read(register(1)), Priority.POLL))
+    retry = Waiting(cast(Task, named('retry')), Exchange(4, Read(register(1)), Priority.POLL))
     for waiting in (retry, *map(entry, _BACKGROUND)):
         scheduler.add(waiting)
     # it costs so much that every other request has a claim on the line
@@ -364,8 +375,8 @@ def test_stops_of_several_units_that_do_not_answer_leave_every_other_turn_to_the
 def test_what_waits_for_a_unit_that_falls_silent_is_ranked_again(kind: Priority) -> None:
     silent: set[int] = set()
     scheduler = Scheduler(silent.__contains__)
-    falls_silent = Waiting(cast(Task, 'asks'), Exchange(7, Read(register(1)), kind))
-    other = Waiting(cast(Task, 'asks'), Exchange(1, Read(register(1)), kind))
+    falls_silent = Waiting(cast(Task, named('asks')), Exchange(7, Read(register(1)), kind))
+    other = Waiting(cast(Task, named('asks')), Exchange(1, Read(register(1)), kind))
     for waiting in (falls_silent, other):
         scheduler.add(waiting)
     silent.add(7)
@@ -375,7 +386,8 @@ def test_what_waits_for_a_unit_that_falls_silent_is_ranked_again(kind: Priority)
 def test_the_first_stop_of_a_unit_is_not_held_back_by_its_service_that_was_in_vain() -> None:
     scheduler = Scheduler({2}.__contains__)
     stop, poll = stop_of(2), entry(Priority.POLL)
-    service = Waiting(cast(Task, 'service'), Exchange(2, Read(register(1)), Priority.SERVICE))
+    asked = Exchange(2, Read(register(1)), Priority.SERVICE)
+    service = Waiting(cast(Task, named('service')), asked)
     for waiting in (service, poll):
         scheduler.add(waiting)
     assert scheduler.take() is service
@@ -400,7 +412,7 @@ def test_a_stop_that_is_answered_gives_way_to_none() -> None:
 
 def poll_of(unit: int) -> Waiting:
     """A poll of one unit."""
-    return Waiting(cast(Task, 'poll'), Exchange(unit, Read(register(1)), Priority.POLL))
+    return Waiting(cast(Task, named('poll')), Exchange(unit, Read(register(1)), Priority.POLL))
 
 
 def test_what_is_for_a_missing_unit_waits_until_it_may_go_and_goes_first_then() -> None:
@@ -423,7 +435,7 @@ def test_what_waits_for_a_unit_that_goes_missing_waits_with_the_others_then(
 ) -> None:
     missing: set[int] = set()
     scheduler = Scheduler(missing.__contains__, missing.__contains__)
-    waiting = Waiting(cast(Task, 'asks'), Exchange(7, Read(register(1)), kind))
+    waiting = Waiting(cast(Task, named('asks')), Exchange(7, Read(register(1)), kind))
     scheduler.add(waiting)
     missing.add(7)
     assert scheduler.take(missing=False) is None
@@ -487,10 +499,10 @@ def test_what_a_task_waits_for_can_be_withdrawn() -> None:
         entry(Priority.POLL, 'mine'),
     ):
         scheduler.add(waiting)
-    scheduler.withdraw(cast(Task, 'mine'))
+    scheduler.withdraw(cast(Task, named('mine')))
     assert scheduler.take() is slot
     left = scheduler.take()
-    assert isinstance(left, Waiting) and left.task == cast(Task, 'other')
+    assert isinstance(left, Waiting) and left.task == cast(Task, named('other'))
     assert scheduler.take() is None
 
 
@@ -520,3 +532,21 @@ def test_a_stop_in_vain_goes_ahead_again_once_the_unit_answers() -> None:
     missing.clear()
     assert scheduler.take(missing=False) is repeated
     assert scheduler.take(missing=False) is other
+
+
+def test_of_stops_in_vain_the_one_that_was_tried_least_goes_first() -> None:
+    scheduler = Scheduler(lambda unit: True)
+
+    def tried() -> int:
+        """Have the next one tried in vain, and wait again behind all; return its unit."""
+        taken = scheduler.take()
+        assert isinstance(taken, Waiting)
+        scheduler.took(0.01)
+        scheduler.add(taken)
+        return taken.exchange.unit
+
+    for unit in (1, 2):
+        scheduler.add(stop_of(unit))
+    assert [tried() for _ in range(4)] == [1, 2, 1, 2]
+    scheduler.add(stop_of(3))
+    assert [tried() for _ in range(4)] == [3, 3, 1, 2]
