@@ -495,7 +495,7 @@ class Drive:
         takes_control = state.held_by_line
         if takes_control and not self.statistics.transactions:
             state.notify(Severity.WARNING, Cause.TAKES_CONTROL, why=takes_control)
-        named = await self._recogniser.recognise(retry=retry)
+        named = await self._recogniser.recognise(Priority.SERVICE if retry else Priority.POLL)
         if self._controller is not None:
             await self._controller.stop_unexpected_run()
             self._watchdog.connected()

@@ -83,14 +83,15 @@ class Nameplate:
         self._mailbox_trouble = ''
         self.scales = Scales(params, self.has, settings.scales, settings.method_class.unused_scales)
 
-    async def identify(self, *, retry: bool = True) -> Identity:
+    async def identify(self, priority: Priority = Priority.SERVICE) -> Identity:
         """
         Find out whether a drive answers, and with which firmware.
 
-        :param retry: repeat the request if none does; a silent drive costs the others time-outs.
+        :param priority: of the first request; it is repeated for a service alone, for a silent
+            drive costs the others time-outs.
         """
         # any parameter will do that every drive has, in either dialect
-        priority = Priority.SERVICE if retry else Priority.POLL
+        retry = priority is Priority.SERVICE
         await self._params.read(self._model.key_of_status, priority, retry=retry)
         if self._params.in_block:
             # the block has its layout, and the data of a drive that the PLC is set for

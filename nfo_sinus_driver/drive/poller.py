@@ -289,7 +289,7 @@ class Poller:
                     self._publish_changed()
                 if self._state.connected and not self._params.recognition.holds:
                     # it was silent for long, or this driver stood still: is it still the same?
-                    await self._recogniser.recognise(retry=False)
+                    await self._recogniser.recognise(Priority.POLL)
                 self._failures.forget(_POLL)
             except (LinkError, DriveError) as error:
                 self._on_poll_failed(error)

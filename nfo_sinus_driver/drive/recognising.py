@@ -46,11 +46,11 @@ class Recogniser:
         is_named = profile.identify or profile.product or profile.vendor
         return bool(is_named) or self._params.in_block
 
-    async def recognise(self, *, retry: bool = True) -> bool:
+    async def recognise(self, priority: Priority = Priority.SERVICE) -> bool:
         """
         Read all that tells whether it is a drive of this family.
 
-        :param retry: as for :meth:`Nameplate.identify`.
+        :param priority: as for :meth:`Nameplate.identify`.
         :returns: whether its nameplate was read. One that was recognised before is stopped first,
             and so is one that has none by which it could be told from another.
         :raises LinkError: it does not answer.
@@ -61,7 +61,7 @@ class Recogniser:
         known = self._params.recognition.holds
         named = bool(tells) and not known
         try:
-            await state.nameplate.identify(retry=retry)
+            await state.nameplate.identify(priority)
             self._require_fitted()
             await self._read_what_identifies()
             if named:
@@ -116,7 +116,7 @@ class Recogniser:
         """
         recognition, state = self._params.recognition, self._state
         if not recognition.was_here:
-            await self.recognise(retry=False)
+            await self.recognise(Priority.LOOK)
             return
         if self._params.in_block:
             # the PLC shows the layout of its block with each answer
@@ -130,7 +130,7 @@ class Recogniser:
         if await self._still_runs():
             recognition.look_again()
         else:
-            await self.recognise(retry=False)
+            await self.recognise(Priority.LOOK)
 
     async def _still_runs(self) -> bool:
         """Return whether the drive shows a run, by its status word alone where it has one."""

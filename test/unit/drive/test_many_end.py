@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from support.rig import Rig
+from support.stops import takes_run_away
 
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 
@@ -131,3 +132,27 @@ def test_what_has_come_since_the_last_poll_of_an_end_is_stopped(
         stops = [key for _, key, data in rig.asked if key == _SCMD and data == b'\0\0']
         assert stops and rig.far.control_unit.tuning is None
         rig.notes.events.clear()
+
+
+@pytest.mark.parametrize('drives', [2, 4, 8])
+def test_after_a_pause_each_is_stopped_before_one_is_released(drives: int) -> None:
+    # each may be another one by then, and is recognised before
+    with Rig('described', drives=drives, poll_rate=20.0, drive_timeout=2.0) as rig:
+        rig.turn()
+        ended = {at: drive.stop_for_good(_PATIENCE) for at, drive in rig.drives.items()}
+        rig.line.go_to(rig.clock.now + 3.5)
+        rig.asked.clear()
+        releases = {}
+
+        def stopped() -> set[int]:
+            for at, stop in ended.items():
+                if at not in releases and stop.done():
+                    releases[at] = rig.drives[at].disconnect(_PATIENCE)
+            return {at for at, key, data in rig.asked if takes_run_away(rig, key, data)}
+
+        # each has stopped its motor by itself: ten requests, with the silence that it wants
+        rig.wait_until(lambda: stopped() == set(rig.drives), 0.17 * drives)
+        rig.wait_until(lambda: stopped() and len(releases) == drives, 20.0)
+        for release in releases.values():
+            rig.answer(release)
+        assert not rig.turns
