@@ -419,9 +419,9 @@ def _name_faults(axes: Axes, run: Recording) -> None:
 def _name_unknown(axes: Axes, run: Recording) -> None:
     """Say where the speed is not known, if there is room: after a fault, or STOP at the keypad."""
     for span in run.unknown:
-        text = axes.text(
-            (span.begin + span.end) / 2, 0.03, span.what, transform=_at_height(axes), ha='center',
-            va='bottom', size=11.5, color=_SOFT, zorder=6, bbox=_BOX,
+        text = axes.annotate(
+            span.what, (span.begin, 0.03), (8, 0), textcoords='offset points',
+            xycoords=_at_height(axes), va='bottom', size=11.5, color=_INK, zorder=6, bbox=_BOX,
         )
         if _width(text) > span.end - span.begin:
             text.remove()

@@ -32,6 +32,8 @@ _PHASE_OF_STATE = {
     'FAULTED': 'fault',
 }
 _REASON = 'REASON_'
+#: Below this part of the highest speed of a run a motor stands.
+_STANDS = 0.05
 _CALLED_BY = ' called by '
 #: A reason that a later status gives is a better one for the same stop, not that of another one.
 _BETTER = {
@@ -106,7 +108,8 @@ class Recording:
     :ivar phases: what the motor did: standby, running, stopping or fault; lost: not known.
     :ivar texts: what the drive's display said.
     :ivar faults: of the texts, those that name a fault.
-    :ivar unknown: when the drive answered, and did not tell how fast the motor turned.
+    :ivar unknown: when it was not known how fast the motor turned: the drive did not tell, or had
+        released it, and reported the 0 of its output.
     :ivar enabled: when the driver followed set-points.
     :ivar calls: which services were called, and when.
     :ivar logged: what the log says of calls, with who called.
@@ -258,10 +261,19 @@ class _Reader:
         return [span for span in _spans(points, end) if span.what]
 
     def _unknown(self, end: float) -> list[Span]:
-        points = [
-            (time, 'speed unknown' * (m.connected and math.isnan(m.actual)))
-            for time, m in self._statuses
-        ]
+        told = (abs(m.actual) for _, m in self._statuses if not math.isnan(m.actual))
+        most = max(told, default=0.0)
+        points = []
+        turned = released = False
+        for time, m in self._statuses:
+            phase = _phase(m)
+            if phase in ('running', 'stopping'):
+                released, turned = False, abs(m.actual) > _STANDS * most
+            else:
+                # a motor that is not released is at standstill by then
+                released, turned = released or turned, False
+            unknown = m.connected and (released or math.isnan(m.actual))
+            points.append((time, 'speed unknown' * unknown))
         return [span for span in _spans(points, end) if span.what]
 
     def _calls(self) -> Iterator[Call]:

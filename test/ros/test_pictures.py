@@ -13,9 +13,10 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.text import Text
+from nfo_sinus_msgs.msg import DriveStatus
 import pytest
 
-from nfo_sinus_driver.demo import plot
+from nfo_sinus_driver.demo import plot, recorded
 from nfo_sinus_driver.demo.recorded import Call, Curve, Recording, Span, Stop
 
 RATE = 20.0
@@ -125,3 +126,27 @@ def test_an_unknown_speed_is_said_whatever_made_it_so() -> None:
         calls=[Call(9.0, 'enable')],
     )
     assert names(panels(stopped)[1], 'speed unknown')
+
+
+def spans_unknown(*states: tuple[int, float]) -> list[tuple[float, float]]:
+    """From when to when it was unknown; a state and what the drive tells, for each second."""
+    statuses = []
+    for second, (state, actual) in enumerate(states):
+        status = DriveStatus(connected=True, state=state, actual=actual)
+        status.header.stamp.sec = second
+        statuses.append((second * 10**9, status))
+    reader = recorded._Reader({'/drive/status': statuses}, '/drive', 0)
+    return [(span.begin, span.end) for span in reader._unknown(float(len(states)))]
+
+
+RUNS, STOPS = DriveStatus.OPERATION_ENABLED, DriveStatus.STOPPING
+FAULT, STANDS = DriveStatus.FAULTED, DriveStatus.SWITCH_ON_DISABLED
+
+
+def test_the_speed_of_a_released_motor_is_unknown_until_it_runs_again() -> None:
+    # by a fault, and by STOP at the keypad: the drive reports the 0 of its output
+    for released in (FAULT, STANDS):
+        told = spans_unknown((RUNS, 20.0), (released, 0.0), (STANDS, 0.0), (RUNS, 0.0), (RUNS, 9.0))
+        assert told == [(1.0, 3.0)]
+    assert not spans_unknown((RUNS, 20.0), (STOPS, 8.0), (STOPS, 0.4), (STANDS, 0.0), (STANDS, 0.0))
+    assert spans_unknown((RUNS, 20.0), (RUNS, math.nan), (RUNS, 20.0)) == [(1.0, 2.0)]
