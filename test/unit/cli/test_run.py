@@ -712,9 +712,9 @@ def test_the_last_tries_of_a_stop_open_a_mute_port_once_more() -> None:
         drive=lambda: None, on_mute=lambda call: None, last_tries=tries.append
     )
     screen: Any = SimpleNamespace(say=lines.append)
+    drive: Any = SimpleNamespace(
         stop_unconfirmed=False, stop_overdue=True, state=SimpleNamespace(status=None),
         end_unconfirmed='ending WITHOUT a confirmed stop',
-        stop_unconfirmed=False, stop_overdue=True, state=SimpleNamespace(status=None)
     )
     signals: Any = None
     control = ControlSession(session, screen, signals, ())
