@@ -376,7 +376,7 @@ def _standing(followed: Curve, unit: str) -> Iterator[Span]:
         (next(group)[0], what)
         for what, group in itertools.groupby(points, lambda one: f'{one[1]:+.3g}')
     ]
-    ends = [*(time for time, _ in groups[1:]), followed.times[-1] if groups else 0.0]
+    ends = [*(time for time, _ in groups[1:]), *followed.times[-1:]]
     for (begin, what), end in zip(groups, ends, strict=True):
         if what not in ('+nan', '+0', '-0'):
             yield Span(begin, end, f'{what} {unit}')

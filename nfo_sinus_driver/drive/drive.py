@@ -211,16 +211,7 @@ class Drive:
     @property
     def end_unconfirmed(self) -> str:
         """What is said where the driver ends, and no stop was confirmed."""
-        if self.settings.goes_through_plc(self._bus.protocol):
-            return (
-                'ending WITHOUT a stop that the PLC has confirmed: the program of this driver in '
-                'the PLC stops the motor 1 s after the last request, if the PLC runs and reaches '
-                'the drive; else use the enable input or the emergency stop'
-            )
-        return (
-            'ending WITHOUT a confirmed stop, the motor may still run: use the enable input or '
-            'the emergency stop'
-        )
+        return self.settings.end_unconfirmed(self._bus.protocol)
 
     @property
     def statistics(self) -> Statistics:

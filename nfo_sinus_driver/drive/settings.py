@@ -304,6 +304,19 @@ class DriveSettings:
         """Return whether a PLC is between the line and the drive."""
         return self.model != AUTO and self.method_class.addressing in protocol.carries
 
+    def end_unconfirmed(self, protocol: LineProtocol) -> str:
+        """Return what is said where the driver ends, and no stop was confirmed."""
+        if self.goes_through_plc(protocol):
+            return (
+                'ending WITHOUT a stop that the PLC has confirmed: the program of this driver in '
+                'the PLC stops the motor 1 s after the last request, if the PLC runs and reaches '
+                'the drive; else use the enable input or the emergency stop'
+            )
+        return (
+            'ending WITHOUT a confirmed stop, the motor may still run: use the enable input or '
+            'the emergency stop'
+        )
+
     def _require_no_broadcast(self, protocol: LineProtocol) -> None:
         """Make sure that no write to one drive reaches all that are behind a gateway."""
         if protocol is not PROTOCOLS['modbus_tcp'] or self.address:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from datetime import datetime
 import itertools
 import math
@@ -85,6 +86,11 @@ def test_some_set_points_are_named_and_can_be_read(kind: str, length: float) -> 
         assert {text.get_text() for text in named} >= {'+5 Hz', '+15 Hz', '+40 Hz'}
     if kind in ('sine', 'stick'):
         assert not named
+
+
+def test_a_run_without_set_points_has_a_picture() -> None:
+    run = dataclasses.replace(run_of(30.0, lambda time: 20.0), setpoint=Curve())
+    assert not names(panels(run)[1], ' Hz')
 
 
 @pytest.mark.parametrize('seed', range(5))
