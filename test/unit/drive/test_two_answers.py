@@ -142,4 +142,6 @@ def test_of_two_drives_at_one_address_nothing_is_believed(connection: str) -> No
     rig.pass_time(20.0)
     assert told.at < math.inf
     assert not told.false
+    if connection not in ('classic', 'movitrac'):
+        assert rig.notes.said('answered twice, and not alike')
     assert_stopped(rig)
