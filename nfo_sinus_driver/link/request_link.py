@@ -286,10 +286,14 @@ class RequestLink(ABC, Generic[_Request]):
         """
         Take what comes until the line is silent, or a stop waits; return it, and whether it is.
 
+        Where answers are waited for briefly, others go first.
+
         :param silence: how long it has to be, s.
         :param least: until when at least.
         """
         came = b''
+        if not self._patience:
+            return came, False
         until = max(least, self._line_end + silence)
         give_up = until + _SILENCES * silence
         while data := self._listen(until):

@@ -156,9 +156,8 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             self._require_certain(request)
             raise
         if names_it:
+            # of a write a second one passes for no other answer
             self._confirm(request, names_it=True)
-            if silence := self._seconds.silence(request.unit, self._now()):
-                self._hear_out(silence)
         else:
             self._require_ours(request)
             self._require_certain(request)
