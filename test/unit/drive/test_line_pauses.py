@@ -14,6 +14,7 @@ import pytest
 from support.described import SHIPPED, DescribedRig
 from support.rig import SLICE, Asked, Rig
 
+from nfo_sinus_driver.catalog import CatalogError
 from nfo_sinus_driver.catalog.declared import read
 from nfo_sinus_driver.drive import Cause, DriveError
 
@@ -259,3 +260,9 @@ def test_a_line_whose_drives_want_silence_is_shown_as_full() -> None:
         rig.connect()
         rig.pass_time(4.0)
         assert rig.bus.statistics().utilisation > 0.9
+
+
+def test_no_file_keeps_a_stop_back_for_longer_than_half_a_second(tmp_path: Path) -> None:
+    read(described(tmp_path, '  after_write: 0.5\n'))
+    with pytest.raises(CatalogError, match=r'after_write'):
+        read(described(tmp_path, '  after_write: 0.6\n'))
