@@ -166,9 +166,11 @@ class Controller:
         """
         Make sure that no stop was confirmed since a client requested a motion, s, monotonic.
 
-        A request for a motion and a later one for a stop may arrive in the other order.
+        A request for a motion and a later one for a stop may arrive in the other order. After a
+        fault has stopped the motor, to request it again would not help.
         """
         if requested_at < self._control.stopped_at:
+            self._require_no_known_fault()
             raise DriveError(Cause.STOPPED_SINCE_ASKED)
 
     async def _require_enable(self) -> None:

@@ -99,6 +99,20 @@ def test_what_was_requested_before_a_stop_was_confirmed_is_refused_after_it() ->
         assert 'enabled' in rig.answer(rig.drive.enable(rig.clock.now))
 
 
+def test_where_a_fault_forbids_what_was_requested_before_a_stop_the_fault_is_told() -> None:
+    with Rig() as rig:
+        rig.turn()
+        stop, requested_at = rig.drive.stop(), rig.clock.now
+        assert succeeds(rig, stop)
+        rig.far.trip(5)
+        rig.pass_time(0.5)
+        for command in (
+            rig.drive.enable(requested_at),
+            rig.drive.tune(Procedure.FULL, requested_at=requested_at),
+        ):
+            assert 'fault 5 Overload is active' in rig.answer(command)
+
+
 def test_an_enable_is_refused_until_every_quick_stop_has_ended() -> None:
     with Rig() as rig:
         rig.turn()
