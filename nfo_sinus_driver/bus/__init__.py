@@ -52,6 +52,8 @@ in one place of the worker (it hides how often a status was missed, which drive 
 """
 
 from nfo_sinus_driver.bus.by_address import ByAddress
+from nfo_sinus_driver.bus.calls import Run, on_bus, stops_on_bus
+from nfo_sinus_driver.bus.lock import Lock
 from nfo_sinus_driver.bus.silences import EXCHANGE
 from nfo_sinus_driver.bus.statistics import Statistics
 from nfo_sinus_driver.bus.tasks import Cancelled, Exchange, LatestValue, Priority, Task
@@ -64,8 +66,12 @@ __all__ = [
     'Cancelled',
     'Exchange',
     'LatestValue',
+    'Lock',
     'Priority',
+    'Run',
     'Statistics',
     'Task',
     'Watch',
+    'on_bus',
+    'stops_on_bus',
 ]

@@ -69,10 +69,10 @@ is handled where it occurs).
 """
 
 from nfo_sinus_driver.catalog import InverterStatus, Procedure
+from nfo_sinus_driver.drive.changes import ParameterChange
 from nfo_sinus_driver.drive.drive import Drive
 from nfo_sinus_driver.drive.events import Cause, DriveError, Event, Report, Severity
 from nfo_sinus_driver.drive.identity import Identity
-from nfo_sinus_driver.drive.parameter_writer import ParameterChange
 from nfo_sinus_driver.drive.settings import CONTROL_METHODS, DriveSettings
 from nfo_sinus_driver.drive.snapshot import Listener, LogEntry, Snapshot, Telemetry
 from nfo_sinus_driver.drive.stop_reason import StopReason

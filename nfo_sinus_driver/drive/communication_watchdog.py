@@ -12,12 +12,13 @@ from typing import TypeVar
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Role, Value
+from nfo_sinus_driver.drive.changes import ParameterChange
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import explain_failure
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.memory import Borrowed, Memory
-from nfo_sinus_driver.drive.parameter_writer import ParameterChange, not_changed
+from nfo_sinus_driver.drive.parameter_writer import not_changed
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN, DRIVE_TIMEOUT_MARGIN
 from nfo_sinus_driver.link import LinkError

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Coroutine, Sequence
 from concurrent.futures import Future
-import functools
 import logging
 import math
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, TypeVar
 
-from nfo_sinus_driver.bus import Bus, Priority, Statistics, Task
+from nfo_sinus_driver.bus import Bus, Priority, Statistics, Task, on_bus, stops_on_bus
 from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
+from nfo_sinus_driver.drive.changes import ParameterChange
 from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
 from nfo_sinus_driver.drive.controller import Controller, required
 from nfo_sinus_driver.drive.diagnosis import explained
@@ -23,8 +23,7 @@ from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.fault_name import FaultNamer
 from nfo_sinus_driver.drive.identity import Identity
 from nfo_sinus_driver.drive.memory import Memory, ProcessMemory
-from nfo_sinus_driver.drive.parameter_writer import ParameterChange
-from nfo_sinus_driver.drive.parameters import Parameters, on_bus
+from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.poller import Poller, take_snapshot
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.recognising import Recogniser
@@ -38,7 +37,6 @@ from nfo_sinus_driver.link import LinkError
 
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
-_P = ParamSpec('_P')
 
 #: How long an exit waits for the first answer of a drive that has never answered, s.
 _FIRST_ANSWER = 1.0
@@ -51,18 +49,6 @@ _QUICK_STOP = Report(Cause.QUICK_STOP_REQUESTED, by=_BY)
 _ACKNOWLEDGE = Report(Cause.ACKNOWLEDGE_REQUESTED, by=_BY)
 _LEFT = Report(Cause.TRANSITION_REQUESTED, by=_BY)
 _ENDS = Report(Cause.DRIVER_ENDS, by=_BY)
-
-
-def _stops(
-    method: Callable[Concatenate[Drive, _P], Coroutine[Any, Any, _T]],
-) -> Callable[Concatenate[Drive, _P], Future[_T]]:
-    """Have a method run on the bus, as :func:`on_bus` does; it stops the motor."""
-
-    @functools.wraps(method)
-    def run(me: Drive, /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
-        return me.run(lambda: method(me, *args, **kwargs), stops=True)
-
-    return run
 
 
 class Drive:
@@ -304,7 +290,7 @@ class Drive:
             method = self.settings.method
             raise DriveError(self.state.report(Cause.OTHER_METHOD_RUNS, method=method))
 
-    @_stops
+    @stops_on_bus
     async def disconnect(self, timeout: float, why: Report = _LEFT) -> Report:
         """Stop the motor, wait ``timeout`` s at most for standstill, and release control."""
         # no client may enable it until the motor stands still
@@ -326,12 +312,12 @@ class Drive:
             self._fault_namer.end()
             self._poller.end()
 
-    @_stops
+    @stops_on_bus
     async def deactivate(self, why: Report = _LEFT) -> Report | None:
         """Stop the motor, if it may run, and only watch the drive until it is active again."""
         return await self._deactivate(why)
 
-    @_stops
+    @stops_on_bus
     async def stop_for_good(self, patience: float, why: Report = _ENDS) -> Report | None:
         """Stop the motor within ``patience`` s; it can never be enabled again."""
         if self._controller is not None:
@@ -363,17 +349,17 @@ class Drive:
         self._poller.wake()
         return answer
 
-    @_stops
+    @stops_on_bus
     async def stop(self, why: Report = _STOP) -> Report:
         """Stop as the drive's StMode says; control is kept."""
         return await required(self._controller).stop(why)
 
-    @_stops
+    @stops_on_bus
     async def rapid_stop(self, why: Report = _STOP) -> Report:
         """Stop along the stop ramp of the drive, where it has one; control is kept."""
         return await required(self._controller).rapid_stop(why)
 
-    @_stops
+    @stops_on_bus
     async def quick_stop(self, why: Report = _QUICK_STOP) -> Report:
         """Release the motor at once: it coasts."""
         return await required(self._controller).quick_stop(why)
@@ -452,7 +438,7 @@ class Drive:
 
         return await self._tuning.tune_now(procedure, report)
 
-    @_stops
+    @stops_on_bus
     async def cancel_tuning(self) -> Report | None:
         """Stop a tuning, if there is one; stop nothing else."""
         return await self._procedures.abort()

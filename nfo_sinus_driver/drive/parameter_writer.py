@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 import contextlib
-from dataclasses import dataclass
 
 from nfo_sinus_driver.bus import Cancelled, Priority
 from nfo_sinus_driver.catalog import Family, Role, Value
 from nfo_sinus_driver.catalog.profile import Wait
+from nfo_sinus_driver.drive.changes import ParameterChange, Written, show, shown_raw
 from nfo_sinus_driver.drive.diagnosis import explain_failure, report_of
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
@@ -47,40 +47,6 @@ class ParameterError(DriveError):
 
 class _BadValue(ParameterError):
     """The drive does not accept the value as things are; after other changes it may."""
-
-
-@dataclass(frozen=True)
-class ParameterChange:
-    """A parameter that was written; bytes that mean nothing are shown as text."""
-
-    key: str
-    old: Value
-    new: Value
-    unit: str
-
-    def __str__(self) -> str:
-        return f'{self.key}: {show(self.old)} -> {show(self.new)} {self.unit}'.rstrip()
-
-
-@dataclass(frozen=True)
-class Written:
-    """A parameter that was written and read back, as bytes."""
-
-    key: str
-    before: bytes
-    after: bytes
-
-
-def show(value: Value) -> str:
-    """Return a value as it is written in a parameter file."""
-    if isinstance(value, bool):
-        return 'true' if value else 'false'
-    return f'{value:.10g}' if isinstance(value, float) else str(value)
-
-
-def shown_raw(data: bytes) -> str:
-    """Return bytes that mean nothing, as the manuals print numbers."""
-    return f'{data.hex().upper()}h'
 
 
 def not_changed(key: str, why: Report) -> ParameterError:

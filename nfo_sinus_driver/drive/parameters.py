@@ -5,35 +5,28 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import (
     AsyncIterator,
     Awaitable,
     Callable,
     Collection,
-    Coroutine,
     Mapping,
     Sequence,
 )
-from concurrent.futures import Future
 import contextlib
-import functools
 import logging
-from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
-from nfo_sinus_driver.bus import Bus, Priority, Task
+from nfo_sinus_driver.bus import Lock, Priority, Run, on_bus
 from nfo_sinus_driver.catalog import Value
+from nfo_sinus_driver.drive.changes import ParameterChange, Written, show
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.parameter_writer import (
-    ParameterChange,
     ParameterError,
     ParameterWriter,
-    Written,
     after_change,
     followers,
     not_changed,
-    show,
     write_forbidden,
 )
 from nfo_sinus_driver.drive.procedure import Procedures
@@ -54,30 +47,6 @@ _PROGRESS = 5.0
 #: After how many rounds of refusals alone the drive does not have the parameters left.
 _REFUSALS = 2
 
-_T = TypeVar('_T')
-_P = ParamSpec('_P')
-
-
-class OnBus(Protocol):
-    """A part of a drive whose methods any thread may call."""
-
-    def run(self, command: Callable[[], Coroutine[Any, Any, _T]]) -> Future[_T]:
-        """Run a coroutine on the bus; an error of the line becomes one that explains it."""
-
-
-_Self = TypeVar('_Self', bound=OnBus)
-
-
-def on_bus(
-    method: Callable[Concatenate[_Self, _P], Coroutine[Any, Any, _T]],
-) -> Callable[Concatenate[_Self, _P], Future[_T]]:
-    """Have a method run on the bus: it may be called from any thread, and returns a future."""
-
-    @functools.wraps(method)
-    def run(me: _Self, /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
-        return me.run(lambda: method(me, *args, **kwargs))
-
-    return run
 
 
 class Parameters:
@@ -98,7 +67,7 @@ class Parameters:
         self,
         state: DriveState,
         procedures: Procedures,
-        run: Callable[[Callable[[], Coroutine[Any, Any, Any]]], Future[Any]],
+        run: Run,
         on_change: Callable[[Collection[str]], None],
         on_scale: Callable[[ParameterChange], None],
     ) -> None:
@@ -519,31 +488,3 @@ class DesiredConfig:
 def _not_as_wanted(drift: ParameterChange) -> Report:
     has = f'{show(drift.new)} {drift.unit}'.rstrip()
     return Report(Cause.NOT_AS_WANTED, key=drift.key, has=has, wanted=show(drift.old))
-
-
-#: No polling is needed: the one that leaves wakes the next one, s.
-_LONG = 60.0
-
-
-class Lock:
-    """A lock for coroutines on the bus, in the order in which they came."""
-
-    def __init__(self, bus: Bus) -> None:
-        self._bus = bus
-        #: The holder, and behind it those that wait.
-        self._tasks: deque[Task | None] = deque()
-
-    async def __aenter__(self) -> None:
-        task = self._bus.current
-        self._tasks.append(task)
-        try:
-            while self._tasks[0] is not task:
-                await self._bus.sleep(_LONG)
-        except BaseException:
-            self._tasks.remove(task)
-            raise
-
-    async def __aexit__(self, *_: object) -> None:
-        self._tasks.popleft()
-        if self._tasks:
-            self._bus.wake(self._tasks[0])

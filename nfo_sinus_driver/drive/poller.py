@@ -14,11 +14,11 @@ from typing import TypeVar
 
 from nfo_sinus_driver.bus import Priority, Task, Watch
 from nfo_sinus_driver.catalog import InverterStatus, Role
+from nfo_sinus_driver.drive.changes import ParameterChange
 from nfo_sinus_driver.drive.controller import Controller
 from nfo_sinus_driver.drive.diagnosis import Conditions, explain_failure, explain_fault
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
-from nfo_sinus_driver.drive.parameter_writer import ParameterChange
 from nfo_sinus_driver.drive.recognising import Recogniser
 from nfo_sinus_driver.drive.setpoint import Setpoint
 from nfo_sinus_driver.drive.settings import MONITOR

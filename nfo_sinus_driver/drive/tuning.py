@@ -12,10 +12,10 @@ import math
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import MOTOR_PLATE, InverterStatus, Meaning, Procedure, Role
 from nfo_sinus_driver.drive import drive_state
+from nfo_sinus_driver.drive.changes import ParameterChange
 from nfo_sinus_driver.drive.drive_state import DriveState
 from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
-from nfo_sinus_driver.drive.parameter_writer import ParameterChange
 from nfo_sinus_driver.drive.parameters import Parameters
 from nfo_sinus_driver.drive.procedure import Procedures
 from nfo_sinus_driver.drive.starting import Prepare

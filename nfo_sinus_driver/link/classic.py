@@ -32,9 +32,9 @@ from nfo_sinus_driver.link.interface import (
     Reply,
     Why,
 )
+from nfo_sinus_driver.link.pair_link import CodecLink
 from nfo_sinus_driver.link.port import Port
 from nfo_sinus_driver.link.protocols import BROADCAST, CLASSIC, POINT_TO_POINT
-from nfo_sinus_driver.link.request_link import CodecLink
 
 #: How many encoded messages are cached: the ENQUIRIES of a poll are sent again and again.
 PREPARED = 1024

@@ -17,7 +17,7 @@ import re
 from typing import Any, TypeVar
 
 from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link.foreign_traffic import message_lengths
+from nfo_sinus_driver.link.foreign_modbus import message_lengths
 from nfo_sinus_driver.link.modbus_pdu import AnswerReader, Request
 from nfo_sinus_driver.link.protocols import MODBUS_ASCII
 from nfo_sinus_driver.link.serial_link import SerialLink

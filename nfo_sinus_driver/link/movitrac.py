@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 from nfo_sinus_driver.link.foreign_traffic import Codec
 from nfo_sinus_driver.link.interface import Address, DamagedAnswer, Refused, Reply
 from nfo_sinus_driver.link.late_replies import STOP_WAITS
+from nfo_sinus_driver.link.pair_link import CodecLink
 from nfo_sinus_driver.link.protocols import MOVITRAC
-from nfo_sinus_driver.link.request_link import CodecLink
 
 #: How many bytes a value has, in a plain frame and in a long one.
 SIZES = (4, 8)

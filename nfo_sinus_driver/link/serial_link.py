@@ -10,7 +10,8 @@ from collections.abc import Iterator, Sequence
 import time
 from typing import Any, TypeVar
 
-from nfo_sinus_driver.link.foreign_traffic import DOUBTFUL, ForeignModbus
+from nfo_sinus_driver.link.foreign_modbus import ForeignModbus
+from nfo_sinus_driver.link.foreign_traffic import DOUBTFUL
 from nfo_sinus_driver.link.interface import (
     Address,
     AnotherValue,
