@@ -36,12 +36,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.substitutions import ExecutableInPackage
 
-from nfo_sinus_driver.launch_arguments import (
-    fail_with_driver,
-    number,
-    simulated_drives,
-    written,
-)
+from nfo_sinus_driver.launch_arguments import fail_with_driver, number, simulated_drives, written
 
 _EXIT_TIMEOUT = '15'
 #: Runs a command that Ctrl-C does not end, whether terminal or launch pass it on; SIGTERM does.

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 import re
 
-from nfo_sinus_driver.drive.control_state import TRANSITIONS, ControlEvent, ControlState
+from nfo_sinus_driver.drive.known.control_state import TRANSITIONS, ControlEvent, ControlState
 
 PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'control.md'
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 import re
 
-from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
+from nfo_sinus_driver.node.parameters.settings import BUS_SETTINGS, DRIVE_SETTINGS
 from nfo_sinus_driver.setting import FIXED, Setting
 
 PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'interface.md'

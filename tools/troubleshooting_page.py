@@ -16,7 +16,7 @@ import textwrap
 from types import SimpleNamespace
 
 from nfo_sinus_driver.drive import Cause, Report
-from nfo_sinus_driver.node.wording import Wording
+from nfo_sinus_driver.node.messages.wording import Wording
 
 _ROOT = Path(__file__).resolve().parents[1]
 _PACKAGE = _ROOT / 'nfo_sinus_driver'
@@ -24,8 +24,8 @@ _PACKAGE = _ROOT / 'nfo_sinus_driver'
 #: ends of long messages: one that begins so has ``[…]`` there.
 BY_HAND = _ROOT / 'docs' / 'troubleshooting.md.in'
 _MADE = (
-    '<!-- Made from docs/troubleshooting.md.in, and the causes in nfo_sinus_driver/drive/events.py,'
-    ' by `make pages`: change those. -->\n\n'
+    '<!-- Made from docs/troubleshooting.md.in, and the causes in '
+    'nfo_sinus_driver/drive/known/events.py, by `make pages`: change those. -->\n\n'
 )
 _WORDING = Wording(SimpleNamespace(
     get_fully_qualified_name=lambda: '/nfo_sinus',

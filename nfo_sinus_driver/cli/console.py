@@ -24,7 +24,7 @@ import unicodedata
 from tqdm import tqdm
 
 from nfo_sinus_driver.drive import DriveError, Report
-from nfo_sinus_driver.drive.events import Calls, sentence
+from nfo_sinus_driver.drive.known.events import Calls, sentence
 from nfo_sinus_driver.signals import are_held_to_the_end
 
 #: What takes less needs no bar, s.

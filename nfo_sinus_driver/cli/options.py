@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from nfo_sinus_driver.catalog import load_profile, with_factory_line
 from nfo_sinus_driver.drive import DriveSettings
-from nfo_sinus_driver.drive.settings import AUTO, MONITOR
+from nfo_sinus_driver.drive.known.settings import AUTO, MONITOR
 from nfo_sinus_driver.link import BIT_RATES, BusSettings
 from nfo_sinus_driver.setting import settings_of
 

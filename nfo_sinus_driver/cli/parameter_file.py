@@ -27,7 +27,7 @@ import yaml
 
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Value
 from nfo_sinus_driver.cli.console import CliError, listed, put
-from nfo_sinus_driver.drive.changes import show
+from nfo_sinus_driver.drive.known.changes import show
 
 #: What the header says, in this order.
 HEADER = ('model', 'product', 'firmware', 'serial number', 'address', 'date', 'written by')

@@ -41,7 +41,7 @@ from nfo_sinus_driver.cli.parameter_file import (
 )
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, LogEntry
-from nfo_sinus_driver.drive.parameter_writer import ParameterError
+from nfo_sinus_driver.drive.change.parameter_writer import ParameterError
 from nfo_sinus_driver.link import Refused
 
 _NAMEPLATE = (

@@ -22,9 +22,9 @@ from nfo_sinus_driver.cli.control_session import (
 from nfo_sinus_driver.cli.options import SETTINGS, Verb, add_setting, duration, period, setpoint
 from nfo_sinus_driver.cli.screen import as_facts, as_line
 from nfo_sinus_driver.drive import Cause, DriveError, Report
-from nfo_sinus_driver.drive.diagnosis import explain_fault
-from nfo_sinus_driver.drive.settings import REFERENCES
-from nfo_sinus_driver.drive.starting import read_limits
+from nfo_sinus_driver.drive.known.diagnosis import explain_fault
+from nfo_sinus_driver.drive.known.settings import REFERENCES
+from nfo_sinus_driver.drive.motion.starting import read_limits
 
 #: How often the set-point is sent anew, s; it is given up as old after 2.5 s.
 _PERIOD = 0.1

@@ -29,7 +29,7 @@ from nfo_sinus_driver.cli.options import DEFAULTS, OF_SCAN, Verb, add_flag, addr
 from nfo_sinus_driver.cli.parameter_file import STANDARD, write_file
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError
-from nfo_sinus_driver.drive.settings import AUTO
+from nfo_sinus_driver.drive.known.settings import AUTO
 from nfo_sinus_driver.link import PROTOCOLS, DamagedAnswer, NoAnswer, PortError, Refused
 from nfo_sinus_driver.link.interface import NeverSilent
 

@@ -35,8 +35,8 @@ from nfo_sinus_driver.drive import (
     Report,
     Severity,
 )
-from nfo_sinus_driver.drive.diagnosis import ended
-from nfo_sinus_driver.drive.settings import MONITOR
+from nfo_sinus_driver.drive.known.diagnosis import ended
+from nfo_sinus_driver.drive.known.settings import MONITOR
 from nfo_sinus_driver.link import BusSettings, Refused
 from nfo_sinus_driver.state_folder import StateFolder
 

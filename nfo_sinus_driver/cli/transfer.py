@@ -44,8 +44,8 @@ from nfo_sinus_driver.cli.parameter_file import (
 )
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, Identity
-from nfo_sinus_driver.drive.changes import ParameterChange, shown_raw
-from nfo_sinus_driver.drive.parameter_writer import ParameterError
+from nfo_sinus_driver.drive.change.parameter_writer import ParameterError
+from nfo_sinus_driver.drive.known.changes import ParameterChange, shown_raw
 
 
 class Dump(Verb):

@@ -37,7 +37,7 @@ from nfo_sinus_driver.demo.sequence import (
     DomainTakenError,
     StepError,
 )
-from nfo_sinus_driver.node.executor import spinning
+from nfo_sinus_driver.node.ros.executor import spinning
 
 #: More often than by default, for a smooth curve.
 _DRIVER_SETTINGS = ('-p', 'telemetry_rate:=5.0')

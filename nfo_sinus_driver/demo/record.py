@@ -34,8 +34,8 @@ from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.bench import handle_signals
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
 from nfo_sinus_driver.demo.type_definitions import name_of
-from nfo_sinus_driver.node.executor import spinning
-from nfo_sinus_driver.node.start import init_ros
+from nfo_sinus_driver.node.ros.executor import spinning
+from nfo_sinus_driver.node.ros.start import init_ros
 from nfo_sinus_driver.version import VERSION
 
 #: When it is time to say that there is no driver, s.

@@ -21,7 +21,7 @@ from std_msgs.msg import Float32
 from std_srvs.srv import SetBool, Trigger
 
 from nfo_sinus_driver.demo import bags
-from nfo_sinus_driver.node.qos import LATCHED, NEWEST, RELIABLE, ROSOUT, newest
+from nfo_sinus_driver.node.ros.qos import LATCHED, NEWEST, RELIABLE, ROSOUT, newest
 
 _EVENT = '_service_event'
 #: How many messages may wait while the machine is busy with something else.

@@ -18,7 +18,7 @@ from std_msgs.msg import Float32
 from std_srvs.srv import SetBool, Trigger
 
 from nfo_sinus_driver.demo.bench import Bench
-from nfo_sinus_driver.node.qos import LATCHED, NEWEST, RELIABLE
+from nfo_sinus_driver.node.ros.qos import LATCHED, NEWEST, RELIABLE
 
 #: A shared machine may be very slow; a step that takes longer has failed, s.
 PATIENCE = 30.0

@@ -4,32 +4,15 @@
 """
 One drive in engineering units. No ROS.
 
-**Whether the motor may turn is known in one place**, the table of :mod:`.control_state`: every
-command, status, loss and refusal is an event of it, and set-points are followed in ENABLED alone.
-With flags in several classes, two events in an unforeseen order went wrong again and again;
-``test_control_table`` goes through all states of the table with a model of drive and line.
+:class:`Drive` is the door. Behind it are four rooms, each with its reasons at its head, and none
+imports one above it:
 
-**What counts is the status, never what was written.** What a drive has taken, a terminal may have
-undone; what got no answer, it may have carried out. So an enable ends with a status that shows the
-run, and a stop with one from after the stop that shows that the drive stops.
-
-**A stop is a sequence of its own** (:mod:`.stopping`), which all reasons share. It takes the run
-command first, each step by itself, and goes on until the status confirms it, over a lost line and a
-new connection, too. What shaped it:
-
-- A drive refuses every command in a fault: it waits for the fault to end, and removes the run
-  command then, for the drive may run on.
-- The line returns between a stop and the read after it: that stop is repeated at once.
-- A stop is taken and the motor does not slow down: it is stopped by every means left [C126].
-- A PLC shows the status from before the stop: what confirms it has to be newer.
-- A released motor shows a speed that does not fall: it is reported as not clear.
-
-**Nothing is written to a drive that was not recognised** (:mod:`.recognition`). After a silence in
-which a plug can be moved, another drive may be at the address; to it, a stop may be a run command.
-
-**The driver takes only what it needs from the drive.** It polls without side effects, writes a
-setting only on change and reads it back, and puts back the drive's own time-out at its end, after a
-kill at the next start (:mod:`.communication_watchdog`).
+===============  =================================================================================
+:mod:`.watch`    when to look at the drive
+:mod:`.change`   what changes it and lasts: parameters, tuning, its own time-out
+:mod:`.motion`   what makes its motor turn, and what stops it
+:mod:`.known`    what is known of it, and what the driver does with it
+===============  =================================================================================
 
 What a public call of :class:`Drive` guarantees when its future has a result:
 
@@ -69,14 +52,14 @@ is handled where it occurs).
 """
 
 from nfo_sinus_driver.catalog import InverterStatus, Procedure
-from nfo_sinus_driver.drive.changes import ParameterChange
+from nfo_sinus_driver.drive.change.tuning import Tuned
 from nfo_sinus_driver.drive.drive import Drive
-from nfo_sinus_driver.drive.events import Cause, DriveError, Event, Report, Severity
-from nfo_sinus_driver.drive.identity import Identity
-from nfo_sinus_driver.drive.settings import CONTROL_METHODS, DriveSettings
-from nfo_sinus_driver.drive.snapshot import Listener, LogEntry, Snapshot, Telemetry
-from nfo_sinus_driver.drive.stop_reason import StopReason
-from nfo_sinus_driver.drive.tuning import Tuned
+from nfo_sinus_driver.drive.known.changes import ParameterChange
+from nfo_sinus_driver.drive.known.events import Cause, DriveError, Event, Report, Severity
+from nfo_sinus_driver.drive.known.identity import Identity
+from nfo_sinus_driver.drive.known.settings import CONTROL_METHODS, DriveSettings
+from nfo_sinus_driver.drive.known.snapshot import Listener, LogEntry, Snapshot, Telemetry
+from nfo_sinus_driver.drive.known.stop_reason import StopReason
 
 __all__ = [
     'CONTROL_METHODS',

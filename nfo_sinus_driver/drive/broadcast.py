@@ -9,9 +9,9 @@ from collections.abc import Iterable
 from concurrent.futures import Future
 
 from nfo_sinus_driver.bus import Bus, Priority
-from nfo_sinus_driver.drive.diagnosis import ended
 from nfo_sinus_driver.drive.drive import Drive
-from nfo_sinus_driver.drive.events import Cause, DriveError
+from nfo_sinus_driver.drive.known.diagnosis import ended
+from nfo_sinus_driver.drive.known.events import Cause, DriveError
 from nfo_sinus_driver.link import Address, Write
 
 

@@ -9,8 +9,8 @@ from concurrent.futures import Future
 
 from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.catalog import Family, families, load_family
-from nfo_sinus_driver.drive.diagnosis import explained
-from nfo_sinus_driver.drive.events import Cause, DriveError
+from nfo_sinus_driver.drive.known.diagnosis import explained
+from nfo_sinus_driver.drive.known.events import Cause, DriveError
 from nfo_sinus_driver.link import Address, Identification, Read, Refused
 
 

@@ -13,26 +13,26 @@ from typing import Any, TypeVar
 
 from nfo_sinus_driver.bus import Bus, Priority, Statistics, Task, on_bus, stops_on_bus
 from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
-from nfo_sinus_driver.drive.changes import ParameterChange
-from nfo_sinus_driver.drive.communication_watchdog import CommunicationWatchdog
-from nfo_sinus_driver.drive.controller import Controller, required
-from nfo_sinus_driver.drive.diagnosis import explained
-from nfo_sinus_driver.drive.drive_state import DriveState, Hooks
-from nfo_sinus_driver.drive.error_log import ErrorLog, ErrorLogMonitor
-from nfo_sinus_driver.drive.events import Cause, DriveError, Report, Severity
-from nfo_sinus_driver.drive.fault_name import FaultNamer
-from nfo_sinus_driver.drive.identity import Identity
-from nfo_sinus_driver.drive.memory import Memory, ProcessMemory
-from nfo_sinus_driver.drive.parameters import Parameters
-from nfo_sinus_driver.drive.poller import Poller, take_snapshot
-from nfo_sinus_driver.drive.procedure import Procedures
-from nfo_sinus_driver.drive.recognising import Recogniser
-from nfo_sinus_driver.drive.setpoint import Setpoint
-from nfo_sinus_driver.drive.settings import DriveSettings
-from nfo_sinus_driver.drive.snapshot import Listener, LogEntry, Snapshot
-from nfo_sinus_driver.drive.steps import carry_out
-from nfo_sinus_driver.drive.telemetry import watch_telemetry
-from nfo_sinus_driver.drive.tuning import Tuned, Tuning
+from nfo_sinus_driver.drive.change.communication_watchdog import CommunicationWatchdog
+from nfo_sinus_driver.drive.change.memory import Memory, ProcessMemory
+from nfo_sinus_driver.drive.change.parameters import Parameters
+from nfo_sinus_driver.drive.change.tuning import Tuned, Tuning
+from nfo_sinus_driver.drive.known.changes import ParameterChange
+from nfo_sinus_driver.drive.known.diagnosis import explained
+from nfo_sinus_driver.drive.known.drive_state import DriveState, Hooks
+from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.drive.known.identity import Identity
+from nfo_sinus_driver.drive.known.recognising import Recogniser
+from nfo_sinus_driver.drive.known.settings import DriveSettings
+from nfo_sinus_driver.drive.known.snapshot import Listener, LogEntry, Snapshot
+from nfo_sinus_driver.drive.known.steps import carry_out
+from nfo_sinus_driver.drive.motion.controller import Controller, required
+from nfo_sinus_driver.drive.motion.procedure import Procedures
+from nfo_sinus_driver.drive.motion.setpoint import Setpoint
+from nfo_sinus_driver.drive.watch.error_log import ErrorLog, ErrorLogMonitor
+from nfo_sinus_driver.drive.watch.fault_name import FaultNamer
+from nfo_sinus_driver.drive.watch.poller import Poller, take_snapshot
+from nfo_sinus_driver.drive.watch.telemetry import watch_telemetry
 from nfo_sinus_driver.link import LinkError
 
 _log = logging.getLogger(__name__)

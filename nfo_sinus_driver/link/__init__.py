@@ -89,8 +89,8 @@ from nfo_sinus_driver.link.interface import (
     carry_out,
     silent,
 )
+from nfo_sinus_driver.link.ports.reconnect import Reconnect
 from nfo_sinus_driver.link.protocols import ADDRESSES, BIT_RATES, PROTOCOLS, BusSettings, open_link
-from nfo_sinus_driver.link.reconnect import Reconnect
 
 __all__ = [
     'ADDRESSES',

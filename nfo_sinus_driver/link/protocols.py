@@ -29,7 +29,7 @@ BROADCAST = 95
 
 MODBUS_RTU = LineProtocol(
     name='modbus_rtu',
-    link='rtu.RtuLink',
+    link='modbus.rtu.RtuLink',
     addressing='modbus',
     units=_MODBUS_UNITS,
     baud_rate=19200,
@@ -43,7 +43,7 @@ MODBUS_RTU = LineProtocol(
 )
 MODBUS_ASCII = LineProtocol(
     name='modbus_ascii',
-    link='modbus_ascii.AsciiLink',
+    link='modbus.ascii.AsciiLink',
     addressing='modbus',
     units=_MODBUS_UNITS,
     baud_rate=19200,
@@ -55,7 +55,7 @@ MODBUS_ASCII = LineProtocol(
 )
 MODBUS_TCP = LineProtocol(
     name='modbus_tcp',
-    link='modbus_tcp.TcpLink',
+    link='modbus.tcp.TcpLink',
     addressing='modbus',
     units=(0, *_MODBUS_UNITS, _NO_GATEWAY),
     point_to_point=0,
@@ -73,7 +73,7 @@ MODBUS_TCP = LineProtocol(
 )
 CLASSIC = LineProtocol(
     name='classic',
-    link='classic.ClassicLink',
+    link='pairs.classic.ClassicLink',
     addressing='classic',
     units=range(POINT_TO_POINT, BROADCAST),
     baud_rate=9600,
@@ -85,7 +85,7 @@ CLASSIC = LineProtocol(
 )
 MOVITRAC = LineProtocol(
     name='movitrac',
-    link='movitrac.MovitracLink',
+    link='pairs.movitrac.MovitracLink',
     addressing='movitrac',
     # P842 [M4 §2.3.1]
     units=range(64),
@@ -99,7 +99,7 @@ MOVITRAC = LineProtocol(
 )
 CANOPEN = LineProtocol(
     name='canopen',
-    link='canopen_link.CanopenLink',
+    link='canopen.link.CanopenLink',
     addressing='canopen',
     units=range(1, 128),
     baud_rate=125_000,
@@ -137,7 +137,7 @@ class _LinkClass(Protocol):
 
 def link_class(protocol: LineProtocol) -> _LinkClass:
     """Return the link class of a protocol."""
-    module, name = protocol.link.split('.')
+    module, _, name = protocol.link.rpartition('.')
     return cast('_LinkClass', getattr(importlib.import_module(f'{__package__}.{module}'), name))
 
 

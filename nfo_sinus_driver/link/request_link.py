@@ -4,13 +4,13 @@
 """
 Requests on one serial line: send, wait, and decide whether to believe the answer.
 
-:class:`RequestLink` has what all protocols share; each adds its messages. :class:`CodecLink`
-serves those whose codec distinguishes answers from requests.
+:class:`RequestLink` has what all protocols share; each adds its messages. :mod:`.pairs` serves
+those whose codec distinguishes answers from requests.
 
-Modbus does not (:mod:`serial_link`): the answer to a read names no register, that to a write is the
-request again, and how long one is follows from the request. So what is believed there rests on the
-answers before, here on the kind of an answer. One engine for both would share thirty lines more,
-and need a dozen steps that one protocol alone takes.
+Modbus does not (:mod:`.modbus.serial`): the answer to a read names no register, that to a write is
+the request again, and how long one is follows from the request. So what is believed there rests on
+the answers before, with pairs on the kind of an answer. One engine for both would share thirty
+lines more, and need a dozen steps that one protocol alone takes.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from nfo_sinus_driver.link.interface import (
 )
 from nfo_sinus_driver.link.late_replies import LATEST_REPLY, LISTENING_STEP, LateReplies
 from nfo_sinus_driver.link.pauses import Pauses
-from nfo_sinus_driver.link.port import Port, port_of
+from nfo_sinus_driver.link.ports.port import Port, port_of
 from nfo_sinus_driver.link.second_answers import SecondAnswers
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 

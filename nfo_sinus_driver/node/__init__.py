@@ -18,11 +18,11 @@ Each of these has a file for it:
 
 - A call costs more the more entities its executor has: one executor for each node.
 - Publishing may block on a slow subscriber: all of it, and all that is periodic, runs in
-  :mod:`.publish_queue`, which keeps the newest ten of a stream.
-- A terminal that is not read blocks the process that writes to it: :mod:`.nonblocking_stdio`.
+  :mod:`.ros.publish_queue`, which keeps the newest ten of a stream.
+- A terminal that is not read blocks the process that writes to it: :mod:`.ros.nonblocking_stdio`.
 - rclpy accepts a field of a wrong type and ends the process in C: the check in Python is turned on
   (below).
-- What rclpy does not promise but is needed stands in :mod:`.rclpy_internals` alone.
+- What rclpy does not promise but is needed stands in :mod:`.ros.rclpy_internals` alone.
 - Requests may overtake each other in the middleware: an enable that was requested before a
   confirmed stop is refused (``requested_at``).
 

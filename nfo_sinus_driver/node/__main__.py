@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import sys
 
-from nfo_sinus_driver.node.nonblocking_stdio import open_closed_streams
+from nfo_sinus_driver.node.ros.nonblocking_stdio import open_closed_streams
 from nfo_sinus_driver.signals import HeldSignals, ros2_parent
 
 
@@ -25,7 +25,7 @@ def main(args: list[str] | None = None) -> int:
     signals.hold()
     # as early as possible: a parent that has ended before it was looked for is not noticed
     parent = ros2_parent(os.getppid())
-    from nfo_sinus_driver.node import main as process
+    from nfo_sinus_driver.node.process import main as process
 
     return process.main(signals, parent, args)
 

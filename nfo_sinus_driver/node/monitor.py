@@ -34,8 +34,8 @@ from rclpy.task import Future
 from rclpy.utilities import get_default_context
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.node.qos import KEPT, LATCHED, RELIABLE, ROSOUT
-from nfo_sinus_driver.node.start import init_ros
+from nfo_sinus_driver.node.ros.qos import KEPT, LATCHED, RELIABLE, ROSOUT
+from nfo_sinus_driver.node.ros.start import init_ros
 from nfo_sinus_driver.version import VERSION
 from nfo_sinus_driver.view import show, why_unavailable
 from nfo_sinus_driver.view.picture import (

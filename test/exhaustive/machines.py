@@ -12,7 +12,7 @@ from any_order_machine import AnyOrder
 from any_order_machines import MACHINES, Canopen, CanopenDs402, Classic, G2ModeScmd, OptimalModeScmd
 from support.rig import CONNECTIONS, Connection
 
-from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
+from nfo_sinus_driver.drive.known.settings import AS_THE_DRIVE_CAN
 
 
 class _Of(AnyOrder):

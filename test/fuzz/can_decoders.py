@@ -12,8 +12,8 @@ import struct
 
 from fuzz.decoders import Case
 from fuzz.mutations import Mutator
-from nfo_sinus_driver.link import lawicel, sdo
-from nfo_sinus_driver.link.can import Frame
+from nfo_sinus_driver.link.canopen import lawicel, sdo
+from nfo_sinus_driver.link.canopen.can import Frame
 from nfo_sinus_driver.link.interface import DamagedAnswer, Refused
 
 _MOST_KEPT = 30

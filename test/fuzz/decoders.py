@@ -23,17 +23,10 @@ from support.plans import followed
 from fuzz import judges
 from fuzz.judges import Asked, Meaning, Objects, Refusal
 from fuzz.mutations import Mutator
-from nfo_sinus_driver.link import (
-    classic,
-    modbus_ascii,
-    modbus_link,
-    modbus_pdu,
-    modbus_tcp,
-    movitrac,
-    rtu,
-)
 from nfo_sinus_driver.link.interface import NoAnswer, Refused
-from nfo_sinus_driver.link.modbus_pdu import AnswerReader
+from nfo_sinus_driver.link.modbus import ascii, link, pdu, rtu, tcp
+from nfo_sinus_driver.link.modbus.pdu import AnswerReader
+from nfo_sinus_driver.link.pairs import classic, movitrac
 
 #: Most bytes that a reader of a whole connection keeps, beside those just handed over.
 _MOST_KEPT = 600
@@ -62,18 +55,18 @@ def _asked(random: Random) -> Asked:
     return Asked(unit, function, place, random.choice((1, 1, 2, 4, 16)))
 
 
-def _request(asked: Asked) -> modbus_pdu.Request[Any]:
+def _request(asked: Asked) -> pdu.Request[Any]:
     """Return the driver's own object for a request."""
     unit, function, place, count, data = asked
     if function == judges.READ:
-        return modbus_pdu.Read(unit, place, count)
+        return pdu.Read(unit, place, count)
     if function in (judges.WRITE_ONE, judges.WRITE_SEVERAL):
-        return modbus_pdu.Write(unit, place, data)
+        return pdu.Write(unit, place, data)
     if function == judges.WRITE_AND_READ:
-        return modbus_pdu.WriteAndRead(unit, place, data, place ^ 2, count)
+        return pdu.WriteAndRead(unit, place, data, place ^ 2, count)
     if function == judges.REPORT_ID:
-        return modbus_link.ReportSlaveId(unit)
-    return modbus_link.ReadDevice(unit, count, place)
+        return link.ReportSlaveId(unit)
+    return link.ReadDevice(unit, count, place)
 
 
 def _answer(asked: Asked, random: Random) -> bytes:
@@ -122,7 +115,7 @@ def _message(asked: Asked, random: Random) -> bytes:
 def _said(meant: Meaning | None) -> object:
     """Return what the driver makes of a meaning."""
     if isinstance(meant, Objects):
-        return modbus_link.DeviceObjects(*meant)
+        return link.DeviceObjects(*meant)
     return meant
 
 
@@ -130,7 +123,7 @@ def _said(meant: Meaning | None) -> object:
 
 
 def _on_a_line(
-    reader_of: Callable[[modbus_pdu.Request[Any]], AnswerReader[Any]],
+    reader_of: Callable[[pdu.Request[Any]], AnswerReader[Any]],
     seal: Callable[[bytes], bytes],
     open_frame: Callable[[bytes], bytes | None],
 ) -> Case:
@@ -225,7 +218,7 @@ def _tcp(random: Random, frames: int) -> None:
 
         stream, _, came = _stream(asked, random, mutator, seal, min(_FEW, frames))
         frames -= came
-        reader = modbus_tcp.FrameReader()
+        reader = tcp.FrameReader()
         found = []
         for piece in mutator.pieces(stream):
             found += reader.feed(piece)
@@ -242,7 +235,7 @@ def _understand(asked: Asked, message: bytes) -> None:
     """Judge what is made of a whole message."""
     meant = judges.meaning(asked, message)
     try:
-        answer = modbus_pdu.understand(_request(asked), message)
+        answer = pdu.understand(_request(asked), message)
     except Refused as refused:
         assert meant == Refusal(refused.code), f'{refused!r} instead of {meant!r}'
     else:
@@ -266,22 +259,22 @@ def _identify(random: Random, frames: int) -> None:
         unit = random.choice((1, 5))
         questions = 0
 
-        def ask(request: modbus_pdu.Request[Any]) -> tuple[object, float]:
+        def ask(request: pdu.Request[Any]) -> tuple[object, float]:
             nonlocal questions
             questions += 1
             assert questions <= _MOST_QUESTIONS, 'it never ends'
             asked = Asked(request.unit, request.function)
-            if isinstance(request, modbus_link.ReadDevice):
+            if isinstance(request, link.ReadDevice):
                 asked = asked._replace(place=request.first, count=request.code)
             message = _answer(asked, random)
             if random.random() < 0.6:
                 message = mutator.frame(message, [message, mutator.rubbish()], bytes)
-            answer = modbus_pdu.understand(request, message)
+            answer = pdu.understand(request, message)
             if answer is None:
                 raise NoAnswer
             return answer, 0.0
 
-        for text in vars(followed(modbus_link.questions(unit, ask))).values():
+        for text in vars(followed(link.questions(unit, ask))).values():
             assert text.isprintable(), f'{text!r} would come into a log'
         frames -= questions
 
@@ -478,7 +471,7 @@ _MOVITRAC_ANSWERS: Mapping[str, Callable[[judges.Movitrac], movitrac.Message]] =
 #: Every decoder of bytes that the driver has.
 LINK_CASES: Mapping[str, Case] = {
     'rtu': _on_a_line(rtu.RtuReader, judges.seal_rtu, judges.rtu_message),
-    'ascii': _on_a_line(modbus_ascii.AsciiReader, judges.seal_ascii, judges.ascii_message),
+    'ascii': _on_a_line(ascii.AsciiReader, judges.seal_ascii, judges.ascii_message),
     'tcp': _tcp,
     'pdu': _messages,
     'identify': _identify,

@@ -16,9 +16,9 @@ from rclpy.parameter import Parameter
 
 from nfo_sinus_driver.drive import Drive
 from nfo_sinus_driver.node.__main__ import main
-from nfo_sinus_driver.node.drive_node import DriveNode
-from nfo_sinus_driver.node.reporter import Reporter
-from nfo_sinus_driver.node.setpoints import Setpoints
+from nfo_sinus_driver.node.drive.drive_node import DriveNode
+from nfo_sinus_driver.node.drive.reporter import Reporter
+from nfo_sinus_driver.node.drive.setpoints import Setpoints
 
 #: The parameter that cannot be set.
 PARAMETER = 'frame_id'

@@ -33,8 +33,8 @@ from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.simulator.family import every_option
 
 _MODULES = (
-    'nfo_sinus_driver.link.rtu',
-    'nfo_sinus_driver.node.main',
+    'nfo_sinus_driver.link.modbus.rtu',
+    'nfo_sinus_driver.node.process.main',
     'nfo_sinus_driver.simulator.main',
     'numpy',
     'rosidl_generator_py',
@@ -153,7 +153,7 @@ def _become(command: list[str], environment: dict[str, str], log: str) -> None:
     # to the log itself, whatever becomes of the output
     faulthandler.register(TELL_STACKS, os.dup(1))
     if PLC_TIME in environment:
-        importlib.import_module('nfo_sinus_driver.link.telegram').PLC_TIME = float(
+        importlib.import_module('nfo_sinus_driver.link.plc.telegram').PLC_TIME = float(
             environment[PLC_TIME]
         )
     sys.argv = command

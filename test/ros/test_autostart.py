@@ -13,8 +13,8 @@ import rclpy
 from rclpy.lifecycle import LifecycleNode
 from rclpy.signals import SignalHandlerOptions
 
-from nfo_sinus_driver.node import lifecycle
-from nfo_sinus_driver.node.lifecycle import Lifecycle
+from nfo_sinus_driver.node.drive import lifecycle
+from nfo_sinus_driver.node.drive.lifecycle import Lifecycle
 
 #: Far longer than anything here takes, s.
 PATIENCE = 20.0

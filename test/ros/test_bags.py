@@ -25,7 +25,7 @@ from std_srvs.srv import SetBool
 
 from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.recorded import drives_in, read
-from nfo_sinus_driver.node.qos import LATCHED, NEWEST, RELIABLE
+from nfo_sinus_driver.node.ros.qos import LATCHED, NEWEST, RELIABLE
 
 MODULES = ('bags_rosbag2', 'bags_rosbags')
 STAND_INS = Path(__file__).with_name('stand_ins')

@@ -13,7 +13,7 @@ import pytest
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-from nfo_sinus_driver.node.callers import Call
+from nfo_sinus_driver.node.drive.callers import Call
 
 
 @pytest.mark.parametrize('error', [rclpy_implementation.RCLError('x'), InvalidHandle('x')])

@@ -19,8 +19,8 @@ from topic_hardware import Component, Hardware, components
 import yaml
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.node.messages import Joint
-from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
+from nfo_sinus_driver.node.messages.messages import Joint
+from nfo_sinus_driver.node.parameters.settings import BUS_SETTINGS, DRIVE_SETTINGS
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _CONFIG = Path(__file__).parents[2] / 'config'

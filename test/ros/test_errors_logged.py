@@ -14,7 +14,7 @@ from failing_driver import PARAMETER
 from std_msgs.msg import Float32
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.node.log_limit import PERIOD
+from nfo_sinus_driver.node.ros.log_limit import PERIOD
 
 _FAILING = str(Path(__file__).with_name('failing_driver.py'))
 #: What comes with every message: what is logged of it, and the text of the exception.

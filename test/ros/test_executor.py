@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.node.executor import NodeExecutor
+from nfo_sinus_driver.node.ros.executor import NodeExecutor
 
 # as rclpy says it
 _DROPPED = 'failed to send response (timeout): client will not receive response'

@@ -22,7 +22,7 @@ from std_srvs.srv import SetBool
 from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.record import plot
 from nfo_sinus_driver.demo.recorded import read
-from nfo_sinus_driver.node.qos import RELIABLE
+from nfo_sinus_driver.node.ros.qos import RELIABLE
 
 _DRIVE = '/line1/infeed'
 _BEGAN = 1_700_000_000

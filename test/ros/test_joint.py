@@ -22,8 +22,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.drive import Snapshot
-from nfo_sinus_driver.drive.identity import Identity
-from nfo_sinus_driver.node.messages import Joint, require_whole
+from nfo_sinus_driver.drive.known.identity import Identity
+from nfo_sinus_driver.node.messages.messages import Joint, require_whole
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _RADIANS = 2 * math.pi

@@ -16,8 +16,8 @@ import pytest
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.demo.bench import own_domain
-from nfo_sinus_driver.node.qos import RELIABLE
-from nfo_sinus_driver.node.settings import DRIVE_SETTINGS
+from nfo_sinus_driver.node.parameters.settings import DRIVE_SETTINGS
+from nfo_sinus_driver.node.ros.qos import RELIABLE
 
 
 @pytest.fixture

@@ -19,8 +19,8 @@ import pytest
 from std_srvs.srv import SetBool, Trigger
 from support.wire import understand
 
-from nfo_sinus_driver.node import executor
-from nfo_sinus_driver.node.commands import CALLS_OF_ENABLE
+from nfo_sinus_driver.node.drive.commands import CALLS_OF_ENABLE
+from nfo_sinus_driver.node.ros import executor
 
 _REFUSING = ('--stop-in-tuning', 'refused')
 #: How a person, a manager of lifecycles or a script stops a drive.
@@ -262,8 +262,8 @@ from concurrent.futures import Future
 import rclpy
 from types import SimpleNamespace
 from nfo_sinus_driver.drive import Cause, Drive, DriveError, Report
-from nfo_sinus_driver.node.bus_node import BusNode
-from nfo_sinus_driver.node.drive_node import DriveNode
+from nfo_sinus_driver.node.line.bus_node import BusNode
+from nfo_sinus_driver.node.drive.drive_node import DriveNode
 
 not_in_time = Future()
 unanswered = Report(Cause.STOP_UNCONFIRMED, why=Report(Cause.NO_ANSWER_YET))

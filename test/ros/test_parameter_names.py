@@ -10,8 +10,8 @@ from collections.abc import Mapping
 import pytest
 
 from nfo_sinus_driver.catalog import families, load_family
-from nfo_sinus_driver.node.parameter_names import did_you_mean
-from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
+from nfo_sinus_driver.node.parameters.parameter_names import did_you_mean
+from nfo_sinus_driver.node.parameters.settings import BUS_SETTINGS, DRIVE_SETTINGS
 from nfo_sinus_driver.setting import Setting
 
 #: What rclpy declares for each node.

@@ -15,7 +15,7 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
-from nfo_sinus_driver.node import rclpy_internals
+from nfo_sinus_driver.node.ros import rclpy_internals
 
 FOLDER = Path(rclpy_internals.__file__).parent
 

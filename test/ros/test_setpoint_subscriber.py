@@ -15,8 +15,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float32, Float64
 
-from nfo_sinus_driver.node.graph_watch import PERIOD
-from nfo_sinus_driver.node.setpoint_subscriber import SetpointSubscriber
+from nfo_sinus_driver.node.drive.graph_watch import PERIOD
+from nfo_sinus_driver.node.drive.setpoint_subscriber import SetpointSubscriber
 
 
 @pytest.fixture

@@ -86,7 +86,7 @@ def test_a_driver_outlives_a_parent_that_is_not_ros2(bench: Bench) -> None:
     assert 'SIGTERM: stopping the motors' in shell.text
 
 
-@pytest.mark.parametrize('module', ['rclpy', 'nfo_sinus_driver.node.drive_node'])
+@pytest.mark.parametrize('module', ['rclpy', 'nfo_sinus_driver.node.drive.drive_node'])
 def test_a_signal_while_it_is_still_loading_ends_it_cleanly(bench: Bench, module: str) -> None:
     bench.simulator(paced=True)
     code = _SIGNALLED.replace('MODULE', repr(module))

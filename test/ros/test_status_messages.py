@@ -22,9 +22,9 @@ from std_msgs.msg import Float32, Header
 
 from nfo_sinus_driver.catalog import Kind, families, load_profile
 from nfo_sinus_driver.drive import StopReason
-from nfo_sinus_driver.node.messages import drive_status, error_log_entry
-from nfo_sinus_driver.node.reporter import Reporter
-from nfo_sinus_driver.node.serialized import Stamped, float32
+from nfo_sinus_driver.node.drive.reporter import Reporter
+from nfo_sinus_driver.node.messages.messages import drive_status, error_log_entry
+from nfo_sinus_driver.node.messages.serialized import Stamped, float32
 
 #: What a field of 32 bits may hold: rclpy's limit has ten digits, and refuses the greatest itself.
 FLOATS = st.floats(width=32).filter(lambda value: not 3.4028234e38 < abs(value) < math.inf)

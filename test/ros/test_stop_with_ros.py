@@ -23,7 +23,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.node.other_lines import OtherLines
+from nfo_sinus_driver.node.drive.other_lines import OtherLines
 from nfo_sinus_driver.simulator.control import Client as Simulated
 
 _TWO = """

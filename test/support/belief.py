@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from nfo_sinus_driver.link import classic, movitrac
 from nfo_sinus_driver.link.interface import Refused, Reply
+from nfo_sinus_driver.link.pairs import classic, movitrac
 from support.rig import Rig
 
 #: Whether a parameter was read, which, and the data that were answered, or nothing where it was

@@ -37,7 +37,7 @@ import math
 from typing import Any
 
 from nfo_sinus_driver.drive import Cause, Snapshot
-from nfo_sinus_driver.link.movitrac import LONGEST_RESPONSE_TIME
+from nfo_sinus_driver.link.pairs.movitrac import LONGEST_RESPONSE_TIME
 from support.rig import Asked, Rig
 from support.said import says
 from support.stops import takes_run_away

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from nfo_sinus_driver.catalog import Role, load_family
-from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
+from nfo_sinus_driver.drive.known.settings import AS_THE_DRIVE_CAN
 from support.rig import CONNECTIONS, Rig
 from support.variants import stopping_at_timeout
 

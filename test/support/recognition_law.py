@@ -15,15 +15,7 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping
 import math
 
-from nfo_sinus_driver.link import (
-    MAILBOX,
-    Address,
-    LinkError,
-    NotReady,
-    NotSent,
-    PortError,
-    Refused,
-)
+from nfo_sinus_driver.link import MAILBOX, Address, LinkError, NotReady, NotSent, PortError, Refused
 
 #: So long a silence lets one drive be exchanged for another, s, and how late the driver may see it.
 _EXCHANGE, _LATE = 3.0, 0.5

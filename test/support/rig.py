@@ -31,7 +31,7 @@ from nfo_sinus_driver.drive import (
     Snapshot,
     Telemetry,
 )
-from nfo_sinus_driver.drive.memory import Memory, ProcessMemory
+from nfo_sinus_driver.drive.change.memory import Memory, ProcessMemory
 from nfo_sinus_driver.link import Address, LinkError, Refused, Reply
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from support import golden, telegram_laws, trace_laws

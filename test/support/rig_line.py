@@ -12,11 +12,11 @@ from random import Random
 from typing import Any
 
 from nfo_sinus_driver.link import BusSettings, PortError
-from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.canopen.lawicel import LawicelPort
+from nfo_sinus_driver.link.canopen.link import CanopenLink
 from nfo_sinus_driver.link.interface import Link
-from nfo_sinus_driver.link.lawicel import LawicelPort
-from nfo_sinus_driver.link.modbus_tcp import TcpLink
-from nfo_sinus_driver.link.movitrac import LONGEST_RESPONSE_TIME
+from nfo_sinus_driver.link.modbus.tcp import TcpLink
+from nfo_sinus_driver.link.pairs.movitrac import LONGEST_RESPONSE_TIME
 from nfo_sinus_driver.link.protocols import link_class, protocol_of
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
 from nfo_sinus_driver.simulator.endpoints import Endpoint

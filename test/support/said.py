@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from nfo_sinus_driver.drive import Cause, DriveError, Event, Report, Tuned
-from nfo_sinus_driver.drive.events import Calls, sentence
+from nfo_sinus_driver.drive.known.events import Calls, sentence
 
 CALLS = Calls(
     acknowledge='call ~/fault_ack',

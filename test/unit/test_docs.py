@@ -14,7 +14,7 @@ import runpy
 import pytest
 from support.places import MSG_DEFS, ROOT
 
-from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
+from nfo_sinus_driver.node.parameters.settings import BUS_SETTINGS, DRIVE_SETTINGS
 from nfo_sinus_driver.simulator.main import _inject_parser, _parser
 
 PACKAGE = ROOT / 'nfo_sinus_driver'

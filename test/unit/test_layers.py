@@ -34,7 +34,7 @@ CHANGES = {
 #: What has a bus write something, or what has an effect; and who may use it: they ask before
 #: whether the drive was recognised.
 SENDS = {'Ask', 'ReadThenWrite', 'Write', 'WriteAndRead', 'Written'}
-GATES = ['drive/broadcast.py', 'drive/parameter_access.py', 'drive/setpoint.py']
+GATES = ['drive/broadcast.py', 'drive/known/parameter_access.py', 'drive/motion/setpoint.py']
 
 LICENCE = re.compile(
     r'(#!.*\n)?(#|//|\(\*) Copyright 20\d\d The nfo_sinus_driver authors((?: \*\))?)\n'

@@ -17,7 +17,7 @@ from test_docs import fields, headings, read, topics_and_services
 from nfo_sinus_driver.catalog import Family, load_family
 from nfo_sinus_driver.cli.main import VERBS
 from nfo_sinus_driver.cli.parameter_file import readable
-from nfo_sinus_driver.node.settings import BUS_SETTINGS, DRIVE_SETTINGS
+from nfo_sinus_driver.node.parameters.settings import BUS_SETTINGS, DRIVE_SETTINGS
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / 'docs'

@@ -52,7 +52,7 @@ def read(name: str) -> str:
 
 def longest_end(shutdown_timeout: float) -> float:
     """How long the driver may take from the signal to its end, s."""
-    main = read('nfo_sinus_driver/node/main.py')
+    main = read('nfo_sinus_driver/node/process/main.py')
     waits = dict(re.findall(r'^(_LAST_\w+) = ([\d.]+)', main, re.MULTILINE))
     closing = inspect.signature(Bus.close).parameters['timeout'].default
     # the stop, then the release; then the bus, the queue, the set-points, the callbacks and the

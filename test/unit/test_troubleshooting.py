@@ -29,7 +29,7 @@ NEVER_SHOWN = {
     *(f'catalog/{name}.py' for name in ('codec', 'family', 'table')),
     *(f'catalog/declared/{name}.py' for name in ('register_map', 'yaml_file')),
     *(f'link/{name}.py' for name in ('classic', 'lawicel', 'movitrac', 'sdo')),
-    *('drive/drive_state.py', 'drive/setpoint.py', 'node/messages.py'),
+    *('drive/known/drive_state.py', 'drive/motion/setpoint.py', 'node/messages/messages.py'),
 }
 REFUSALS = {(str(Refused(n)),) for n in (1, 2, 3, 4, 5, 6, 8, 10, 11)}
 Parts = tuple[str, ...]

@@ -13,16 +13,7 @@ import pytest
 from support.addresses import packed
 from support.places import MSG_DEFS
 
-from nfo_sinus_driver.catalog import (
-    Fact,
-    Family,
-    Kind,
-    Meaning,
-    Role,
-    State,
-    families,
-    load_family,
-)
+from nfo_sinus_driver.catalog import Fact, Family, Kind, Meaning, Role, State, families, load_family
 from nfo_sinus_driver.families.movitrac31 import words as movitrac
 from nfo_sinus_driver.families.sinus_g2 import words as g2
 from nfo_sinus_driver.families.sinus_optimal import words as optimal

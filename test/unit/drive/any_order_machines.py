@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 
 from nfo_sinus_driver.drive import Procedure
-from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
+from nfo_sinus_driver.drive.known.settings import AS_THE_DRIVE_CAN
 from nfo_sinus_driver.simulator.family import load
 from nfo_sinus_driver.simulator.movitrac31.commands import CONTROL_MODE, FUNCTION_BITS, SETPOINT
 from nfo_sinus_driver.simulator.movitrac31.parameters import Bit, Mode

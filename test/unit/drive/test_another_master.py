@@ -14,9 +14,10 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause, Snapshot
-from nfo_sinus_driver.link import classic, modbus_ascii, movitrac, rtu
-from nfo_sinus_driver.link.modbus_link import ReadDevice, ReportSlaveId
-from nfo_sinus_driver.link.modbus_pdu import Read, Write, read_of
+from nfo_sinus_driver.link.modbus import ascii, rtu
+from nfo_sinus_driver.link.modbus.link import ReadDevice, ReportSlaveId
+from nfo_sinus_driver.link.modbus.pdu import Read, Write, read_of
+from nfo_sinus_driver.link.pairs import classic, movitrac
 
 SECONDS = 40.0
 
@@ -28,7 +29,7 @@ def _classic(unit: int, address: Any) -> bytes:
 #: How another master asks a drive for a parameter.
 ENCODE: dict[str, Callable[[int, Any], bytes]] = {
     'rtu': lambda unit, address: rtu.encode(read_of(unit, address)),
-    'ascii': lambda unit, address: modbus_ascii.encode(read_of(unit, address)),
+    'ascii': lambda unit, address: ascii.encode(read_of(unit, address)),
     'classic': _classic,
     'classic v5.0': _classic,
     'movitrac': lambda unit, address: movitrac.encode(movitrac.Enquiry(unit, address.index)),
@@ -86,7 +87,7 @@ def test_a_master_that_asks_what_the_drive_is_is_another_master(
 ) -> None:
     with Rig(connection, poll_rate=5.0) as rig:
         rig.turn()
-        encode = rtu.encode if connection == 'rtu' else modbus_ascii.encode
+        encode = rtu.encode if connection == 'rtu' else ascii.encode
         rig.line.another_asks(encode(request_), 0.5)
         require_truth(rig, connection)
 
@@ -96,7 +97,7 @@ def test_no_reading_and_no_refusal_of_another_master_is_taken_for_ours(
     connection: str, rate: float
 ) -> None:
     nowhere = 0xEEE0
-    encode = rtu.encode if connection == 'rtu' else modbus_ascii.encode
+    encode = rtu.encode if connection == 'rtu' else ascii.encode
     random = Random(1)
     rig = Rig(connection, line={'turnaround': 0.02}, poll_rate=10.0)
     rig.turn()

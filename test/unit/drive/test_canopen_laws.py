@@ -13,7 +13,7 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause, Event, Severity
-from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
+from nfo_sinus_driver.drive.known.settings import AS_THE_DRIVE_CAN
 from nfo_sinus_driver.simulator.can_frames import Frame
 from nfo_sinus_driver.simulator.canopen import Server
 

@@ -17,8 +17,9 @@ from any_order_machines import G2ModeScmd
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.drive import Procedure, control_state
-from nfo_sinus_driver.drive.control_state import TRANSITIONS, ControlEvent, ControlState
+from nfo_sinus_driver.drive import Procedure
+from nfo_sinus_driver.drive.known import control_state
+from nfo_sinus_driver.drive.known.control_state import TRANSITIONS, ControlEvent, ControlState
 
 Row = tuple[ControlState, ControlEvent]
 

@@ -19,14 +19,14 @@ from typing import NamedTuple
 
 import pytest
 
-from nfo_sinus_driver.drive.control_state import (
+from nfo_sinus_driver.drive.known.control_state import (
     COMMANDED,
     TRANSITIONS,
     ControlEvent as Event,
     ControlState as State,
     ControlTable,
 )
-from nfo_sinus_driver.drive.exclusive_access import ExclusiveAccess
+from nfo_sinus_driver.drive.known.exclusive_access import ExclusiveAccess
 
 _Table = Mapping[tuple[State, Event], State]
 

@@ -15,7 +15,7 @@ import yaml
 
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.drive import Cause, Severity, StopReason
-from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
+from nfo_sinus_driver.drive.known.settings import AS_THE_DRIVE_CAN
 from nfo_sinus_driver.simulator.memory import Refused
 
 #: A drive without peculiarities; of each odd one, what is otherwise.

@@ -16,8 +16,8 @@ from support.variants import shipped
 
 from nfo_sinus_driver.catalog import Kind, Role
 from nfo_sinus_driver.drive import Cause, DriveSettings, Severity
-from nfo_sinus_driver.drive.diagnosis import explain
-from nfo_sinus_driver.drive.events import Report
+from nfo_sinus_driver.drive.known.diagnosis import explain
+from nfo_sinus_driver.drive.known.events import Report
 from nfo_sinus_driver.families.sinus_g2.words import Mode
 from nfo_sinus_driver.link import PROTOCOLS, NoAnswer
 from nfo_sinus_driver.setting import settings_of

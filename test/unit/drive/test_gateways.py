@@ -17,7 +17,7 @@ import pytest
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause, DriveError
-from nfo_sinus_driver.link.tcp_connection import Connection
+from nfo_sinus_driver.link.ports.tcp_connection import Connection
 
 
 def muted(rig: Rig) -> None:

@@ -24,7 +24,7 @@ from support.said import raises
 from nfo_sinus_driver import families
 from nfo_sinus_driver.catalog import CatalogError, load_family
 from nfo_sinus_driver.drive import Cause, DriveSettings
-from nfo_sinus_driver.drive.settings import AUTO
+from nfo_sinus_driver.drive.known.settings import AUTO
 
 MADE_UP = Path(__file__).parent / 'made_up'
 PATIENT, SOURCE, BITS, SIZE, STATUS, INPUTS, HERTZ, TURNS = 11, 12, 100, 102, 400, 402, 403, 404

@@ -8,8 +8,8 @@ from __future__ import annotations
 from support.rig import Rig
 
 from nfo_sinus_driver.catalog.profile import Steps
-from nfo_sinus_driver.drive.control_state import ControlState
-from nfo_sinus_driver.drive.events import Cause, Report
+from nfo_sinus_driver.drive.known.control_state import ControlState
+from nfo_sinus_driver.drive.known.events import Cause, Report
 
 
 def test_a_drive_that_is_left_alone_while_it_runs_is_stopped() -> None:

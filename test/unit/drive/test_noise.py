@@ -13,7 +13,7 @@ import pytest
 from support.rig import CONNECTIONS, Rig
 from support.variants import stopping_at_timeout
 
-from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
+from nfo_sinus_driver.drive.known.settings import AS_THE_DRIVE_CAN
 
 #: The driver gave the motor up, whether or not it could say so to the drive.
 _ENDS = ('lost: ', 'stopped: ', 'stopping: ')

@@ -23,7 +23,7 @@ from support.said import raises, said
 from nfo_sinus_driver.catalog import Fact, Kind, Role
 from nfo_sinus_driver.drive import Cause, DriveError, Severity
 from nfo_sinus_driver.drive.broadcast import broadcast_stop
-from nfo_sinus_driver.drive.tuning import Procedure
+from nfo_sinus_driver.drive.change.tuning import Procedure
 from nfo_sinus_driver.families.sinus_g2.words import Scmd
 from nfo_sinus_driver.simulator.classic import LineError
 from nfo_sinus_driver.simulator.memory import Reason, Refused

@@ -20,8 +20,8 @@ from support.variants import ramps
 
 from nfo_sinus_driver.catalog import Role, Value, load_family
 from nfo_sinus_driver.drive import Cause, Severity, StopReason
-from nfo_sinus_driver.drive.memory import ProcessMemory
-from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
+from nfo_sinus_driver.drive.change.memory import ProcessMemory
+from nfo_sinus_driver.drive.known.settings import AS_THE_DRIVE_CAN
 from nfo_sinus_driver.state_folder import StateFolder
 
 #: How soon after its time-out a motor has to stand, s.

@@ -17,8 +17,8 @@ from support.variants import ramps
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive import Cause, Severity
-from nfo_sinus_driver.drive.parameter_writer import ParameterError
-from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.drive.change.parameter_writer import ParameterError
+from nfo_sinus_driver.drive.change.parameters import Parameters
 from nfo_sinus_driver.link import Refused
 
 ACCEL, RETARD, FIX = 'control.accel', 'control.retard', 'freque.f_fix1'

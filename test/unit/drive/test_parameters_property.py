@@ -14,7 +14,7 @@ from support.rig import Rig
 from support.said import said
 
 from nfo_sinus_driver.catalog import Value
-from nfo_sinus_driver.drive.parameter_writer import ParameterError
+from nfo_sinus_driver.drive.change.parameter_writer import ParameterError
 from nfo_sinus_driver.link import Refused
 
 #: What the drive has, what is wanted, and what it has where it keeps another value.

@@ -17,7 +17,7 @@ from support.variants import ramps
 
 from nfo_sinus_driver.catalog import Value
 from nfo_sinus_driver.drive import Cause, DriveError, Severity
-from nfo_sinus_driver.drive.parameters import Parameters
+from nfo_sinus_driver.drive.change.parameters import Parameters
 from nfo_sinus_driver.link import Refused
 
 #: A change at the keypad is seen within a round, s.

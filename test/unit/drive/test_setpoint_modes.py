@@ -13,7 +13,7 @@ from support.rig import Rig
 
 from nfo_sinus_driver.catalog import Fact
 from nfo_sinus_driver.drive import Cause, Severity
-from nfo_sinus_driver.drive.settings import AS_THE_DRIVE_CAN
+from nfo_sinus_driver.drive.known.settings import AS_THE_DRIVE_CAN
 
 
 @dataclass(frozen=True)

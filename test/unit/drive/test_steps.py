@@ -20,8 +20,8 @@ from nfo_sinus_driver.catalog.profile import (
     Until,
     Write,
 )
-from nfo_sinus_driver.drive.drive_state import DriveState
-from nfo_sinus_driver.drive.steps import carry_out
+from nfo_sinus_driver.drive.known.drive_state import DriveState
+from nfo_sinus_driver.drive.known.steps import carry_out
 
 
 class Noted:

@@ -15,7 +15,7 @@ from support.rig import Rig
 from support.said import raises
 
 from nfo_sinus_driver.drive import Cause, DriveSettings
-from nfo_sinus_driver.drive.settings import REFERENCES
+from nfo_sinus_driver.drive.known.settings import REFERENCES
 from nfo_sinus_driver.families.sinus_g2.words import Mode, Scmd
 from nfo_sinus_driver.families.sinus_optimal.words import Smode
 

@@ -20,7 +20,7 @@ from support.telegram_laws import words
 from support.variants import ramps
 
 from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.link.telegram import PLC_TIME
+from nfo_sinus_driver.link.plc.telegram import PLC_TIME
 from nfo_sinus_driver.simulator.plc import Channel, Plc
 
 #: Of each family: the option by which a drive goes on by what stands in a telegram.

@@ -14,12 +14,13 @@ from support.belief import Judge
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause
-from nfo_sinus_driver.link import classic, modbus_ascii, rtu
-from nfo_sinus_driver.link.modbus_link import ReportSlaveId
-from nfo_sinus_driver.link.modbus_pdu import Read, ReadInput, Write
+from nfo_sinus_driver.link.modbus import ascii, rtu
+from nfo_sinus_driver.link.modbus.link import ReportSlaveId
+from nfo_sinus_driver.link.modbus.pdu import Read, ReadInput, Write
+from nfo_sinus_driver.link.pairs import classic
 
 ENCODE: dict[str, Callable[[Any], bytes]] = {
-    'rtu': rtu.encode, 'ascii': modbus_ascii.encode, 'classic': classic.encode,
+    'rtu': rtu.encode, 'ascii': ascii.encode, 'classic': classic.encode,
 }
 #: Where no drive has anything; the first two begin as the length of an answer does.
 NOWHERE = (0x0201, 0x0301, 0xEEE0)

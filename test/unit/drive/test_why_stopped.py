@@ -15,7 +15,7 @@ from support.said import said
 from support.variants import ramps
 
 from nfo_sinus_driver.drive import Cause, Drive, Procedure, Report, StopReason
-from nfo_sinus_driver.drive.stop_reason import reason_of
+from nfo_sinus_driver.drive.known.stop_reason import reason_of
 
 _SPEED = 20.0
 _BY = '/teach_pendant'

@@ -18,8 +18,8 @@ from support.said import CALLS
 from nfo_sinus_driver.catalog import families, load_family
 from nfo_sinus_driver.cli import console as cli
 from nfo_sinus_driver.drive import Cause, Report
-from nfo_sinus_driver.drive.changes import ParameterChange
-from nfo_sinus_driver.drive.events import sentence
+from nfo_sinus_driver.drive.known.changes import ParameterChange
+from nfo_sinus_driver.drive.known.events import sentence
 from nfo_sinus_driver.link import PROTOCOLS
 
 PACKAGE = Path(__file__).resolve().parents[3] / 'nfo_sinus_driver'

@@ -17,7 +17,7 @@ from support.steps import REFUSED, play
 
 from nfo_sinus_driver.catalog import Holder, Limits, NotPossible, Refusal, Removal, load_family
 from nfo_sinus_driver.catalog.profile import FAULT_GONE, Read, Write
-from nfo_sinus_driver.drive.snapshot import InverterStatus
+from nfo_sinus_driver.drive.known.snapshot import InverterStatus
 from nfo_sinus_driver.families.movitrac31 import words
 
 MOVITRAC = load_family('movitrac31')

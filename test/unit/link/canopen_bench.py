@@ -15,8 +15,8 @@ import line_bench
 from support import golden
 from virtual_wire import DROP, GOOD, Asked, Fate
 
-from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.canopen.can import Frame
+from nfo_sinus_driver.link.canopen.link import CanopenLink
 from nfo_sinus_driver.link.interface import Address, LineSettings, Reply
 
 TIMEOUT = 0.2

@@ -9,7 +9,7 @@ import pymodbus_opinion as opinion
 from support.addresses import words_of
 
 from nfo_sinus_driver.link.interface import Identification
-from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+from nfo_sinus_driver.link.modbus.pdu import WriteAndRead
 
 if opinion.OLD:
     from pymodbus import mei_message, other_message

@@ -17,7 +17,6 @@ from support.addresses import classic_id, packed, register, words_of
 from virtual_wire import AsciiWire, Asked, FarEnd, Fate, Wire
 
 from nfo_sinus_driver.catalog import Access, load_family
-from nfo_sinus_driver.link.classic import ClassicLink
 from nfo_sinus_driver.link.interface import (
     Address,
     LineSettings,
@@ -26,10 +25,11 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Reply,
 )
-from nfo_sinus_driver.link.modbus_ascii import AsciiLink
-from nfo_sinus_driver.link.movitrac import MovitracLink
+from nfo_sinus_driver.link.modbus.ascii import AsciiLink
+from nfo_sinus_driver.link.modbus.rtu import RtuLink
+from nfo_sinus_driver.link.pairs.classic import ClassicLink
+from nfo_sinus_driver.link.pairs.movitrac import MovitracLink
 from nfo_sinus_driver.link.request_link import RequestLink
-from nfo_sinus_driver.link.rtu import RtuLink
 
 UNIT = 1
 

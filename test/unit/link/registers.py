@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from nfo_sinus_driver.link.mailbox import Exchange
-from nfo_sinus_driver.link.modbus_link import ModbusLink
+from nfo_sinus_driver.link.modbus.link import ModbusLink
+from nfo_sinus_driver.link.plc.mailbox import Exchange
 
 
 def exchange_by(ask: Callable[[Any], tuple[bytes, float]]) -> Exchange:

@@ -15,10 +15,12 @@ import pytest
 from support.addresses import packed
 from virtual_wire import DROP, Fate
 
-from nfo_sinus_driver.link import classic, interface, modbus_ascii, movitrac, rtu
+from nfo_sinus_driver.link import interface
 from nfo_sinus_driver.link.interface import Address, DamagedAnswer, carry_out
-from nfo_sinus_driver.link.modbus_link import ReportSlaveId
-from nfo_sinus_driver.link.modbus_pdu import Read, Write
+from nfo_sinus_driver.link.modbus import ascii, rtu
+from nfo_sinus_driver.link.modbus.link import ReportSlaveId
+from nfo_sinus_driver.link.modbus.pdu import Read, Write
+from nfo_sinus_driver.link.pairs import classic, movitrac
 
 A, B, C = Rtu.A, Rtu.B, Rtu.C
 OTHER_VALUE = bytes.fromhex('000000aa')
@@ -79,7 +81,7 @@ FOREIGN = {
     'writes what is not there': Write(UNIT, NOWHERE, b'\0\1'),
     'writes several that are not there': Write(UNIT, NOWHERE, b'\0\1\0\2'),
 }
-LINKS = {'rtu': (Rtu, rtu.encode), 'ascii': (Ascii, modbus_ascii.encode)}
+LINKS = {'rtu': (Rtu, rtu.encode), 'ascii': (Ascii, ascii.encode)}
 
 
 class SharedLine:

@@ -21,11 +21,11 @@ from typing import Any
 from canopen_far_end import Server
 import pytest
 
-from nfo_sinus_driver.link import can
-from nfo_sinus_driver.link.can import Frame, SocketCan
-from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.canopen import can
+from nfo_sinus_driver.link.canopen.can import Frame, SocketCan
+from nfo_sinus_driver.link.canopen.lawicel import LawicelPort
+from nfo_sinus_driver.link.canopen.link import CanopenLink
 from nfo_sinus_driver.link.interface import Address, LineSettings, NoAnswer, PortError, Refused
-from nfo_sinus_driver.link.lawicel import LawicelPort
 
 REQUEST = Frame(0x605, bytes.fromhex('4013200000000000'))
 ANSWER = Frame(0x585, bytes.fromhex('4B13200011220000'))

@@ -24,8 +24,8 @@ from canopen_bench import (
 import pytest
 from support.plans import followed
 
-from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.canopen.can import Frame
+from nfo_sinus_driver.link.canopen.link import CanopenLink
 from nfo_sinus_driver.link.interface import (
     DamagedAnswer,
     Identification,

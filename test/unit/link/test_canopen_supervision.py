@@ -14,8 +14,8 @@ import pytest
 from support.plans import followed
 
 from nfo_sinus_driver.link import Address, DamagedAnswer, NoAnswer, Reply, carry_out
-from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.canopen_supervision import GUARDING_MEANS, HEARTBEAT_MEANS
+from nfo_sinus_driver.link.canopen.can import Frame
+from nfo_sinus_driver.link.canopen.supervision import GUARDING_MEANS, HEARTBEAT_MEANS
 
 BEAT = Frame(0x77F, b'\x05')
 GUARD = Frame(0x705, b'\0', remote=True)

@@ -9,7 +9,16 @@ import classic_far_end as far
 from hypothesis import assume, example, given, strategies as st
 import pytest
 
-from nfo_sinus_driver.link.classic import Ack, Enquiry, Message, Nak, Reader, Select, Value, encode
+from nfo_sinus_driver.link.pairs.classic import (
+    Ack,
+    Enquiry,
+    Message,
+    Nak,
+    Reader,
+    Select,
+    Value,
+    encode,
+)
 
 #: [M0 §6.1.3]: "A SELECT message to address 1 which gives parameter 25 the value of 100".
 WORKED_EXAMPLE = '04H 21H 02H 45H 30H 30H 31H 39H 3DH 30H 30H 36H 34H 03H 71H'

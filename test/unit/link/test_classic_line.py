@@ -15,7 +15,6 @@ import pytest
 from support.addresses import classic_id, packed
 from virtual_wire import DROP, REFUSE, Fate
 
-from nfo_sinus_driver.link.classic import ClassicLink, Enquiry, encode
 from nfo_sinus_driver.link.interface import (
     BAUD_RATES,
     DamagedAnswer,
@@ -24,6 +23,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     carry_out,
 )
+from nfo_sinus_driver.link.pairs.classic import ClassicLink, Enquiry, encode
 
 A, B, MODE = Classic.A, Classic.B, Classic.MODE
 TIMEOUT = Classic.settings.response_timeout

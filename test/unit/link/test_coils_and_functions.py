@@ -12,7 +12,7 @@ from __future__ import annotations
 import pytest
 
 from nfo_sinus_driver.link import Address, Refused
-from nfo_sinus_driver.link.modbus_pdu import encode, read_of, understand, write_of
+from nfo_sinus_driver.link.modbus.pdu import encode, read_of, understand, write_of
 
 COILS = Address('coil', 0x13, None, 3)
 INPUT = Address('input', 8, None, 2)

@@ -15,13 +15,13 @@ import pytest
 from support.addresses import classic_id, packed, register
 
 from nfo_sinus_driver.link import LinkError
-from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.canopen_link import CanopenLink
-from nfo_sinus_driver.link.classic import ClassicLink
+from nfo_sinus_driver.link.canopen.can import Frame
+from nfo_sinus_driver.link.canopen.link import CanopenLink
 from nfo_sinus_driver.link.interface import Address, LineSettings
-from nfo_sinus_driver.link.modbus_ascii import AsciiLink
-from nfo_sinus_driver.link.movitrac import MovitracLink
-from nfo_sinus_driver.link.rtu import RtuLink
+from nfo_sinus_driver.link.modbus.ascii import AsciiLink
+from nfo_sinus_driver.link.modbus.rtu import RtuLink
+from nfo_sinus_driver.link.pairs.classic import ClassicLink
+from nfo_sinus_driver.link.pairs.movitrac import MovitracLink
 
 SETTINGS = LineSettings(19200, '8N1', 0.1)
 #: How long it takes to have a byte, s: no longer than until the next is there.

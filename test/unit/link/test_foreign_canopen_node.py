@@ -10,8 +10,8 @@ from types import SimpleNamespace
 from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.canopen.can import Frame
+from nfo_sinus_driver.link.canopen.link import CanopenLink
 from nfo_sinus_driver.link.interface import Address, LineSettings, Refused
 
 canopen = pytest.importorskip('canopen', reason='canopen is not installed')

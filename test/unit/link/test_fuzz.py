@@ -9,7 +9,9 @@ from fuzz import campaign, decoders, judges
 from fuzz.campaign import CASE, CASES, Part
 import pytest
 
-from nfo_sinus_driver.link import classic, lawicel, modbus_ascii, modbus_pdu, movitrac, rtu, sdo
+from nfo_sinus_driver.link.canopen import lawicel, sdo
+from nfo_sinus_driver.link.modbus import ascii, pdu, rtu
+from nfo_sinus_driver.link.pairs import classic, movitrac
 
 #: Fixed, so that every run goes through the same.
 SEED = 11
@@ -43,7 +45,7 @@ def test_a_check_sum_that_is_not_checked_is_found(monkeypatch: pytest.MonkeyPatc
     assert _first('rtu', most=2) is None
     monkeypatch.setattr(rtu, 'crc', lambda data: AnyBytes())
     assert 'from a damaged frame' in _what('rtu')
-    monkeypatch.setattr(modbus_ascii, 'lrc', lambda data: AnyBytes())
+    monkeypatch.setattr(ascii, 'lrc', lambda data: AnyBytes())
     finding = _first('ascii')
     assert finding is not None and 'from a damaged frame' in finding.what
     # and can be gone through again
@@ -84,7 +86,7 @@ def test_what_a_can_bus_says_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_an_answer_that_is_not_measured_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    def understand(request: modbus_pdu.Request[object], message: bytes) -> object:
+    def understand(request: pdu.Request[object], message: bytes) -> object:
         return request.decode(message) if message.startswith(request.answer_head) else None
 
     monkeypatch.setattr(decoders.modbus_pdu, 'understand', understand)

@@ -26,7 +26,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Reply,
 )
-from nfo_sinus_driver.link.modbus_link import (
+from nfo_sinus_driver.link.modbus.link import (
     REGULAR,
     DeviceObjects,
     ReadDevice,
@@ -36,7 +36,7 @@ from nfo_sinus_driver.link.modbus_link import (
     serial_number,
     text,
 )
-from nfo_sinus_driver.link.modbus_pdu import Request
+from nfo_sinus_driver.link.modbus.pdu import Request
 
 TIMEOUT = Rtu.settings.response_timeout
 

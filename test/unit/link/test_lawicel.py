@@ -8,8 +8,8 @@ from __future__ import annotations
 from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.link.can import Frame
-from nfo_sinus_driver.link.lawicel import BIT_RATES, Output, Reader, bit_rate, encode
+from nfo_sinus_driver.link.canopen.can import Frame
+from nfo_sinus_driver.link.canopen.lawicel import BIT_RATES, Output, Reader, bit_rate, encode
 from nfo_sinus_driver.link.protocols import CANOPEN
 
 FRAMES = st.builds(Frame, st.integers(0, 0x7FF), st.binary(max_size=8), st.just(False))

@@ -26,12 +26,13 @@ from types import SimpleNamespace
 import pytest
 from support.addresses import packed, register
 
-from nfo_sinus_driver.link import open_link, serial_port
+from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.interface import BAUD_RATES, LineSettings, PortError
-from nfo_sinus_driver.link.modbus_pdu import Read
-from nfo_sinus_driver.link.rtu import crc, encode
-from nfo_sinus_driver.link.serial_port import SerialPort
-from nfo_sinus_driver.link.url_port import UrlPort
+from nfo_sinus_driver.link.modbus.pdu import Read
+from nfo_sinus_driver.link.modbus.rtu import crc, encode
+from nfo_sinus_driver.link.ports import serial_port
+from nfo_sinus_driver.link.ports.serial_port import SerialPort
+from nfo_sinus_driver.link.ports.url_port import UrlPort
 
 #: No honest wait here takes this long, on any machine, s.
 PATIENCE = 30.0

@@ -23,9 +23,9 @@ from nfo_sinus_driver.link import (
     PortError,
     Refused,
     Unconfirmed,
-    telegram,
 )
-from nfo_sinus_driver.link.modbus_pdu import Read, Write, WriteAndRead
+from nfo_sinus_driver.link.modbus.pdu import Read, Write, WriteAndRead
+from nfo_sinus_driver.link.plc import telegram
 
 START = 100
 ACCEL = Address('pnu', 1028, 1, 4, True, START)

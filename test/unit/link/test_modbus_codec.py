@@ -23,10 +23,10 @@ import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed, words_of
 
-from nfo_sinus_driver.link import modbus_ascii, modbus_pdu, rtu
 from nfo_sinus_driver.link.interface import Refused
-from nfo_sinus_driver.link.modbus_ascii import INTER_BYTE_TIMEOUT, AsciiReader
-from nfo_sinus_driver.link.modbus_link import (
+from nfo_sinus_driver.link.modbus import ascii, pdu, rtu
+from nfo_sinus_driver.link.modbus.ascii import INTER_BYTE_TIMEOUT, AsciiReader
+from nfo_sinus_driver.link.modbus.link import (
     BASIC,
     REGULAR,
     SPECIFIC,
@@ -34,8 +34,8 @@ from nfo_sinus_driver.link.modbus_link import (
     ReadDevice,
     ReportSlaveId,
 )
-from nfo_sinus_driver.link.modbus_pdu import AnswerReader, Read, Request, Write, WriteAndRead
-from nfo_sinus_driver.link.rtu import RtuReader
+from nfo_sinus_driver.link.modbus.pdu import AnswerReader, Read, Request, Write, WriteAndRead
+from nfo_sinus_driver.link.modbus.rtu import RtuReader
 
 # --- what may be asked and answered ---------------------------------------------------------------
 
@@ -206,7 +206,7 @@ class Framing(NamedTuple):
 
 
 RTU = Framing(rtu.encode, RtuReader, lambda data: data + opinion.crc(data), in_rtu, 1, 2)
-ASCII = Framing(modbus_ascii.encode, AsciiReader, opinion.ascii_frame, in_ascii, 2, 5)
+ASCII = Framing(ascii.encode, AsciiReader, opinion.ascii_frame, in_ascii, 2, 5)
 of_both = pytest.mark.parametrize('framing', [RTU, ASCII], ids=['rtu', 'ascii'])
 
 
@@ -285,7 +285,7 @@ def test_golden_frames(request_: Request[Any], frame: str) -> None:
     ],
 )
 def test_golden_check_sums_of_ascii(message: str, check: int) -> None:
-    assert modbus_ascii.lrc(bytes.fromhex(message)) == check
+    assert ascii.lrc(bytes.fromhex(message)) == check
 
 
 @pytest.mark.parametrize(
@@ -307,8 +307,8 @@ def test_golden_check_sums_of_ascii(message: str, check: int) -> None:
     ],
 )
 def test_golden_frames_of_ascii(request_: Request[Any], frame: bytes) -> None:
-    assert modbus_ascii.encode(request_) == frame
-    assert modbus_ascii.length(len(modbus_pdu.encode(request_))) == len(frame)
+    assert ascii.encode(request_) == frame
+    assert ascii.length(len(pdu.encode(request_))) == len(frame)
 
 
 @pytest.mark.parametrize(
@@ -366,7 +366,7 @@ def test_what_is_no_frame_of_ascii(frame: bytes) -> None:
 @given(st.binary(min_size=3, max_size=250))
 def test_check_sums_are_pymodbus_s(message: bytes) -> None:
     assert rtu.crc(message) == opinion.crc(message) == rtu.crc(bytearray(message))
-    frame = b':%b%02X\r\n' % (message.hex().upper().encode(), modbus_ascii.lrc(message))
+    frame = b':%b%02X\r\n' % (message.hex().upper().encode(), ascii.lrc(message))
     assert opinion.ascii_frame(message) == frame
 
 

@@ -31,7 +31,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
 )
 from nfo_sinus_driver.link.late_replies import SUSPECT_FOR
-from nfo_sinus_driver.link.modbus_pdu import WriteAndRead
+from nfo_sinus_driver.link.modbus.pdu import WriteAndRead
 from nfo_sinus_driver.link.request_link import Echo
 
 Way = type[Rtu]

@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 import movitrac_far_end as far
 import pytest
 
-from nfo_sinus_driver.link.movitrac import (
+from nfo_sinus_driver.link.pairs.movitrac import (
     Ack,
     Answer,
     Data,

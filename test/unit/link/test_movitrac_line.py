@@ -26,7 +26,7 @@ from nfo_sinus_driver.link.interface import (
     PortError,
     Refused,
 )
-from nfo_sinus_driver.link.movitrac import DONE, REFUSALS, refusal
+from nfo_sinus_driver.link.pairs.movitrac import DONE, REFUSALS, refusal
 
 A, B, LONG, VALUE = Movitrac.A, Movitrac.B, Movitrac.LONG, Movitrac.VALUE
 SETTINGS = Movitrac.settings

@@ -10,8 +10,8 @@ import struct
 
 import pytest
 
-from nfo_sinus_driver.link import netlink
-from nfo_sinus_driver.link.netlink import restart_ms
+from nfo_sinus_driver.link.canopen import netlink
+from nfo_sinus_driver.link.canopen.netlink import restart_ms
 
 
 def attribute(kind: int, data: bytes) -> bytes:

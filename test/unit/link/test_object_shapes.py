@@ -10,7 +10,8 @@ from canopen_far_end import NO_OBJECT, WRONG_LENGTH, Server
 from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.link import Address, DamagedAnswer, Refused, sdo
+from nfo_sinus_driver.link import Address, DamagedAnswer, Refused
+from nfo_sinus_driver.link.canopen import sdo
 
 MODE = 0x2022
 INV_ST = 0x2026

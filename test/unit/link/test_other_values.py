@@ -8,8 +8,8 @@ from __future__ import annotations
 import pytest
 
 from nfo_sinus_driver.link import AnotherValue, DamagedAnswer
-from nfo_sinus_driver.link.modbus_pdu import Write
-from nfo_sinus_driver.link.other_values import OtherValues
+from nfo_sinus_driver.link.modbus.other_values import OtherValues
+from nfo_sinus_driver.link.modbus.pdu import Write
 
 MEMORY = 0.8
 

@@ -12,10 +12,11 @@ import tty
 
 import pytest
 
-from nfo_sinus_driver.link import open_link, place
+from nfo_sinus_driver.link import open_link
 from nfo_sinus_driver.link.interface import LineSettings
-from nfo_sinus_driver.link.place import place_of_interface, place_of_tty
-from nfo_sinus_driver.link.port import port_of
+from nfo_sinus_driver.link.ports import place
+from nfo_sinus_driver.link.ports.place import place_of_interface, place_of_tty
+from nfo_sinus_driver.link.ports.port import port_of
 
 _HUB = 'devices/pci0000:00/0000:00:14.0/usb1/1-2'
 _FTDI = {'idVendor': '0403', 'idProduct': '6001', 'serial': 'A50285BI'}

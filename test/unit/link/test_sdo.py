@@ -9,8 +9,7 @@ from canopen_far_end import Server, messages
 from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.link.interface import DamagedAnswer, Refused
-from nfo_sinus_driver.link.sdo import (
+from nfo_sinus_driver.link.canopen.sdo import (
     ABORT_CODES,
     LONGEST_VALUE,
     TIMED_OUT,
@@ -19,6 +18,7 @@ from nfo_sinus_driver.link.sdo import (
     Upload,
     kind,
 )
+from nfo_sinus_driver.link.interface import DamagedAnswer, Refused
 
 UNIT = 5
 INDICES = st.integers(0, 0xFFFF)

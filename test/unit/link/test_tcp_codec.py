@@ -10,9 +10,9 @@ import pymodbus_opinion as opinion
 import pytest
 from support.addresses import packed
 
-from nfo_sinus_driver.link import modbus_pdu
-from nfo_sinus_driver.link.modbus_pdu import Read, Request, Write
-from nfo_sinus_driver.link.modbus_tcp import FrameReader, encode
+from nfo_sinus_driver.link.modbus import pdu
+from nfo_sinus_driver.link.modbus.pdu import Read, Request, Write
+from nfo_sinus_driver.link.modbus.tcp import FrameReader, encode
 
 NUMBER = st.integers(0, 0xFFFF)
 MESSAGE = st.binary(min_size=2, max_size=254)
@@ -42,7 +42,7 @@ def test_golden_frames(request_: Request[object], number: int, frame: str) -> No
 @given(st.integers(0, 247), st.integers(0, 0xFFFF), st.integers(1, 125), NUMBER)
 def test_request_is_pymodbus_s(unit: int, register: int, count: int, number: int) -> None:
     request = Read(unit, register, count)
-    assert encode(request, number) == opinion.tcp_frame(modbus_pdu.encode(request), number)
+    assert encode(request, number) == opinion.tcp_frame(pdu.encode(request), number)
 
 
 @given(st.data(), FRAMES)

@@ -26,10 +26,10 @@ from nfo_sinus_driver.link import (
     PortError,
     Refused,
     open_link,
-    telegram,
 )
-from nfo_sinus_driver.link.modbus_tcp import TcpLink
-from nfo_sinus_driver.link.tcp_connection import TcpConnection
+from nfo_sinus_driver.link.modbus.tcp import TcpLink
+from nfo_sinus_driver.link.plc import telegram
+from nfo_sinus_driver.link.ports.tcp_connection import TcpConnection
 
 A = register(0x400)
 B = register(0x264)

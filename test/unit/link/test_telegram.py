@@ -14,17 +14,9 @@ from hypothesis import given, strategies as st
 import pytest
 from registers import exchange_by
 
-from nfo_sinus_driver.link import (
-    Address,
-    Interrupted,
-    LinkError,
-    NoAnswer,
-    NoData,
-    NoPath,
-    Refused,
-    telegram,
-)
-from nfo_sinus_driver.link.modbus_pdu import Read, Write, WriteAndRead
+from nfo_sinus_driver.link import Address, Interrupted, LinkError, NoAnswer, NoData, NoPath, Refused
+from nfo_sinus_driver.link.modbus.pdu import Read, Write, WriteAndRead
+from nfo_sinus_driver.link.plc import telegram
 
 START = 100
 STATUS = Address('telegram1', 0, telegram.STATUS, 4, block=START)

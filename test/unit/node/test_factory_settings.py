@@ -12,7 +12,7 @@ import pytest
 from support.described import SHIPPED
 
 from nfo_sinus_driver.link import PROTOCOLS
-from nfo_sinus_driver.node.factory_settings import line_of, with_factory_address
+from nfo_sinus_driver.node.parameters.factory_settings import line_of, with_factory_address
 from nfo_sinus_driver.setting import Setting
 
 NAMES = ('protocol', 'baud_rate', 'char_format')

@@ -14,8 +14,8 @@ import time
 
 import pytest
 
-from nfo_sinus_driver.node.log_limit import PERIOD, LogLimit, limit_errors
-from nfo_sinus_driver.node.publish_queue import PublishQueue
+from nfo_sinus_driver.node.ros.log_limit import PERIOD, LogLimit, limit_errors
+from nfo_sinus_driver.node.ros.publish_queue import PublishQueue
 
 _log = logging.getLogger('nfo_sinus_driver.made_up')
 #: Far longer than anything here takes, s.

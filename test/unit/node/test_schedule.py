@@ -12,8 +12,8 @@ import time
 
 import pytest
 
-from nfo_sinus_driver.node import publish_queue
-from nfo_sinus_driver.node.publish_queue import PublishQueue, Schedule
+from nfo_sinus_driver.node.ros import publish_queue
+from nfo_sinus_driver.node.ros.publish_queue import PublishQueue, Schedule
 
 #: Far longer than anything here takes, s.
 PATIENCE = 20.0

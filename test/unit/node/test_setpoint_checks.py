@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.node.setpoint_checks import Origin, Repeated, Sources
+from nfo_sinus_driver.node.drive.setpoint_checks import Origin, Repeated, Sources
 
 OWN, ALL = '/line/infeed/setpoint', '/line/bus/setpoint_all'
 Given = tuple[float, Origin, float]

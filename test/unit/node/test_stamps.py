@@ -10,7 +10,7 @@ import math
 
 from hypothesis import given, strategies as st
 
-from nfo_sinus_driver.node.stamps import Sequence, Stamps
+from nfo_sinus_driver.node.messages.stamps import Sequence, Stamps
 
 #: What the node's clock shows when the steady one shows 0, ns.
 _EPOCH = 1_800_000_000_000_000_000

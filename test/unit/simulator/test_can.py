@@ -11,9 +11,9 @@ import threading
 from hypothesis import given, strategies as st
 import pytest
 
-from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.canopen.link import CanopenLink
+from nfo_sinus_driver.link.canopen.sdo import Upload
 from nfo_sinus_driver.link.interface import Address, LineSettings
-from nfo_sinus_driver.link.sdo import Upload
 from nfo_sinus_driver.simulator.can_frames import Frame, bits
 from nfo_sinus_driver.simulator.lawicel import Adapter
 from nfo_sinus_driver.simulator.sdo import Abort, AbortCode, Server

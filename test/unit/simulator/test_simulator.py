@@ -18,7 +18,7 @@ from classic_bench import ACK, NAK, enquiry, reply, select as select_
 import movitrac_drive_bench as movitrac
 import pytest
 
-from nfo_sinus_driver.link.canopen_link import CanopenLink
+from nfo_sinus_driver.link.canopen.link import CanopenLink
 from nfo_sinus_driver.link.interface import Address, LineSettings
 from nfo_sinus_driver.simulator.control import Client, ControlError
 from nfo_sinus_driver.simulator.modbus import server

@@ -10,7 +10,7 @@ import runpy
 
 import pytest
 
-from nfo_sinus_driver.drive.stopping import StopSequence
+from nfo_sinus_driver.drive.motion.stopping import StopSequence
 
 TOOL = runpy.run_path(str(Path(__file__).resolve().parents[2] / 'exhaustive' / 'run.py'))
 

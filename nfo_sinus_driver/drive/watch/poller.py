@@ -1,0 +1,819 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Polls one drive, checks its status, and notices when it is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+import contextlib
+import functools
+import logging
+import math
+from typing import TypeVar
+
+from nfo_sinus_driver.bus import Priority, Task, Watch
+from nfo_sinus_driver.catalog import InverterStatus, Role
+from nfo_sinus_driver.drive.known.changes import ParameterChange
+from nfo_sinus_driver.drive.known.diagnosis import Conditions, explain_failure, explain_fault
+from nfo_sinus_driver.drive.known.drive_state import DriveState
+from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.drive.known.recognising import Recogniser
+from nfo_sinus_driver.drive.known.settings import MONITOR
+from nfo_sinus_driver.drive.known.snapshot import NAN, NOT_MEASURED, Measured, Snapshot
+from nfo_sinus_driver.drive.motion.controller import Controller
+from nfo_sinus_driver.drive.motion.setpoint import Setpoint
+from nfo_sinus_driver.link import (
+    Interrupted,
+    LinkError,
+    NoAnswer,
+    NoData,
+    PortError,
+    Refused,
+    Reply,
+    silent,
+)
+
+_log = logging.getLogger(__name__)
+_T = TypeVar('_T')
+
+#: How often a drive is polled while its node is not active, s.
+_INACTIVE_PERIOD = 0.5
+#: How often an idle one is polled at most while another one is read for the first time, s.
+_YIELDING_PERIOD = 2.0
+#: How often the control mode is read, and what scales set-points, while no motor at standstill may
+#: start by one, s; and once in so many times what only scales measured values.
+_MODE_PERIOD = 1.0
+_ALL_SCALES = 10
+#: How often the status is read at least while the motor runs, s; and of a drive that keeps its run
+#: command without power: so two requests of the least time without it get no answer.
+_WATCH_PERIOD = 0.2
+_RESTART_WATCH_PERIOD = 0.1
+#: How often a drive that is lost is tried again, at first and at last, s.
+_RECONNECT_PERIOD = 1.0
+_SLOWEST_RECONNECT = 4.0
+#: The bus is silent for no more than this share of the drive's own time-out.
+_KEEP_ALIVE_SHARE = 1 / 3
+#: After this share of it the drive gets a request ahead of all but stops and set-points.
+_LATEST_SHARE = 0.5
+#: How long before the silence of all others passes for its own a drive is asked itself, s, and for
+#: how long its turn is waited for, where a request to another one took all of that time.
+_LOOK_BEFORE_LOSS, _LOOKED_FOR = 0.4, 0.2
+#: What is measured in every control mode.
+_BASIC = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
+#: How often the rest of a poll is read, s: the other one of frequency and speed, and an inverter
+#: status that the status word gives no reason to read. All that the driver reacts to shows in
+#: that word: fault, control lost, a stop, the current limit.
+_SLOW_PERIOD = 0.1
+#: On a full line, where each read waits for its turn, once in so many turns of this drive: so two
+#: reads that every poll takes become 2.4 at most, with the control mode, which changes least.
+_SLOW_TURNS = 15
+#: A motor is at its speed while the controlled quantity changes by no more than this share from
+#: poll to poll; else frequency and speed are both measured each time.
+_STEADY = 0.02
+#: How often what is known is published while a stop keeps polls from their turns, s.
+_SHOW_PERIOD = 0.25
+_MODE_TURNS = 60
+#: How often a read beside the status is tried in one poll: what the driver has to know, and what it
+#: measures, which did not fail just before.
+_TRIES, _MEASURED_TRIES = 3, 2
+#: The reads without which a poll fails, and anything in it.
+_STATUS, _MODE, _POLL = 'status', 'control mode', 'poll'
+
+
+class _Failures:
+    """
+    Since when each read of a poll has failed, s of one clock.
+
+    Failures of several reads, one after the other, are one: each began with the first of them,
+    when its answer failed to come, as a silence does.
+
+    :ivar newest: the last one.
+    """
+
+    def __init__(self) -> None:
+        self._since: dict[str, float] = {}
+        self._all_since = math.inf
+        self.newest: LinkError | DriveError = NoAnswer()
+
+    def note(self, what: str, now: float, error: LinkError | DriveError) -> None:
+        """Note that a read failed."""
+        self.newest = error
+        self._all_since = min(self._all_since, now)
+        self._since[what] = min(self._since.get(what, math.inf), self._all_since)
+
+    def lasts(self, what: str, now: float) -> float:
+        """Return for how long a read has failed, s; 0: it has not."""
+        return now - self._since.get(what, now)
+
+    def end(self, what: str) -> None:
+        """Note that a read was answered."""
+        self.forget(what)
+        self._all_since = math.inf
+
+    def forget(self, what: str) -> None:
+        """Note that something is over that is no read: it ends no failures of reads."""
+        self._since.pop(what, None)
+
+
+class Poller:
+    """
+    Watches one drive from :meth:`begin` to :meth:`end`; used on the bus alone.
+
+    :param controller: how it is commanded; ``None`` if this driver only reads.
+    :param connect: connects to the drive again after it was lost.
+    """
+
+    def __init__(
+        self,
+        state: DriveState,
+        setpoint: Setpoint,
+        controller: Controller | None,
+        recogniser: Recogniser,
+        connect: Callable[[], Awaitable[None]],
+    ) -> None:
+        self._bus = state.bus
+        self._unit = state.settings.address
+        self._state = state
+        self._params = state.params
+        self._setpoint = setpoint
+        self._controller = controller
+        self._recogniser = recogniser
+        self._connect = connect
+        self._task: Task | None = None
+        self._keep_alive_task: Task | None = None
+        self._show_task: Task | None = None
+        #: Asks the drive before the silence of all others passes for its own.
+        self._look_task: Task | None = None
+        self._looked_at = -math.inf
+        #: Poll at full rate.
+        self.active = False
+        #: The newest poll.
+        self.snapshot = take_snapshot(state, setpoint)
+        #: When it was published, s; its own time is that of its status.
+        self._shown_at = -math.inf
+        self._failures = _Failures()
+        #: How often in a row it could not be connected to.
+        self._failed_reconnects = 0
+        #: A PLC answers that has no new data from the drive.
+        self._behind_plc = False
+        #: When a value was last asked for, pauses of the worker aside, and how long it took, s:
+        #: long, where the line is full.
+        self._requested_at = self._turn = 0.0
+        #: When was last read what changes rarely: control mode and scales; and how often it was.
+        self._rare_read_at = 0.0
+        self._rare_reads = 1
+        self._complaint: Report | None = None
+        #: A status word that came with a set-point, and has not been checked yet.
+        self._received: Reply | None = None
+        #: For how long the worker had paused when the status was last requested, s.
+        self._status_paused = 0.0
+        self._reported_fault = 0
+        self._conditions = Conditions(state)
+        watch = Watch(self._look_for_loss, lambda: state.control.stop_owed, self._paused)
+        self._bus.watch_over(self._unit, watch)
+
+    @property
+    def begun(self) -> bool:
+        """It is polling."""
+        return self._task is not None
+
+    def begin(self) -> None:
+        """Poll from now on."""
+        self._task = self._bus.spawn(self._poll_repeatedly())
+        if self._keep_alive_task is None and self._controller is not None:
+            self._keep_alive_task = self._bus.spawn(self._keep_alive())
+
+    def end(self) -> None:
+        """Stop polling."""
+        if self._task is not None:
+            task, self._task = self._task, None
+            self._bus.cancel(task)
+        self._bus.cancel(self._keep_alive_task)
+        self._keep_alive_task = None
+        self._bus.cancel(self._show_task)
+        self._bus.recorder.cycle(self._unit, math.nan)
+        self._publish(None)
+
+    def take_status(self, reply: Reply) -> None:
+        """
+        Take a status word that came with another answer, if one came.
+
+        It is the answer to a read that waits for it; else, if it is news, the next poll comes at
+        once. A poll that may have to stop the motor replaces one that waits for its turn to read
+        something else: on a full line that may take long.
+        """
+        state, params = self._state, self._params
+        if self._task is None or not state.connected or not reply.data:
+            return
+        place = params.address(state.word_key)
+        if self._bus.answer(self._task, self._unit, place, reply):
+            return
+        # impossible values are ignored: the next poll reads again
+        if not params.can_be(state.word_key, reply.data):
+            return
+        word = state.status_word(reply.data)
+        if state.status is None or word == state.status.word:
+            return
+        if self._received is not None and word == state.status_word(self._received.data):
+            return
+        self._received = reply
+        if self._alarming(state.status_of_word(word, reply.arrived)):
+            self._bus.cancel(self._task)
+            self.begin()
+        else:
+            self.wake()
+
+    def restarted(self) -> None:
+        """Note that the drive has restarted: it is lost until it is connected to again."""
+        if self._task is None or not self._state.connected:
+            return
+        self._begin_anew(DriveError(Cause.RESTARTED))
+
+    def _begin_anew(self, error: LinkError | DriveError) -> None:
+        """Treat the drive as lost until it is connected to again, and poll anew."""
+        self._bus.cancel(self._task)
+        self._mark_lost(error)
+        self._failed_reconnects = 0
+        self.begin()
+
+    def set_active(self, active: bool) -> None:
+        """Poll at full rate, or only so that the drive stays watched."""
+        self.active = active
+        if active:
+            self.wake()
+
+    def wake(self) -> None:
+        """Poll at once."""
+        if self._task is not None:
+            self._bus.wake(self._task)
+
+    def poll_soon(self) -> None:
+        """Find out at once whether a drive responds that did not answer another request."""
+        if not self._state.connected:
+            return
+        if self._fails_for_long(_STATUS):
+            # the read that waits for its turn would come too late
+            self._begin_anew(self._failures.newest)
+        self.wake()
+
+    def read_mode_soon(self) -> None:
+        """Read the control mode with the next poll: it may be another one now."""
+        self._rare_read_at = -math.inf
+        self.wake()
+
+    def connected(self) -> None:
+        """Reset the counts of failures: the drive is connected."""
+        self._bus.recorder.connected(self._unit)
+        self._failures = _Failures()
+        self._failed_reconnects = 0
+        self._complaint = None
+        self._received = None
+        self._state.forget_polled()
+
+    async def _poll_repeatedly(self) -> None:
+        polled_at = -math.inf
+        while True:
+            started = self._bus.now()
+            due = started >= polled_at + self._period
+            try:
+                if not self._state.connected:
+                    if not self._waits_to_look:
+                        await self._connect()
+                        # nothing is measured yet: it is polled at once
+                        due, polled_at = False, started - self._period
+                elif due:
+                    await self._poll()
+                else:
+                    await self._read_status()
+                    self._publish_changed()
+                if self._state.connected and not self._params.recognition.holds:
+                    # it was silent for long, or this driver stood still: is it still the same?
+                    await self._recogniser.recognise(Priority.POLL)
+                self._failures.forget(_POLL)
+            except (LinkError, DriveError) as error:
+                self._on_poll_failed(error)
+            except Exception as error:
+                # a drive that is no longer watched must not go on running
+                self._on_poll_failed(DriveError(Cause.DRIVER_ERROR, error=repr(error)))
+            if due:
+                if self._state.connected and self.active and polled_at > 0:
+                    self._bus.recorder.cycle(self._unit, started - polled_at)
+                polled_at = started
+            lost = not self._state.connected
+            await self._bus.sleep(self._pause(polled_at), or_opening=lost)
+
+    async def _keep_alive(self) -> None:
+        """
+        Send the drive a request before its own time-out strikes, where polls wait for too long.
+
+        They give way to commands, and enabling many drives at once takes seconds. A silent drive
+        gets one such request, for then the polls have to find out that it is lost.
+        """
+        state = self._state
+        asked_after = -math.inf
+        while True:
+            latest = state.timeout.seconds * _LATEST_SHARE
+            if not state.connected or not latest or self._bus.is_quiet:
+                await self._bus.sleep(_WATCH_PERIOD)
+                continue
+            frame_at = self._bus.silences.last_frame_at(self._unit)
+            left = frame_at + latest - self._bus.now()
+            if left <= 0 and frame_at != asked_after:
+                asked_after = frame_at
+                await self._be_heard()
+            await self._bus.sleep(left if left > 0 else latest / 2)
+
+    def _pause(self, polled_at: float) -> float:
+        """Return how long to wait until the next poll, s."""
+        state = self._state
+        if self._waits_to_look:
+            # as soon as it was seen the rest is read
+            return _WATCH_PERIOD
+        if not state.connected:
+            # a drive that stays silent costs its neighbours less and less
+            pause = min(_RECONNECT_PERIOD * self._failed_reconnects, _SLOWEST_RECONNECT)
+            pause = state.pause_before_timeout(pause, state.timeout.seconds)
+            # the life counter goes on, else the PLC takes the driver for dead
+            return min(pause, self._period) if self._behind_plc else pause
+        pause = polled_at + self._period - self._bus.now()
+        # however low the poll rate, a motor that runs is watched, and so is one whose run
+        # command may still be active, for it would start when its fault ends
+        if self._may_restart:
+            return min(pause, _RESTART_WATCH_PERIOD)
+        watched = state.control.stopping or self._setpoint.following
+        return min(pause, _WATCH_PERIOD) if watched else pause
+
+    @property
+    def _waits_to_look(self) -> bool:
+        """It is lost, and gets no request but that of its stop."""
+        waits = self._controller is not None and self._controller.waits_to_look
+        return waits and not self._behind_plc
+
+    @property
+    def _may_restart(self) -> bool:
+        """After a moment without power the motor would run again, as if nothing had been."""
+        return bool(self._state.model.profile.keeps_run) and self._setpoint.following
+
+    @property
+    def _priority(self) -> Priority:
+        """The priority of what a poll reads."""
+        urgent = self._may_restart and not self._state.responsive
+        return Priority.LOOK if urgent else Priority.POLL
+
+    @property
+    def _period(self) -> float:
+        settings = self._state.settings
+        rate = settings.poll_rate
+        if settings.idle_poll_rate and self._is_idle:
+            rate = settings.idle_poll_rate
+        period = 1 / rate if rate else 0.0
+        if not self.active:
+            period = _INACTIVE_PERIOD
+        if self.yields:
+            period = max(period, _YIELDING_PERIOD)
+        state = self._state
+        for timeout in (state.timeout.seconds, state.plc_time):
+            if timeout:
+                period = min(period, timeout * _KEEP_ALIVE_SHARE)
+        return period
+
+    @property
+    def yields(self) -> bool:
+        """Whether it polls seldom while another drive's settings are first read."""
+        return self._bus.reads_another_first(self._unit) and self._is_idle
+
+    @property
+    def _is_idle(self) -> bool:
+        """The motor is at standstill, and nothing was begun that may change that."""
+        status = self._state.status
+        if self._state.control.stop_owed or status is None or status.driven:
+            return False
+        # a motor that coasts is not driven; what is not measured is NaN, and no greater than 0
+        return not any(abs(value) > 0 for value in (self._state.frequency, self._state.speed))
+
+    @property
+    def _running(self) -> float:
+        """The time, but for pauses of the worker, s."""
+        return self._bus.now() - self._bus.paused
+
+    @property
+    def _silent_for_long(self) -> bool:
+        """It has answered no request for ``lost_after``."""
+        silent = self._bus.silences.lasts(self._unit, self._bus.now())
+        return silent >= self._state.settings.lost_after
+
+    @property
+    def _may_start(self) -> bool:
+        """A motor at standstill may start by the next set-point."""
+        return self._setpoint.following and 0 in (self._state.frequency, self._state.speed)
+
+    @property
+    def _rare_is_due(self) -> bool:
+        """What changes rarely is to be read again."""
+        period = max(_MODE_PERIOD, _MODE_TURNS * self._turn)
+        return self._bus.now() - self._rare_read_at > period
+
+    @property
+    def _slow_period(self) -> float:
+        """How old the values may be that not every poll reads, s."""
+        return max(_SLOW_PERIOD, _SLOW_TURNS * self._turn)
+
+    @property
+    def _code_holds(self) -> float:
+        """How long an inverter status counts while the status word stays the same, s."""
+        control = self._state.control
+        if control.stop_owed and not control.enabled:
+            # the driver waits for the status to change
+            return 0.0
+        if self._state.missed_since_status:
+            # it may have been switched off and on
+            return 0.0
+        return self._slow_period
+
+    def _alarming(self, status: InverterStatus) -> bool:
+        """Return whether a status may have to stop the motor."""
+        return self._controller is not None and self._controller.alarmed_by(status)
+
+    async def _read_status(self) -> InverterStatus:
+        state = self._state
+
+        received = taken = self._received
+        if received is not None and state.status and received.arrived <= state.status.at:
+            # a command has read a newer one since
+            received = None
+
+        async def read() -> InverterStatus:
+            # once: both words of a status are of one moment, so they are repeated together
+            nonlocal received
+            word, received = received, None
+            return await state.read_status(
+                self._priority,
+                retry=False,
+                alarming=self._alarming,
+                received=word,
+                code_for=self._code_holds,
+            )
+
+        paused = self._bus.paused
+        while (status := await self._try(_STATUS, read)) is None:
+            # what was read before stays valid
+            continue
+        self._status_paused = paused
+        if self._received is taken:
+            self._received = None
+        state.require_fresh(status)
+        state.status_read()
+        reported = self._controller is not None and self._controller.on_status(status)
+        self._report_fault(status, reported)
+        self._conditions.take(status)
+        return status
+
+    async def _poll(self) -> None:
+        state = self._state
+        last = state.last_polled(state.controlled).value
+        status = await self._read_status()
+        rare = self._rare_is_due
+        every = rare and self._rare_reads % _ALL_SCALES == 0
+        # it can only change at standstill
+        due, started = rare or self._may_start, self._bus.now()
+        answered = due and await self._read_mode(status)
+        answered = answered and await self._check_scales(all_of_them=every)
+        if rare and answered:
+            self._rare_read_at = started
+            self._rare_reads += 1
+        actual = state.controlled
+        steady = True
+        if actual is not None and not self._is_slow(actual):
+            now = await self._measure(actual)
+            steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
+        for role in _BASIC:
+            age = self._bus.now() - state.last_polled(role).at
+            due = age >= self._slow_period or not steady
+            if role is not actual and due and not self._is_slow(role):
+                await self._measure(role)
+        if self._bus.paused == self._status_paused:
+            # else the status may be old: the next poll is due
+            self._publish(status)
+
+    def _is_slow(self, role: Role) -> bool:
+        """Return whether a value comes by the mailbox of a PLC, which is too slow for a poll."""
+        return self._params.by_mailbox(self._state.model.key(role))
+
+    async def _check_scales(self, *, all_of_them: bool) -> bool:
+        """
+        Read what scales set-points, or any value, and stop the motor if that was changed.
+
+        :returns: whether each was answered.
+        """
+        state, scales = self._state, self._state.nameplate.scales
+        target = state.model.profile.setpoints.get(state.control_mode)
+        keys = scales.keys if all_of_them else scales.of(target.key) if target else ()
+        for key in keys:
+            before = scales.found.get(key)
+            read = functools.partial(scales.read_one, key, self._priority)
+            try:
+                now = await self._read(key, read, _TRIES)
+            except Refused:
+                # it may be busy
+                continue
+            if now is None:
+                return False
+            controller = self._controller
+            # a start that is under way reads them itself
+            if before not in (None, now) and controller is not None and state.control.enabled:
+                change = ParameterChange(key, before, now, state.model[key].unit)
+                controller.stop_because(Report(Cause.SCALE_CHANGED, change=change))
+        return True
+
+    def _report_fault(self, status: InverterStatus, reported: bool) -> None:
+        """Report on change that a fault is active, unless a stop because of it was reported."""
+        code = status.code if status.faulted else 0
+        if code and code != self._reported_fault and not reported:
+            fault = explain_fault(self._state, status)
+            self._state.notify(Severity.ERROR, Cause.FAULT_APPEARED, fault=fault)
+        self._reported_fault = code
+
+    async def _measure(self, role: Role) -> float:
+        """Measure a value anew; NaN if a drive that responds does not give it."""
+        state = self._state
+        status = state.status
+        if role is state.turning.role and status and not math.isnan(status.frequency):
+            # it came with the status
+            return state.last_polled(role).value
+        key = state.model.key(role)
+        try:
+            tries = 1 if self._failures.lasts(key, self._running) else _MEASURED_TRIES
+            value = await self._read(key, lambda: state.measure(key, self._priority), tries)
+        except (PortError, Interrupted):
+            # raised once only: the status that is read next would show a drive that was stopped
+            raise
+        except Refused:
+            value = NAN
+        except LinkError:
+            if self._silent_for_long:
+                raise
+            value = NAN
+        if value is None:
+            # the last one counts until the next poll
+            return state.last_polled(role).value
+        state.polled(role, value)
+        if role in state.model.roles:
+            self._turn = self._running - self._requested_at
+        return value
+
+    async def _read_mode(self, status: InverterStatus) -> bool:
+        """Read the control mode, and judge the status by it; return whether it was answered."""
+        state = self._state
+        before = state.control_mode
+        mode = await self._read(
+            _MODE, lambda: state.read_control_mode(self._priority, retry=False), _TRIES
+        )
+        if mode not in (None, before) and self._controller:
+            # before it is published: a set-point never has the unit of another mode
+            self._controller.on_status(status)
+        return mode is not None
+
+    async def _read(self, what: str, read: Callable[[], Awaitable[_T]], tries: int) -> _T | None:
+        """
+        Do one read of a poll, again at once if need be; ``None``: the next poll has to.
+
+        However seldom the polls, noise is no loss; and however bad a value, the status is read.
+
+        :param what: by which its failures are counted.
+        :raises LinkError: as for :meth:`_try`.
+        """
+        for _ in range(tries):
+            if (answer := await self._try(what, read)) is not None:
+                return answer
+        return None
+
+    async def _try(self, what: str, read: Callable[[], Awaitable[_T]]) -> _T | None:
+        """
+        Do one read of a poll, once; return ``None`` if it was not answered, and may be repeated.
+
+        :param what: by which its failures are counted.
+        :raises LinkError: the drive has been silent for too long, or has answered everything but
+            this; it refuses; the port is gone; or the PLC has no valid data of it.
+        """
+        asked_at, self._requested_at = self._bus.now(), self._running
+        try:
+            answer = await read()
+        except (PortError, Refused, Interrupted, NoData):
+            raise
+        except LinkError as error:
+            self._state.unanswered()
+            self._check_silence(asked_at, self._bus.now())
+            self._failures.note(what, self._running, error)
+            if self._silent_for_long or self._fails_for_long(what):
+                raise
+            self._bus.recorder.retry(self._unit)
+            return None
+        self._failures.end(what)
+        self._state.answered()
+        self._setpoint.answered()
+        return answer
+
+    def _fails_for_long(self, what: str) -> bool:
+        """Return whether a read has failed for ``lost_after``, whatever else was answered."""
+        return self._failures.lasts(what, self._running) >= self._state.settings.lost_after
+
+    def _check_silence(self, asked_at: float, now: float) -> None:
+        """Report a silence of more than one lost answer to what may have to stop the motor."""
+        silences = self._bus.silences
+        # it has begun before the request that was in vain just now
+        if self._controller is not None and silences.lasts(self._unit, asked_at) >= 0:
+            self._controller.silent(now - silences.last_frame_at(self._unit))
+
+    def _paused(self, seconds: float) -> None:
+        """Note that the driver did not run for so long, s."""
+        if self._controller is not None:
+            self._controller.paused(seconds)
+
+    async def _be_heard(self) -> None:
+        """Send the drive a request, ahead of what can wait."""
+        with contextlib.suppress(LinkError):
+            await self._state.keep_alive()
+
+    def _look_for_loss(self) -> float:
+        """Treat the drive as lost once it is silent for too long; return by when it may be, s."""
+        state, now = self._state, self._bus.now()
+        if not state.connected or self._task is None:
+            return math.inf
+        # a motor that may run is watched all the time
+        silences = self._bus.silences
+        since = silences.silent_since(self._unit, is_watched=state.control.stop_owed)
+        lost_at = since + state.settings.lost_after
+        if not (silences.is_silent(self._unit) or silences.was_asked_since_silent(self._unit)):
+            # it is only the others that were asked in vain
+            look_at = lost_at - min(_LOOK_BEFORE_LOSS, state.settings.lost_after / 2)
+            if now < look_at:
+                return look_at
+            if self._look_task is None or self._look_task.future.done():
+                self._look_task, self._looked_at = self._bus.spawn(self._be_heard()), now
+            lost_at = max(lost_at, self._looked_at + _LOOKED_FOR)
+        if now < lost_at:
+            return lost_at
+        self._begin_anew(silent(self._unit))
+        return math.inf
+
+    def _on_poll_failed(self, error: LinkError | DriveError) -> None:
+        state = self._state
+        state.unanswered()
+        self._behind_plc = isinstance(error, NoData) or _is(error, Cause.OLD_DATA)
+        if not state.connected:
+            self._failed_reconnects += 1
+            if isinstance(error, DriveError) and error.report != self._complaint:
+                # what keeps the drive from being used is reported once
+                self._complaint = error.report
+                state.notify(Severity.ERROR, error.report)
+            return
+        self._failures.note(_POLL, self._running, error)
+        # one that answers, but gives no status, cannot be watched either
+        unwatched = any(map(self._fails_for_long, (_STATUS, _MODE, _POLL)))
+        # these have been waited out, or cannot be
+        at_once = self._behind_plc or isinstance(error, (PortError, Interrupted))
+        another = isinstance(error, DriveError) and not self._params.recognition.holds
+        at_once = at_once or another
+        if at_once or self._silent_for_long or unwatched:
+            self._mark_lost(error)
+
+    def _mark_lost(self, error: LinkError | DriveError) -> None:
+        """Treat the drive as lost until it can be connected to again, and report why."""
+        state = self._state
+        state.lost()
+        why = explain_failure(error, state)
+        self._bus.recorder.cycle(self._unit, math.nan)
+        in_use = self._controller is not None and self._controller.lost(why)
+        cause = Cause.LOST_IN_USE if in_use else Cause.LOST
+        state.notify(Severity.ERROR, cause, why=why)
+        try:
+            self._publish(None)
+        except Exception:
+            # an error of the listener must not end the polling
+            _log.exception('the loss of the drive could not be reported')
+
+    def publish_change(self) -> None:
+        """
+        Publish what is known, if that is not what was published last.
+
+        However seldom the polls: what the driver acts on is shown when it changes.
+        """
+        def publish() -> None:
+            try:
+                self._publish_changed()
+            except Exception:
+                # an error of the listener must end nothing
+                _log.exception('a change could not be reported')
+
+        # what happens at this moment may change more of it, and be a stop, which goes first
+        self._bus.call(publish)
+
+    def _publish_changed(self) -> None:
+        """Publish what is known if it has changed, but for what the next poll has to show."""
+        state = self._state
+        if self._task is None:
+            return
+        if state.connected:
+            # a stop may have read it since
+            is_old = state.status is not None and state.status.at < self._bus.resumed_at
+            # on a slow line one may be enabled before it is measured for the first time
+            is_shown = self.snapshot.connected or state.control.enabled
+            if is_old or not is_shown:
+                # it is read, or measured for the first time, at once
+                return
+        snapshot = self._snapshot(state.status if state.connected else None, polled=False)
+        if not snapshot.shows_the_same(self.snapshot):
+            self._show(snapshot)
+
+    def show_stop(self) -> None:
+        """Have what is known published until the motor is stopped."""
+        self._bus.cancel(self._show_task)
+        self._show_task = self._bus.spawn(self._show_while_stopping())
+
+    async def _show_while_stopping(self) -> None:
+        """Publish what is known while the stop of a drive that answers in part delays its polls."""
+        control = self._state.control
+        pause = _SHOW_PERIOD
+        while control.stopping:
+            paused = self._bus.paused
+            await self._bus.sleep(pause)
+            left = self._shown_at + _SHOW_PERIOD - self._bus.now()
+            pause = left if left > 0 else _SHOW_PERIOD
+            waits = left <= 0 and paused == self._bus.paused and control.stopping
+            # one that was lost has shown nothing since that could be shown again
+            known = self._state.connected and self.snapshot.connected
+            if waits and known and self._task is not None:
+                self._publish(self._state.status)
+
+    def _measured(self, role: Role | None, *, polled: bool) -> Measured:
+        """Return what was measured last; nothing from before a pause, until a poll has passed."""
+        last = self._state.last_polled(role)
+        polled |= self._bus.paused == self._status_paused
+        return last if polled or last.at >= self._bus.resumed_at else NOT_MEASURED
+
+    def _publish(self, status: InverterStatus | None) -> None:
+        self._show(self._snapshot(status))
+
+    def _show(self, snapshot: Snapshot) -> None:
+        self.snapshot = snapshot
+        self._shown_at = self._bus.now()
+        self._state.listener.on_snapshot(snapshot)
+
+    def _snapshot(self, status: InverterStatus | None, *, polled: bool = True) -> Snapshot:
+        state = self._state
+        if status is not None and state.status is not None and state.status.at > status.at:
+            # a command has read a newer one: the drive may be enabled since, its fault acknowledged
+            status = state.status
+        measured = (*_BASIC, state.controlled)
+        frequency, speed, controlled = (self._measured(role, polled=polled) for role in measured)
+        actual = state.shown(state.controlled, controlled.value)
+        stop = None if self._controller is None else self._controller.stopped_for
+        return take_snapshot(
+            state, self._setpoint, status, frequency, speed, actual, stop, polled=polled
+        )
+
+
+def _is(error: Exception, cause: Cause) -> bool:
+    return isinstance(error, DriveError) and error.report.cause is cause
+
+
+def take_snapshot(
+    state: DriveState,
+    setpoint: Setpoint,
+    status: InverterStatus | None = None,
+    frequency: Measured = NOT_MEASURED,
+    speed: Measured = NOT_MEASURED,
+    actual: float = NAN,
+    stop: Report | None = None,
+    *,
+    polled: bool = True,
+) -> Snapshot:
+    """Return a snapshot; without a status while the drive is not connected."""
+    common = (state.connected, setpoint.following, state.settings.method)
+    if status is None:
+        return Snapshot(state.bus.now(), *common, stop=stop, polled=polled)
+    code = status.listed
+    watched = state.settings.method == MONITOR
+    return Snapshot(
+        status.at,
+        *common,
+        status=status,
+        control_mode=state.control_mode,
+        unit=state.unit,
+        setpoint=state.own_setpoint if watched else setpoint.commanded,
+        setpoint_age=setpoint.age,
+        setpoint_clamped=setpoint.clamped,
+        text=state.text_of(status),
+        description=code.description,
+        remedy=code.remedy,
+        kind=status.kind,
+        requires_ack=code.requires_ack,
+        frequency=state.shown(Role.ACTUAL_FREQUENCY, frequency.value),
+        frequency_at=frequency.at,
+        speed=state.shown(Role.ACTUAL_SPEED, speed.value),
+        speed_at=speed.at,
+        actual=actual,
+        stop=stop,
+        polled=polled,
+    )
