@@ -35,7 +35,7 @@ def read(path: Path) -> str:
 
 def topics_and_services() -> set[str]:
     """The names that the nodes give their topics and services."""
-    sources = map(read, (PACKAGE / 'node').glob('*.py'))
+    sources = map(read, (PACKAGE / 'node').rglob('*.py'))
     return {name for one in sources for name in re.findall(r"'(~/[a-z_]+|/diagnostics)'", one)}
 
 

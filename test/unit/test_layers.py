@@ -23,7 +23,7 @@ SOURCES = {
     for path in sorted(PACKAGE.rglob('*.py'))
 }
 #: Where the clock is passed in; only what waits for the operating system asks for it.
-WITHOUT_TIME = re.compile(r'(bus|drive)/|link/(?!(can|serial_port|tcp_connection|url_port)\.py)')
+WITHOUT_TIME = re.compile(r'(bus|drive)/|link/(?!canopen/can\.py|ports/)')
 #: What is about families and names them: the files of a family.
 OF_FAMILIES = re.compile(r'families/|simulator/\w+/')
 #: What changes a list, a dict or a set.

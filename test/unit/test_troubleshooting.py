@@ -28,7 +28,8 @@ nodes, texts = _TOOL['nodes'], _TOOL['texts']
 NEVER_SHOWN = {
     *(f'catalog/{name}.py' for name in ('codec', 'family', 'table')),
     *(f'catalog/declared/{name}.py' for name in ('register_map', 'yaml_file')),
-    *(f'link/{name}.py' for name in ('classic', 'lawicel', 'movitrac', 'sdo')),
+    *(f'link/canopen/{name}.py' for name in ('lawicel', 'sdo')),
+    *(f'link/pairs/{name}.py' for name in ('classic', 'movitrac')),
     *('drive/known/drive_state.py', 'drive/motion/setpoint.py', 'node/messages/messages.py'),
 }
 REFUSALS = {(str(Refused(n)),) for n in (1, 2, 3, 4, 5, 6, 8, 10, 11)}

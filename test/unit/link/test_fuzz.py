@@ -89,7 +89,7 @@ def test_an_answer_that_is_not_measured_is_found(monkeypatch: pytest.MonkeyPatch
     def understand(request: pdu.Request[object], message: bytes) -> object:
         return request.decode(message) if message.startswith(request.answer_head) else None
 
-    monkeypatch.setattr(decoders.modbus_pdu, 'understand', understand)
+    monkeypatch.setattr(decoders.pdu, 'understand', understand)
     assert _first('pdu')
 
 
