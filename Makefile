@@ -63,7 +63,7 @@ types: setup ## mypy, on all that is not ROS
 # Those that compute, in virtual time, have a worker for each processor, and are heard when they
 # have ended; beside them those that wait, in real time, have more. Each group collects its own.
 COMPUTING = test/unit/drive test/unit/link test/unit/catalog test/unit/families
-REAL = $(addprefix test/unit/,drive/test_slave_by_hand.py drive/test_threads.py \
+REAL = $(addprefix test/unit/,drive/line/test_slave_by_hand.py drive/test_threads.py \
 	$(addprefix link/test_,can_ports.py line_ports.py link_ports.py tcp_link.py))
 WAITING = $(REAL) $(filter-out $(COMPUTING:=/) %__pycache__/, \
 	$(wildcard test/unit/*/ test/unit/test_*.py))
@@ -118,9 +118,9 @@ mutants: setup ## break each law in a copy and see that a test fails (half an ho
 campaign: setup ## many histories of commands, faults and line losses in any order (HISTORIES=3000)
 	@seed=$(or $(SEED),$$(od -An -N3 -tu4 /dev/urandom | tr -d ' ')); echo "seed $$seed"; \
 	SEED=$$seed HISTORIES=$(or $(HISTORIES),3000) tools/run python $(PYTEST) \
-		-n auto --dist worksteal test/unit/drive/test_any_order.py -k campaign
+		-n auto --dist worksteal test/unit/drive/any_order/test_any_order.py -k campaign
 	@ACKNOWLEDGEMENTS=$(or $(ACKNOWLEDGEMENTS),1000) tools/run python $(PYTEST) -n auto \
-		test/unit/drive/test_no_turn_at_acknowledge.py -k no_turn
+		test/unit/drive/starts/test_no_turn_at_acknowledge.py -k no_turn
 
 exhaustive: setup ## each thing that can go wrong at each request of a run (PART=1/8 PAIRS=1)
 	@$(WITHOUT_ROS) .venv/without-ros/bin/python test/exhaustive/run.py $(if $(PART),--part $(PART)) \

@@ -39,14 +39,14 @@ on tests alone that are skipped where the text of the manuals is not beside the 
 NEEDS_MANUALS = frozenset(
     {
         'unit/catalog/test_manuals.py::test_the_tables_say_what_the_manual_prints',
-        'unit/drive/test_ends_on_classic.py'
+        'unit/drive/settings/test_ends_on_classic.py'
         '::test_the_ends_of_every_setting_go_there_and_back_and_nothing_beyond',
-        'unit/drive/test_every_setting.py'
+        'unit/drive/settings/test_every_setting.py'
         '::test_every_setting_is_written_to_where_the_manual_has_it_and_read_from_there',
-        'unit/drive/test_movitrac_manual.py'
+        'unit/drive/families/test_movitrac_manual.py'
         '::test_both_ends_of_every_setting_are_written_and_read_as_the_manual_has_them',
-        'unit/drive/test_movitrac_manual.py::test_no_row_of_the_list_is_left_out',
-        'unit/drive/test_older_firmware.py'
+        'unit/drive/families/test_movitrac_manual.py::test_no_row_of_the_list_is_left_out',
+        'unit/drive/families/test_older_firmware.py'
         '::test_every_setting_that_its_manual_lists_is_written_and_read_back',
     }
 )

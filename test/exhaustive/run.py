@@ -28,7 +28,7 @@ import tempfile
 from typing import Any
 
 _TEST = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(_TEST.parent), str(_TEST), str(_TEST / 'unit' / 'drive'),
+sys.path[:0] = [str(_TEST.parent), str(_TEST), str(_TEST / 'unit' / 'drive' / 'any_order'),
                 str(_TEST / 'exhaustive')]
 
 from any_order_machine import AnyOrder  # noqa: E402, the tests are no package

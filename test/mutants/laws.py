@@ -807,7 +807,7 @@ LAWS = (
         'Poller.take_status',
         '            self._bus.cancel(self._task)\n            self.begin()\n',
         '            self.wake()\n',
-        ('test_status_with_setpoint.py', '-k', 'whatever'),
+        ('test_status_in_a_setpoint_answer.py', '-k', 'whatever'),
     ),
     Mutant(
         9,
@@ -1030,7 +1030,7 @@ LAWS = (
         'ModbusLink.write_and_read',
         '            raise InProgress(self.clock())',
         '            pass',
-        ('test_set_point_with_status.py', '-k', 'newest_set_point'),
+        ('test_setpoint_and_status_at_once.py', '-k', 'newest_set_point'),
     ),
     Mutant(
         8,

@@ -4,8 +4,8 @@
 """
 Fixed histories of commands and of what happens to a drive, in an order that a seed makes up.
 
-In virtual time, and in thousands, that is ``test/unit/drive/test_any_order.py``; here it is the
-node as it is used, by its topics and services. What counts is what the simulated drive does.
+In virtual time, and in thousands, that is ``test_any_order.py``; here it is the node as it is used,
+by its topics and services. What counts is what the simulated drive does.
 """
 
 from __future__ import annotations

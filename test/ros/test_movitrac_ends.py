@@ -23,7 +23,7 @@ from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.demo.bench import own_domain
 
 #: What has to be so for a setting to be switched on [M4 §2.1.2].
-#: One of each kind; test/unit/drive/test_movitrac_manual.py has both ends of all.
+#: One of each kind; test/unit/drive/families/test_movitrac_manual.py has both ends of all.
 _ONE_OF_EACH = (
     'ramp.t11_up', 'frequency.f_base_1', 'motor.pwm_frequency_1', 'special.four_quadrant_1',
     'serial.inverter_address',

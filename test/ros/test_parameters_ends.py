@@ -26,7 +26,7 @@ from nfo_sinus_driver.demo.bench import own_domain
 
 pytestmark = needs('parameters')
 
-#: One of each kind; test/unit/drive/test_ends_on_classic.py has both ends of all,
+#: One of each kind; test/unit/drive/settings/test_ends_on_classic.py has both ends of all,
 #: test_parameters_listed.py what is shown of all.
 _ONE_OF_EACH = (
     'freque.f_fix1', 'control.accel', 'control.st_mode', 'serial.si_prot', 'serial.address',

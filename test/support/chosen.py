@@ -26,23 +26,22 @@ KINDS = (
 )
 #: Of the others a law has one in so many, if nothing else is said.
 _ONE_IN = 6
-_DRIVE = 'test/unit/drive'
 #: Its laws have all of them, and one in so many of the others; those of other files have one kind
 #: in so many.
-_EACH_KIND = f'{_DRIVE}/test_laws.py'
+_EACH_KIND = 'test_laws.py'
 _ONE_IN_OF_LAWS = 4
 _ONE_KIND_IN = 2
-#: The cells that no other replaces, with the mutant that lives without them.
+#: The cells that no other replaces, by file and name, with the mutant that lives without them.
 NEEDED = {
-    f'{_DRIVE}/test_why_stopped.py::test_after_each_stop_it_is_known_why[rtu-power cycle]':
+    'test_why_stopped.py::test_after_each_stop_it_is_known_why[rtu-power cycle]':
         'a drive that was away and is not in control any more has stopped for no known reason',
-    f'{_DRIVE}/test_stopped_is_true.py::test_no_stop_is_a_success_while_the_measured_speed_stays'
+    'test_stopped_is_true.py::test_no_stop_is_a_success_while_the_measured_speed_stays'
     '[rtu-exit]':
         'an exit does not look for a run command at standstill',
-    f'{_DRIVE}/test_driver_stands_still.py::'
+    'test_driver_stands_still.py::'
     'test_a_stop_is_on_the_wire_at_once_while_a_drive_is_known_as_slow[rtu]':
         'a stop waits for a link that only listens',
-    f'{_DRIVE}/test_stopped_is_true.py::test_the_end_waits_for_the_ramp[canopen, ds402 alone]':
+    'test_stopped_is_true.py::test_the_end_waits_for_the_ramp[canopen, ds402 alone]':
         'a motor on its ramp is let go of where its drive is shown as ready',
 }
 
@@ -70,12 +69,18 @@ def axes_of(item: pytest.Item) -> dict[str, object]:
     return axes | params
 
 
+def _without_folder(name: str) -> str:
+    """Return the name of a test without the folder of its file: what is chosen stays as it is."""
+    head, bracket, cell = name.partition('[')
+    return head.rpartition('/')[2] + bracket + cell
+
+
 def _of_one(law: str, cells: list[Test], one_in: int) -> set[str]:
     connections = {str(params.get('connection')) for _, params in cells}
     # which of them differs from law to law
-    turn = crc32(law.encode())
+    turn = crc32(_without_folder(law).encode())
     kinds = [kind for kind in KINDS if kind in connections]
-    if law.startswith(_EACH_KIND):
+    if _without_folder(law).startswith(_EACH_KIND):
         one_in = _ONE_IN_OF_LAWS
     else:
         kinds = kinds[turn % _ONE_KIND_IN::_ONE_KIND_IN]
@@ -85,9 +90,10 @@ def _of_one(law: str, cells: list[Test], one_in: int) -> set[str]:
     found: set[str] = set()
     met: set[tuple[str, str]] = set()
     # in an order of its own for each law, so that other values go together there
-    for name, params in sorted(wanted or cells, key=lambda cell: crc32(cell[0].encode())):
+    in_turn = sorted(wanted or cells, key=lambda cell: crc32(_without_folder(cell[0]).encode()))
+    for name, params in in_turn:
         values = {(key, repr(value)) for key, value in params.items()}
         if not values or not values <= met:
             found.add(name)
             met |= values
-    return found | NEEDED.keys() & {name for name, _ in cells}
+    return found | {name for name, _ in cells if _without_folder(name) in NEEDED}

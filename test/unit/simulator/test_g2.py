@@ -295,7 +295,7 @@ def test_without_net_ctrl_a_word_does_nothing_and_the_mask_changes_bits_of_it(be
     assert bench.read('fieldbus.mode') == 1
 
 
-# ---- tuning; what each procedure finds is in test/unit/drive/test_tuning.py ----
+# ---- tuning; what each procedure finds is in test/unit/drive/starts/test_tuning.py ----
 
 
 def settings(bench):

@@ -169,7 +169,7 @@ def test_the_keypad_takes_over_and_gives_back(bench):
     assert (bench.read(m.MANUAL_OPERATION), bench.running) == (1, False)
 
 
-# ---- faults; those that are remembered are in test/unit/drive/test_movitrac_manual.py ----
+# ---- faults; those that are remembered are in test_movitrac_manual.py ----
 
 
 def test_a_rising_bit_resets_in_remote_control_alone(running):

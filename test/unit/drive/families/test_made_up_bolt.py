@@ -26,7 +26,7 @@ from nfo_sinus_driver.catalog import CatalogError, load_family
 from nfo_sinus_driver.drive import Cause, DriveSettings
 from nfo_sinus_driver.drive.known.settings import AUTO
 
-MADE_UP = Path(__file__).parent / 'made_up'
+MADE_UP = Path(__file__).parents[1] / 'made_up'
 PATIENT, SOURCE, BITS, SIZE, STATUS, INPUTS, HERTZ, TURNS = 11, 12, 100, 102, 400, 402, 403, 404
 RUN, RESET = 1 << 0, 1 << 3
 RUNNING, TRIPPED, BACKWARDS = 1 << 0, 1 << 1, 1 << 3

@@ -77,7 +77,7 @@ class Acme(FarEnd):
 
 @pytest.fixture(autouse=True)
 def _one_folder_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    more = str(Path(__file__).parent / 'made_up')
+    more = str(Path(__file__).parents[1] / 'made_up')
     monkeypatch.setattr(families, '__path__', [*families.__path__, more])
 
 
@@ -227,7 +227,7 @@ def test_a_refused_part_stops_the_motor() -> None:
 def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """The same drive as a family that has no roles but those of its status."""
     folder = tmp_path / f'bare_{tmp_path.name}'
-    shutil.copytree(Path(__file__).parent / 'made_up' / 'acme', folder)
+    shutil.copytree(Path(__file__).parents[1] / 'made_up' / 'acme', folder)
     (folder / 'roles.csv').write_text(
         'role,parameter\nstatus_word,bus.status\nstatus_code,bus.code\n', encoding='utf-8'
     )

@@ -84,7 +84,7 @@ def test_a_run(name: str, protocol: str) -> None:
 
 
 def test_the_template_of_the_page_is_right_and_is_driven(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[3] / 'docs' / 'your_own_drive.md').read_text(encoding='utf-8')
+    page = (Path(__file__).parents[4] / 'docs' / 'your_own_drive.md').read_text(encoding='utf-8')
     template = page.partition('## Template\n')[2].partition('\nComplete examples')[0]
     path = tmp_path / 'my_drive.vfd.yaml'
     path.write_text(textwrap.dedent(template), encoding='utf-8')
