@@ -136,7 +136,8 @@ class Bus:
         self._sleepers = Sleepers()
         self._stopping = False
         self._closed = False
-        self._tasks: set[Task] = set()
+        #: In the order in which they began, so that one history gives one order of requests.
+        self._tasks: dict[Task, None] = {}
         #: For coroutines on the worker to count in.
         self.recorder = Recorder(now)
         #: How many coroutines read parameters all the time; they share the time for it.
@@ -608,11 +609,11 @@ class Bus:
             self._advance(task, None, Cancelled())
             return
         if awaited is None:
-            self._tasks.discard(task)
+            self._tasks.pop(task, None)
             for joiner in task.joiners:
                 self.wake(joiner)
             return
-        self._tasks.add(task)
+        self._tasks[task] = None
         if isinstance(awaited, Exchange):
             self._scheduler.add(Waiting(task, awaited))
         else:
