@@ -71,8 +71,8 @@ def axes_of(item: pytest.Item) -> dict[str, object]:
 
 def _without_folder(name: str) -> str:
     """Return the name of a test without the folder of its file: what is chosen stays as it is."""
-    head, bracket, cell = name.partition('[')
-    return head.rpartition('/')[2] + bracket + cell
+    file, colons, test = name.partition('::')
+    return file.rpartition('/')[2] + colons + test
 
 
 def _of_one(law: str, cells: list[Test], one_in: int) -> set[str]:
