@@ -54,20 +54,20 @@ in one place of the worker (it hides how often a status was missed, which drive 
 from nfo_sinus_driver.bus.by_address import ByAddress
 from nfo_sinus_driver.bus.calls import Run, on_bus, stops_on_bus
 from nfo_sinus_driver.bus.lock import Lock
-from nfo_sinus_driver.bus.silences import EXCHANGE
+from nfo_sinus_driver.bus.silences import SWAP_TIME
 from nfo_sinus_driver.bus.statistics import Statistics
-from nfo_sinus_driver.bus.tasks import Cancelled, Exchange, LatestValue, Priority, Task
+from nfo_sinus_driver.bus.tasks import Cancelled, LatestValue, Priority, Request, Task
 from nfo_sinus_driver.bus.worker import Bus, Watch
 
 __all__ = [
-    'EXCHANGE',
+    'SWAP_TIME',
     'Bus',
     'ByAddress',
     'Cancelled',
-    'Exchange',
     'LatestValue',
     'Lock',
     'Priority',
+    'Request',
     'Run',
     'Statistics',
     'Task',

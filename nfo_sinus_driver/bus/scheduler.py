@@ -15,7 +15,7 @@ import itertools
 import math
 from typing import Literal, NamedTuple
 
-from nfo_sinus_driver.bus.tasks import Exchange, LatestValue, Priority, Task
+from nfo_sinus_driver.bus.tasks import LatestValue, Priority, Request, Task
 
 __all__ = ['BACKGROUND_SHARE', 'Scheduler', 'Waiting']
 
@@ -60,11 +60,11 @@ class Waiting(NamedTuple):
     """A transaction, and the task that awaits it."""
 
     task: Task
-    exchange: Exchange
+    request: Request
 
 
 def _unit_of(entry: LatestValue | Waiting) -> int:
-    return entry.unit if isinstance(entry, LatestValue) else entry.exchange.unit
+    return entry.unit if isinstance(entry, LatestValue) else entry.request.unit
 
 
 class Scheduler:
@@ -124,10 +124,10 @@ class Scheduler:
         self._owed = dict.fromkeys(_SHARES, 0.0)
         #: What was given out just now, and of which rank.
         self._given: _Rank = _SLOT
-        self._wanted: LatestValue | Exchange | None = None
+        self._wanted: LatestValue | Request | None = None
         self._slot_went = False
         #: The stop, its read, or the service that has just not been answered.
-        self._unanswered: Exchange | None = None
+        self._unanswered: Request | None = None
         #: What units have not answered since they last answered anything: a stop (true), its read;
         #: and how often.
         self._unanswered_stops: dict[tuple[int, bool], int] = {}
@@ -151,7 +151,7 @@ class Scheduler:
             for rank in (*_STOPS, _MISSING)
             for entry in self._queues[rank]
             if isinstance(entry, Waiting)
-            and entry.exchange.priority in _STOPS
+            and entry.request.priority in _STOPS
             and not self._is_resting(entry)
         ]
 
@@ -173,7 +173,7 @@ class Scheduler:
         self._release_found()
         if in_noise and (stops := self.stops):
             rank, stop = min(stops, key=self._requests_of)
-            return None if self._needs_silence(stop.exchange.unit) else self._take_out(rank, stop)
+            return None if self._needs_silence(stop.request.unit) else self._take_out(rank, stop)
         for rank in _STOPS if only_stops else self._order(missing):
             # most are empty, and this runs for every transaction
             entry = self._first(rank) if self._queues[rank] else None
@@ -192,15 +192,15 @@ class Scheduler:
 
     def _requests_of(self, stop: tuple[_Rank, Waiting]) -> tuple[int, bool, float]:
         """Return how many requests a stop has made; of equals the longest ago goes first."""
-        _, (task, exchange) = stop
-        unit = exchange.unit
+        _, (task, request) = stop
+        unit = request.unit
         # none waits for another's silence but after its turn
         return task.requests, self._needs_silence(unit), self._asked_at(unit)
 
     def _take_out(self, rank: _Rank, entry: LatestValue | Waiting) -> LatestValue | Waiting:
         del self._queues[rank][entry]
         self._given = rank
-        self._wanted = entry if isinstance(entry, LatestValue) else entry.exchange
+        self._wanted = entry if isinstance(entry, LatestValue) else entry.request
         return entry
 
     def _release_found(self) -> None:
@@ -245,7 +245,7 @@ class Scheduler:
                 return entry
         return None
 
-    def is_brief(self, exchange: Exchange) -> bool:
+    def is_brief(self, request: Request) -> bool:
         """
         Return whether its answer is waited for no longer than the unit has ever taken.
 
@@ -253,40 +253,40 @@ class Scheduler:
         that answers no stop, both but for the second and then each eighth one, of what is read
         before a stop is written, for that goes without it, and of what is sent to be heard.
         """
-        if exchange.is_brief or (exchange.priority is Priority.STOP and not exchange.writes):
+        if request.is_brief or (request.priority is Priority.STOP and not request.writes):
             return True
         tries = self._unanswered_stops
-        is_look = exchange.priority is Priority.LOOK and (exchange.unit, True) in tries
-        if exchange.priority is not Priority.STOP and not is_look:
+        is_look = request.priority is Priority.LOOK and (request.unit, True) in tries
+        if request.priority is not Priority.STOP and not is_look:
             return False
-        if tries.get((exchange.unit, exchange.writes), 0) % _PATIENT == 1:
+        if tries.get((request.unit, request.writes), 0) % _PATIENT == 1:
             return False
-        return self._is_silent(exchange.unit) or any(
-            isinstance(entry, Waiting) and entry.exchange.unit != exchange.unit
+        return self._is_silent(request.unit) or any(
+            isinstance(entry, Waiting) and entry.request.unit != request.unit
             for entry in self._queues[Priority.STOP]
         )
 
     def _in_vain(self, entry: LatestValue | Waiting) -> tuple[int, int]:
         """Return how often the like of it was in vain, and how many requests its stop has made."""
         assert isinstance(entry, Waiting)
-        task, exchange = entry
-        return self._unanswered_stops.get((exchange.unit, exchange.writes), 0), task.requests
+        task, request = entry
+        return self._unanswered_stops.get((request.unit, request.writes), 0), task.requests
 
     def _gives_way(self, entry: LatestValue | Waiting) -> bool:
         """Return whether it is for the unit that has just not answered, or for one like it."""
         if isinstance(entry, LatestValue):
             return not entry.urgent() and self._waits_for_stops(entry.unit)
-        exchange = entry.exchange
-        if exchange.priority not in _STOPS and self._waits_for_stops(exchange.unit):
+        request = entry.request
+        if request.priority not in _STOPS and self._waits_for_stops(request.unit):
             return True
         before = self._unanswered
-        is_repeated = self._is_repeated(exchange)
-        if before is not None and exchange.unit == before.unit:
+        is_repeated = self._is_repeated(request)
+        if before is not None and request.unit == before.unit:
             # the first stop that is requested is not held back by a service in vain
-            return is_repeated or exchange.priority not in _STOPS or before.priority in _STOPS
+            return is_repeated or request.priority not in _STOPS or before.priority in _STOPS
         # else two of them would take turns, and no other had one
-        is_in_vain = is_repeated or exchange.priority == Priority.SERVICE
-        return is_in_vain and self._is_silent(exchange.unit)
+        is_in_vain = is_repeated or request.priority == Priority.SERVICE
+        return is_in_vain and self._is_silent(request.unit)
 
     def _waits_for_stops(self, unit: int) -> bool:
         """Return whether what is no stop has to wait until all stops were sent, on a dead line."""
@@ -295,7 +295,7 @@ class Scheduler:
         rounds = _ROUNDS if self._is_silent(unit) else 1
         return any(
             isinstance(entry, Waiting)
-            and self._unanswered_stops.get((entry.exchange.unit, entry.exchange.writes), 0) < rounds
+            and self._unanswered_stops.get((entry.request.unit, entry.request.writes), 0) < rounds
             for entry in self._queues[Priority.STOP]
         )
 
@@ -305,7 +305,7 @@ class Scheduler:
         in_vain = wanted is not None and self._is_silent(wanted.unit)
         is_stop = self._given in _STOPS
         is_unanswered = in_vain and self._given in _REPEATED
-        self._unanswered = wanted if isinstance(wanted, Exchange) and is_unanswered else None
+        self._unanswered = wanted if isinstance(wanted, Request) and is_unanswered else None
         # what was in vain takes no turn: else the next one were that of a set-point again
         self._slot_went = self._given == _SLOT or (
             self._slot_went and self._unanswered is not None
@@ -373,18 +373,18 @@ class Scheduler:
             if not self._is_silent(entry.unit) or entry.urgent():
                 return _SLOT
             return _MISSING if self._is_missing(entry.unit) else _RETRY
-        exchange = entry.exchange
-        if not self._is_silent(exchange.unit):
+        request = entry.request
+        if not self._is_silent(request.unit):
             if self._unanswered_stops:
-                self._unanswered_stops.pop((exchange.unit, False), None)
-                self._unanswered_stops.pop((exchange.unit, True), None)
-        elif exchange.priority in _READS:
-            return _MISSING if self._is_missing(exchange.unit) else _RETRY
-        elif self._is_repeated(exchange) and self._is_missing(exchange.unit):
+                self._unanswered_stops.pop((request.unit, False), None)
+                self._unanswered_stops.pop((request.unit, True), None)
+        elif request.priority in _READS:
+            return _MISSING if self._is_missing(request.unit) else _RETRY
+        elif self._is_repeated(request) and self._is_missing(request.unit):
             # of others that answer it takes no more than their share
-            return exchange.priority if self._is_line_silent() else _MISSING
-        return exchange.priority
+            return request.priority if self._is_line_silent() else _MISSING
+        return request.priority
 
-    def _is_repeated(self, exchange: Exchange) -> bool:
-        before = (exchange.unit, exchange.writes)
-        return exchange.priority <= Priority.LOOK and before in self._unanswered_stops
+    def _is_repeated(self, request: Request) -> bool:
+        before = (request.unit, request.writes)
+        return request.priority <= Priority.LOOK and before in self._unanswered_stops

@@ -14,7 +14,7 @@ import math
 
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NotSent, PortError, Refused
 
-__all__ = ['EXCHANGE', 'Silences']
+__all__ = ['SWAP_TIME', 'Silences']
 
 #: A unit that has been silent for so long counts as missing, s: short enough to spare the others,
 #: longer than a burst of noise.
@@ -33,7 +33,7 @@ _MUTE_PAUSES_OF_A_STOP = (2.0, 4.0, *[8.0] * 10, 30.0)
 _MUTE_LONGEST = _MUTE_PAUSES[-1]
 #: In a longer silence another unit may have been put in the place of one, s: that is how long it
 #: takes to move the plug of the line from a drive to a spare one beside it that has power.
-EXCHANGE = 3.0
+SWAP_TIME = 3.0
 #: How much longer than a loss takes a stop may be written, s: until it is noticed that nothing
 #: answers, the last answer is older than the first request in vain, and others have turns.
 _NOTICED_WITHIN = 0.5
@@ -109,7 +109,7 @@ class Silences:
         #: Until when it is opened once more at the latest, s, and until when only once.
         self._once_more = (math.inf, -math.inf)
         self.opened_at = self.moved_at = self.away_at = -math.inf
-        #: When a silence ended that was long enough for an exchange: of the line, and of each unit.
+        #: When a silence ended that was long enough for an request: of the line, and of each unit.
         self._line_since = -math.inf
         self._unit_since: dict[int, float] = {}
 
@@ -140,7 +140,7 @@ class Silences:
         if not isinstance(error, PortError):
             self._asked_at[unit] = now
         if error is None or error.responded or isinstance(error, Refused):
-            self._note_exchange(unit, now)
+            self._note_swap(unit, now)
             if now - self._any_frame_at >= _MISSING_AFTER:
                 # it was the line: the others may be back with this one, and have to be stopped
                 self._back_at = now
@@ -181,7 +181,7 @@ class Silences:
             self.opened_at = now
             if not same_place:
                 self.moved_at = now
-            if not same_place or now - self._any_frame_at > EXCHANGE:
+            if not same_place or now - self._any_frame_at > SWAP_TIME:
                 self._line_since = self.away_at = now
         self._opened += 1
         self._mute_since = math.inf
@@ -235,11 +235,11 @@ class Silences:
         self._in_vain_since += seconds
         self._mute_since += seconds
 
-    def _note_exchange(self, unit: int, now: float) -> None:
+    def _note_swap(self, unit: int, now: float) -> None:
         """Note that a silence ends in which a unit, or any, may have been exchanged."""
-        if now - self._gone_since.get(unit, now) > EXCHANGE:
+        if now - self._gone_since.get(unit, now) > SWAP_TIME:
             self._unit_since[unit] = now
-        if now - self._any_frame_at > EXCHANGE:
+        if now - self._any_frame_at > SWAP_TIME:
             # this end may have stood still
             self._line_since = now
 
@@ -250,9 +250,9 @@ class Silences:
         :param to_stop: it is to be stopped only: for that it is the same until it is lost, however
             long that takes.
         """
-        longest = EXCHANGE
+        longest = SWAP_TIME
         if to_stop:
-            longest = max(EXCHANGE, self._lost_after.get(unit, 0.0) + _NOTICED_WITHIN)
+            longest = max(SWAP_TIME, self._lost_after.get(unit, 0.0) + _NOTICED_WITHIN)
         if now - min(self._gone_since.get(unit, now), self._any_frame_at) > longest:
             return math.inf
         return max(self._line_since, self._unit_since.get(unit, -math.inf))

@@ -62,7 +62,7 @@ class Cancelled(BaseException):
 
 
 @dataclass(eq=False, slots=True)
-class Exchange:
+class Request:
     """
     What is wanted of a unit; a coroutine awaits its answer.
 
@@ -109,7 +109,7 @@ class Exchange:
             raise InProgress(reply.arrived)
         return reply
 
-    def __await__(self) -> Generator[Exchange, Reply, Reply]:
+    def __await__(self) -> Generator[Request, Reply, Reply]:
         return (yield self)
 
 
@@ -125,10 +125,10 @@ async def consistent_read(unit: int, parts: Sequence[Address], priority: Priorit
     :raises LinkError: as the link does.
     """
     low_part, high_part = parts
-    high = await Exchange(unit, Read(high_part), priority)
+    high = await Request(unit, Read(high_part), priority)
     for _ in range(_TRIES):
-        low = await Exchange(unit, Read(low_part), priority)
-        again = await Exchange(unit, Read(high_part), priority)
+        low = await Request(unit, Read(low_part), priority)
+        again = await Request(unit, Read(high_part), priority)
         if again.data == high.data:
             # the drive had both at the moment in between; the last answer may be from after a write
             return Reply(low.data + high.data, low.arrived)
@@ -141,7 +141,7 @@ async def inquire(unit: int, questions: Plan[Identification], priority: Priority
 
     async def ask(question: Operation) -> Reply | None:
         try:
-            return await Exchange(unit, question, priority)
+            return await Request(unit, question, priority)
         except PortError:
             raise
         except LinkError as error:
@@ -162,13 +162,13 @@ async def set_up(
     Have a unit watch this end of the line, each step by itself; return by which means.
 
     :param tries: how often a step without an answer is tried: each may be done again.
-    :param require_wanted: as for :class:`Exchange`.
+    :param require_wanted: as for :class:`Request`.
     """
 
     async def take(step: Operation) -> Reply | None:
         for left in reversed(range(tries)):
             try:
-                return await Exchange(unit, step, priority, require_wanted)
+                return await Request(unit, step, priority, require_wanted)
             except LinkError as error:
                 if isinstance(error, Refused) and error.code != Refused.BUSY:
                     return None
@@ -229,7 +229,7 @@ class Task:
         self.running = False
         self.cancel_due = False
         #: What it waits for.
-        self.awaited: Exchange | Pause | None = None
+        self.awaited: Request | Pause | None = None
         #: Distinguishes the timers of earlier pauses from that of the present one.
         self.pause = 0
         self.asleep = False
@@ -272,7 +272,7 @@ class Task:
         self.asleep = False
         self.pause += 1
 
-    def step(self, value: Any, error: BaseException | None) -> Exchange | Pause | None:
+    def step(self, value: Any, error: BaseException | None) -> Request | Pause | None:
         """Run it up to what it awaits next; ``None`` when it has ended."""
         self.running = True
         self.awaited = None
@@ -284,9 +284,9 @@ class Task:
         except BaseException as failure:
             self.future.set_exception(self._explain(failure))
         else:
-            assert isinstance(awaited, (Exchange, Pause))
+            assert isinstance(awaited, (Request, Pause))
             self.awaited = awaited
-            self.requests += isinstance(awaited, Exchange)
+            self.requests += isinstance(awaited, Request)
             return awaited
         finally:
             self.running = False

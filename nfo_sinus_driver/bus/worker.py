@@ -5,7 +5,7 @@
 The worker of one line.
 
 One worker thread owns the link. What takes several transactions is a coroutine
-(``async def``) that awaits :meth:`Bus.carry_out` and :meth:`Bus.sleep`; the worker steps all of
+(``async def``) that awaits :meth:`Bus.ask` and :meth:`Bus.sleep`; the worker steps all of
 them and sends one transaction at a time, the most urgent first. So the state that coroutines share
 is only ever touched by the worker, a stop waits for one transaction at most, and nothing that a
 coroutine raises can end the worker.
@@ -31,10 +31,10 @@ from nfo_sinus_driver.bus.silences import Silences
 from nfo_sinus_driver.bus.statistics import Recorder, Statistics
 from nfo_sinus_driver.bus.tasks import (
     Cancelled,
-    Exchange,
     LatestValue,
     Pause,
     Priority,
+    Request,
     Sleepers,
     Task,
     consistent_read,
@@ -60,7 +60,6 @@ from nfo_sinus_driver.link import (
     Refused,
     Reply,
     Why,
-    carry_out,
 )
 
 _log = logging.getLogger(__name__)
@@ -285,7 +284,7 @@ class Bus:
 
     # --- for coroutines on the worker ---------------------------------------------------------
 
-    def carry_out(
+    def ask(
         self,
         unit: int,
         operation: Operation,
@@ -300,7 +299,7 @@ class Bus:
         parts = self.protocol.parts(operation.address) if isinstance(operation, Read) else ()
         if len(parts) > 1:
             return consistent_read(unit, parts, priority)
-        return Exchange(unit, operation, priority, require_wanted)
+        return Request(unit, operation, priority, require_wanted)
 
     @property
     def is_quiet(self) -> bool:
@@ -314,7 +313,7 @@ class Bus:
 
     def keep_alive(self, unit: int, address: Address) -> Awaitable[Reply]:
         """Have a unit hear something soon (to be awaited), by reading a parameter of it."""
-        return Exchange(unit, Read(address), Priority.LOOK, is_brief=True)
+        return Request(unit, Read(address), Priority.LOOK, is_brief=True)
 
     def last_tries(self, seconds: float) -> None:
         """
@@ -355,7 +354,7 @@ class Bus:
     def answer(self, task: Task, unit: int, address: Address, reply: Reply) -> bool:
         """Give a task a reading that came with another answer; false if it waits for no such."""
         awaited = task.awaited
-        if not isinstance(awaited, Exchange) or not awaited.reads(unit, address):
+        if not isinstance(awaited, Request) or not awaited.reads(unit, address):
             return False
         self._scheduler.remove(Waiting(task, awaited))
         self._advance(task, reply, None)
@@ -614,7 +613,7 @@ class Bus:
                 self.wake(joiner)
             return
         self._tasks[task] = None
-        if isinstance(awaited, Exchange):
+        if isinstance(awaited, Request):
             self._scheduler.add(Waiting(task, awaited))
         else:
             self._sleepers.add(task, awaited.until)
@@ -639,7 +638,7 @@ class Bus:
         if isinstance(entry, LatestValue):
             self._write_slot(entry)
         elif entry is not None:
-            self._exchange(*entry)
+            self._serve(*entry)
         return entry is not None
 
     def _rests_until(self, unit: int) -> float:
@@ -657,7 +656,7 @@ class Bus:
         if written is None:
             return
         try:
-            reply = self._transact(Exchange(slot.unit, written, Priority.SETPOINT))
+            reply = self._transact(Request(slot.unit, written, Priority.SETPOINT))
         except NotReady as error:
             self._later(error.until, functools.partial(self.request, slot))
         except LinkError as error:
@@ -666,21 +665,21 @@ class Bus:
             slot.done(written, None)
             slot.answered(reply)
 
-    def _exchange(self, task: Task, exchange: Exchange) -> None:
+    def _serve(self, task: Task, request: Request) -> None:
         try:
-            exchange.require_wanted()
-            reply = self._transact(exchange)
+            request.require_wanted()
+            reply = self._transact(request)
         except NotReady as error:
-            self._later(error.until, functools.partial(self._resume, task, exchange))
+            self._later(error.until, functools.partial(self._resume, task, request))
         except Exception as error:
             # the line failed, or it is not wanted any more
             self._advance(task, None, error)
         else:
             self._advance(task, reply, None)
 
-    def _resume(self, task: Task, exchange: Exchange) -> None:
-        if task.awaited is exchange:
-            self._scheduler.add(Waiting(task, exchange))
+    def _resume(self, task: Task, request: Request) -> None:
+        if task.awaited is request:
+            self._scheduler.add(Waiting(task, request))
 
     def _later(self, until: float, function: Callable[[], None]) -> None:
         async def wait() -> None:
@@ -689,30 +688,30 @@ class Bus:
 
         self.spawn(wait())
 
-    def _transact(self, exchange: Exchange) -> Reply:
+    def _transact(self, request: Request) -> Reply:
         """
         Carry out a transaction.
 
         What was read while the worker paused may be old: it is read again, once.
         """
         started = self._clock()
-        silence = self._link.pauses.kept_silent(exchange.unit)
+        silence = self._link.pauses.kept_silent(request.unit)
         paced_until = self._paced_until
         self._paced_until = started + self._request_period
-        self._link.wait_at_most(self._patience(exchange, started))
+        self._link.wait_at_most(self._patience(request, started))
         try:
-            reply = carry_out(self._link, exchange.unit, exchange.operation)
+            reply = request.operation.carry_out(self._link, request.unit)
             if self._clock.resumed_at > started:
-                reply = exchange.without_old(reply)
+                reply = request.without_old(reply)
         except InProgress:
-            self._account(exchange, started, silence, None)
+            self._account(request, started, silence, None)
             raise
         except NotReady:
             self._paced_until = paced_until
             raise
         except LinkError as error:
-            self._account(exchange, started, silence, error, tells=exchange.is_for_all)
-            self._count_write(exchange, error)
+            self._account(request, started, silence, error, tells=request.is_for_all)
+            self._count_write(request, error)
             raise
         except BaseException as error:
             # an error in the link must reach the caller, not leave it waiting
@@ -720,21 +719,21 @@ class Bus:
             raise LinkError(f'error in the link: {error!r}') from error
         if not reply.requests:
             self._paced_until = paced_until
-        self._account(exchange, started, silence, None)
-        self._count_write(exchange, None)
+        self._account(request, started, silence, None)
+        self._count_write(request, None)
         return reply
 
-    def _patience(self, exchange: Exchange, now: float) -> float:
+    def _patience(self, request: Request, now: float) -> float:
         """Return how long an answer is waited for at most, s."""
-        if self._scheduler.is_brief(exchange):
+        if self._scheduler.is_brief(request):
             return 0.0
-        if self.silences.is_silent(exchange.unit) or self.silences.is_line_silent:
+        if self.silences.is_silent(request.unit) or self.silences.is_line_silent:
             # a loss is noticed when it is due, and no other drive is lost because of this one
             most = self._lost_at - now
             if len(self._watches) > 1:
                 most = min(most, _OF_A_LOSS * self.silences.soonest_loss)
             return most
-        if exchange.priority is Priority.SERVICE or self.protocol.most_requests:
+        if request.priority is Priority.SERVICE or self.protocol.most_requests:
             # a gateway would go on waiting, and so would the next request
             return math.inf
         # one lost answer is no loss, however long an answer may take
@@ -742,17 +741,17 @@ class Bus:
 
     def _account(
         self,
-        exchange: Exchange,
+        request: Request,
         started: float,
         silence: float,
         error: LinkError | None,
         *,
         tells: bool = True,
     ) -> None:
-        now, unit = self.now(), exchange.unit
+        now, unit = self.now(), request.unit
         seconds = now - started - self._note_pause()
         answered = unit != self.protocol.broadcast and tells
-        is_stop = exchange.priority <= Priority.LOOK
+        is_stop = request.priority <= Priority.LOOK
         if answered and self.silences.note(unit, now, error, seconds, silence, is_stop=is_stop):
             self._report_mute(0.0)
         self._scheduler.took(silence + seconds)
@@ -761,8 +760,8 @@ class Bus:
         else:
             self.recorder.transaction(unit, now, seconds, error, silence)
 
-    def _count_write(self, exchange: Exchange, error: LinkError | None) -> None:
-        if not exchange.writes or exchange.unit == self.protocol.broadcast:
+    def _count_write(self, request: Request, error: LinkError | None) -> None:
+        if not request.writes or request.unit == self.protocol.broadcast:
             return
         if error is None or isinstance(error, (Refused, AnotherValue)):
             self.writes_in_vain = 0
@@ -823,7 +822,7 @@ class Bus:
         for entry in self._scheduler.clear():
             if isinstance(entry, LatestValue):
                 self._fail_slot(entry, error)
-            elif entry.task.awaited is entry.exchange:
+            elif entry.task.awaited is entry.request:
                 # else an earlier callback has ended it
                 self._advance(entry.task, None, error)
 

@@ -40,4 +40,4 @@ async def _broadcast(bus: Bus, drives: Iterable[Drive]) -> None:
             parameter = model[stop.key]
             address = Address(*parameter.at(addressing).place)
             data = parameter.encode(stop.value, addressing)
-            await bus.carry_out(everyone, Write(address, data), Priority.STOP)
+            await bus.ask(everyone, Write(address, data), Priority.STOP)

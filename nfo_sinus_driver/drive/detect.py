@@ -50,7 +50,7 @@ def _speaks(model: Family, protocol: str) -> bool:
 async def _has(bus: Bus, unit: int, model: Family, key: str) -> bool:
     address = Address(*model[key].at(bus.protocol.addressing).place)
     try:
-        await bus.carry_out(unit, Read(address), Priority.SERVICE)
+        await bus.ask(unit, Read(address), Priority.SERVICE)
     except Refused:
         return False
     return True

@@ -25,7 +25,7 @@ from nfo_sinus_driver.drive.known.identity import Identity
 from nfo_sinus_driver.drive.known.recognising import Recogniser
 from nfo_sinus_driver.drive.known.settings import DriveSettings
 from nfo_sinus_driver.drive.known.snapshot import Listener, LogEntry, Snapshot
-from nfo_sinus_driver.drive.known.steps import carry_out
+from nfo_sinus_driver.drive.known.steps import run_steps
 from nfo_sinus_driver.drive.motion.controller import Controller, required
 from nfo_sinus_driver.drive.motion.procedure import Procedures
 from nfo_sinus_driver.drive.motion.setpoint import Setpoint
@@ -396,7 +396,7 @@ class Drive:
     async def active_control_method(self) -> str:
         """Return the control method by which the bus runs the drive, or could stop it."""
         steps = self.model.profile.active_method(self.state.status)
-        return await carry_out(self.state, steps, Priority.SERVICE)
+        return await run_steps(self.state, steps, Priority.SERVICE)
 
     @on_bus
     async def error_log(self, most: int = 0) -> tuple[LogEntry, ...]:

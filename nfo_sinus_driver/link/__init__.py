@@ -5,9 +5,9 @@
 Transactions on one line, one at a time. No ROS, no knowledge of drives or parameters.
 
 What is wanted of a unit is a value (``Read``, ``Write``, ``WriteAndRead``, ``ReadThenWrite``,
-``Ask``), with an address and bytes that mean nothing here. :func:`carry_out` gives it to the link
-of the protocol. A link returns a reply, or raises an error that says two things: whether the unit
-answered (its type), and whether it may have carried out the request (``maybe_done``).
+``Ask``), with an address and bytes that mean nothing here; ``carry_out`` has the link of a protocol
+do it. A link returns a reply, or raises an error that says two things: whether the unit answered
+(its type), and whether it may have carried out the request (``maybe_done``).
 
 **Nothing received is believed because it fits.** A Modbus answer does not say which register it is
 from, and after a missing answer the next frame of the right shape may be the late one: an old
@@ -31,7 +31,7 @@ is read and written directly, because a frame ends by its length or by a silence
 while a read of pyserial ends by a number of bytes or a time-out.
 
 ====================  ============================================================================
-:func:`carry_out`
+``carry_out``
 ====================  ============================================================================
 returns               The unit has answered this request and no other: a read gives what it held
                       between request and answer (behind a PLC: what that had of it at
@@ -86,7 +86,6 @@ from nfo_sinus_driver.link.interface import (
     Write,
     WriteAndRead,
     Written,
-    carry_out,
     silent,
 )
 from nfo_sinus_driver.link.ports.reconnect import Reconnect
@@ -135,7 +134,6 @@ __all__ = [
     'Write',
     'WriteAndRead',
     'Written',
-    'carry_out',
     'open_link',
     'silent',
 ]

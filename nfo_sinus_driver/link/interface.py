@@ -96,12 +96,20 @@ class Read(NamedTuple):
     address: Address
     once: bool = False
 
+    def carry_out(self, link: Link, unit: int) -> Reply:
+        """Read it (LinkError: as its subclasses say)."""
+        return link.read(unit, self.address, self.once)
+
 
 class Write(NamedTuple):
     """Write a parameter."""
 
     address: Address
     data: bytes
+
+    def carry_out(self, link: Link, unit: int) -> Reply:
+        """Write it (LinkError: as its subclasses say)."""
+        return link.write(unit, self.address, self.data)
 
 
 class WriteAndRead(NamedTuple):
@@ -111,6 +119,10 @@ class WriteAndRead(NamedTuple):
     data: bytes
     source: Address
 
+    def carry_out(self, link: Link, unit: int) -> Reply:
+        """Write and read (LinkError: as its subclasses say)."""
+        return link.write_and_read(unit, self.address, self.data, self.source)
+
 
 class ReadThenWrite(NamedTuple):
     """Read a parameter whose value is not needed, then write another; nothing goes between."""
@@ -119,11 +131,19 @@ class ReadThenWrite(NamedTuple):
     address: Address
     data: bytes
 
+    def carry_out(self, link: Link, unit: int) -> Reply:
+        """Read, then write (LinkError: as its subclasses say)."""
+        return link.read_then_write(unit, self.source, self.address, self.data)
+
 
 class Ask(NamedTuple):
     """Ask a unit what is no parameter."""
 
     question: Callable[[], Reply]
+
+    def carry_out(self, link: Link, unit: int) -> Reply:
+        """Ask it (LinkError: as its subclasses say); who asks has the link and the unit."""
+        return self.question()
 
 
 Written = Write | WriteAndRead
@@ -382,19 +402,6 @@ class Link(Protocol):
 
         :param why: finds out why the unit refused, where that needs its status, the first of them.
         """
-
-
-def carry_out(link: Link, unit: int, operation: Operation) -> Reply:
-    """Have a link carry out what is wanted of a unit (LinkError: as its subclasses say)."""
-    if isinstance(operation, Read):
-        return link.read(unit, *operation)
-    if isinstance(operation, Write):
-        return link.write(unit, *operation)
-    if isinstance(operation, WriteAndRead):
-        return link.write_and_read(unit, *operation)
-    if isinstance(operation, ReadThenWrite):
-        return link.read_then_write(unit, *operation)
-    return operation.question()
 
 
 class LinkError(Exception):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from nfo_sinus_driver.link import LinkError, Plan, carry_out
+from nfo_sinus_driver.link import LinkError, Plan
 
 _T = TypeVar('_T')
 
@@ -22,6 +22,6 @@ def followed(plan: Plan[_T], link: Any = None, unit: int = 1) -> _T:
             found: _T = end.value
             return found
         try:
-            reply = carry_out(link, unit, operation)
+            reply = operation.carry_out(link, unit)
         except LinkError:
             reply = None

@@ -441,7 +441,7 @@ class ParameterAccess:
         busy = _BUSY_TRIES if patient or retry or priority > Priority.LOOK else 0
         while True:
             try:
-                return await self._bus.carry_out(self._unit, operation, priority, require)
+                return await self._bus.ask(self._unit, operation, priority, require)
             except AnotherValue as error:
                 # what writes looks at what the drive has then
                 return Reply(error.data, self.now())

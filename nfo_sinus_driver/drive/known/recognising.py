@@ -16,7 +16,7 @@ from nfo_sinus_driver.drive.known.drive_state import DriveState
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report
 from nfo_sinus_driver.drive.known.identity import Identity
 from nfo_sinus_driver.drive.known.parameter_access import NONE_SUCH
-from nfo_sinus_driver.drive.known.steps import carry_out
+from nfo_sinus_driver.drive.known.steps import run_steps
 from nfo_sinus_driver.link import LinkError, PortError, Refused
 
 #: An inverter status has one byte; firmware that is newer than the manual may have more of them.
@@ -191,7 +191,7 @@ class Recogniser:
                 raise self._another(Report(Cause.MADE_BY, vendor=identity.vendor))
             return identity
         try:
-            return nameplate.take(await carry_out(self._state, product(), Priority.SERVICE))
+            return nameplate.take(await run_steps(self._state, product(), Priority.SERVICE))
         except DriveError:
             self._params.recognition.end()
             raise

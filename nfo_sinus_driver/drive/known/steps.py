@@ -26,7 +26,7 @@ _Condition = Callable[[InverterStatus], bool]
 Reached = Callable[[_Condition], Awaitable[None]]
 
 
-async def carry_out(
+async def run_steps(
     state: DriveState,
     steps: profile.Steps[_T],
     priority: Priority,
@@ -73,27 +73,27 @@ async def carry_out(
             raise DriveError(Cause.NOT_POSSIBLE, why=str(error)) from error
         brought = refusal = None
         try:
-            if isinstance(step, profile.Read):
-                params.require_fitted(step.key)
-                retry = step.retry and not is_blind
-                # what is read behind a stop keeps back no stop of another drive
-                behind = priority is Priority.STOP and written_at > -math.inf
-                urgency = Priority.LOOK if behind else priority
-                brought = await params.read(step.key, urgency, retry=retry)
-            elif isinstance(step, profile.Write) and step.stored:
-                await _store(state, step, priority)
-            elif isinstance(step, profile.Write):
-                await params.write(step, priority, permit=permit)
-            elif isinstance(step, profile.Acknowledge):
-                brought = await params.acknowledge(step.key, priority)
-            elif isinstance(step, profile.AcknowledgeThenWrite):
-                await params.acknowledge_and_write(step.key, step.write)
-            elif isinstance(step, profile.Wait):
-                await params.sleep(step.seconds)
-            elif isinstance(step, profile.Hold):
-                brought = await _holds(state, after_write(step.condition), priority, step.seconds)
-            else:
-                await reached(after_write(step.condition))
+            match step:
+                case profile.Read(key, retry):
+                    params.require_fitted(key)
+                    # what is read behind a stop keeps back no stop of another drive
+                    behind = priority is Priority.STOP and written_at > -math.inf
+                    urgency = Priority.LOOK if behind else priority
+                    brought = await params.read(key, urgency, retry=retry and not is_blind)
+                case profile.Write(stored=True):
+                    await _store(state, step, priority)
+                case profile.Write():
+                    await params.write(step, priority, permit=permit)
+                case profile.Acknowledge(key):
+                    brought = await params.acknowledge(key, priority)
+                case profile.AcknowledgeThenWrite(key, write):
+                    await params.acknowledge_and_write(key, write)
+                case profile.Wait(seconds):
+                    await params.sleep(seconds)
+                case profile.Hold(condition, seconds):
+                    brought = await _holds(state, after_write(condition), priority, seconds)
+                case profile.Until(condition):
+                    await reached(after_write(condition))
         except (Refused, NoAnswer, DamagedAnswer) as error:
             goes_on = onward or (is_blind and isinstance(step, profile.Read))
             if not (goes_on or isinstance(error, Refused)):

@@ -28,7 +28,7 @@ from nfo_sinus_driver.drive.known.diagnosis import (
 from nfo_sinus_driver.drive.known.drive_state import LOOK_PERIOD, TIMEOUT, DriveState
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.known.exclusive_access import ExclusiveAccess
-from nfo_sinus_driver.drive.known.steps import carry_out
+from nfo_sinus_driver.drive.known.steps import run_steps
 from nfo_sinus_driver.drive.known.stop_reason import StopReason, reason_of
 from nfo_sinus_driver.drive.motion.following import FollowingCheck
 from nfo_sinus_driver.drive.motion.setpoint import Setpoint
@@ -299,7 +299,7 @@ class Controller:
         return Report(Cause.RAMPING)
 
     async def _read_run_command(self) -> bool | None:
-        return await carry_out(self._state, self.method.has_run_command(), Priority.LOOK)
+        return await run_steps(self._state, self.method.has_run_command(), Priority.LOOK)
 
     async def _coasts(self, status: InverterStatus) -> bool:
         """Return whether a motor that is shown as driven after a stop is released all the same."""
@@ -315,14 +315,14 @@ class Controller:
 
     async def in_control(self, priority: Priority) -> bool:
         """Return whether the bus has control, taken by this session or an earlier one."""
-        return await carry_out(self._state, self.method.in_control(), priority)
+        return await run_steps(self._state, self.method.in_control(), priority)
 
     async def give_back(self) -> None:
         """Give control back; again from the beginning where a step that is sent once is lost."""
         try:
-            await carry_out(self._state, self.method.release(), Priority.SERVICE)
+            await run_steps(self._state, self.method.release(), Priority.SERVICE)
         except (NoAnswer, DamagedAnswer):
-            await carry_out(self._state, self.method.release(), Priority.SERVICE)
+            await run_steps(self._state, self.method.release(), Priority.SERVICE)
 
     async def _has_retained_control(self) -> bool:
         """Return whether control has stayed with the bus; true if the drive does not answer."""
@@ -356,7 +356,7 @@ class Controller:
                     await self._sequence.find()
                     steps = self.method.quick_stop(self._state.control_mode)
                     permit = self._sequence.require_same
-                    await carry_out(self._state, steps, Priority.STOP, permit=permit)
+                    await run_steps(self._state, steps, Priority.STOP, permit=permit)
                     await self._await_quick_stop(self._bus.now())
             except Exception as error:
                 # even after an error in the driver the motor is stopped
@@ -390,7 +390,7 @@ class Controller:
                 await self._sequence.find()
                 steps = self.method.rapid_stop(self._state.control_mode)
                 permit = self._sequence.require_same
-                await carry_out(self._state, steps, Priority.STOP, permit=permit)
+                await run_steps(self._state, steps, Priority.STOP, permit=permit)
             stopped = await self.stop(why)
         status = self._state.status
         if status is None or not status.driven or status.faulted:
@@ -431,7 +431,7 @@ class Controller:
             shown = state.model.status_code(status.code)
             # it is no stop, and does not have the priority of one: the motor might start
             steps = self.method.acknowledge(shown, state.control_mode)
-            details = await carry_out(state, steps, Priority.SERVICE)
+            details = await run_steps(state, steps, Priority.SERVICE)
         finally:
             # even if no answer came, the drive may be free to run now
             if may_run:
@@ -589,7 +589,7 @@ class Controller:
                 state.notify(Severity.WARNING, found)
             self._sequence.restart(found)
         else:
-            await carry_out(self._state, self.method.remove_leftover(), Priority.STOP)
+            await run_steps(self._state, self.method.remove_leftover(), Priority.STOP)
             if self._lost_in_use and status is not None and not status.faulted:
                 why = state.report(Cause.CONTROL_LOST_WHILE_AWAY)
                 state.notify(Severity.WARNING, why)

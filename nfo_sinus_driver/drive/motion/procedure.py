@@ -16,7 +16,7 @@ from nfo_sinus_driver.drive.known.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.known.drive_state import DriveState
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report
 from nfo_sinus_driver.drive.known.exclusive_access import ExclusiveAccess
-from nfo_sinus_driver.drive.known.steps import carry_out
+from nfo_sinus_driver.drive.known.steps import run_steps
 from nfo_sinus_driver.drive.motion.controller import Controller, required
 from nfo_sinus_driver.link import LinkError
 
@@ -149,7 +149,7 @@ class Procedures:
         controller, state, what = self.controller, self._state, access.what
         status = await state.read_status(Priority.SERVICE)
         require_no_fault(state, status)
-        found = await carry_out(state, controller.method.holder(), Priority.SERVICE)
+        found = await run_steps(state, controller.method.holder(), Priority.SERVICE)
         if found is Holder.INHIBITED:
             why = state.model.profile.inhibited
             raise DriveError(state.report(Cause.CONTROL_INHIBITED, what=what, why=why))
@@ -168,7 +168,7 @@ class Procedures:
                     await self._give_back(found)
                 raise DriveError(state.report(Cause.NO_STANDBY, what=what))
             # no manual says that a drive forgets an earlier command
-            await carry_out(state, controller.method.stop(control_mode), Priority.STOP)
+            await run_steps(state, controller.method.stop(control_mode), Priority.STOP)
             await self._bus.sleep(drive_state.LOOK_PERIOD)
         return found
 

@@ -17,7 +17,7 @@ from nfo_sinus_driver.drive.known import drive_state
 from nfo_sinus_driver.drive.known.diagnosis import require_no_fault
 from nfo_sinus_driver.drive.known.drive_state import DriveState
 from nfo_sinus_driver.drive.known.events import Cause, DriveError
-from nfo_sinus_driver.drive.known.steps import carry_out
+from nfo_sinus_driver.drive.known.steps import run_steps
 from nfo_sinus_driver.link import Refused
 
 #: How long the steps of a start may take together, s, delays of the drive itself aside.
@@ -37,7 +37,7 @@ async def read_limits(state: DriveState, control_mode: str) -> Limits:
     if target is None:
         return Limits()
     steps = target.read_limits(state.nameplate.has, older=state.nameplate.is_older)
-    limits = await carry_out(state, steps, Priority.SERVICE)
+    limits = await run_steps(state, steps, Priority.SERVICE)
     if not state.params.is_rescaled(target.key):
         return limits
     # with another scale a word may not hold all that the drive takes
@@ -108,7 +108,7 @@ class StartSequence:
             raise DriveError(
                 Cause.WRONG_CONTROL_MODE, mode=control_mode, expected=expected, key=key
             )
-        await carry_out(state, self._method.require_startable(), Priority.SERVICE)
+        await run_steps(state, self._method.require_startable(), Priority.SERVICE)
         # the keypad may have changed it since the drive was connected
         await state.nameplate.read_scales()
         scales = state.nameplate.scales
@@ -149,7 +149,7 @@ class StartSequence:
         await prepare()
         self._deadline += self._state.bus.now() - begun
         run = self._method.run()
-        await carry_out(self._state, run, Priority.SERVICE, self._await_start)
+        await run_steps(self._state, run, Priority.SERVICE, self._await_start)
         run_at = self._state.bus.now()
         # behind a PLC a status from before the run command is shown for a while
         await self._await_start(lambda now: now.may_run and now.at > run_at)
@@ -192,8 +192,8 @@ class StartSequence:
             with contextlib.suppress(DriveError, Refused):
                 await self._zero_setpoint(control_mode)
         steps = self._method.take_control()
-        await carry_out(self._state, steps, Priority.SERVICE, self._await_status)
+        await run_steps(self._state, steps, Priority.SERVICE, self._await_status)
 
     async def _zero_setpoint(self, control_mode: str) -> None:
         steps = self._method.zero_setpoint(control_mode)
-        await carry_out(self._state, steps, Priority.SERVICE)
+        await run_steps(self._state, steps, Priority.SERVICE)

@@ -10,14 +10,14 @@ import contextlib
 import enum
 import math
 
-from nfo_sinus_driver.bus import EXCHANGE, Priority, Task
+from nfo_sinus_driver.bus import SWAP_TIME, Priority, Task
 from nfo_sinus_driver.catalog import ControlMethod, InverterStatus, Removal, State
 from nfo_sinus_driver.drive.known import drive_state
 from nfo_sinus_driver.drive.known.control_state import ControlEvent
 from nfo_sinus_driver.drive.known.diagnosis import report_of
 from nfo_sinus_driver.drive.known.drive_state import DriveState
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report, Severity
-from nfo_sinus_driver.drive.known.steps import carry_out
+from nfo_sinus_driver.drive.known.steps import run_steps
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, NoData, PortError, Refused
 
 #: How often a stop that was answered and is not confirmed is written again, s.
@@ -386,9 +386,9 @@ class StopSequence:
         if self._state.params.recognition.allows_stop:
             return True
         # the stops of all others may go before the second one
-        longest = EXCHANGE + silences.round_in_vain
+        longest = SWAP_TIME + silences.round_in_vain
         in_time = self._bus.now() <= self._due_at + longest
-        in_time &= self._bus.paused <= self._paused + EXCHANGE
+        in_time &= self._bus.paused <= self._paused + SWAP_TIME
         return self._blind_left > 0 and in_time and self._due_at >= silences.away_at
 
     @property
@@ -458,7 +458,7 @@ class StopSequence:
         await self.find()
         is_blind, self._wrote, self._removed_blind = self._is_blind, False, False
         try:
-            await carry_out(
+            await run_steps(
                 self._state,
                 self._method.stop(control_mode),
                 Priority.STOP,
@@ -500,7 +500,7 @@ class StopSequence:
             status = await self._newer(status, reasons, self._sent_at)
         if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
             # ahead of all else, too: the fault may end by itself, and the motor run on
-            removal = await carry_out(
+            removal = await run_steps(
                 self._state,
                 self._method.remove(control_mode),
                 Priority.STOP,
@@ -563,7 +563,7 @@ class StopSequence:
     async def _force(self, control_mode: str, reasons: int, why: Report) -> Report | None:
         """Stop by every means left [C126]; return why that is not confirmed."""
         steps = self._method.force_stop(control_mode)
-        obeyed = await carry_out(
+        obeyed = await run_steps(
             self._state, steps, Priority.STOP, onward=True, permit=self.require_same
         )
         sent_at = self._bus.now()
@@ -637,7 +637,7 @@ class StopSequence:
         """Return whether a drive that shows a run has a run command, as far as that shows yet."""
         # without an answer, a word that was acknowledged just now has none
         steps, onward = self._method.has_run_command(), self._removed_blind
-        stands = await carry_out(self._state, steps, Priority.LOOK, onward=onward)
+        stands = await run_steps(self._state, steps, Priority.LOOK, onward=onward)
         if stands or self._method.reads_run_command:
             return bool(stands)
         # on its ramp it shows a run, too

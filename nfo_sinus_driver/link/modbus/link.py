@@ -76,7 +76,7 @@ class ModbusLink(ABC):
             raise InProgress(self.clock())
         return self.write(unit, address, data)
 
-    def exchange(
+    def transfer(
         self, unit: int, first: int, count: int, at: int, data: bytes
     ) -> tuple[bytes, float]:
         """

@@ -165,7 +165,7 @@ class TcpLink(ModbusLink):
         #: connection at another one.
         self._known: set[int] = set()
         self._closed_at: dict[int, int] = {}
-        self._blocks = telegram.Blocks(self.exchange, now)
+        self._blocks = telegram.Blocks(self.transfer, now)
         self.remarks = Remarks()
         #: When the last message was sent, or came.
         self._line_end = -math.inf

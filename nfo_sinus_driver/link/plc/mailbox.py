@@ -61,7 +61,7 @@ _CODES = {
 }
 
 #: Reads registers of a unit: the first and how many, with what is written from which one on.
-Exchange = Callable[[int, int, int, int, bytes], tuple[bytes, float]]
+Registers = Callable[[int, int, int, int, bytes], tuple[bytes, float]]
 
 
 class _Stage(enum.Enum):
@@ -156,14 +156,14 @@ class Mailbox:
     """
     The mailbox of one block.
 
-    :param exchange: reads registers of a PLC, see :meth:`ModbusLink.exchange`.
+    :param registers: reads registers of a PLC, see :meth:`ModbusLink.transfer`.
     :param now: the clock of these moments, s.
     :param unit: the unit of the PLC.
     :param start: the first register of the block.
     """
 
-    def __init__(self, exchange: Exchange, now: Clock, unit: int, start: int) -> None:
-        self._transact = exchange
+    def __init__(self, registers: Registers, now: Clock, unit: int, start: int) -> None:
+        self._transact = registers
         self._now = now
         self._unit = unit
         self._first = start + FIRST
@@ -233,16 +233,16 @@ class Mailbox:
     def _step(self, pending: _Pending) -> _Shown | None:
         """Do the next step; return the content of the mailbox, once the number was written."""
         if pending.stage is _Stage.PREPARE:
-            shown = self._exchange(1, pending.wanted.registers)
+            shown = self._swap(1, pending.wanted.registers)
             pending.number = _unlike(shown.number, shown.answered)
             pending.stage = _Stage.ASK
             return None
         if pending.stage is _Stage.WAIT:
-            return self._exchange()
+            return self._swap()
         # it may be written, whether the answer comes or not
         pending.stage = _Stage.WAIT
         pending.until = self._now() + TIME
-        return self._exchange(0, pending.number.to_bytes(2, 'big'))
+        return self._swap(0, pending.number.to_bytes(2, 'big'))
 
     def _answer(self, pending: _Pending, shown: _Shown) -> Reply:
         """Return the answer of the mailbox to a request, if it has one."""
@@ -263,7 +263,7 @@ class Mailbox:
             return Reply(b'', shown.arrived)
         return Reply(shown.data[-wanted.address.size :], shown.arrived)
 
-    def _exchange(self, offset: int = 0, data: bytes = b'') -> _Shown:
+    def _swap(self, offset: int = 0, data: bytes = b'') -> _Shown:
         """Write registers, if any, and read all."""
         at, count = self._first, _LAYOUT.size // 2
         try:

@@ -37,7 +37,7 @@ from nfo_sinus_driver.link.interface import (
     Refused,
     Reply,
 )
-from nfo_sinus_driver.link.plc.mailbox import Exchange, Mailbox
+from nfo_sinus_driver.link.plc.mailbox import Mailbox, Registers
 
 #: The addressing of parameters in a block, and their space; the sub-index is the part of the block,
 #: as follows.
@@ -95,14 +95,14 @@ class Block:
     """
     One block: its content, and how old that is.
 
-    :param exchange: reads registers of a PLC, see :meth:`ModbusLink.exchange`.
+    :param registers: reads registers of a PLC, see :meth:`ModbusLink.transfer`.
     :param now: the clock of these moments, s.
     :param unit: the unit of the PLC.
     :param start: its first register.
     """
 
-    def __init__(self, exchange: Exchange, now: Clock, unit: int, start: int) -> None:
-        self._transact = exchange
+    def __init__(self, registers: Registers, now: Clock, unit: int, start: int) -> None:
+        self._transact = registers
         self._now = now
         self._unit = unit
         self._start = start
@@ -126,7 +126,7 @@ class Block:
         self._layout = 0
         #: The last reading, and when.
         self._last: tuple[_Shown, float] | None = None
-        self._mailbox = Mailbox(exchange, now, unit, start)
+        self._mailbox = Mailbox(registers, now, unit, start)
 
     def forget(self) -> None:
         """Write nothing any more, only read: the connection is a new one."""
@@ -147,7 +147,7 @@ class Block:
         shared = self._shared_with(address)
         if shared is not None:
             return Reply(self._part(shared[0], address), shared[1], requests=0)
-        shown, arrived = self._exchange()
+        shown, arrived = self._swap()
         reply = Reply(self._part(shown, address), arrived)
         if address.sub_index == STATUS:
             self._beside = (shown, arrived), self._now()
@@ -166,12 +166,12 @@ class Block:
         """Write a part of it."""
         if address.space == MAILBOX:
             return self._access(address, data)
-        _, arrived = self._exchange((address, data))
+        _, arrived = self._swap((address, data))
         return Reply(b'', arrived)
 
     def write_and_read(self, address: Address, data: bytes, source: Address) -> Reply:
         """Write a part of it and read another; empty where the PLC has no valid data."""
-        shown, arrived = self._exchange((address, data))
+        shown, arrived = self._swap((address, data))
         try:
             reply = Reply(self._part(shown, source), arrived)
         except NoData:
@@ -204,7 +204,7 @@ class Block:
             return _word(shown[5 + part - MORE])
         return struct.pack('>HH', word, flags) if part == STATUS else _word(actual)
 
-    def _exchange(self, write: _Written | None = None) -> _Shown:
+    def _swap(self, write: _Written | None = None) -> _Shown:
         """Carry out a transaction; return what was read, and when it first came."""
         began = self._now()
         self._beside = None
@@ -318,8 +318,8 @@ class Block:
 class Blocks:
     """The blocks of one line, by unit and first register."""
 
-    def __init__(self, exchange: Exchange, now: Clock) -> None:
-        self._transact = exchange
+    def __init__(self, registers: Registers, now: Clock) -> None:
+        self._transact = registers
         self._now = now
         self._blocks: dict[tuple[int, int], Block] = {}
 

@@ -30,8 +30,8 @@ def ask(
 
     async def job() -> bytes:
         if data is None:
-            return (await bus.carry_out(unit, Read(register(number)), priority)).data
-        return (await bus.carry_out(unit, Write(register(number), data), priority)).data
+            return (await bus.ask(unit, Read(register(number)), priority)).data
+        return (await bus.ask(unit, Write(register(number), data), priority)).data
 
     return bus.run(job())
 

@@ -35,11 +35,11 @@ def test_read_and_write(bus: Bus, link: FakeLink) -> None:
 
 def test_result_and_mistake_of_a_coroutine(bus: Bus) -> None:
     async def good() -> str:
-        await bus.carry_out(UNIT, Read(register(1)), Priority.SERVICE)
+        await bus.ask(UNIT, Read(register(1)), Priority.SERVICE)
         return 'done'
 
     async def bad() -> None:
-        await bus.carry_out(UNIT, Read(register(1)), Priority.SERVICE)
+        await bus.ask(UNIT, Read(register(1)), Priority.SERVICE)
         raise ZeroDivisionError
 
     assert result(bus.run(good())) == 'done'
@@ -61,7 +61,7 @@ def test_error_of_the_link_reaches_the_coroutine(
 
     async def job() -> str:
         try:
-            await bus.carry_out(UNIT, Read(register(1)), Priority.SERVICE)
+            await bus.ask(UNIT, Read(register(1)), Priority.SERVICE)
         except LinkError as raised:
             caught.append(raised)
         return 'goes on'
@@ -104,7 +104,7 @@ def test_nothing_goes_between_a_read_and_the_write_behind_it(
 
     async def job() -> bytes:
         both = ReadThenWrite(register(1), register(2), packed(0))
-        reply = await bus.carry_out(UNIT, both, Priority.STOP)
+        reply = await bus.ask(UNIT, both, Priority.STOP)
         return reply.data
 
     link.answer = answer
@@ -160,7 +160,7 @@ def test_stop_waits_for_one_transaction_at_most(bus: Bus, link: FakeLink) -> Non
 
     async def chatter(number: int, priority: Priority) -> None:
         while not ended.is_set():
-            await bus.carry_out(UNIT, Read(register(number)), priority)
+            await bus.ask(UNIT, Read(register(number)), priority)
 
     talkers = [
         bus.run(chatter(10 + priority, priority)) for priority in Priority if priority > 0
@@ -182,7 +182,7 @@ def test_stop_waits_for_one_transaction_at_most(bus: Bus, link: FakeLink) -> Non
 
 async def read_parts(bus: Bus) -> bytes:
     """Read a value of two words, of which register 5 has the low one."""
-    return (await bus.carry_out(UNIT, Read(Address('register', 5, 6, 4)), Priority.REFRESH)).data
+    return (await bus.ask(UNIT, Read(Address('register', 5, 6, 4)), Priority.REFRESH)).data
 
 
 def test_stop_goes_between_the_words_of_a_value(bus: Bus, link: FakeLink) -> None:
@@ -245,7 +245,7 @@ def test_background_has_a_sixth_of_the_time_each(
 
     async def chatter(priority: Priority) -> None:
         while len(link.done) < rounds:
-            await bus.carry_out(UNIT, Read(register(priority)), priority)
+            await bus.ask(UNIT, Read(register(priority)), priority)
 
     talkers = [bus.run(chatter(priority)) for priority in took for _ in range(3)]
     bus.start()

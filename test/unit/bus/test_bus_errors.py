@@ -182,7 +182,7 @@ def test_cancelled_while_its_unit_is_in_doubt(bus: Bus, link: FakeLink) -> None:
         return packed(done.number)
 
     async def job() -> None:
-        await bus.carry_out(UNIT, Read(register(66)), Priority.POLL)
+        await bus.ask(UNIT, Read(register(66)), Priority.POLL)
 
     async def past_it() -> None:
         await bus.sleep(0.05)

@@ -72,7 +72,7 @@ def test_each_question_is_asked_once(link: _Link, bus: Bus) -> None:
 
 def test_a_stop_goes_between_two_questions(link: _Link, bus: Bus) -> None:
     async def stop() -> None:
-        await bus.carry_out(_UNIT, Write(register(_STOP), packed(0)), Priority.STOP)
+        await bus.ask(_UNIT, Write(register(_STOP), packed(0)), Priority.STOP)
 
     with link.held():
         inquiry = bus.run(bus.identify(_UNIT, Priority.SERVICE))

@@ -71,14 +71,14 @@ def test_lost_port_is_reported_to_all_though_one_of_them_ends_another(
 
     async def end_the_other() -> None:
         try:
-            await bus.carry_out(UNIT, Read(register(1)), Priority.POLL)
+            await bus.ask(UNIT, Read(register(1)), Priority.POLL)
         except PortError:
             bus.cancel(tasks[0])
             raise
 
     async def wait_behind() -> None:
         tasks.append(bus.current)
-        await bus.carry_out(UNIT, Read(register(2)), Priority.POLL)
+        await bus.ask(UNIT, Read(register(2)), Priority.POLL)
 
     with link.held():
         lost = hold(bus, link)
@@ -250,7 +250,7 @@ def test_close_ends_everything(link: FakeLink) -> None:
 
     async def for_ever() -> None:
         while True:
-            await bus.carry_out(UNIT, Read(register(1)), Priority.POLL)
+            await bus.ask(UNIT, Read(register(1)), Priority.POLL)
 
     futures = [bus.run(sleeper()), bus.run(for_ever())]
     wait_until(lambda: len(link.done) > 3)

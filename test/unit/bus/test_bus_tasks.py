@@ -14,7 +14,7 @@ import pytest
 from support.addresses import packed, register
 
 from nfo_sinus_driver.bus import Bus, Cancelled, Priority, Task
-from nfo_sinus_driver.bus.tasks import Exchange
+from nfo_sinus_driver.bus.tasks import Request
 from nfo_sinus_driver.link import InProgress, NotReady, Read, Reply
 
 
@@ -89,7 +89,7 @@ def test_waking_does_not_shorten_the_next_sleep(bus: Bus) -> None:
 
 def test_waking_a_task_that_waits_for_an_answer_does_nothing(bus: Bus, link: FakeLink) -> None:
     async def job() -> bytes:
-        return (await bus.carry_out(UNIT, Read(register(9)), Priority.REFRESH)).data
+        return (await bus.ask(UNIT, Read(register(9)), Priority.REFRESH)).data
 
     with link.held():
         hold(bus, link, Priority.POLL)
@@ -125,7 +125,7 @@ def test_cancelled_task_sends_nothing_more(bus: Bus, link: FakeLink) -> None:
 
     async def job() -> None:
         try:
-            await bus.carry_out(UNIT, Read(register(66)), Priority.REFRESH)
+            await bus.ask(UNIT, Read(register(66)), Priority.REFRESH)
         except Cancelled:
             seen.append('cancelled')
             raise
@@ -158,7 +158,7 @@ def test_cancelled_sleeper(bus: Bus) -> None:
 
 def test_cancelling_one_leaves_the_others(bus: Bus, link: FakeLink) -> None:
     async def job(number: int) -> bytes:
-        return (await bus.carry_out(UNIT, Read(register(number)), Priority.REFRESH)).data
+        return (await bus.ask(UNIT, Read(register(number)), Priority.REFRESH)).data
 
     tasks: list[Task] = []
     with link.held():
@@ -172,8 +172,8 @@ def test_cancelling_one_leaves_the_others(bus: Bus, link: FakeLink) -> None:
 def test_cancelled_while_its_answer_is_on_the_way(bus: Bus, link: FakeLink) -> None:
     # the transaction on the line ends first; what comes after it is not sent
     async def job() -> None:
-        await bus.carry_out(UNIT, Read(register(1)), Priority.POLL)
-        await bus.carry_out(UNIT, Read(register(2)), Priority.POLL)
+        await bus.ask(UNIT, Read(register(1)), Priority.POLL)
+        await bus.ask(UNIT, Read(register(2)), Priority.POLL)
 
     tasks: list[Task] = []
     with link.held():
@@ -213,7 +213,7 @@ def test_cancelled_task_may_still_talk_while_it_cleans_up(bus: Bus, link: FakeLi
         try:
             await bus.sleep(3600)
         except Cancelled:
-            return (await bus.carry_out(UNIT, Read(register(8)), Priority.STOP)).data
+            return (await bus.ask(UNIT, Read(register(8)), Priority.STOP)).data
         return b''
 
     def answer(done: Done) -> bytes:
@@ -243,9 +243,9 @@ def test_current_task(bus: Bus) -> None:
 def test_what_is_read_again_after_a_pause_is_the_same_read(once: bool) -> None:
     # the link repeats it where another master is, as before, unless it acknowledges
     read, reply = Read(register(1), once), Reply(packed(1), 0.0)
-    exchange = Exchange(UNIT, read, Priority.POLL)
+    request = Request(UNIT, read, Priority.POLL)
     if not once:
         with pytest.raises(InProgress):
-            exchange.without_old(reply)
-    assert exchange.without_old(reply) == reply
-    assert exchange.operation == read
+            request.without_old(reply)
+    assert request.without_old(reply) == reply
+    assert request.operation == read

@@ -34,7 +34,7 @@ def test_set_points_that_never_end_leave_every_other_turn_to_the_polls() -> None
 
     async def poll() -> None:
         while True:
-            await bus.carry_out(1, Read(register(_POLL)), Priority.POLL)
+            await bus.ask(1, Read(register(_POLL)), Priority.POLL)
 
     bus.start()
     polling = bus.run(poll())

@@ -14,7 +14,7 @@ import pytest
 from support.addresses import packed, register
 
 from nfo_sinus_driver.bus.scheduler import BACKGROUND_SHARE, Scheduler, Waiting
-from nfo_sinus_driver.bus.tasks import Exchange, LatestValue, Priority, Task
+from nfo_sinus_driver.bus.tasks import LatestValue, Priority, Request, Task
 from nfo_sinus_driver.link import Read, Write
 
 _SLOT = 'slot'
@@ -38,14 +38,14 @@ def entry(kind: object, name: str = '') -> LatestValue | Waiting:
     """Something that waits; a name stands for its task."""
     if kind == _SLOT:
         return LatestValue(1, lambda: None, lambda written, error: None)
-    exchange = Exchange(1, Read(register(1)), cast(Priority, kind))
-    return Waiting(cast(Task, named(name)), exchange)
+    request = Request(1, Read(register(1)), cast(Priority, kind))
+    return Waiting(cast(Task, named(name)), request)
 
 
 def kind_of(taken: LatestValue | Waiting | None) -> object:
     """What was taken out: ``slot``, a priority, or ``None``."""
     if isinstance(taken, Waiting):
-        return taken.exchange.priority
+        return taken.request.priority
     return None if taken is None else _SLOT
 
 
@@ -105,7 +105,7 @@ def test_a_stop_goes_before_a_look_whether_a_motor_stops() -> None:
     look = entry(Priority.LOOK, 'look')
     write = Write(register(1), packed(0))
     stops = [
-        Waiting(cast(Task, named(name)), Exchange(1, write, Priority.STOP))
+        Waiting(cast(Task, named(name)), Request(1, write, Priority.STOP))
         for name in ('1', '2')
     ]
     for waiting in (look, *stops):
@@ -146,15 +146,15 @@ def test_set_points_without_end_halve_the_turns_of_polls_and_background_alike(
 def test_polls_of_units_that_do_not_answer_have_half_the_time() -> None:
     silent, timeout = {7, 8}, 0.2
     scheduler = Scheduler(silent.__contains__)
-    polls = {unit: Exchange(unit, Read(register(1)), Priority.POLL) for unit in (1, 2, 7, 8)}
-    for exchange in polls.values():
-        scheduler.add(Waiting(cast(Task, named('')), exchange))
+    polls = {unit: Request(unit, Read(register(1)), Priority.POLL) for unit in (1, 2, 7, 8)}
+    for request in polls.values():
+        scheduler.add(Waiting(cast(Task, named('')), request))
     took: Counter[int] = Counter()
     gaps, gap = [], 0.0
     while sum(took.values()) < 60.0:
         taken = scheduler.take()
         assert isinstance(taken, Waiting)
-        unit = taken.exchange.unit
+        unit = taken.request.unit
         seconds = timeout if unit in silent else _READ
         scheduler.took(seconds)
         took[unit] += seconds
@@ -174,11 +174,11 @@ def test_the_request_with_which_a_unit_falls_silent_is_of_that_half_too() -> Non
         scheduler.add(poll_of(unit))
     for unit in (7, 8):
         taken = scheduler.take()
-        assert isinstance(taken, Waiting) and taken.exchange.unit == unit
+        assert isinstance(taken, Waiting) and taken.request.unit == unit
         silent.add(unit)
         scheduler.took(0.2)
         scheduler.add(taken)
-    assert cast(Waiting, scheduler.take()).exchange.unit == 1
+    assert cast(Waiting, scheduler.take()).request.unit == 1
 
 
 def test_units_that_do_not_answer_do_not_wait_when_no_other_waits() -> None:
@@ -292,8 +292,8 @@ def test_set_point_that_was_not_sent_had_no_turn() -> None:
 
 def stop_of(unit: int) -> Waiting:
     """A stop that waits."""
-    exchange = Exchange(unit, Write(register(1), packed(0)), Priority.STOP)
-    return Waiting(cast(Task, named(f'stop {unit}')), exchange)
+    request = Request(unit, Write(register(1), packed(0)), Priority.STOP)
+    return Waiting(cast(Task, named(f'stop {unit}')), request)
 
 
 def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
@@ -324,7 +324,7 @@ def test_between_two_stops_without_an_answer_the_most_urgent_has_its_turn(
 ) -> None:
     scheduler = Scheduler({2, 4}.__contains__)
     urgent, silent = entry(kind), stop_of(2)
-    retry = Waiting(cast(Task, named('retry')), Exchange(4, Read(register(1)), Priority.POLL))
+    retry = Waiting(cast(Task, named('retry')), Request(4, Read(register(1)), Priority.POLL))
     for waiting in (retry, *map(entry, _BACKGROUND)):
         scheduler.add(waiting)
     # it costs so much that every other request has a claim on the line
@@ -375,8 +375,8 @@ def test_stops_of_several_units_that_do_not_answer_leave_every_other_turn_to_the
 def test_what_waits_for_a_unit_that_falls_silent_is_ranked_again(kind: Priority) -> None:
     silent: set[int] = set()
     scheduler = Scheduler(silent.__contains__)
-    falls_silent = Waiting(cast(Task, named('asks')), Exchange(7, Read(register(1)), kind))
-    other = Waiting(cast(Task, named('asks')), Exchange(1, Read(register(1)), kind))
+    falls_silent = Waiting(cast(Task, named('asks')), Request(7, Read(register(1)), kind))
+    other = Waiting(cast(Task, named('asks')), Request(1, Read(register(1)), kind))
     for waiting in (falls_silent, other):
         scheduler.add(waiting)
     silent.add(7)
@@ -386,7 +386,7 @@ def test_what_waits_for_a_unit_that_falls_silent_is_ranked_again(kind: Priority)
 def test_the_first_stop_of_a_unit_is_not_held_back_by_its_service_that_was_in_vain() -> None:
     scheduler = Scheduler({2}.__contains__)
     stop, poll = stop_of(2), entry(Priority.POLL)
-    asked = Exchange(2, Read(register(1)), Priority.SERVICE)
+    asked = Request(2, Read(register(1)), Priority.SERVICE)
     service = Waiting(cast(Task, named('service')), asked)
     for waiting in (service, poll):
         scheduler.add(waiting)
@@ -412,7 +412,7 @@ def test_a_stop_that_is_answered_gives_way_to_none() -> None:
 
 def poll_of(unit: int) -> Waiting:
     """A poll of one unit."""
-    return Waiting(cast(Task, named('poll')), Exchange(unit, Read(register(1)), Priority.POLL))
+    return Waiting(cast(Task, named('poll')), Request(unit, Read(register(1)), Priority.POLL))
 
 
 def test_what_is_for_a_missing_unit_waits_until_it_may_go_and_goes_first_then() -> None:
@@ -435,7 +435,7 @@ def test_what_waits_for_a_unit_that_goes_missing_waits_with_the_others_then(
 ) -> None:
     missing: set[int] = set()
     scheduler = Scheduler(missing.__contains__, missing.__contains__)
-    waiting = Waiting(cast(Task, named('asks')), Exchange(7, Read(register(1)), kind))
+    waiting = Waiting(cast(Task, named('asks')), Request(7, Read(register(1)), kind))
     scheduler.add(waiting)
     missing.add(7)
     assert scheduler.take(missing=False) is None
@@ -477,15 +477,15 @@ def test_in_noise_the_stop_with_the_fewest_requests_goes_first(
 ) -> None:
     async def stop(unit: int) -> None:
         while True:
-            await Exchange(unit, Write(register(1), packed(0)), Priority.STOP)
+            await Request(unit, Write(register(1), packed(0)), Priority.STOP)
 
     scheduler = Scheduler(lambda unit: unit == 2, lambda unit: unit == 2)
     for unit, requests in ((1, answers), (2, silent)):
         task = Task(stop(unit), stops=True)
         awaited = [task.step(None, None) for _ in range(requests)]
-        scheduler.add(Waiting(task, cast(Exchange, awaited[-1])))
+        scheduler.add(Waiting(task, cast(Request, awaited[-1])))
     taken = scheduler.take(in_noise=True)
-    assert isinstance(taken, Waiting) and taken.exchange.unit == first
+    assert isinstance(taken, Waiting) and taken.request.unit == first
 
 
 def test_what_a_task_waits_for_can_be_withdrawn() -> None:
@@ -543,7 +543,7 @@ def test_of_stops_in_vain_the_one_that_was_tried_least_goes_first() -> None:
         assert isinstance(taken, Waiting)
         scheduler.took(0.01)
         scheduler.add(taken)
-        return taken.exchange.unit
+        return taken.request.unit
 
     for unit in (1, 2):
         scheduler.add(stop_of(unit))

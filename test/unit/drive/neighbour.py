@@ -15,4 +15,4 @@ async def neighbour(bus: Bus, address: Address, priority: Priority = Priority.PO
     """Read something again and again, with this urgency; never ends by itself."""
     while True:
         with contextlib.suppress(LinkError):
-            await bus.carry_out(1, Read(address), priority)
+            await bus.ask(1, Read(address), priority)

@@ -9,14 +9,14 @@ from collections.abc import Callable
 from typing import Any
 
 from nfo_sinus_driver.link.modbus.link import ModbusLink
-from nfo_sinus_driver.link.plc.mailbox import Exchange
+from nfo_sinus_driver.link.plc.mailbox import Registers
 
 
-def exchange_by(ask: Callable[[Any], tuple[bytes, float]]) -> Exchange:
+def registers_by(ask: Callable[[Any], tuple[bytes, float]]) -> Registers:
     """Return what reads and writes registers by requests that ``ask`` answers."""
 
     class Link(ModbusLink):
         def _ask(self, request: Any) -> tuple[Any, float]:
             return ask(request)
 
-    return Link().exchange
+    return Link().transfer

@@ -16,7 +16,7 @@ from support.addresses import packed
 from virtual_wire import DROP, Fate
 
 from nfo_sinus_driver.link import interface
-from nfo_sinus_driver.link.interface import Address, DamagedAnswer, carry_out
+from nfo_sinus_driver.link.interface import Address, DamagedAnswer
 from nfo_sinus_driver.link.modbus import ascii, rtu
 from nfo_sinus_driver.link.modbus.link import ReportSlaveId
 from nfo_sinus_driver.link.modbus.pdu import Read, Write
@@ -153,7 +153,7 @@ def test_what_acknowledges_is_sent_once(protocol: str) -> None:
         line.number = 1
         sent = len(line.bench.wire.sent)
         try:
-            carry_out(line.bench.link, UNIT, interface.Read(A, once=True))
+            interface.Read(A, once=True).carry_out(line.bench.link, UNIT)
         except DamagedAnswer:
             doubted += 1
         assert len(line.bench.wire.sent) == sent + 1
@@ -167,7 +167,7 @@ def test_what_acknowledges_is_sent_once_over_classic(once: bool) -> None:
     bench.wire.arrive(begun + 0.05, classic_far_end.verdict(1, True))
     doubted = pytest.raises(DamagedAnswer) if once else contextlib.nullcontext()
     with doubted:
-        carry_out(bench.link, UNIT, interface.Read(Classic.A, once))
+        interface.Read(Classic.A, once).carry_out(bench.link, UNIT)
     assert (len(bench.wire.sent) == 1) == once
 
 

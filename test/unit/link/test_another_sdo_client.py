@@ -9,7 +9,7 @@ from canopen_bench import TEXT, UNIT, A, B, Bench, Frame
 from canopen_far_end import WRONG_LENGTH
 import pytest
 
-from nfo_sinus_driver.link.interface import DamagedAnswer, Read, Refused, carry_out
+from nfo_sinus_driver.link.interface import DamagedAnswer, Read, Refused
 
 REQUESTS = 0x600 + UNIT
 CANNOT = 0x08000022
@@ -93,7 +93,7 @@ def test_what_acknowledges_is_sent_once() -> None:
         bench = SharedBench(bytes.fromhex(foreign), 1, before=False)
         bench.read(B)
         try:
-            carry_out(bench.link, UNIT, Read(A, once=True))
+            Read(A, once=True).carry_out(bench.link, UNIT)
         except (DamagedAnswer, Refused):
             doubted += 1
         assert bench.asked.count(A.index) == 1

@@ -13,7 +13,7 @@ from canopen_far_end import Server
 import pytest
 from support.plans import followed
 
-from nfo_sinus_driver.link import Address, DamagedAnswer, NoAnswer, Reply, carry_out
+from nfo_sinus_driver.link import Address, DamagedAnswer, NoAnswer, Reply
 from nfo_sinus_driver.link.canopen.can import Frame
 from nfo_sinus_driver.link.canopen.supervision import GUARDING_MEANS, HEARTBEAT_MEANS
 
@@ -178,14 +178,14 @@ def test_a_step_without_an_answer_is_done_again() -> None:
     far = _Objects(HEARTBEAT_OBJECTS)
     link = far.bench.link
     plan = link.supervision.watch(UNIT, 1.5)
-    step = plan.send(carry_out(link, UNIT, next(plan)))
+    step = plan.send(next(plan).carry_out(link, UNIT))
     far.bench.bus.heal(DROP)
     with pytest.raises(NoAnswer):
-        carry_out(link, UNIT, step)
+        step.carry_out(link, UNIT)
     with pytest.raises(StopIteration) as end:
         while True:
             try:
-                step = plan.send(carry_out(link, UNIT, step))
+                step = plan.send(step.carry_out(link, UNIT))
             except (NoAnswer, DamagedAnswer):
                 far.bench.bus.now += TIMEOUT
     assert end.value.value == HEARTBEAT_MEANS

@@ -21,7 +21,6 @@ from nfo_sinus_driver.link.interface import (
     LineSettings,
     Read,
     Refused,
-    carry_out,
 )
 from nfo_sinus_driver.link.pairs.classic import ClassicLink, Enquiry, encode
 
@@ -266,5 +265,5 @@ def test_what_acknowledges_is_sent_once_behind_an_answer_that_comes_twice(once: 
     bench.drive.values[A.index] = 5
     bench.read(A)
     with pytest.raises(DamagedAnswer) if once else contextlib.nullcontext():
-        carry_out(bench.link, 1, Read(A, once))
+        Read(A, once).carry_out(bench.link, 1)
     assert bench.asked.count(A.index) == (2 if once else 3)

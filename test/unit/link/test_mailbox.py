@@ -11,7 +11,7 @@ from typing import Any
 
 from hypothesis import given, strategies as st
 import pytest
-from registers import exchange_by
+from registers import registers_by
 
 from nfo_sinus_driver.link import (
     Address,
@@ -108,7 +108,7 @@ def plc() -> Plc:
 
 @pytest.fixture
 def block(plc: Plc) -> telegram.Block:
-    return telegram.Block(exchange_by(plc.ask), lambda: plc.now, 7, START)
+    return telegram.Block(registers_by(plc.ask), lambda: plc.now, 7, START)
 
 
 def access(block: telegram.Block, plc: Plc, address: Address, data: bytes | None = None) -> bytes:
@@ -307,7 +307,7 @@ def test_whatever_is_lost_a_write_is_done_once_at_most(
 ) -> None:
     errors = {'lost': NoAnswer, 'gone': PortError}
     plc = Plc(takes=takes, refuses=(23,) if apart else ())
-    block = telegram.Block(exchange_by(plc.ask), lambda: plc.now, 7, START)
+    block = telegram.Block(registers_by(plc.ask), lambda: plc.now, 7, START)
     plc.loses = [loss and (errors[loss[0]](loss[0]), loss[1]) for loss in losses]
     try:
         access(block, plc, ACCEL, b'\0\0\0\1')

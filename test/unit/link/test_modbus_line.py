@@ -311,7 +311,7 @@ def test_what_was_written_may_be_done_where_the_read_behind_it_is_refused() -> N
     bench.drive.code = lambda number: Refused.ILLEGAL_FUNCTION
 
     def exchange(data: bytes) -> object:
-        return bench.link.exchange(UNIT, B.index, 1, A.index, data)
+        return bench.link.transfer(UNIT, B.index, 1, A.index, data)
 
     assert bench.expect(Refused, lambda: exchange(packed(7, 8))).maybe_done
     assert bench.functions == [23, 16, 3]

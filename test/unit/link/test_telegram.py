@@ -12,7 +12,7 @@ from typing import Any
 
 from hypothesis import given, strategies as st
 import pytest
-from registers import exchange_by
+from registers import registers_by
 
 from nfo_sinus_driver.link import Address, Interrupted, LinkError, NoAnswer, NoData, NoPath, Refused
 from nfo_sinus_driver.link.modbus.pdu import Read, Write, WriteAndRead
@@ -76,7 +76,7 @@ def plc() -> Plc:
 
 @pytest.fixture
 def block(plc: Plc) -> telegram.Block:
-    return telegram.Block(exchange_by(plc.ask), lambda: plc.now, 7, START)
+    return telegram.Block(registers_by(plc.ask), lambda: plc.now, 7, START)
 
 
 def command(word: int, setpoint: int = 0) -> bytes:
@@ -305,7 +305,7 @@ STEP = st.one_of(
 def test_no_run_word_ever_follows_a_gap(steps: list[tuple[str, int]]) -> None:
     """Judged by what the PLC gets: after a gap of a second nothing runs without a beginning."""
     plc = Plc()
-    block = telegram.Block(exchange_by(plc.ask), lambda: plc.now, 7, START)
+    block = telegram.Block(registers_by(plc.ask), lambda: plc.now, 7, START)
     for what, value in steps:
         try:
             if what == 'read':

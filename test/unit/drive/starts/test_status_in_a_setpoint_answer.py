@@ -15,7 +15,7 @@ from neighbour import neighbour
 import pytest
 from support.rig import Rig
 
-from nfo_sinus_driver.bus import Exchange
+from nfo_sinus_driver.bus import Request
 from nfo_sinus_driver.drive import Cause
 from nfo_sinus_driver.link import Interrupted
 
@@ -29,7 +29,7 @@ def waits_for(rig: Rig, key: str) -> bool:
     task = rig.drive._poller._task
     assert task is not None
     awaited = task.awaited
-    return isinstance(awaited, Exchange) and awaited.reads(1, rig.drive.params.address(key))
+    return isinstance(awaited, Request) and awaited.reads(1, rig.drive.params.address(key))
 
 
 def until(rig: Rig, condition: Callable[[], object]) -> None:

@@ -21,7 +21,7 @@ from nfo_sinus_driver.catalog.profile import (
     Write,
 )
 from nfo_sinus_driver.drive.known.drive_state import DriveState
-from nfo_sinus_driver.drive.known.steps import carry_out
+from nfo_sinus_driver.drive.known.steps import run_steps
 
 
 class Noted:
@@ -68,7 +68,7 @@ def test_each_step_brings_what_the_next_one_is_given() -> None:
 
     noted = Noted(3, None, 4, None, None)
     state = cast(DriveState, SimpleNamespace(params=noted, wait_until=noted.reached))
-    done = carry_out(state, steps(), Priority.STOP)
+    done = run_steps(state, steps(), Priority.STOP)
     assert asyncio.run(done) == 7
     assert noted.asked == [
         ('read', 'a', Priority.STOP, False),
