@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from support.described import SHIPPED, DescribedRig
-from test_described_oddities import PLAIN, described
+from support.oddities import PLAIN, described
 
 from nfo_sinus_driver.catalog import Fact, Role, load_family
 from nfo_sinus_driver.cli.families import notes

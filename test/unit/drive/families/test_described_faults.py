@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from support.described import SHIPPED, DescribedRig
-from test_described_oddities import ODD, PLAIN, described
+from support.oddities import ODD, PLAIN, described
 
 from nfo_sinus_driver.catalog.declared import DescriptionError, read
 from nfo_sinus_driver.drive import Cause

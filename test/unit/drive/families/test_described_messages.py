@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 from support.described import DescribedRig
+from support.oddities import PLAIN, described
 from test_described_faults import complaints
-from test_described_oddities import PLAIN, described
 
 from nfo_sinus_driver.drive import Cause
 

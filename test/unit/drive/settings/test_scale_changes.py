@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 from support.described import SHIPPED, DescribedRig
+from support.oddities import ODD, described
 from support.rig import Rig
-from test_described_oddities import ODD, described
 
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.catalog.declared import read

@@ -19,10 +19,10 @@ from unittest import mock
 
 import pytest
 from support.described import DescribedRig
+from support.oddities import PLAIN, described
 from support.rig import CONNECTIONS, Rig
 from support.said import said
 from support.variants import ramps
-from test_described_oddities import PLAIN, described
 from test_every_step_of_a_stop import QUICK, STOPS
 
 from nfo_sinus_driver.drive import Cause, Severity
