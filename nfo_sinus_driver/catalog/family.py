@@ -201,9 +201,9 @@ class Family(Mapping[str, Parameter]):
         By the manual, or because the drive may be lost by it: its motor could not be stopped then.
         The drive's own time-out is a setting of its line by which none is lost.
         """
-        own_timeout = key == self.key(Role.COMMUNICATION_TIMEOUT)
-        own_timeout = own_timeout or key in self.profile.timeout_conditions
-        return self[key].stopped or (key in self.communication and not own_timeout)
+        drive_timeout = key == self.key(Role.COMMUNICATION_TIMEOUT)
+        drive_timeout = drive_timeout or key in self.profile.timeout_conditions
+        return self[key].stopped or (key in self.communication and not drive_timeout)
 
     @functools.cached_property
     def scaling(self) -> frozenset[str]:

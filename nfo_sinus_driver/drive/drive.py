@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from nfo_sinus_driver.bus import Bus, Priority, Statistics, Task, on_bus, stops_on_bus
 from nfo_sinus_driver.catalog import InverterStatus, Procedure, Role, Value
-from nfo_sinus_driver.drive.change.communication_watchdog import CommunicationWatchdog
+from nfo_sinus_driver.drive.change.drive_timeout_writer import DriveTimeoutWriter
 from nfo_sinus_driver.drive.change.memory import Memory, ProcessMemory
 from nfo_sinus_driver.drive.change.parameters import Parameters
 from nfo_sinus_driver.drive.change.tuning import Tuned, Tuning
@@ -94,14 +94,14 @@ class Drive:
         self.parameters = Parameters(
             self.state, procedures, self.run, self._take_parameters, self._take_scale
         )
-        self._watchdog = CommunicationWatchdog(
+        self._drive_timeout = DriveTimeoutWriter(
             self.state, self.parameters, memory or ProcessMemory(), self._controller
         )
         self.log = ErrorLog(self.state, procedures)
         self._error_log_monitor = ErrorLogMonitor(self.state, self.log)
         self._fault_namer = FaultNamer(self.state)
         self._tuning = Tuning(
-            self.state, self.parameters, procedures, self._watchdog.ensure_set
+            self.state, self.parameters, procedures, self._drive_timeout.ensure_set
         )
         #: Once a session: with each reconnect it would be said again.
         self._slow_line_reported = self._long_pauses_reported = False
@@ -299,11 +299,11 @@ class Drive:
             if self._controller is None:
                 return Report(Cause.ONLY_WATCHED)
             try:
-                answer = await self._controller.release(timeout, why, self._watchdog.undo)
+                answer = await self._controller.release(timeout, why, self._drive_timeout.undo)
             except (LinkError, DriveError) as error:
-                self._watchdog.left(error)
+                self._drive_timeout.left(error)
                 raise
-            await self._watchdog.put_back()
+            await self._drive_timeout.put_back()
             return answer
         finally:
             self._bus.cancel(self._parameters_task)
@@ -345,7 +345,7 @@ class Drive:
         self._require_active()
         controller = required(self._controller)
         self._require_connected()
-        answer = await controller.enable(self._watchdog.ensure_set, requested_at)
+        answer = await controller.enable(self._drive_timeout.ensure_set, requested_at)
         self._poller.wake()
         return answer
 
@@ -446,7 +446,7 @@ class Drive:
     @on_bus
     async def set_drive_timeout(self, seconds: float) -> Sequence[ParameterChange]:
         """Set and verify the drive's own time-out, SioTot with AutoStop on [C91]."""
-        return await self._watchdog.set_now(seconds)
+        return await self._drive_timeout.set_now(seconds)
 
     # --- on the bus ---------------------------------------------------------------------------
 
@@ -475,10 +475,10 @@ class Drive:
         named = await self._recogniser.recognise(Priority.SERVICE if retry else Priority.POLL)
         if self._controller is not None:
             await self._controller.stop_unexpected_run()
-            self._watchdog.connected()
+            self._drive_timeout.connected()
         if not named:
             await self._recogniser.read_nameplate()
-        await self._watchdog.recall()
+        await self._drive_timeout.recall()
         self._poller.connected()
         self.log.connected()
         state.found()
@@ -487,7 +487,7 @@ class Drive:
         self._report_identity()
         if self._controller is None and takes_control:
             state.notify(Severity.WARNING, Cause.HELD_BY_LINE, why=takes_control)
-        self._watchdog.warn_if_unfit()
+        self._drive_timeout.warn_if_unfit()
         seconds, longest = self._bus.round_time(), self.settings.lost_after
         if seconds > longest and not self._slow_line_reported:
             self._slow_line_reported = True

@@ -176,7 +176,7 @@ HISTORIES = (
         3,
         'a clean-up does not stop the motor',
         'Drive.disconnect',
-        '            answer = await self._controller.release(timeout, why, self._watchdog.undo)\n',
+        '            answer = await self._controller.release(timeout, why, self._drive_timeout.undo)\n',
         '            answer = Report(Cause.ONLY_WATCHED)\n',
         ('test_laws.py', '-k', 'way_out'),
     ),

@@ -388,17 +388,17 @@ class LineLaws:
         if self._clock.now > until + _SLACK:
             self._break('S2', number, 'has no stop on the wire, due since', unit.due_since)
 
-    def own_timeout(self, number: int) -> float | None:
+    def drive_timeout(self, number: int) -> float | None:
         """Return how soon a drive stops its motor by itself, s; ``None``: it does not."""
         settings = self._rig.drives[number].settings
         if self._line.plc is not None:
             # its program stops the drive of a driver that does not live
             return self._line.plc.setting.ros_time
-        return settings.communication_timeout or None
+        return settings.wanted_drive_timeout or None
 
     def _judge_standstill(self, number: int, unit: _Unit) -> None:
         """Judge S3."""
-        own = self.own_timeout(number)
+        own = self.drive_timeout(number)
         asked_by = max(unit.answered_at, self._there_since + _OPENED) + (own or math.inf)
         if self.noise:
             # so many requests to others may be in vain before

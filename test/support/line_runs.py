@@ -17,8 +17,8 @@ import functools
 from typing import Any
 
 from nfo_sinus_driver.drive import Cause, Report
+from support.drive_timeout import by_default
 from support.line_laws import LineLaws
-from support.own_timeout import by_default
 from support.rig import CONNECTIONS, SLICE, Rig
 
 #: What a program gives before something happens, and from then on, Hz.

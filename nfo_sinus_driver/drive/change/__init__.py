@@ -9,5 +9,5 @@ move a motor otherwise than meant. So a value is written only where it differs, 
 none, and what is read back is what it is (:mod:`.parameter_writer`).
 
 **The driver takes only what it needs from the drive.** It puts back the drive's own time-out at its
-end, after a kill at the next start (:mod:`.communication_watchdog`, :mod:`.memory`).
+end, after a kill at the next start (:mod:`.drive_timeout_writer`, :mod:`.memory`).
 """

@@ -17,9 +17,9 @@ from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.catalog import Fact, Holder, InverterStatus, Kind, Meaning, Role, load_family
 from nfo_sinus_driver.catalog.inverter_status import NO_CODE
 from nfo_sinus_driver.catalog.status import FREQUENCY, PROCESS_VALUE, QUANTITIES, SPEED
-from nfo_sinus_driver.drive.known.communication_timeout import CommunicationTimeout
 from nfo_sinus_driver.drive.known.control_state import ControlTable
 from nfo_sinus_driver.drive.known.direction import Direction
+from nfo_sinus_driver.drive.known.drive_timeout import DriveTimeout
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Event, Report, Severity
 from nfo_sinus_driver.drive.known.identity import Nameplate
 from nfo_sinus_driver.drive.known.parameter_access import ParameterAccess
@@ -154,7 +154,7 @@ class DriveState:
         self.control_mode = ''
         self.unit = ''
         #: Its communication time-outs.
-        self.timeout = CommunicationTimeout(self.params, self.model, self.nameplate.has)
+        self.timeout = DriveTimeout(self.params, self.model, self.nameplate.has)
 
     async def read_status(
         self,

@@ -75,7 +75,7 @@ def _telegram_words(model: str, method: str) -> tuple[str, ...]:
     return ('', *dict.fromkeys(found))
 
 
-def _communication_timeouts(model: str) -> Sequence[tuple[Fraction, Fraction]]:
+def _drive_timeouts(model: str) -> Sequence[tuple[Fraction, Fraction]]:
     """Return the longest communication time-out of a model, and its step, s; of all if unknown."""
     found = []
     for name in families() if model == AUTO else (model,):
@@ -95,7 +95,7 @@ REFERENCES = _references(AUTO, MONITOR)
 #: The control modes by the names that ``expected_control_mode`` takes.
 CONTROL_MODES = _control_modes(AUTO)
 #: The longest of the time-outs that drives have themselves, s.
-LONGEST_DRIVE_TIMEOUT = float(max(longest for longest, _ in _communication_timeouts(AUTO)))
+LONGEST_DRIVE_TIMEOUT = float(max(longest for longest, _ in _drive_timeouts(AUTO)))
 
 #: How many registers a PLC shows for one drive, and where the last of them can begin.
 BLOCK_SIZE = 11
@@ -414,11 +414,11 @@ class DriveSettings:
         return found
 
     @functools.cached_property
-    def communication_timeout(self) -> float:
+    def wanted_drive_timeout(self) -> float:
         """What the communication time-out of the drive is to be, s; 0: it is left as it is."""
         if self.drive_timeout != AS_THE_DRIVE_CAN:
             return self.drive_timeout
-        for longest, step in _communication_timeouts(self.model):
+        for longest, step in _drive_timeouts(self.model):
             seconds = self._least_drive_timeout(step, _USUAL_DRIVE_TIMEOUT)
             return seconds if seconds <= longest else 0.0
         return 0.0
@@ -431,10 +431,10 @@ class DriveSettings:
     def _check_drive_timeout(self) -> None:
         if self.drive_timeout == AS_THE_DRIVE_CAN:
             # the table of the drive is read now, and not when the motor is to run
-            assert self.communication_timeout >= 0
+            assert self.wanted_drive_timeout >= 0
             return
         # a drive that has none refuses any, with the reason
-        own = _communication_timeouts(self.model) or _communication_timeouts(AUTO)
+        own = _drive_timeouts(self.model) or _drive_timeouts(AUTO)
         longest, step = max(most for most, _ in own), min(least for _, least in own)
         whose = f' with {self.model}' if len(own) == 1 else ''
         declared = settings_of(DriveSettings)['drive_timeout']

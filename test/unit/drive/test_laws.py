@@ -5,7 +5,7 @@
 The laws of the house, each over every connection to a drive, in virtual time.
 
 Laws 1, 4, 5 and 6 are judged besides in every test that has a rig, by all frames on its line; law 9
-stands in test_own_timeout.py, too. A new connection is one line in
+stands in test_drive_timeout.py, too. A new connection is one line in
 :data:`support.rig.CONNECTIONS`; a new law is one test here.
 """
 
@@ -19,7 +19,7 @@ import math
 from typing import Any
 
 import pytest
-from support.own_timeout import TIMED, by_default
+from support.drive_timeout import TIMED, by_default
 from support.rig import CONNECTIONS, Rig
 from support.variants import ramps
 

@@ -229,7 +229,7 @@ class Laws(History):
 
     def _judge_silence(self) -> None:
         """Keep the drive's own time-out from striking."""
-        sio_tot = self._rig.drive.settings.communication_timeout
+        sio_tot = self._rig.drive.settings.wanted_drive_timeout
         if not sio_tot or not self._steady or not self._connected:
             return
         if self.now - self._asked_at > sio_tot / 2:

@@ -14,7 +14,7 @@ import itertools
 from typing import Any
 
 import pytest
-from support.own_timeout import by_default
+from support.drive_timeout import by_default
 from support.rig import CONNECTIONS, Rig
 
 from nfo_sinus_driver.link import Reply

@@ -14,9 +14,9 @@ import itertools
 from zlib import crc32
 
 import pytest
+from support.drive_timeout import by_default, drive_timeout
 from support.line_laws import LineLaws
 from support.line_runs import CALLS, HAPPENS, KINDS, LineRun
-from support.own_timeout import by_default, own_timeout
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause
@@ -71,7 +71,7 @@ def test_a_drive_that_hears_reads_alone_is_stopped_by_its_own_time_out(any_count
         begun = rig.clock.now
         rig.line.plan = lambda frame: 'drop' if frame[1] == 0x03 else 'unheard'
         rig.wait_until(lambda: not any(far.motor.driven for far in rig.fars.values()))
-        assert rig.clock.now - begun < own_timeout(rig) + _LOST_BEFORE
+        assert rig.clock.now - begun < drive_timeout(rig) + _LOST_BEFORE
 
 
 def test_no_poll_of_a_lost_drive_feeds_its_time_out_beside_one_that_answers() -> None:
@@ -84,7 +84,7 @@ def test_no_poll_of_a_lost_drive_feeds_its_time_out_beside_one_that_answers() ->
             lost.get(frame[1], 'unheard') if rig.line.unit_of(frame) == 1 else None
         )
         rig.wait_until(lambda: not rig.turns)
-        assert rig.clock.now - begun < own_timeout(rig) + _LOST_BEFORE
+        assert rig.clock.now - begun < drive_timeout(rig) + _LOST_BEFORE
 
 
 def test_one_at_standstill_is_not_asked_while_the_time_out_of_another_runs() -> None:
@@ -96,21 +96,21 @@ def test_one_at_standstill_is_not_asked_while_the_time_out_of_another_runs() -> 
         begun = rig.clock.now
         rig.line.plan = lambda frame: 'drop' if frame[1] == 0x03 else 'unheard'
         rig.wait_until(lambda: not rig.turns)
-        assert rig.clock.now - begun < own_timeout(rig) + _LOST_BEFORE
+        assert rig.clock.now - begun < drive_timeout(rig) + _LOST_BEFORE
 
 
 def test_a_line_with_a_drive_that_answers_is_not_quiet_for_another() -> None:
     with by_default('rtu', drives=2) as rig:
         rig.turn()
         rig.line.plan = lambda frame: 'drop' if rig.line.unit_of(frame) == 1 else None
-        rig.pass_time(own_timeout(rig) + 2 * _LOST_BEFORE)
+        rig.pass_time(drive_timeout(rig) + 2 * _LOST_BEFORE)
         assert not rig.fars[2].faults and rig.drives[2].following
 
 
 def test_a_drive_whose_time_out_has_struck_while_the_driver_stood_still_is_stopped() -> None:
     with by_default('rtu') as rig:
         rig.turn()
-        rig.line.go_to(rig.clock.now + own_timeout(rig) + 0.5)
+        rig.line.go_to(rig.clock.now + drive_timeout(rig) + 0.5)
         rig.pass_time(0.3)
         assert rig.notes.said(Cause.DRIVER_PAUSED)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from random import Random
 
 import pytest
-from support.own_timeout import by_default
+from support.drive_timeout import by_default
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause, DriveSettings

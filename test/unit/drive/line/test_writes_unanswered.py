@@ -10,7 +10,7 @@ So does a gateway that was put into read-only mode, a filter, or a line that car
 from __future__ import annotations
 
 import pytest
-from support.own_timeout import by_default
+from support.drive_timeout import by_default
 from support.rig import CONNECTIONS, Rig
 from support.said import says
 from support.variants import ramps

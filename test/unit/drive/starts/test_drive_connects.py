@@ -231,7 +231,7 @@ def test_exit_leaves_a_slow_motor_to_its_ramp_unless_a_fault_would_end_it(
 def test_the_default_is_what_the_drive_and_lost_after_allow(
     model: str, lost_after: float, own: float
 ) -> None:
-    assert DriveSettings(model=model, lost_after=lost_after).communication_timeout == own
+    assert DriveSettings(model=model, lost_after=lost_after).wanted_drive_timeout == own
 
 
 NO_SENSE: list[tuple[dict[str, Any], str]] = [

@@ -30,7 +30,7 @@ _LONGEST_DISK = 1.0
 _LOOK_PERIOD = 0.005
 
 
-class CommunicationWatchdog:
+class DriveTimeoutWriter:
     """
     Sets SioTot with AutoStop of one drive [C91]; a :class:`DriveError` says why not; on the bus
     alone.
@@ -145,15 +145,15 @@ class CommunicationWatchdog:
         Failing to set the default prevents no start; the next enable tries again.
         """
         settings = self._state.settings
-        if self._is_settled(settings.communication_timeout):
+        if self._is_settled(settings.wanted_drive_timeout):
             return
         done = True
         if settings.drive_timeout == AS_THE_DRIVE_CAN:
-            done = await self._try_usual(settings.communication_timeout)
+            done = await self._try_usual(settings.wanted_drive_timeout)
         else:
-            await self.set_now(settings.communication_timeout)
+            await self.set_now(settings.wanted_drive_timeout)
         if done:
-            self._settled = settings.communication_timeout, self._state.timeout.stops_motor
+            self._settled = settings.wanted_drive_timeout, self._state.timeout.stops_motor
         self._report_timeout()
         self.warn_if_unfit()
 
@@ -371,7 +371,7 @@ class CommunicationWatchdog:
             return state.report(Cause.NO_OWN_TIMEOUT)
         name = state.timeout.watched_by or model[model.key(Role.COMMUNICATION_TIMEOUT)].name
         asked = settings.drive_timeout
-        if not timeout and not settings.communication_timeout:
+        if not timeout and not settings.wanted_drive_timeout:
             return Report(Cause.OWN_TIMEOUT_OFF, name=name, asked=asked)
         if prevented := state.timeout.prevented_by:
             return Report(

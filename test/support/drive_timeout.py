@@ -29,7 +29,7 @@ def by_default(connection: str, found: float | None = None, **more: Any) -> Rig:
     return Rig(connection, parameters=parameters, drive_timeout=AS_THE_DRIVE_CAN, **more)
 
 
-def own_timeout(rig: Rig) -> float:
+def drive_timeout(rig: Rig) -> float:
     """Return the time-out that stands in the drive, s."""
     key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
     return float(rig.far.memory.number(key))

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.own_timeout import TIMED, by_default, own_timeout
+from support.drive_timeout import TIMED, by_default, drive_timeout
 from support.rig import CONNECTIONS, Rig
 from support.said import says
 from support.variants import ramps
@@ -34,7 +34,7 @@ def test_9_a_drive_that_is_polled_seldom_gets_a_request_in_time(connection: str)
     with by_default(connection, poll_rate=0.05, telemetry_rate=0.0) as rig:
         rig.connect()
         rig.enable()
-        assert own_timeout(rig) == 2.0
+        assert drive_timeout(rig) == 2.0
         rig.line.make_noise(0.15, seed=1)
         begun = rig.clock.now
         rig.pass_time(12.0)
@@ -103,10 +103,10 @@ def test_9_the_end_leaves_the_time_out_of_a_drive_as_it_was_found(
     with by_default(connection, found) as rig:
         rig.turn()
         # what is shorter was decided by others
-        assert own_timeout(rig) == (found if found == 1.0 else 2.0)
+        assert drive_timeout(rig) == (found if found == 1.0 else 2.0)
         rig.answer(rig.drive.stop_for_good(4.0))
         rig.answer(rig.drive.disconnect(4.0))
-        assert own_timeout(rig) == found
+        assert drive_timeout(rig) == found
         assert rig.far.writes.get(rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT), 0) == (
             0 if found == 1.0 else 2
         )
@@ -119,12 +119,12 @@ def test_9_a_time_out_that_was_changed_meanwhile_is_set_again_by_the_next_enable
     with by_default(connection, 0.0) as rig:
         rig.connect(parameters=True)
         rig.enable()
-        assert own_timeout(rig) == 2.0
+        assert drive_timeout(rig) == 2.0
         rig.answer(rig.drive.stop())
         rig.far.set_from_keypad(rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT), 0.0)
         rig.pass_time(15.0)
         rig.enable()
-        assert own_timeout(rig) == 2.0
+        assert drive_timeout(rig) == 2.0
 
 
 @pytest.mark.parametrize('connection', ['rtu', 'classic'])
@@ -136,7 +136,7 @@ def test_9_an_end_with_a_fault_leaves_the_time_out_and_says_so(connection: str) 
         rig.pass_time(1.0)
         rig.answer(rig.drive.stop_for_good(4.0))
         rig.answer(rig.drive.disconnect(4.0))
-        assert own_timeout(rig) == 2.0
+        assert drive_timeout(rig) == 2.0
         assert rig.notes.said(Cause.OWN_TIMEOUT_NOT_PUT_BACK)
 
 
@@ -164,11 +164,11 @@ def test_9_by_default_a_time_out_that_may_not_stop_the_motor_is_left_alone(conne
     with Rig(connection, drive_timeout=AS_THE_DRIVE_CAN) as rig:
         rig.connect()
         assert rig.notes.said(Cause.OWN_TIMEOUT_STOPS_NOTHING, Severity.WARNING)
-        before = own_timeout(rig)
+        before = drive_timeout(rig)
         rig.turn()
-        assert own_timeout(rig) == before
+        assert drive_timeout(rig) == before
         rig.answer(rig.drive.set_drive_timeout(2.0))
-        assert own_timeout(rig) == 2.0 and rig.drive.state.timeout.stops_motor
+        assert drive_timeout(rig) == 2.0 and rig.drive.state.timeout.stops_motor
 
 
 @timed
@@ -185,7 +185,7 @@ def test_9_a_default_that_the_drive_does_not_take_keeps_no_motor_from_running(
             rig.answer(rig.drive.stop())
         said = [one for one in rig.notes.events if says(one.text, Cause.OWN_TIMEOUT_NOT_TAKEN)]
         assert [one.severity for one in said] == [Severity.WARNING]
-        assert own_timeout(rig) == 0.0
+        assert drive_timeout(rig) == 0.0
 
 
 @timed
@@ -199,10 +199,10 @@ def test_9_a_default_that_the_drive_did_not_take_is_set_by_the_next_enable(
         rig.spoil(what, key, 1000)
         rig.enable()
         rig.answer(rig.drive.stop())
-        assert rig.notes.said(Cause.OWN_TIMEOUT_NOT_TAKEN) and own_timeout(rig) == 0.0
+        assert rig.notes.said(Cause.OWN_TIMEOUT_NOT_TAKEN) and drive_timeout(rig) == 0.0
         rig.meet = lambda key, data: None
         rig.enable()
-        assert own_timeout(rig) == rig.drive.settings.communication_timeout
+        assert drive_timeout(rig) == rig.drive.settings.wanted_drive_timeout
 
 
 @timed
@@ -212,7 +212,7 @@ def test_9_by_default_a_clean_end_leaves_a_slow_motor_to_its_ramp(connection: st
     ) as rig:
         rig.turn()
         assert 'left to its ramp' in rig.answer(rig.drive.disconnect(0.2))
-        assert own_timeout(rig) == 0.0
+        assert drive_timeout(rig) == 0.0
         rig.kill()
         rig.line.go_to(rig.clock.now + 40.0)
         assert not rig.far.motor.turning and not rig.far.faults
@@ -236,7 +236,7 @@ def test_9_a_stop_that_comes_while_the_time_out_is_set_is_no_later_and_undoes_it
         rig.wait_until(stops[0].done, 1.0)
         assert not rig.drive.following and not rig.turns
         rig.answer(rig.drive.disconnect(4.0))
-        assert own_timeout(rig) == 0.0
+        assert drive_timeout(rig) == 0.0
 
 
 # --- a driver that was killed ---------------------------------------------------------------------
@@ -247,7 +247,7 @@ def enable_and_kill(rig: Rig) -> None:
     rig.connect()
     rig.wait_until(lambda: not rig.drive.stop_unconfirmed)
     rig.enable()
-    assert own_timeout(rig) == 2.0
+    assert drive_timeout(rig) == 2.0
     rig.kill()
     rig.pass_time(0.5)
     rig.begin()
@@ -273,9 +273,9 @@ def test_9_the_end_after_one_that_was_killed_leaves_the_time_out_as_the_first_fo
         if enabled_again:
             rig.wait_until(lambda: not rig.drive.stop_unconfirmed)
             rig.enable()
-            assert own_timeout(rig) == 2.0
+            assert drive_timeout(rig) == 2.0
         end(rig)
-        assert own_timeout(rig) == found
+        assert drive_timeout(rig) == found
         rig.begin()
         rig.connect()
         assert not rig.notes.said(Cause.OWN_TIMEOUT_RECALLED)
@@ -292,12 +292,12 @@ def test_9_a_time_out_that_the_owner_has_changed_since_is_the_owners(
         rig.connect()
         rig.wait_until(lambda: not rig.drive.stop_unconfirmed)
         rig.enable()
-        assert own_timeout(rig) == 2.0
+        assert drive_timeout(rig) == 2.0
         # in this session, too
         rig.answer(rig.drive.stop())
         rig.far.set_from_keypad(rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT), 9.0)
         end(rig)
-        assert own_timeout(rig) == 9.0
+        assert drive_timeout(rig) == 9.0
 
 
 @pytest.mark.parametrize('connection', ['rtu', 'movitrac'])
@@ -311,9 +311,9 @@ def test_9_a_time_out_that_the_owner_has_changed_and_an_enable_has_set_again_is_
         rig.far.set_from_keypad(rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT), 9.0)
         rig.pass_time(15.0)
         rig.enable()
-        assert own_timeout(rig) == 2.0
+        assert drive_timeout(rig) == 2.0
         end(rig)
-        assert own_timeout(rig) == 9.0
+        assert drive_timeout(rig) == 9.0
 
 
 def test_9_a_time_out_that_a_setting_wants_stays_after_a_kill_as_after_an_end() -> None:
@@ -326,7 +326,7 @@ def test_9_a_time_out_that_a_setting_wants_stays_after_a_kill_as_after_an_end() 
         rig.begin()
         rig.connect()
         end(rig)
-        assert own_timeout(rig) == 2.0
+        assert drive_timeout(rig) == 2.0
 
 
 @pytest.mark.parametrize('connection', ['movitrac', 'described'])
@@ -339,7 +339,7 @@ def test_9_where_the_bus_keeps_control_what_a_setting_wants_is_put_back_after_a_
         enable_and_kill(rig)
         rig.connect()
         end(rig)
-        assert own_timeout(rig) == 6.0
+        assert drive_timeout(rig) == 6.0
 
 
 def test_9_an_end_with_a_fault_leaves_the_time_out_to_the_next_end() -> None:
@@ -348,13 +348,13 @@ def test_9_an_end_with_a_fault_leaves_the_time_out_to_the_next_end() -> None:
         rig.far.trip(rig.a_fault)
         rig.pass_time(1.0)
         end(rig)
-        assert own_timeout(rig) == 2.0
+        assert drive_timeout(rig) == 2.0
         rig.kill()
         rig.far.faults.acknowledge()
         rig.begin()
         rig.connect()
         end(rig)
-        assert own_timeout(rig) == 0.0
+        assert drive_timeout(rig) == 0.0
 
 
 def test_9_what_is_remembered_of_one_drive_is_not_put_back_in_another() -> None:
@@ -415,7 +415,7 @@ def test_9_a_drive_is_known_by_its_serial_number_or_by_its_place(
             rig.connect()
             assert rig.notes.said(Cause.OWN_TIMEOUT_RECALLED) == recalled
             end(rig)
-            assert own_timeout(rig) == (0.0 if recalled else 2.0)
+            assert drive_timeout(rig) == (0.0 if recalled else 2.0)
 
 
 class Broken:
@@ -450,10 +450,10 @@ def test_9_a_disk_that_keeps_nothing_prevents_no_enable_and_is_reported_once(
         rig.connect()
         for _ in range(2):
             rig.enable()
-            assert own_timeout(rig) == 2.0
+            assert drive_timeout(rig) == 2.0
             rig.answer(rig.drive.stop())
         end(rig)
-        assert own_timeout(rig) == 0.0
+        assert drive_timeout(rig) == 0.0
         key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
         said = [one.text for one in rig.notes.events if says(one.text, Cause.NOT_REMEMBERED)]
         assert len(said) == 1 and f'check {key}' in said[0], said
@@ -489,7 +489,7 @@ def test_9_a_spoilt_file_keeps_no_drive_from_being_connected_to(
         rig.turn()
         rig.answer(rig.drive.stop())
         end(rig)
-        assert not rig.turns and own_timeout(rig) == 2.0
+        assert not rig.turns and drive_timeout(rig) == 2.0
 
 
 class Slow(ProcessMemory):

@@ -13,7 +13,7 @@ from nfo_sinus_driver.drive.known.parameter_access import ParameterAccess
 from nfo_sinus_driver.link import Refused
 
 
-class CommunicationTimeout:
+class DriveTimeout:
     """
     The communication time-outs of one drive, as far as they are known.
 
