@@ -142,7 +142,7 @@ class Ask(NamedTuple):
     question: Callable[[], Reply]
 
     def carry_out(self, link: Link, unit: int) -> Reply:
-        """Ask it (LinkError: as its subclasses say); who asks has the link and the unit."""
+        """Ask it (LinkError: as its subclasses say); the question has its link and its unit."""
         return self.question()
 
 
