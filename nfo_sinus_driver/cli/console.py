@@ -18,7 +18,7 @@ import os
 import signal
 import sys
 import threading
-from typing import Any
+from typing import Any, TextIO
 import unicodedata
 
 from tqdm import tqdm
@@ -52,14 +52,22 @@ def progress(what: str, total: int) -> Iterator[Callable[[], None]]:
         yield lambda: bar.update()
 
 
+def _write_no_more(stream: TextIO) -> None:
+    """Lead a stream that is lost nowhere: what is left in it would change the exit status."""
+    with open(os.devnull, 'w', encoding='utf-8') as nowhere:
+        os.dup2(nowhere.fileno(), stream.fileno())
+
+
 def remark(text: str) -> None:
     """Say something to the operator, above the bar if there is one."""
     if sys.stderr is None:
         return
     # what cannot be said must not end what is under way: settings are put back, too
-    with contextlib.suppress(OSError):
+    try:
         tqdm.write(f'nfo-sinus: {text}', file=sys.stderr)
         sys.stderr.flush()
+    except OSError:
+        _write_no_more(sys.stderr)
 
 
 def put(text: str) -> None:
@@ -74,9 +82,7 @@ def put(text: str) -> None:
         tqdm.write(text, file=sys.stdout)
         sys.stdout.flush()
     except OSError as error:
-        # what is left would be written at the end once more, in vain
-        with open(os.devnull, 'w', encoding='utf-8') as nowhere:
-            os.dup2(nowhere.fileno(), sys.stdout.fileno())
+        _write_no_more(sys.stdout)
         raise OutputLost(error.strerror or '') from error
 
 
