@@ -176,8 +176,8 @@ HISTORIES = (
         3,
         'a clean-up does not stop the motor',
         'Drive.disconnect',
-        '            answer = await self._controller.release(timeout, why, self._drive_timeout.undo)\n',
-        '            answer = Report(Cause.ONLY_WATCHED)\n',
+        'answer = await self._controller.release(timeout, why, self._drive_timeout.undo)\n',
+        'answer = Report(Cause.ONLY_WATCHED)\n',
         ('test_laws.py', '-k', 'way_out'),
     ),
     Mutant(

@@ -473,7 +473,8 @@ LAWS = (
         'the time-out of the drive is set by looking',
         'Drive._connect',
         '            self._drive_timeout.connected()',
-        '            self._drive_timeout.connected()\n            await self._drive_timeout.ensure_set()',
+        '            self._drive_timeout.connected()\n'
+        '            await self._drive_timeout.ensure_set()',
         ('test_laws.py', '-k', 'test_1_'),
     ),
     Mutant(
