@@ -42,7 +42,8 @@ from nfo_sinus_driver.drive import (
 )
 from nfo_sinus_driver.node.drive.callers import Call, publish_calls
 from nfo_sinus_driver.node.drive.managed_drive import ManagedDrive
-from nfo_sinus_driver.node.messages.messages import inv_st, messages
+from nfo_sinus_driver.node.messages import messages
+from nfo_sinus_driver.node.messages.messages import inv_st
 from nfo_sinus_driver.node.messages.wording import NodeError
 from nfo_sinus_driver.node.ros.executor import received_at
 from nfo_sinus_driver.node.ros.qos import COMMANDS

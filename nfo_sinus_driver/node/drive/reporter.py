@@ -28,7 +28,8 @@ from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.drive import Event, LogEntry, Report, Severity, Snapshot, Telemetry
 from nfo_sinus_driver.node.drive import diagnostics
 from nfo_sinus_driver.node.drive.managed_drive import ManagedDrive
-from nfo_sinus_driver.node.messages.messages import Joint, messages
+from nfo_sinus_driver.node.messages import messages
+from nfo_sinus_driver.node.messages.messages import Joint
 from nfo_sinus_driver.node.messages.serialized import Stamped, float32
 from nfo_sinus_driver.node.messages.stamps import Sequence, Stamps
 from nfo_sinus_driver.node.messages.wording import Wording

@@ -26,7 +26,7 @@ from nfo_sinus_driver.node.drive import diagnostics
 from nfo_sinus_driver.node.drive.bus_context import BusContext
 from nfo_sinus_driver.node.drive.setpoint_checks import Origin
 from nfo_sinus_driver.node.line.all_drives import AllDrives
-from nfo_sinus_driver.node.messages.messages import messages
+from nfo_sinus_driver.node.messages import messages
 from nfo_sinus_driver.node.messages.stamps import Stamps
 from nfo_sinus_driver.node.parameters.declaring import coerce, declare
 from nfo_sinus_driver.node.parameters.factory_settings import line_of
