@@ -119,7 +119,7 @@ def _read(
         drive.identify(thoroughly=False)
 
     async def measure() -> tuple[InverterStatus, Mapping[str, float]]:
-        status = await drive.state.read_status(Priority.POLL, retry=False)
+        status = await drive.state.reader.read(Priority.POLL, retry=False)
         values = dict.fromkeys(_VALUES, math.nan)
         for name, (role, _, _) in _VALUES.items():
             key = drive.model.key(role)

@@ -285,7 +285,7 @@ class Drive:
         """
         if self._controller is None or self.state.nameplate.identity is None:
             return
-        status = await self.state.read_status(Priority.SERVICE)
+        status = await self.state.reader.read(Priority.SERVICE)
         if status.driven and status.from_bus:
             method = self.settings.method
             raise DriveError(self.state.report(Cause.OTHER_METHOD_RUNS, method=method))
@@ -381,7 +381,7 @@ class Drive:
     @on_bus
     async def read_status(self) -> InverterStatus:
         """Read the status, connected or not, without acknowledging anything."""
-        return await self.state.read_status(Priority.SERVICE)
+        return await self.state.reader.read(Priority.SERVICE)
 
     @on_bus
     async def measure(self, key: str) -> Value:
@@ -389,7 +389,7 @@ class Drive:
         value = await self.params.read(key, Priority.SERVICE)
         if isinstance(value, str):
             return value
-        cut_off = await self.state.is_cut_off(key, value, Priority.SERVICE, retry=True)
+        cut_off = await self.state.measurements.is_cut_off(key, value, Priority.SERVICE, retry=True)
         return math.nan if cut_off else value
 
     @on_bus

@@ -199,7 +199,7 @@ HISTORIES = (
     Mutant(
         1,
         'in any order: polling acknowledges faults',
-        'DriveState._read_int',
+        'StatusReader._read_int',
         'read_reply(key, priority, retry=retry',
         "read_reply('fieldbus.inv_st_with_ack', priority, retry=retry",
         (ANY_ORDER, '-k', 'G2Monitor'),

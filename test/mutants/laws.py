@@ -43,7 +43,7 @@ LAWS = (
     Mutant(
         1,
         'polling acknowledges faults',
-        'DriveState._read_int',
+        'StatusReader._read_int',
         'read_reply(key, priority, retry=retry',
         "read_reply(key.replace('inv_st', 'inv_st_with_ack'), priority, retry=retry",
         (TRACE,),
@@ -226,7 +226,7 @@ LAWS = (
     Mutant(
         2,
         'a take-over that is over after less than a second is not noticed',
-        'DriveState._with_control',
+        'StatusReader._with_control',
         '_BY_MODE_WHILE_ENABLED if enabled else _BY_MODE_FOR',
         '_BY_MODE_FOR',
         ('test_described_oddities.py', '-k', 'however_short'),
@@ -845,7 +845,7 @@ LAWS = (
     Mutant(
         2,
         'a keypad that takes control is not asked for',
-        'DriveState._held_by_bus',
+        'StatusReader._held_by_bus',
         'holder is Holder.BUS and not await self._operated_locally(priority, retry)',
         'holder is Holder.BUS',
         (MOVITRAC_LAWS, '-k', 'after_trouble and keypad'),

@@ -125,7 +125,7 @@ class ParameterWriter:
         if not stopped:
             return
         try:
-            status = await self._state.read_status(_SERVICE)
+            status = await self._state.reader.read(_SERVICE)
         except LinkError as error:
             raise not_changed(stopped, explain_failure(error, self._state)) from error
         if status.driven:
@@ -288,7 +288,7 @@ class ParameterWriter:
             why = Report(Cause.RELEASE_NEEDED, why=why)
         with contextlib.suppress(LinkError):
             # the last poll may have been before the fault
-            await state.read_status(_SERVICE)
+            await state.reader.read(_SERVICE)
         status = state.status
         if status is not None and status.driven and self._params.model[key].stopped:
             return Report(Cause.REFUSED_WHILE_RUNNING, why=why)

@@ -121,7 +121,7 @@ class Tuning:
         reported_code, reported_at = -1, 0.0
         faulted_at = math.inf
         while True:
-            status = await state.read_status(Priority.POLL)
+            status = await state.reader.read(Priority.POLL)
             elapsed = state.bus.now() - started
             if status.code != reported_code or elapsed > reported_at + _REPORT_PERIOD:
                 reported_code, reported_at = status.code, elapsed

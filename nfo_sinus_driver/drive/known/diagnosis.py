@@ -156,9 +156,9 @@ def explain_fall(
         return None
     return state.report(
         Cause.SLOWER_AFTER_SILENCE,
-        before=abs(before.frequency) / state.turning.hertz,
-        now=abs(status.frequency) / state.turning.hertz,
-        unit=state.turning.unit,
+        before=abs(before.frequency) / state.measurements.turning.hertz,
+        now=abs(status.frequency) / state.measurements.turning.hertz,
+        unit=state.measurements.turning.unit,
     )
 
 

@@ -69,7 +69,7 @@ class Recogniser:
             await state.nameplate.read_scales()
             await state.read_control_mode()
             await state.timeout.read()
-            status = await state.read_status(Priority.SERVICE)
+            status = await state.reader.read(Priority.SERVICE)
         except Refused as error:
             raise self._meant(error) from error
         state.require_fresh(status)
@@ -135,13 +135,13 @@ class Recogniser:
     async def _still_runs(self) -> bool:
         """Return whether the drive shows a run, by its status word alone where it has one."""
         state, params = self._state, self._params
-        if not state.nameplate.has(state.word_key):
-            status = await state.read_status(Priority.LOOK, retry=False)
+        if not state.nameplate.has(state.reader.word_key):
+            status = await state.reader.read(Priority.LOOK, retry=False)
             return status.driven or status.runs_by_bus
-        reply = await params.read_reply(state.word_key, Priority.LOOK, retry=False)
-        if not params.can_be(state.word_key, reply.data):
+        reply = await params.read_reply(state.reader.word_key, Priority.LOOK, retry=False)
+        if not params.can_be(state.reader.word_key, reply.data):
             return False
-        shown = state.status_of_word(state.status_word(reply.data), reply.arrived)
+        shown = state.reader.status_of_word(state.reader.status_word(reply.data), reply.arrived)
         return shown.driven or shown.runs_by_bus
 
     async def _is_same(self, key: str, values: Sequence[Value]) -> bool:
@@ -221,7 +221,7 @@ class Recogniser:
             return
         word, identity = status.word, state.nameplate.identity
         if word is not None and not profile.status_word.may_say(word):
-            raise self._impossible(state.word_key, f'{word:04X}h')
+            raise self._impossible(state.reader.word_key, f'{word:04X}h')
         if profile.status_word.code is None and status.code > _LAST_CODE:
             raise self._impossible(state.model.key(Role.STATUS_CODE), str(status.code))
         low, high = _NO_FIRMWARE

@@ -188,7 +188,7 @@ class Controller:
         if self._control.state is ControlState.ENABLING:
             raise DriveError(Cause.ENABLING_ALREADY)
         if self._control.blocked:
-            status = await self._state.read_status(Priority.SERVICE)
+            status = await self._state.reader.read(Priority.SERVICE)
             self._explain_refusal(status)
             require_no_fault(self._state, status)
         self._require_no_known_fault()
@@ -221,7 +221,7 @@ class Controller:
 
     async def _enabled_already(self) -> Report:
         """Return that the motor is enabled; it may have stopped by itself since the last poll."""
-        status = await self._state.read_status(Priority.SERVICE)
+        status = await self._state.reader.read(Priority.SERVICE)
         self._state.require_fresh(status)
         self.on_status(status)
         if not self._control.enabled:
@@ -236,7 +236,7 @@ class Controller:
         """
         try:
             if self._refusal is not None:
-                self._explain_refusal(await self._state.read_status(Priority.SERVICE))
+                self._explain_refusal(await self._state.reader.read(Priority.SERVICE))
             return await self._starting.check()
         except Exception as error:
             self._control.dispatch(ControlEvent.REFUSED)
@@ -307,7 +307,7 @@ class Controller:
         if coasts is not None or status.by_frequency:
             return bool(coasts)
         await self._bus.sleep(_RELEASED_WITHIN)
-        return not (await self._state.read_status(Priority.LOOK)).driven
+        return not (await self._state.reader.read(Priority.LOOK)).driven
 
     async def take_control(self, control_mode: str) -> None:
         """Put the drive under bus control for a procedure, with no run command active."""
@@ -351,7 +351,7 @@ class Controller:
         with self._sequence.external_stop(why):
             try:
                 may_run = may_run or await self.in_control(Priority.STOP)
-                may_run = may_run or (await self._state.read_status(Priority.LOOK)).tuning
+                may_run = may_run or (await self._state.reader.read(Priority.LOOK)).tuning
                 if may_run:
                     await self._sequence.find()
                     steps = self.method.quick_stop(self._state.control_mode)
@@ -362,7 +362,7 @@ class Controller:
                 # even after an error in the driver the motor is stopped
                 self._sequence.start()
                 with contextlib.suppress(LinkError):
-                    await self._state.read_status(Priority.LOOK)
+                    await self._state.reader.read(Priority.LOOK)
                 status = self._state.status
                 by_fault = status is not None and status.faulted and not status.runs_by_bus
                 if isinstance(error, Refused) and by_fault:
@@ -410,7 +410,7 @@ class Controller:
     async def acknowledge(self, why: Report) -> Report:
         """Acknowledge a fault; remove run command and set-point first, if the drive allows it."""
         state = self._state
-        status = await state.read_status(Priority.SERVICE)
+        status = await state.reader.read(Priority.SERVICE)
         fault = status.listed
         if not status.faulted and fault.kind is Kind.STATUS:
             return state.report(Cause.NOTHING_TO_ACKNOWLEDGE)
@@ -471,7 +471,7 @@ class Controller:
         ended = self._control.stopped_at >= self._control.closed_at and not owed
         if ended:
             # the last poll shows nothing of what has come since
-            status = await self._state.read_status(Priority.SERVICE)
+            status = await self._state.reader.read(Priority.SERVICE)
             ended = status.from_bus and not (
                 status.runs_by_bus or status.tuning or status.faulted
             )
@@ -716,7 +716,7 @@ class Controller:
         return explain_stop(self._state, status, self._setpoint.control_mode)
 
     def _why_slower(self, status: InverterStatus, before: InverterStatus | None) -> Report | None:
-        turning = self._state.turning
+        turning = self._state.measurements.turning
         by_it = self._setpoint.control_mode == turning.mode
         if before is None or before.at < self._control.since or not by_it:
             return None

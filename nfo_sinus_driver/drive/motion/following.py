@@ -103,9 +103,9 @@ class FollowingCheck:
 
     def check(self) -> Report | None:
         """Return why the last measurement has to stop the motor; report what else is wrong."""
-        measured = self._state.turned
+        measured = self._state.measurements.turned
         role, unit = _COMPARED.get(self._setpoint.control_mode, (None, 1.0))
-        actual = self._state.last_polled(role)
+        actual = self._state.measurements.last(role)
         if measured.at <= max(self._at, self._setpoint.following_since):
             return None
         self._at = measured.at
@@ -126,7 +126,7 @@ class FollowingCheck:
         elif role is not None:
             self._check_overspeed(actual.value, measured.at, max(-least, most), unit)
             self._check_scale(actual.value, measured.at, unit)
-        turning = self._state.turning
+        turning = self._state.measurements.turning
         now = frequency / turning.hertz
         return cause and self._state.report(
             cause, now=now, unit=turning.unit, seconds=_FALLS_WITHIN
@@ -179,7 +179,7 @@ class FollowingCheck:
             return False
         self._stands_since = min(self._stands_since, at)
         least, most = self._setpoint.range_since(at - _STANDS_FOR)
-        wanted = max(least, -most) * self._state.turning.hertz
+        wanted = max(least, -most) * self._state.measurements.turning.hertz
         return wanted > _STANDSTILL and at - self._stands_since > _STANDS_FOR
 
     def _turns_back(self, frequency: float, at: float, least: float, most: float) -> bool:

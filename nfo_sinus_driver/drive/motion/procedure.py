@@ -113,13 +113,13 @@ class Procedures:
         if not key or not state.params.by_mailbox(key):
             yield
             return
-        await state.read_reported_code(Priority.SERVICE)
+        await state.reader.read_reported_code(Priority.SERVICE)
         task = self._bus.spawn(self._watch_code())
         try:
             yield
         finally:
             self._bus.cancel(task)
-            state.forget_reported_code()
+            state.reader.forget_reported_code()
 
     async def _watch_code(self) -> None:
         state = self._state
@@ -127,7 +127,7 @@ class Procedures:
             await self._bus.sleep(_CODE_PERIOD)
             # the poll reports it if the drive is lost
             with contextlib.suppress(LinkError, DriveError):
-                await state.read_reported_code(Priority.POLL)
+                await state.reader.read_reported_code(Priority.POLL)
 
     async def abort(self) -> Report | None:
         """End the procedure that has exclusive access; stop nothing else."""
@@ -147,7 +147,7 @@ class Procedures:
 
     async def _take(self, access: ExclusiveAccess) -> Holder:
         controller, state, what = self.controller, self._state, access.what
-        status = await state.read_status(Priority.SERVICE)
+        status = await state.reader.read(Priority.SERVICE)
         require_no_fault(state, status)
         found = await run_steps(state, controller.method.holder(), Priority.SERVICE)
         if found is Holder.INHIBITED:
@@ -162,7 +162,7 @@ class Procedures:
         control_mode = state.control_mode or await state.read_control_mode()
         await controller.take_control(control_mode)
         deadline = self._bus.now() + drive_state.TIMEOUT
-        while not (await state.read_status(Priority.SERVICE)).standby:
+        while not (await state.reader.read(Priority.SERVICE)).standby:
             if self._bus.now() > deadline:
                 with contextlib.suppress(DriveError, LinkError):
                     await self._give_back(found)

@@ -200,7 +200,7 @@ class Setpoint:
                 self._keys[address] = step.key
                 self._written[address] = data, self.following_since
         self.commanded = 0.0 if follows else NAN
-        self._state.direction.command(self.commanded)
+        self._state.measurements.direction.command(self.commanded)
         self._had = [(0.0, math.inf)]
         self.clamped = self._clamp_reported = False
         self.ceased = self.expired = False
@@ -220,7 +220,7 @@ class Setpoint:
         """Follow no more set-points."""
         self.following_since = math.inf
         self.commanded = NAN
-        self._state.direction.command(NAN)
+        self._state.measurements.direction.command(NAN)
         self.clamped = False
         tasks, self._tasks = self._tasks, []
         for task in tasks:
@@ -258,7 +258,7 @@ class Setpoint:
 
     def _may_have(self, value: float) -> None:
         """Note that the drive may have a set-point from now on; NaN: it is not known which."""
-        self._state.direction.command(value)
+        self._state.measurements.direction.command(value)
         value = 0.0 if math.isnan(value) else value
         oldest = self._bus.now() - _REMEMBERED
         self._had = [one for one in self._had if one[1] >= oldest]

@@ -97,7 +97,7 @@ class StartSequence:
         :returns: the control mode, and the limits of its set-points.
         """
         state = self._state
-        status = await state.read_status(Priority.SERVICE)
+        status = await state.reader.read(Priority.SERVICE)
         require_no_fault(state, status)
         control_mode = await state.read_control_mode()
         expected = state.settings.expected_control_mode
@@ -163,7 +163,7 @@ class StartSequence:
         """Wait until the drive has made a step on its way to run."""
         state = self._state
         step = _StepTime(state, min(state.bus.now() + drive_state.TIMEOUT, self._deadline))
-        while not wanted(status := await state.read_status(Priority.SERVICE)):
+        while not wanted(status := await state.reader.read(Priority.SERVICE)):
             if status.faulted:
                 raise DriveError(state.report(Cause.START_FAULTED))
             if Fact.RUN_INPUT_MISSING in status.facts:

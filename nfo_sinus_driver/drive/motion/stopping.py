@@ -488,12 +488,12 @@ class StopSequence:
             # only reads before a stop does not have to be: the stop is written without it
             is_damaged = isinstance(error, DamagedAnswer) and self._wrote
             if is_damaged and before is _Outcome.UNANSWERED:
-                await self._state.read_status(Priority.LOOK, retry=False)
+                await self._state.reader.read(Priority.LOOK, retry=False)
             if self._unanswered < _UNANSWERED_BEFORE_FORCE:
                 raise
             failure = error
         # a drive that does not respond at all ends it here
-        status = await self._state.read_status(Priority.LOOK, retry=False)
+        status = await self._state.reader.read(Priority.LOOK, retry=False)
         ignored = isinstance(failure, NoAnswer | DamagedAnswer)
         self._ignored += ignored
         if failure is None:
@@ -509,7 +509,7 @@ class StopSequence:
             removed = removal is Removal.COMMAND
             removed_at = self._bus.now()
             # some faults end as control is released
-            status = await self._state.read_status(Priority.LOOK, retry=False)
+            status = await self._state.reader.read(Priority.LOOK, retry=False)
             if removed:
                 failure = None
                 self._sent_at = min(self._sent_at, removed_at)
@@ -567,7 +567,7 @@ class StopSequence:
             self._state, steps, Priority.STOP, onward=True, permit=self.require_same
         )
         sent_at = self._bus.now()
-        status = await self._state.read_status(Priority.LOOK, retry=False)
+        status = await self._state.reader.read(Priority.LOOK, retry=False)
         if not obeyed:
             return why
         self._sent_at = min(self._sent_at, sent_at)
@@ -590,7 +590,7 @@ class StopSequence:
             if self._bus.now() > until:
                 break
             await self._bus.sleep(drive_state.LOOK_PERIOD)
-            status = await self._state.read_status(Priority.LOOK, retry=False)
+            status = await self._state.reader.read(Priority.LOOK, retry=False)
         return status
 
     async def _why_unconfirmed(
@@ -624,12 +624,12 @@ class StopSequence:
         if status.driven and not status.ramp_hidden:
             # it is on its way
             return None
-        self._measured = status = await self._state.measured_with(
+        self._measured = status = await self._state.reader.measured_with(
             status, self._measured, retry=retry
         )
         if not self.coasts or status.falls_since(self._begun_at):
             return None
-        turning = self._state.turning
+        turning = self._state.measurements.turning
         now = status.frequency / turning.hertz
         return self._state.report(Cause.STILL_TURNS, now=now, unit=turning.unit)
 

@@ -44,11 +44,11 @@ class FaultNamer:
         state, read_at = self._state, -math.inf
         while True:
             now = state.bus.now()
-            if not state.unresolved_code:
+            if not state.reader.unresolved_code:
                 read_at = -math.inf
-            elif now - read_at > (_PERIOD if state.fault_resolved else _RETRY_PERIOD):
+            elif now - read_at > (_PERIOD if state.reader.fault_resolved else _RETRY_PERIOD):
                 read_at = now
-                await self._name(state.unresolved_code)
+                await self._name(state.reader.unresolved_code)
             await state.bus.sleep(_WAIT)
 
     async def _name(self, unresolved: int) -> None:
@@ -56,9 +56,9 @@ class FaultNamer:
         if not state.params.reaches(state.model.key(Role.FAULT_CODE)):
             return
         try:
-            code = await state.read_fault_code(Priority.POLL)
+            code = await state.reader.read_fault_code(Priority.POLL)
         except (LinkError, DriveError):
             # the poll reports it if the drive is lost, or has to be recognised anew
             return
-        if state.unresolved_code == unresolved:
-            state.resolve_fault(unresolved, code)
+        if state.reader.unresolved_code == unresolved:
+            state.reader.resolve_fault(unresolved, code)

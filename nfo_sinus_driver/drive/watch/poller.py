@@ -206,19 +206,19 @@ class Poller:
         state, params = self._state, self._params
         if self._task is None or not state.connected or not reply.data:
             return
-        place = params.address(state.word_key)
+        place = params.address(state.reader.word_key)
         if self._bus.answer(self._task, self._unit, place, reply):
             return
         # impossible values are ignored: the next poll reads again
-        if not params.can_be(state.word_key, reply.data):
+        if not params.can_be(state.reader.word_key, reply.data):
             return
-        word = state.status_word(reply.data)
+        word = state.reader.status_word(reply.data)
         if state.status is None or word == state.status.word:
             return
-        if self._received is not None and word == state.status_word(self._received.data):
+        if self._received is not None and word == state.reader.status_word(self._received.data):
             return
         self._received = reply
-        if self._alarming(state.status_of_word(word, reply.arrived)):
+        if self._alarming(state.reader.status_of_word(word, reply.arrived)):
             self._bus.cancel(self._task)
             self.begin()
         else:
@@ -269,7 +269,7 @@ class Poller:
         self._failed_reconnects = 0
         self._complaint = None
         self._received = None
-        self._state.forget_polled()
+        self._state.measurements.forget()
 
     async def _poll_repeatedly(self) -> None:
         polled_at = -math.inf
@@ -390,7 +390,8 @@ class Poller:
         if self._state.control.stop_owed or status is None or status.driven:
             return False
         # a motor that coasts is not driven; what is not measured is NaN, and no greater than 0
-        return not any(abs(value) > 0 for value in (self._state.frequency, self._state.speed))
+        measured = self._state.measurements
+        return not any(abs(value) > 0 for value in (measured.frequency, measured.speed))
 
     @property
     def _running(self) -> float:
@@ -406,7 +407,8 @@ class Poller:
     @property
     def _may_start(self) -> bool:
         """A motor at standstill may start by the next set-point."""
-        return self._setpoint.following and 0 in (self._state.frequency, self._state.speed)
+        measured = self._state.measurements
+        return self._setpoint.following and 0 in (measured.frequency, measured.speed)
 
     @property
     def _rare_is_due(self) -> bool:
@@ -447,12 +449,13 @@ class Poller:
             # once: both words of a status are of one moment, so they are repeated together
             nonlocal received
             word, received = received, None
-            return await state.read_status(
-                self._priority,
-                retry=False,
-                alarming=self._alarming,
-                received=word,
-                code_for=self._code_holds,
+            alarming, code_for = self._alarming, self._code_holds
+            if word is not None:
+                return await state.reader.complete(
+                    word, self._priority, alarming=alarming, code_for=code_for
+                )
+            return await state.reader.read(
+                self._priority, retry=False, alarming=alarming, code_for=code_for
             )
 
         paused = self._bus.paused
@@ -471,7 +474,7 @@ class Poller:
 
     async def _poll(self) -> None:
         state = self._state
-        last = state.last_polled(state.controlled).value
+        last = state.measurements.last(state.controlled).value
         status = await self._read_status()
         rare = self._rare_is_due
         every = rare and self._rare_reads % _ALL_SCALES == 0
@@ -488,7 +491,7 @@ class Poller:
             now = await self._measure(actual)
             steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
         for role in _BASIC:
-            age = self._bus.now() - state.last_polled(role).at
+            age = self._bus.now() - state.measurements.last(role).at
             due = age >= self._slow_period or not steady
             if role is not actual and due and not self._is_slow(role):
                 await self._measure(role)
@@ -538,13 +541,16 @@ class Poller:
         """Measure a value anew; NaN if a drive that responds does not give it."""
         state = self._state
         status = state.status
-        if role is state.turning.role and status and not math.isnan(status.frequency):
+        measurements = state.measurements
+        if role is measurements.turning.role and status and not math.isnan(status.frequency):
             # it came with the status
-            return state.last_polled(role).value
+            return measurements.last(role).value
         key = state.model.key(role)
         try:
             tries = 1 if self._failures.lasts(key, self._running) else _MEASURED_TRIES
-            value = await self._read(key, lambda: state.measure(key, self._priority), tries)
+            value = await self._read(
+                key, lambda: measurements.measure(key, self._priority, state.status), tries
+            )
         except (PortError, Interrupted):
             # raised once only: the status that is read next would show a drive that was stopped
             raise
@@ -556,8 +562,8 @@ class Poller:
             value = NAN
         if value is None:
             # the last one counts until the next poll
-            return state.last_polled(role).value
-        state.polled(role, value)
+            return measurements.last(role).value
+        measurements.note(role, value)
         if role in state.model.roles:
             self._turn = self._running - self._requested_at
         return value
@@ -748,7 +754,7 @@ class Poller:
 
     def _measured(self, role: Role | None, *, polled: bool) -> Measured:
         """Return what was measured last; nothing from before a pause, until a poll has passed."""
-        last = self._state.last_polled(role)
+        last = self._state.measurements.last(role)
         polled |= self._bus.paused == self._status_paused
         return last if polled or last.at >= self._bus.resumed_at else NOT_MEASURED
 
@@ -767,7 +773,7 @@ class Poller:
             status = state.status
         measured = (*_BASIC, state.controlled)
         frequency, speed, controlled = (self._measured(role, polled=polled) for role in measured)
-        actual = state.shown(state.controlled, controlled.value)
+        actual = state.measurements.shown(state.controlled, controlled.value)
         stop = None if self._controller is None else self._controller.stopped_for
         return take_snapshot(
             state, self._setpoint, status, frequency, speed, actual, stop, polled=polled
@@ -809,9 +815,9 @@ def take_snapshot(
         remedy=code.remedy,
         kind=status.kind,
         requires_ack=code.requires_ack,
-        frequency=state.shown(Role.ACTUAL_FREQUENCY, frequency.value),
+        frequency=state.measurements.shown(Role.ACTUAL_FREQUENCY, frequency.value),
         frequency_at=frequency.at,
-        speed=state.shown(Role.ACTUAL_SPEED, speed.value),
+        speed=state.measurements.shown(Role.ACTUAL_SPEED, speed.value),
         speed_at=speed.at,
         actual=actual,
         stop=stop,

@@ -52,7 +52,7 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
 
     :param yields: whether the line is left to another drive now.
     """
-    key_of = state.model.key
+    key_of, measurements = state.model.key, state.measurements
     #: By key: what was measured, and how often in a row the drive has denied it.
     values: dict[str, float] = {}
     denied: Counter[str] = Counter()
@@ -71,8 +71,8 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
         if denied[key] >= _DENIALS or not state.nameplate.has(key):
             return
         try:
-            value = await state.measure(key, Priority.TELEMETRY)
-            values[key] = state.shown(state.model.role_of.get(key), value)
+            value = await measurements.measure(key, Priority.TELEMETRY, state.status)
+            values[key] = measurements.shown(state.model.role_of.get(key), value)
             denied[key] = 0
         except Refused as error:
             values[key] = NAN
@@ -83,14 +83,14 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
         above, below = map(values.get, scale, (NAN, NAN)) if scale else (1.0, 1.0)
         # one that is impossible, or not known, is that of the factory [C114]
         scaled = above != below and min(above, below) > 0
-        state.polled(role, NAN if scaled else values[key_of(role)])
+        measurements.note(role, NAN if scaled else values[key_of(role)])
 
     while True:
         started = state.bus.now()
         rate = state.settings.telemetry_rate
         if not rate:
             for role in unpolled:
-                state.polled(role, NAN)
+                measurements.note(role, NAN)
         if rate and state.connected and state.responsive and not yields():
             try:
                 keys = map(key_of, (*fast, *unpolled))
@@ -103,15 +103,15 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
                 first = False
                 by_role = {role: values.get(key_of(role), NAN) for role in (*FAST, *SLOW)}
                 for role in _POLLED:
-                    by_role[role] = state.shown(role, state.last_polled(role).value)
+                    by_role[role] = measurements.shown(role, measurements.last(role).value)
                 by_key = {key: values[key] for key in named}
-                state.note_measured(by_key)
+                measurements.note_beside(by_key)
                 state.listener.on_telemetry(Telemetry(state.bus.now(), by_role, by_key))
             except (LinkError, DriveError):
                 # the poll reports it if the drive is lost, or has to be recognised anew
                 state.missed()
                 values.update(dict.fromkeys((*map(key_of, FAST), *state.measured_keys), NAN))
                 for role in unpolled:
-                    state.polled(role, NAN)
+                    measurements.note(role, NAN)
         period = 1 / rate if rate else _OFF_PERIOD
         await state.bus.sleep(period - (state.bus.now() - started))

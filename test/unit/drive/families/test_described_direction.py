@@ -67,7 +67,7 @@ def test_a_size_has_the_direction_commanded_or_is_not_shown(tmp_path: Path, name
             rig.send(rig.unit(frequency))
             rig.pass_time(4.0)
             shown, measured = rig.drive.snapshot, rig.notes.telemetry[-1].values
-            for value in (shown.actual, measured[rig.drive.state.turning.role]):
+            for value in (shown.actual, measured[rig.drive.state.measurements.turning.role]):
                 assert value == pytest.approx(rig.unit(frequency), rel=0.03)
             assert shown.status is not None and Fact.REVERSE not in shown.status.valid
         # it turns in reverse until it stands

@@ -132,7 +132,7 @@ def test_a_motor_that_does_not_slow_down_after_a_time_out_is_stopped(connection:
         rig.pass_time(10.0)
         assert rig.notes.said(Cause.SETPOINT_TIMED_OUT)
         # as it is measured; a speed with the slip of the motor, where its frequency is controlled
-        hertz = rig.drive.state.turning.unit == 'Hz'
+        hertz = rig.drive.state.measurements.turning.unit == 'Hz'
         turns = ('20 Hz',) if hertz else ('600 rpm', '590 rpm')
         assert any(rig.notes.said(f'does not slow down at set-point 0 ({one}') for one in turns)
         assert not rig.drive.following

@@ -73,7 +73,8 @@ class Hidden:
 def hide_status(rig: Rig) -> Hidden:
     """Have each answer damaged that has a status in it; to all else the drive answers."""
     state = rig.drive.state
-    return Hidden(rig, {state.word_key, state.model.key(Role.STATUS_CODE)}, {_WRITE_AND_READ})
+    hidden = {state.reader.word_key, state.model.key(Role.STATUS_CODE)}
+    return Hidden(rig, hidden, {_WRITE_AND_READ})
 
 
 def hide_block(rig: Rig) -> None:
@@ -151,7 +152,7 @@ def test_a_status_is_read_as_often_while_a_measured_value_cannot_be(connection: 
     with Rig(connection, lost_after=3.0, setpoint_timeout=0.0) as rig:
         rig.turn()
         state = rig.drive.state
-        status, beside = state.status, state.model.key(state.turning.role)
+        status, beside = state.status, state.model.key(state.measurements.turning.role)
         measured = {state.model.key(role) for role in _MEASURED}
         if connection == 'described, by states':
             # the register of its speed has its direction, too
