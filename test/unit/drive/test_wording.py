@@ -60,7 +60,8 @@ def texts(node: ast.AST) -> Iterator[str]:
 
 def reported_by(call: ast.Call) -> ast.expr | None:
     """The cause that a call makes a report of."""
-    place = {'Report': 0, 'report': 0, 'DriveError': 0, 'notify': 1, '_notify': 1}.get(name_of(call))
+    places = {'Report': 0, 'report': 0, 'DriveError': 0, 'notify': 1, '_notify': 1}
+    place = places.get(name_of(call))
     if place is None or len(call.args) <= place or isinstance(call.args[place], ast.Call):
         return None
     return call.args[place]
