@@ -502,16 +502,20 @@ class Client(contextlib.ExitStack):
     @contextlib.contextmanager
     def run_at(self, value: float) -> Iterator[None]:
         """Enable, and publish a set-point until the motor is there and all through the block."""
-        response = wait_until(self._enable_unless_stopping, 'nothing is being stopped', period=0.05)
+        response = wait_until(self._enable_when_possible, 'it can be enabled', period=0.05)
         assert response.success, response.message
         with self.setpoints(value):
             self.wait_for('status', lambda status: abs(status.actual - value) < 1, f'{value}')
             yield
 
-    def _enable_unless_stopping(self) -> Any:
-        """Enable; nothing while what a driver has found under control is being stopped."""
+    def _enable_when_possible(self) -> Any:
+        """
+        Enable; nothing while what a driver has found under control is being stopped, and where the
+        simulator has answered too late, on a machine that has more to do.
+        """
         response = self.enable()
-        return None if 'a stop is on its way' in response.message else response
+        not_yet = ('a stop is on its way', 'did not answer')
+        return None if any(one in response.message for one in not_yet) else response
 
     def change_state(self, transition: int) -> bool:
         """Ask for a lifecycle transition."""
