@@ -306,15 +306,10 @@ class Setpoint:
         assert self._target is not None
         return tuple(map(self._params.target, self._target.writes(value, before)))
 
-    def _due(self, request: Request) -> list[tuple[Address, bytes]]:
-        """Return the writes for a request: what the drive does not have, or not recently."""
-        assert self._target is not None
-        found: list[tuple[Address, bytes]] = []
-        before_all = self._decoded(self._in_drive)
-        for address, data in self._encode(self._limited(request), before_all):
-            if not self._is_current(address, data):
-                found.append((address, data))
-        return found
+    def _due(self, value: float) -> list[tuple[Address, bytes]]:
+        """Return the writes for a set-point: what the drive does not have, or not recently."""
+        writes = self._encode(value, self._decoded(self._in_drive))
+        return [one for one in writes if not self._is_current(*one)]
 
     def _is_current(self, address: Address, data: bytes) -> bool:
         """Return whether the drive has the same there, and it need not be written again."""
@@ -346,19 +341,19 @@ class Setpoint:
         if self._target is None or not self._counts(request):
             return None
         limited = self._limited(request)
-        due_at = max(request.since, self.following_since)
+        due_at = self._due_at(request)
         self._want(limited, due_at)
         unanswered = not self._state.responsive and limited == self._unanswered
         if unanswered or not self._params.recognition.holds:
             self._waits_for_answer = True
             if limited == 0:
-                self._note_waiting(request)
+                self._note_waiting(limited, due_at)
             return None
         self._accept(request, limited)
         if self.clamped and not self._clamp_reported:
             self._report_limited(request.value, limited)
         self._clamp_reported = self.clamped
-        due = self._due(request)
+        due = self._due(limited)
         if not due:
             self._in_vain.clear()
             return None
@@ -380,11 +375,14 @@ class Setpoint:
         if sign(value) != sign(before):
             self.turn = Turn(at, before, value)
 
-    def _note_waiting(self, request: Request) -> None:
+    def _due_at(self, request: Request) -> float:
+        """Return since when a request is to be carried out, s."""
+        return max(request.since, self.following_since)
+
+    def _note_waiting(self, value: float, due_at: float) -> None:
         """Note what waits to be sent, where others are in vain: 0 from when it is due, else now."""
-        value, now = self._limited(request), self._bus.now()
-        at = now if value else max(request.since, self.following_since)
-        for address, data in self._due(request):
+        at = self._bus.now() if value else due_at
+        for address, data in self._due(value):
             self._note_in_vain(address, value, self._due_since(address, data, at))
 
     def _note_in_vain(
@@ -510,7 +508,7 @@ class Setpoint:
         now, seconds = self._bus.now(), self._state.settings.lost_after
         silences, unit = self._bus.silences, self._state.settings.address
         if self._slot.pending and self._counts(self._request):
-            self._note_waiting(self._request)
+            self._note_waiting(self._limited(self._request), self._due_at(self._request))
         is_held = not self._params.recognition.holds
         for one in self._in_vain.values():
             silent = silences.is_silent(unit) and silences.last_frame_at(unit) <= one.since
