@@ -119,9 +119,9 @@ HISTORIES = (
     Mutant(
         3,
         'in any order: a stop that a fault has refused waits for measured values',
-        'StopSequence._try_once',
-        'self._method.remove(control_mode),\n                Priority.STOP,',
-        'self._method.remove(control_mode),\n                Priority.SERVICE,',
+        'StopSequence._remove_in_fault',
+        'self._method.remove(control_mode),\n            Priority.STOP,',
+        'self._method.remove(control_mode),\n            Priority.SERVICE,',
         ('test_any_order_found.py',),
     ),
     Mutant(

@@ -404,7 +404,7 @@ LAWS = (
     Mutant(
         3,
         'a stop waits behind everything else',
-        'StopSequence._try_once',
+        'StopSequence._send',
         'self._method.stop(control_mode),\n                Priority.STOP,',
         'self._method.stop(control_mode),\n                Priority.REFRESH,',
         ('test_drive_commands.py', '-k', 'ahead_of_all'),

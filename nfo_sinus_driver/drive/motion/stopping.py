@@ -9,6 +9,7 @@ from collections.abc import Awaitable, Callable, Iterator
 import contextlib
 import enum
 import math
+from typing import NamedTuple
 
 from nfo_sinus_driver.bus import SWAP_TIME, Priority, Task
 from nfo_sinus_driver.catalog import ControlMethod, InverterStatus, Removal, State
@@ -67,6 +68,18 @@ class _Outcome(enum.Enum):
     BLOCKED_BY_FAULT = enum.auto()
     #: The drive has taken all there is and shows no run, but a speed that does not fall.
     UNCLEAR = enum.auto()
+
+
+class _Sent(NamedTuple):
+    """
+    What became of a stop that was written.
+
+    :ivar failure: why it was not acknowledged; a status may show what it did all the same.
+    :ivar is_busy: the drive has no time for it, and is asked once more.
+    """
+
+    failure: LinkError | None = None
+    is_busy: bool = False
 
 
 #: What ends the tries.
@@ -451,10 +464,45 @@ class StopSequence:
             self._control.dispatch(ControlEvent.STOPPED)
 
     async def _try_once(self, before: _Outcome) -> _Outcome:
-        control_mode = self._state.control_mode
-        reasons = self._reasons
-        faulted = self._state.status is not None and self._state.status.faulted
-        failure: LinkError | None = None
+        """Write the stop, see what the drive shows, and judge both."""
+        control_mode, reasons = self._state.control_mode, self._reasons
+        was_faulted = self._state.status is not None and self._state.status.faulted
+        failure, is_busy = await self._send(control_mode, before)
+        if failure is not None and is_busy:
+            self._unconfirmed = report_of(failure)
+            return _Outcome.BUSY
+        # a drive that does not respond at all ends it here
+        status = await self._state.reader.read(Priority.LOOK, retry=False)
+        ignored = isinstance(failure, NoAnswer | DamagedAnswer)
+        self._ignored += ignored
+        if failure is None:
+            status = await self._newer(status, reasons, self._sent_at)
+        if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
+            removed, status = await self._remove_in_fault(control_mode, reasons)
+            if removed:
+                failure = None
+            elif status.faulted and not await self.unrest(status):
+                self._unconfirmed = report_of(failure)
+                return _Outcome.BLOCKED_BY_FAULT
+        unconfirmed = await self._why_unconfirmed(status, failure)
+        if unconfirmed is not None and self._needs_force(status, failure):
+            unconfirmed = await self._force(control_mode, reasons, unconfirmed)
+        if unconfirmed is None:
+            return _Outcome.CONFIRMED
+        self._unconfirmed = unconfirmed
+        if unconfirmed.cause is Cause.STILL_TURNS and self._bus.now() > self._forced_at + _CLEAR_BY:
+            return _Outcome.UNCLEAR
+        over = isinstance(failure, Refused) and was_faulted and not status.faulted
+        if ignored and self._ignored == 1:
+            return _Outcome.IGNORED
+        return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED
+
+    async def _send(self, control_mode: str, before: _Outcome) -> _Sent:
+        """
+        Write the stop once.
+
+        :raises LinkError: what it did is not to be seen: the line, or the drive, is gone.
+        """
         await self.find()
         is_blind, self._wrote, self._removed_blind = self._is_blind, False, False
         try:
@@ -465,16 +513,11 @@ class StopSequence:
                 permit=self.require_same,
                 is_blind=is_blind,
             )
-            self._sent_at = min(self._sent_at, self._bus.now())
-            self._refusals = self._unanswered = self._ignored = 0
-            self._removed_blind, self._acknowledged = is_blind, True
         except Refused as error:
             self._unanswered = self._ignored = 0
-            if error.code == Refused.BUSY and self._bus.now() < self._due:
-                self._unconfirmed = report_of(error)
-                return _Outcome.BUSY
-            failure = error
-            self._refusals += 1
+            is_busy = error.code == Refused.BUSY and self._bus.now() < self._due
+            self._refusals += not is_busy
+            return _Sent(error, is_busy)
         except PortError:
             raise
         except LinkError as error:
@@ -491,44 +534,33 @@ class StopSequence:
                 await self._state.reader.read(Priority.LOOK, retry=False)
             if self._unanswered < _UNANSWERED_BEFORE_FORCE:
                 raise
-            failure = error
-        # a drive that does not respond at all ends it here
+            return _Sent(error)
+        self._sent_at = min(self._sent_at, self._bus.now())
+        self._refusals = self._unanswered = self._ignored = 0
+        self._removed_blind, self._acknowledged = is_blind, True
+        return _Sent()
+
+    async def _remove_in_fault(
+        self, control_mode: str, reasons: int
+    ) -> tuple[bool, InverterStatus]:
+        """
+        Remove the run command of a drive in a fault; return whether it is gone, and the status.
+
+        Ahead of all else, too: the fault may end by itself, and the motor run on.
+        """
+        removal = await run_steps(
+            self._state,
+            self._method.remove(control_mode),
+            Priority.STOP,
+            permit=self.require_same,
+        )
+        removed, removed_at = removal is Removal.COMMAND, self._bus.now()
+        # some faults end as control is released
         status = await self._state.reader.read(Priority.LOOK, retry=False)
-        ignored = isinstance(failure, NoAnswer | DamagedAnswer)
-        self._ignored += ignored
-        if failure is None:
-            status = await self._newer(status, reasons, self._sent_at)
-        if isinstance(failure, Refused) and status.faulted and not status.runs_by_bus:
-            # ahead of all else, too: the fault may end by itself, and the motor run on
-            removal = await run_steps(
-                self._state,
-                self._method.remove(control_mode),
-                Priority.STOP,
-                permit=self.require_same,
-            )
-            removed = removal is Removal.COMMAND
-            removed_at = self._bus.now()
-            # some faults end as control is released
-            status = await self._state.reader.read(Priority.LOOK, retry=False)
-            if removed:
-                failure = None
-                self._sent_at = min(self._sent_at, removed_at)
-                status = await self._newer(status, reasons, removed_at)
-            elif status.faulted and not await self.unrest(status):
-                self._unconfirmed = report_of(failure)
-                return _Outcome.BLOCKED_BY_FAULT
-        unconfirmed = await self._why_unconfirmed(status, failure)
-        if unconfirmed is not None and self._needs_force(status, failure):
-            unconfirmed = await self._force(control_mode, reasons, unconfirmed)
-        if unconfirmed is None:
-            return _Outcome.CONFIRMED
-        self._unconfirmed = unconfirmed
-        if unconfirmed.cause is Cause.STILL_TURNS and self._bus.now() > self._forced_at + _CLEAR_BY:
-            return _Outcome.UNCLEAR
-        over = isinstance(failure, Refused) and faulted and not status.faulted
-        if ignored and self._ignored == 1:
-            return _Outcome.IGNORED
-        return _Outcome.UNANSWERED if over else _Outcome.UNCONFIRMED
+        if removed:
+            self._sent_at = min(self._sent_at, removed_at)
+            status = await self._newer(status, reasons, removed_at)
+        return removed, status
 
     @property
     def _is_blind(self) -> bool:
