@@ -109,7 +109,7 @@ class Silences:
         #: Until when it is opened once more at the latest, s, and until when only once.
         self._once_more = (math.inf, -math.inf)
         self.opened_at = self.moved_at = self.away_at = -math.inf
-        #: When a silence ended that was long enough for an request: of the line, and of each unit.
+        #: When a silence ended that was long enough for a swap: of the line, and of each unit.
         self._line_since = -math.inf
         self._unit_since: dict[int, float] = {}
 

@@ -52,8 +52,19 @@ def progress(what: str, total: int) -> Iterator[Callable[[], None]]:
         yield lambda: bar.update()
 
 
+def flush_output() -> None:
+    """Write what is left of the output; what is lost must not take the place of the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if stream is None:
+            continue
+        try:
+            stream.flush()
+        except OSError:
+            _write_no_more(stream)
+
+
 def _write_no_more(stream: TextIO) -> None:
-    """Lead a stream that is lost nowhere: what is left in it would change the exit status."""
+    """Lead a stream that is lost nowhere: what is left would be written at the end, in vain."""
     with open(os.devnull, 'w', encoding='utf-8') as nowhere:
         os.dup2(nowhere.fileno(), stream.fileno())
 
@@ -63,11 +74,9 @@ def remark(text: str) -> None:
     if sys.stderr is None:
         return
     # what cannot be said must not end what is under way: settings are put back, too
-    try:
+    with contextlib.suppress(OSError):
         tqdm.write(f'nfo-sinus: {text}', file=sys.stderr)
         sys.stderr.flush()
-    except OSError:
-        _write_no_more(sys.stderr)
 
 
 def put(text: str) -> None:

@@ -19,6 +19,7 @@ from nfo_sinus_driver.cli.console import (
     CliError,
     OutputLost,
     UsageError,
+    flush_output,
     put,
     remark,
     say,
@@ -89,7 +90,10 @@ VERBS: dict[str, Verb] = {
 def command() -> int:
     """Run the command as a process of its own, which ends with this exit status."""
     hold_to_the_end()
-    return main()
+    try:
+        return main()
+    finally:
+        flush_output()
 
 
 def main(argv: Sequence[str] | None = None) -> int:

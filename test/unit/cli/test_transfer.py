@@ -13,10 +13,13 @@ import os
 from pathlib import Path
 import shlex
 import signal
+import subprocess
+import sys
 import threading
 
 from cli_bench import PATIENCE, Bench, Done, signals_until_it_ends, wait_until
 import pytest
+from support.places import ROOT
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli import read, transfer
@@ -507,6 +510,26 @@ def test_what_was_written_is_put_back_though_nobody_can_be_told(
     process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert has(bench, BEFORE)
+
+
+_UNBUFFERED = 'PYTHONUNBUFFERED'
+
+
+@pytest.mark.parametrize('stream', ['stdout', 'stderr'])
+def test_output_that_cannot_be_written_at_the_end_leaves_the_exit_status(stream: str) -> None:
+    program = (
+        'import sys\n'
+        'from nfo_sinus_driver.cli import main\n'
+        f'main.main = lambda: sys.{stream}.write("half a line") and 3\n'
+        'sys.exit(main.command())'
+    )
+    with open('/dev/full', 'w', encoding='utf-8') as full:
+        lost = {'stdout': full} if stream == 'stdout' else {'stderr': full}
+        command = [sys.executable, '-c', program]
+        # without buffers nothing is left at the end
+        variables = {name: value for name, value in os.environ.items() if name != _UNBUFFERED}
+        done = subprocess.run(command, cwd=ROOT, env=variables, check=False, **lost)
+    assert done.returncode == 3
 
 
 def test_what_was_set_is_said_though_the_output_is_lost(bench: Bench) -> None:
