@@ -18,6 +18,6 @@ new connection, too. What shaped it:
 - A PLC shows the status from before the stop: what confirms it has to be newer.
 - A released motor shows a speed that does not fall: it is reported as not clear.
 
-:mod:`.controller` is told of every status and command, and dispatches the events of
+:mod:`.controller` gets every status and command, and dispatches the events of
 :mod:`..known.control_state`; what to write, the control method of the family says.
 """
