@@ -28,8 +28,8 @@ so by ``require_wanted``, which is called at that moment, too.
 
 **Silence is no loss, and a mute port no silent drive.** :class:`~.silences.Silences` has for how
 long each unit has not answered, and since when another drive may be in its place (law 11). Where no
-unit answers, the port is opened again: some adapters pass nothing until then and report no error;
-others restart by it and need time for that, so the pauses grow.
+unit answers, the port is opened again (:mod:`.mute_port`): some adapters pass nothing until then
+and report no error; others restart by it and need time for that, so the pauses grow.
 
 **Time in which this process did not run** (a suspended or overloaded machine) is no silence of a
 drive; what was read meanwhile may be old, and is read again (:mod:`..link.thread_clock`).

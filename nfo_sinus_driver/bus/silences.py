@@ -10,6 +10,8 @@ request, and asks.
 
 from __future__ import annotations
 
+from collections import defaultdict
+import dataclasses
 import math
 
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NotSent, PortError, Refused
@@ -23,14 +25,6 @@ _MISSING_AFTER = 2.0
 _MISSING_SHARE = 1 / 20
 #: The same for stops to silent units while noise damages answers: they may be there.
 _STOPS_IN_NOISE = 1 / 2
-#: How long a port that was opened is mute, s, until it is opened again, each time in vain: what is
-#: behind it may restart whenever it is opened, and takes so long.
-_MUTE_PAUSES = (2.0, 4.0, 8.0, 15.0, 30.0)
-#: The same while a stop waits; then from the first on again. The last one is for what takes so long
-#: to start, and would never be heard.
-_MUTE_PAUSES_OF_A_STOP = (2.0, 4.0, *[8.0] * 10, 30.0)
-#: The same where nothing was ever heard, or where bytes come, but nothing that is valid, s.
-_MUTE_LONGEST = _MUTE_PAUSES[-1]
 #: In a longer silence another unit may have been put in the place of one, s: that is how long it
 #: takes to move the plug of the line from a drive to a spare one beside it that has power.
 SWAP_TIME = 3.0
@@ -45,6 +39,28 @@ _NOISE = 0.4
 _NOISE_LASTS = 5.0
 #: How many units have to be asked in vain until it is the line that is silent.
 _A_LINE = 2
+
+
+@dataclasses.dataclass(slots=True)
+class _Unit:
+    """
+    What is known of the answers of one unit; all times are of one clock, s.
+
+    :ivar frame_at: when its last valid frame came.
+    :ivar asked_at: when it was last sent anything.
+    :ivar silent_since: since when it does not answer; infinite while it does.
+    :ivar gone_since: the same, when the first answer had failed to come, with the time in which the
+        worker did not run: a drive can be exchanged in it.
+    :ivar there_since: when a silence of it ended that was long enough for a swap.
+    :ivar longest: the longest time from one valid frame to the next.
+    """
+
+    frame_at: float = -math.inf
+    asked_at: float = -math.inf
+    silent_since: float = math.inf
+    gone_since: float = math.inf
+    there_since: float = -math.inf
+    longest: float = 0.0
 
 
 class Silences:
@@ -62,25 +78,15 @@ class Silences:
     Each request to a unit that is missing costs the others a whole time-out, so there is a pause
     behind it, in which none of the missing units gets one.
 
-    Where no unit answers any more, the port itself may be mute: what carries the bytes may pass
-    none until it is opened again, and report no error. Units that are switched off look the same,
-    and so does what is starting, so it is opened again more and more seldom. A port from which any
-    byte comes is not mute. An address that never answered shows nothing.
-
-    :ivar heard: something valid has ever come.
     :ivar opened_at: when the port was opened that had been lost.
     :ivar moved_at: when it was last opened where it may not be the port that it was before.
     :ivar away_at: when it was last opened after so long that other units may be behind it.
     """
 
     def __init__(self) -> None:
+        self._units: defaultdict[int, _Unit] = defaultdict(_Unit)
         #: After which silence the drive at a unit is lost, s: all units that have a drive.
         self._lost_after: dict[int, float] = {}
-        self._last_frame_at: dict[int, float] = {}
-        self._since: dict[int, float] = {}
-        #: The same, when the first answer had failed to come, with the time in which the worker did
-        #: not run: a drive can be exchanged in it.
-        self._gone_since: dict[int, float] = {}
         #: The units asked in vain since the last valid frame, and since when one of them was.
         self._in_vain: set[int] = set()
         self._in_vain_since = math.inf
@@ -88,10 +94,6 @@ class Silences:
         self._longest_in_vain = 0.0
         #: When an answer was last damaged.
         self._damaged_at = -math.inf
-        #: When each unit was last sent anything.
-        self._asked_at: dict[int, float] = {}
-        #: The longest time from one valid frame to the next.
-        self._longest: dict[int, float] = {}
         #: When the last valid frame of any unit came.
         self._any_frame_at = -math.inf
         self._pause_ends = -math.inf
@@ -99,25 +101,15 @@ class Silences:
         self._stops_from = -math.inf
         #: When the last silence of the whole line ended.
         self._back_at = -math.inf
-        self.heard = False
-        #: Since when every request has failed, when the last of them did; how often the port was
-        #: opened since the last that did not, and when it was opened last.
-        self._mute_since = math.inf
-        self._in_vain_at = -math.inf
-        self._opened = 0
-        self._newly_at = -math.inf
-        #: Until when it is opened once more at the latest, s, and until when only once.
-        self._once_more = (math.inf, -math.inf)
         self.opened_at = self.moved_at = self.away_at = -math.inf
-        #: When a silence ended that was long enough for a swap: of the line, and of each unit.
+        #: When a silence of the line ended that was long enough for a swap.
         self._line_since = -math.inf
-        self._unit_since: dict[int, float] = {}
 
     def watch(self, unit: int, lost_after: float) -> None:
         """Note that there is a drive at a unit, and after which silence that is lost, s."""
         self._lost_after[unit] = lost_after
 
-    def note(
+    def note_request(
         self,
         unit: int,
         now: float,
@@ -126,119 +118,67 @@ class Silences:
         silence: float = 0.0,
         *,
         is_stop: bool = False,
-    ) -> bool:
+    ) -> None:
         """
-        Note the outcome of a request that took ``seconds``; return whether the port carries.
+        Note the outcome of a request that took ``seconds``.
 
         :param silence: how long the line was kept silent for it before, s.
         :param is_stop: it was a stop, or the look before it.
         """
         if isinstance(error, NotSent):
-            return False
+            return
+        its = self._units[unit]
         if isinstance(error, DamagedAnswer):
             self._damaged_at = now
         if not isinstance(error, PortError):
-            self._asked_at[unit] = now
+            its.asked_at = now
         if error is None or error.responded or isinstance(error, Refused):
-            self._note_swap(unit, now)
+            self._note_swap(its, now)
             if now - self._any_frame_at >= _MISSING_AFTER:
                 # it was the line: the others may be back with this one, and have to be stopped
                 self._back_at = now
-            pause = now - self._last_frame_at.get(unit, now)
-            self._longest[unit] = max(self._longest.get(unit, 0.0), pause)
-            self._last_frame_at[unit] = self._any_frame_at = now
-            self._since.pop(unit, None)
-            self._gone_since.pop(unit, None)
+            if its.frame_at > -math.inf:
+                its.longest = max(its.longest, now - its.frame_at)
+            its.frame_at = self._any_frame_at = now
+            its.silent_since = its.gone_since = math.inf
             self._in_vain.clear()
             self._in_vain_since = math.inf
         elif self.is_missing(unit, now):
             self._pause_ends = now + (silence + seconds) * (1 / _MISSING_SHARE - 1)
-        if is_stop and unit in self._since:
+        if is_stop and its.silent_since < math.inf:
             self._stops_from = now + (silence + seconds) * (1 / _STOPS_IN_NOISE - 1)
         if error is not None and not isinstance(error, (PortError, Refused)):
             # by then a drive has answered
             failed_at = now - max(seconds - _ANSWERED_WITHIN, 0.0)
-            self._since.setdefault(unit, failed_at)
-            self._gone_since.setdefault(unit, now)
+            if its.silent_since == math.inf:
+                its.silent_since = failed_at
+            its.gone_since = min(its.gone_since, now)
             self._in_vain.add(unit)
             self._longest_in_vain = max(seconds, self._longest_in_vain)
             self._in_vain_since = min(self._in_vain_since, failed_at)
-        if error is None or error.responded or error.heard:
-            self.heard, self._opened, self._mute_since = True, 0, math.inf
-            return True
-        if not isinstance(error, PortError) and (not self.heard or unit in self._last_frame_at):
-            self._mute_since = min(self._mute_since, now)
-            self._in_vain_at = now
-        return False
 
-    def opened(self, now: float, *, lost: bool, same_place: bool = False) -> None:
+    def opened(self, now: float, *, same_place: bool = False) -> None:
         """
-        Note that the port was opened; after it was lost, other units may be behind it.
+        Note that a port that was lost was opened: other units may be behind it.
 
         :param same_place: it is where it was before.
         """
-        if lost:
-            self.opened_at = now
-            if not same_place:
-                self.moved_at = now
-            if not same_place or now - self._any_frame_at > SWAP_TIME:
-                self._line_since = self.away_at = now
-        self._opened += 1
-        self._mute_since = math.inf
-        self._newly_at = now
-        self._once_more = (math.inf, self._once_more[1])
-
-    def hurry(self, at: float, end: float) -> None:
-        """Have a port that is mute opened once more, at this moment or before, until the end, s."""
-        first, last = self._once_more
-        self._once_more = (min(first, at), max(last, end))
-
-    def mute_for(self, now: float) -> float:
-        """Return for how long nothing has come, s, although units were asked; 0: not at all."""
-        return max(0.0, now - self._mute_since)
-
-    def reopen_at(self, last_byte_at: float, *, stop_waits: bool) -> float:
-        """
-        Return when the port is to be opened again, for it is mute, s; infinity: it is not.
-
-        :param last_byte_at: when the last byte came, be it of no use, s.
-        :param stop_waits: a motor is to be stopped.
-        """
-        since, opened = self._mute_since, self._opened
-        lost_after = max(self._lost_after.values(), default=math.inf)
-        at_last = since + max(lost_after, _MUTE_LONGEST)
-        if not self.heard or (opened and last_byte_at >= self._newly_at):
-            due = at_last
-        elif opened:
-            due = since + max(lost_after, _mute_pause(opened, stop_waits=stop_waits))
-        else:
-            due = min(max(since, last_byte_at) + lost_after, at_last)
-        at, end = self._once_more
-        if at == math.inf:
-            # it was opened once more, if that was wanted
-            return max(due, end)
-        return min(due, max(at, since + end - at))
-
-    def is_mute_at(self, moment: float, last_byte_at: float) -> bool:
-        """
-        Return whether it is known that the port is mute still at the moment when it is opened.
-
-        What takes just so long to start answers a request that is sent then; and where bytes came,
-        others may have come since if units had been asked.
-        """
-        is_doubtful = self._opened or last_byte_at > self._mute_since
-        return not is_doubtful or self._in_vain_at >= moment
+        self.opened_at = now
+        if not same_place:
+            self.moved_at = now
+        if not same_place or now - self._any_frame_at > SWAP_TIME:
+            self._line_since = self.away_at = now
 
     def paused(self, seconds: float) -> None:
         """Note that nothing was sent for so long, s, for the worker did not run."""
-        self._since = {unit: since + seconds for unit, since in self._since.items()}
+        for its in self._units.values():
+            its.silent_since += seconds
         self._in_vain_since += seconds
-        self._mute_since += seconds
 
-    def _note_swap(self, unit: int, now: float) -> None:
+    def _note_swap(self, its: _Unit, now: float) -> None:
         """Note that a silence ends in which a unit, or any, may have been exchanged."""
-        if now - self._gone_since.get(unit, now) > SWAP_TIME:
-            self._unit_since[unit] = now
+        if now - its.gone_since > SWAP_TIME:
+            its.there_since = now
         if now - self._any_frame_at > SWAP_TIME:
             # this end may have stood still
             self._line_since = now
@@ -253,9 +193,10 @@ class Silences:
         longest = SWAP_TIME
         if to_stop:
             longest = max(SWAP_TIME, self._lost_after.get(unit, 0.0) + _NOTICED_WITHIN)
-        if now - min(self._gone_since.get(unit, now), self._any_frame_at) > longest:
+        its = self._units[unit]
+        if now - min(its.gone_since, self._any_frame_at) > longest:
             return math.inf
-        return max(self._line_since, self._unit_since.get(unit, -math.inf))
+        return max(self._line_since, its.there_since)
 
     @property
     def is_line_silent(self) -> bool:
@@ -264,7 +205,7 @@ class Silences:
 
     def is_silent(self, unit: int) -> bool:
         """Return whether a unit has not answered the last request to it."""
-        return unit in self._since
+        return self._units[unit].silent_since < math.inf
 
     def silent_since(self, unit: int, *, is_watched: bool) -> float:
         """
@@ -272,7 +213,7 @@ class Silences:
 
         :param is_watched: it would have been asked all the time, were there time for it.
         """
-        since = self._since.get(unit, math.inf)
+        since = self._units[unit].silent_since
         return min(since, self._in_vain_since) if is_watched and self.is_line_silent else since
 
     @property
@@ -285,9 +226,14 @@ class Silences:
         """After which silence the first drive of the line is lost, s."""
         return min(self._lost_after.values(), default=math.inf)
 
+    @property
+    def latest_loss(self) -> float:
+        """After which silence all drives of the line are lost, s."""
+        return max(self._lost_after.values(), default=math.inf)
+
     def was_asked_since_silent(self, unit: int) -> bool:
         """Return whether a unit was sent anything since the line is silent."""
-        return self._asked_at.get(unit, -math.inf) >= self._in_vain_since
+        return self._units[unit].asked_at >= self._in_vain_since
 
     def is_dead(self, now: float) -> bool:
         """Return whether the line is silent for more than noise: for several units, or for long."""
@@ -297,25 +243,28 @@ class Silences:
     @property
     def any_silent(self) -> bool:
         """A unit has not answered the last request to it."""
-        return bool(self._since)
+        return any(its.silent_since < math.inf for its in self._units.values())
 
     def asked_at(self, unit: int | None = None) -> float:
         """Return when a unit, or any, was last sent anything."""
         if unit is None:
-            return max(self._asked_at.values(), default=-math.inf)
-        return self._asked_at.get(unit, -math.inf)
+            return max((its.asked_at for its in self._units.values()), default=-math.inf)
+        return self._units[unit].asked_at
 
     def last_frame_at(self, unit: int) -> float:
         """Return when the last valid frame of a unit came."""
-        return self._last_frame_at.get(unit, -math.inf)
+        return self._units[unit].frame_at
 
     def take_longest(self, unit: int) -> float:
         """Return the longest time between two valid frames of a unit since the last call."""
-        return self._longest.pop(unit, 0.0)
+        its = self._units[unit]
+        longest, its.longest = its.longest, 0.0
+        return longest
 
     def lasts(self, unit: int, now: float) -> float:
         """Return for how long a unit has been silent; 0 if it answers."""
-        return now - self._since.get(unit, now)
+        since = self._units[unit].silent_since
+        return now - since if since < math.inf else 0.0
 
     def is_missing(self, unit: int, now: float) -> bool:
         """Return whether a unit has been silent for so long that it gets few requests."""
@@ -333,10 +282,3 @@ class Silences:
     def stops_in_vain_from(self, now: float) -> float:
         """Return from when on a silent unit gets its stop ahead of others; infinity: not."""
         return self._stops_from if self.is_in_noise(now) else math.inf
-
-
-def _mute_pause(opened: int, *, stop_waits: bool) -> float:
-    """Return how long a port is left alone that was opened so often in vain, s."""
-    if stop_waits:
-        return _MUTE_PAUSES_OF_A_STOP[(opened - 1) % len(_MUTE_PAUSES_OF_A_STOP)]
-    return _MUTE_PAUSES[min(opened, len(_MUTE_PAUSES)) - 1]

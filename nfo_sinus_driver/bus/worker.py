@@ -26,6 +26,7 @@ import threading
 import time
 from typing import Any, NamedTuple, TypeVar
 
+from nfo_sinus_driver.bus.mute_port import MutePort
 from nfo_sinus_driver.bus.scheduler import Scheduler, Waiting
 from nfo_sinus_driver.bus.silences import Silences
 from nfo_sinus_driver.bus.statistics import Recorder, Statistics
@@ -120,6 +121,7 @@ class Bus:
         link.end_listening_if(lambda: self._stop_waits)
         #: Which units do not answer, for coroutines on the worker.
         self.silences = Silences()
+        self._mute_port = MutePort()
         self._scheduler = Scheduler(
             self.silences.is_silent,
             lambda unit: self.silences.is_missing(unit, self.now()),
@@ -322,7 +324,7 @@ class Bus:
         After half of them at the latest, however often that was in vain; and not twice, for what is
         behind it may restart each time.
         """
-        self.silences.hurry(self.now() + seconds / 2, self.now() + seconds)
+        self._mute_port.hurry(self.now() + seconds / 2, self.now() + seconds)
 
     def keep_quiet(self, unit: int, until: float) -> None:
         """
@@ -553,6 +555,7 @@ class Bus:
         if seconds:
             self._paused = self._clock.paused
             self.silences.paused(seconds)
+            self._mute_port.paused(seconds)
         return seconds
 
     def _supervise(self) -> float:
@@ -750,10 +753,12 @@ class Bus:
     ) -> None:
         now, unit = self.now(), request.unit
         seconds = now - started - self._note_pause()
-        answered = unit != self.protocol.broadcast and tells
-        is_stop = request.priority <= Priority.LOOK
-        if answered and self.silences.note(unit, now, error, seconds, silence, is_stop=is_stop):
-            self._report_mute(0.0)
+        if tells and unit != self.protocol.broadcast:
+            is_stop = request.priority <= Priority.LOOK
+            self.silences.note_request(unit, now, error, seconds, silence, is_stop=is_stop)
+            ever_answered = self.silences.last_frame_at(unit) > -math.inf
+            if self._mute_port.note_request(now, error, ever_answered=ever_answered):
+                self._report_mute(0.0)
         self._scheduler.took(silence + seconds)
         if isinstance(error, PortError):
             self._port.mark_lost(error, now + REOPEN_PERIOD)
@@ -777,28 +782,30 @@ class Bus:
             return due
         # ahead of the request that shows whether it helps
         if not lost:
-            if not self.silences.is_mute_at(due, self._link.last_byte_at):
+            if not self._mute_port.is_mute_at(due, self._link.last_byte_at):
                 # while the line is left alone a time-out of a drive runs, which a request may feed
                 if due != self._woken_for and not self._line_quiet_until():
                     self._woken_for = due
                     self._wake_for_port()
                 return math.inf
-            if self.silences.heard:
-                self._report_mute(self.silences.mute_for(now))
+            if self._mute_port.heard:
+                self._report_mute(self._mute_port.mute_for(now))
         self._port.open(now + REOPEN_PERIOD)
         if self._port.is_open:
             self.recorder.opened()
-            at_same_place = self._port.is_at_same_place
-            self.silences.opened(self.now(), lost=lost, same_place=at_same_place)
+            self._mute_port.opened(self.now())
+            if lost:
+                self.silences.opened(self.now(), same_place=self._port.is_at_same_place)
             self._wake_for_port()
         return math.inf
 
     def _mute_until(self) -> float:
         """Return when a port that is open and mute is opened again, s; infinity: it is not."""
-        if not self.silences.mute_for(self.now()):
+        if not self._mute_port.mute_for(self.now()):
             return math.inf
-        return self.silences.reopen_at(
-            self._link.last_byte_at, stop_waits=any(task.stops for task in self._tasks)
+        stop_waits = any(task.stops for task in self._tasks)
+        return self._mute_port.reopen_at(
+            self._link.last_byte_at, self.silences.latest_loss, stop_waits=stop_waits
         )
 
     def _wake_for_port(self) -> None:
