@@ -28,7 +28,7 @@ def broadcast_stop(bus: Bus, drives: Iterable[Drive]) -> Future[None]:
 
 
 async def _broadcast(bus: Bus, drives: Iterable[Drive]) -> None:
-    models = [drive.model for drive in drives if drive.params.recognition.since_port_opened]
+    models = [drive.model for drive in drives if drive.state.contact.since_port_opened]
     if not models:
         raise DriveError(Cause.NONE_RECOGNISED)
     everyone = bus.protocol.broadcast

@@ -18,6 +18,7 @@ from nfo_sinus_driver.drive.change.memory import Memory, ProcessMemory
 from nfo_sinus_driver.drive.change.parameters import Parameters
 from nfo_sinus_driver.drive.change.tuning import Tuned, Tuning
 from nfo_sinus_driver.drive.known.changes import ParameterChange
+from nfo_sinus_driver.drive.known.contact import ContactEvent
 from nfo_sinus_driver.drive.known.diagnosis import explained
 from nfo_sinus_driver.drive.known.drive_state import DriveState, Hooks
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report, Severity
@@ -157,7 +158,7 @@ class Drive:
     @property
     def ever_responded(self) -> bool:
         """A drive has answered at its address at least once."""
-        return self._bus.silences.last_frame_at(self._unit) > -math.inf
+        return self.state.contact.ever_answered
 
     @property
     def following(self) -> bool:
@@ -177,7 +178,7 @@ class Drive:
     @property
     def recognised(self) -> bool:
         """It is known what is at its address; before, nothing is written there."""
-        return self.params.recognition.holds
+        return self.state.contact.is_recognised
 
     @property
     def stop_owed(self) -> bool:
@@ -451,7 +452,7 @@ class Drive:
     # --- on the bus ---------------------------------------------------------------------------
 
     def _require_connected(self) -> None:
-        if not self.state.connected:
+        if not self.state.contact.connected:
             raise DriveError(Cause.NOT_CONNECTED, address=self._unit)
 
     def _require_active(self) -> None:
@@ -481,7 +482,7 @@ class Drive:
         await self._drive_timeout.recall()
         self._poller.connected()
         self.log.connected()
-        state.found()
+        state.contact.dispatch(ContactEvent.CONNECTED)
         if self._controller is not None:
             self._controller.connected()
         self._report_identity()
@@ -519,7 +520,7 @@ class Drive:
         state.notify(Severity.INFO, cause, drive=shown)
 
     def _set_disconnected(self, why: Report) -> None:
-        self.state.lost()
+        self.state.contact.dispatch(ContactEvent.LOST)
         if self._controller is not None:
             self._controller.disconnected(why)
 

@@ -184,7 +184,7 @@ HISTORIES = (
         3,
         'in any order: a drive that is lost is still reported as connected',
         'Poller._mark_lost',
-        '        state.lost()\n        why =',
+        '        self._contact.dispatch(ContactEvent.LOST)\n        why =',
         '        why =',
         G2_CONTROL,
     ),

@@ -49,8 +49,8 @@ class DescribedRig(Rig):
         """Let the line be silent, until the drive is lost, and come back."""
         self.line.state = 'silent'
         self.pass_time(4.0)
-        assert not self.drive.state.connected
+        assert not self.drive.state.contact.connected
         self.line.mend()
-        self.wait_until(lambda: self.drive.state.connected, 20.0)
+        self.wait_until(lambda: self.drive.state.contact.connected, 20.0)
         self.pass_time(2.0)
         assert not self.turns

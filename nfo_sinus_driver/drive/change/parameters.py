@@ -233,7 +233,7 @@ class Parameters:
         due = [key for key in keys if key not in skipped and not self._cannot_change(key)]
         started = self._bus.now()
         for number, key in enumerate(due, start=1):
-            if state.connected and state.responsive:
+            if state.contact.connected and state.contact.responsive:
                 try:
                     await self._read(key, retry=False)
                 except Refused:

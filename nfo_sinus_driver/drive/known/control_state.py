@@ -11,7 +11,7 @@ the same table.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 import contextlib
 import enum
 import math
@@ -19,6 +19,7 @@ import math
 from nfo_sinus_driver.drive.known.events import Report
 from nfo_sinus_driver.drive.known.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.drive.known.stop_reason import StopReason, reason_of
+from nfo_sinus_driver.drive.known.transitions import read_table
 
 
 class ControlState(enum.Enum):
@@ -65,20 +66,8 @@ BEGIN         PROCEDURE PROCEDURE .        .        .         .        .
 END           .         .         .        .        IDLE      .        .
 """
 
-
-def _read(table: str) -> Mapping[tuple[ControlState, ControlEvent], ControlState]:
-    head, *rows = (line.split() for line in table.strip().splitlines())
-    states = [ControlState[name] for name in head]
-    transitions = {}
-    for name, *cells in rows:
-        for state, cell in zip(states, cells, strict=True):
-            if cell != '.':
-                transitions[state, ControlEvent[name]] = ControlState[cell]
-    return transitions
-
-
 #: The same by state and event; what is missing changes nothing, or is refused.
-TRANSITIONS = _read(_TABLE)
+TRANSITIONS = read_table(_TABLE, ControlState, ControlEvent)
 
 #: Something that the driver has begun may drive the motor.
 COMMANDED = frozenset((ControlState.ENABLING, ControlState.ENABLED, ControlState.PROCEDURE))

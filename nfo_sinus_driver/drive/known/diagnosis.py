@@ -113,7 +113,7 @@ def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -
         cause = Cause.DRIVER_PAUSED
     elif not status.may_run:
         cause = Cause.STOPPED_BY_ITSELF
-    elif state.model.profile.keeps_run and state.unheard:
+    elif state.model.profile.keeps_run and state.contact.unheard:
         cause = Cause.MAY_HAVE_RESTARTED
     return cause and state.report(cause, seconds=state.timeout.shortest)
 
@@ -128,7 +128,7 @@ def _why_control_is_lost(state: DriveState, status: InverterStatus) -> Cause:
     if status.runs:
         # the current limit, for one, hides what runs it
         return Cause.OTHERS_IN_CONTROL
-    return Cause.POWER_CYCLED if state.missed_reply else Cause.CONTROL_LOST
+    return Cause.POWER_CYCLED if state.contact.missed_before_poll else Cause.CONTROL_LOST
 
 
 def explain_fall(
@@ -147,10 +147,10 @@ def explain_fall(
     away = status.at - before.at
     if state.plc_time:
         # the PLC answers all the time, and a drive that is back may catch a coasting motor
-        silent = away >= _LIFE_STOOD + state.usual_interval
+        silent = away >= _LIFE_STOOD + state.contact.usual_interval
         most = min(was - _LEAST_FALL, was * _CAUGHT)
     else:
-        silent, most = state.missed_reply and away >= SHORTEST_POWER_OFF, was / 2
+        silent, most = state.contact.missed_before_poll and away >= SHORTEST_POWER_OFF, was / 2
     # where the frequency is not read with the status, it is NaN and does not fall
     if not (silent and was >= _LEAST_FALL and abs(status.frequency) < most):
         return None

@@ -1,11 +1,10 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is known of one drive: its status, and whether it responds."""
+"""What is known of one drive, and what follows from it in its other parts."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterator
 import contextlib
 import logging
@@ -15,6 +14,7 @@ from typing import NamedTuple
 from nfo_sinus_driver.bus import Bus, Priority
 from nfo_sinus_driver.catalog import Fact, InverterStatus, Kind, Role, load_family
 from nfo_sinus_driver.catalog.status import PROCESS_VALUE, QUANTITIES
+from nfo_sinus_driver.drive.known.contact import Contact, ContactEvent
 from nfo_sinus_driver.drive.known.control_state import ControlTable
 from nfo_sinus_driver.drive.known.drive_timeout import DriveTimeout
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Event, Report, Severity
@@ -99,12 +99,20 @@ class DriveState:
         method = settings.method_class
         #: How long after the driver's last message a PLC stops the drive, s; 0: no PLC.
         self.plc_time = method.plc_time
+        #: Whether it answers, and whether it is the same one.
+        self.contact = Contact(
+            bus,
+            settings.address,
+            lambda: self.settings.lost_after,
+            self.model.profile.enable_input,
+        )
         #: Its parameters.
         self.params = ParameterAccess(
             bus,
             settings.address,
             self.model,
             settings.retries,
+            self.contact,
             method.addressing,
             settings.block_address,
         )
@@ -123,20 +131,7 @@ class DriveState:
             lambda: self.status,
             self._note_status,
         )
-        self.connected = False
-        #: The last poll was answered; while it was not, no other request should wait for it.
-        self.responsive = False
-        #: It did not answer a request just before the last status.
-        self.missed_reply = False
-        #: How many requests had got no answer when the status was last read.
-        self._unanswered = 0
         self.status: InverterStatus | None = None
-        #: A request got no answer since the newest status, and before it.
-        self._in_vain = self._asked_in_vain = False
-        #: How far apart the last statuses were, s, the newest last.
-        self._intervals: deque[float] = deque((0.0,), maxlen=4)
-        #: The longest time without a valid frame before the newest one, s.
-        self._alone = 0.0
         #: The status that first showed the active fault, and whether that had just come.
         self.fault: InverterStatus | None = None
         self.fault_is_fresh = False
@@ -187,9 +182,7 @@ class DriveState:
         before = self.status
         if before is None or status.at >= before.at:
             self.status = status
-            self._intervals.append(status.at - before.at if before else 0.0)
-            self._alone = self.bus.silences.take_longest(self.settings.address)
-            self._asked_in_vain, self._in_vain = self._in_vain, False
+            self.contact.note_status(status.at - before.at if before else 0.0)
             self._note_fault(before)
             if before is None or before.tells_otherwise(status):
                 self.hooks.status_changed()
@@ -206,8 +199,7 @@ class DriveState:
 
         :param timeout: after which silence it does, s; 0: it does not.
         """
-        strikes_in = self.bus.silences.last_frame_at(self.settings.address) + timeout
-        strikes_in -= self.bus.now()
+        strikes_in = self.contact.last_frame_at + timeout - self.bus.now()
         if strikes_in <= 0:
             return pause
         return min(pause, max(strikes_in - _LAST_CHANCE, LOOK_PERIOD))
@@ -215,23 +207,12 @@ class DriveState:
     @property
     def left_alone(self) -> bool:
         """Before the newest status the drive got no request for longer than its own time-out."""
-        timeout = self.timeout
-        alone = self._alone if not self._asked_in_vain else 0.0
+        timeout, alone = self.timeout, self.contact.left_alone_for
         return timeout.stops_motor and 0 < timeout.shortest <= alone
 
     def may_have_restarted(self, silent: float) -> bool:
         """Return whether a drive that was silent for so long, s, may run again by itself."""
         return bool(self.model.profile.keeps_run) and silent >= SHORTEST_POWER_OFF
-
-    @property
-    def unheard(self) -> bool:
-        """Before the newest status no frame came for as long as a loss takes, asked or not."""
-        return self._alone >= self.settings.lost_after
-
-    @property
-    def usual_interval(self) -> float:
-        """How far apart the statuses before the newest were, s."""
-        return max(list(self._intervals)[:-1])
 
     def _note_fault(self, before: InverterStatus | None) -> None:
         status = self.status
@@ -245,36 +226,8 @@ class DriveState:
 
     def missed(self) -> None:
         """Note that a request failed; until it is known why, none should wait for it."""
-        self.unanswered()
+        self.contact.dispatch(ContactEvent.MISSED)
         self.hooks.request_missed()
-
-    def answered(self) -> None:
-        """Note that a poll was answered."""
-        self.responsive = True
-
-    def unanswered(self) -> None:
-        """Note that a poll was not."""
-        self.responsive = False
-        self._in_vain = True
-
-    def found(self) -> None:
-        """Note that it is connected."""
-        self.connected = self.responsive = True
-
-    def lost(self) -> None:
-        """Note that it is not connected any more."""
-        self.connected = False
-
-    @property
-    def missed_since_status(self) -> bool:
-        """It has not answered a request since the last status."""
-        # one that was busy, or whose answer was damaged, has responded
-        return self.params.unanswered > self._unanswered
-
-    def status_read(self) -> None:
-        """Note whether it did not answer a request just before the status read now."""
-        self.missed_reply = self.missed_since_status
-        self._unanswered = self.params.unanswered
 
     def use_hooks(self, hooks: Hooks) -> None:
         """Take what follows in other parts of the drive."""

@@ -95,7 +95,7 @@ class Nameplate:
         await self._params.read(self._model.key_of_status, priority, retry=retry)
         if self._params.in_block:
             # the block has its layout, and the data of a drive that the PLC is set for
-            self._params.recognition.begin()
+            self._params.contact.recognised()
         await self._params.find_lacking()
         await self._find_mailbox()
         dialect = self._dialect

@@ -10,15 +10,14 @@ from fractions import Fraction
 
 from nfo_sinus_driver.bus import Bus, ByAddress, Priority
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Role, Value, profile
+from nfo_sinus_driver.drive.known.contact import Contact
 from nfo_sinus_driver.drive.known.events import DriveError
-from nfo_sinus_driver.drive.known.recognition import Recognition
 from nfo_sinus_driver.link import (
     MAILBOX,
     Address,
     AnotherValue,
     DamagedAnswer,
     Identification,
-    LinkError,
     NoAnswer,
     Read,
     ReadThenWrite,
@@ -57,7 +56,7 @@ class ParameterAccess:
     :raises LinkError: reading or writing fails, as the link does.
     :raises DriveError: nothing is written, for it is not known what is there.
     :raises ValueError: a value that the drive cannot have, or bytes that mean none.
-    :ivar recognition: whether that is known.
+    :ivar contact: whether that is known, and whether it answers.
     """
 
     def __init__(
@@ -66,6 +65,7 @@ class ParameterAccess:
         unit: int,
         model: Family,
         retries: int,
+        contact: Contact,
         addressing: str = '',
         block_address: int = 0,
     ) -> None:
@@ -75,10 +75,8 @@ class ParameterAccess:
         self.now, self.sleep = bus.now, bus.sleep
         self._unit = unit
         self._retries = retries
-        self.recognition = Recognition(bus, unit, model.profile.enable_input)
+        self.contact = contact
         self._recognise: Callable[[], Awaitable[None]] | None = None
-        #: How many requests got no answer.
-        self.unanswered = 0
         #: Impossible values that were read more than once.
         self._odd: dict[str, bytes] = {}
         #: What steps of a profile have written last and no reading has shown yet.
@@ -248,9 +246,9 @@ class ParameterAccess:
 
     async def require_recognised(self) -> None:
         """Make sure that it is known what is there, by reading it if need be (DriveError: not)."""
-        if not self.recognition.holds and self._recognise is not None:
+        if not self.contact.is_recognised and self._recognise is not None:
             await self._recognise()
-        self.recognition.require()
+        self.contact.require_recognised()
 
     async def identify(self, priority: Priority) -> Identification:
         """Read the identity of the drive; what it does not give stays empty."""
@@ -260,7 +258,7 @@ class ParameterAccess:
         """Have the drive notice a silence of the line; see :meth:`Bus.watch`."""
         if self._bus.supervised:
             await self.require_recognised()
-        tries, require = 1 + self._retries, self.recognition.require
+        tries, require = 1 + self._retries, self.contact.require_recognised
         return await self._bus.watch(self._unit, seconds, priority, tries, require)
 
     async def acknowledge(self, key: str, priority: Priority) -> Value:
@@ -378,10 +376,6 @@ class ParameterAccess:
         parameter = self.model[key]
         return refusal.of(parameter.key if parameter.is_setting else parameter.name)
 
-    def count(self, error: LinkError) -> None:
-        """Count a request that got no answer, of this object or another."""
-        self.unanswered += isinstance(error, NoAnswer)
-
     def _meant(self, refusal: Refused) -> Refused:
         """Return a refusal with what its code means to this family."""
         profile, code = self.model.profile, refusal.code
@@ -409,7 +403,7 @@ class ParameterAccess:
             def require_same() -> None:
                 if permit is None:
                     # what was written before may be in another drive
-                    self.recognition.require(began)
+                    self.contact.require_recognised(began)
                 else:
                     permit()
                 require_wanted()
@@ -430,7 +424,7 @@ class ParameterAccess:
 
             def require() -> None:
                 if permit is None:
-                    self.recognition.require()
+                    self.contact.require_recognised()
                 else:
                     permit()
                 require_wanted()
@@ -446,7 +440,7 @@ class ParameterAccess:
                 # what writes looks at what the drive has then
                 return Reply(error.data, self.now())
             except (NoAnswer, DamagedAnswer) as error:
-                self.count(error)
+                self.contact.count(error)
                 tries -= 1
                 if not tries:
                     raise

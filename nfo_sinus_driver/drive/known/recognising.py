@@ -58,7 +58,7 @@ class Recogniser:
         """
         state, profile = self._state, self._profile
         tells = profile.identify or profile.product
-        known = self._params.recognition.holds
+        known = self._params.contact.is_recognised
         named = bool(tells) and not known
         try:
             await state.nameplate.identify(priority)
@@ -76,7 +76,7 @@ class Recogniser:
         if not known:
             # of one that is known, a word that no manual has keeps no stop back
             self._require_possible(status)
-        self._params.recognition.begin()
+        self._params.contact.recognised()
         return named
 
     async def require(self) -> None:
@@ -93,7 +93,7 @@ class Recogniser:
         error = task.future.result()
         if error is not None:
             why = explain_failure(error, self._state)
-            raise self._params.recognition.error(why) from error
+            raise self._params.contact.not_recognised(why) from error
 
     async def _find_out(self) -> LinkError | DriveError | None:
         """Recognise it; return why not."""
@@ -114,21 +114,21 @@ class Recogniser:
         :raises LinkError: it does not answer.
         :raises DriveError: another one does.
         """
-        recognition, state = self._params.recognition, self._state
-        if not recognition.was_here:
+        contact, state = self._params.contact, self._state
+        if not contact.was_here:
             await self.recognise(Priority.LOOK)
             return
         if self._params.in_block:
             # the PLC shows the layout of its block with each answer
             await self._params.read(state.model.key_of_status, Priority.LOOK, retry=False)
-            recognition.look_again()
+            contact.seen_again()
             return
         key, values = self._identifying
         if key and await self._is_same(key, values):
-            recognition.look_again()
+            contact.seen_again()
             return
         if await self._still_runs():
-            recognition.look_again()
+            contact.seen_again()
         else:
             await self.recognise(Priority.LOOK)
 
@@ -151,7 +151,7 @@ class Recogniser:
         except PortError:
             raise
         except LinkError as error:
-            if not self._params.recognition.since_port_opened:
+            if not self._params.contact.since_port_opened:
                 raise (self._meant(error) if isinstance(error, Refused) else error) from error
             return False
         self._require_identity(key, value, values)
@@ -193,7 +193,7 @@ class Recogniser:
         try:
             return nameplate.take(await run_steps(self._state, product(), Priority.SERVICE))
         except DriveError:
-            self._params.recognition.end()
+            self._params.contact.another_answers()
             raise
 
     def _require_fitted(self) -> None:
@@ -235,7 +235,7 @@ class Recogniser:
 
     def _another(self, why: Report) -> DriveError:
         """Note that another drive answers; return the error for that."""
-        self._params.recognition.end()
+        self._params.contact.another_answers()
         return DriveError(Cause.ANOTHER_DRIVE, title=self._profile.title, why=why)
 
     def _meant(self, error: Refused) -> LinkError | DriveError:
@@ -243,6 +243,6 @@ class Recogniser:
         if error.code == Refused.BUSY:
             return error
         if error.code in NONE_SUCH:
-            self._params.recognition.end()
+            self._params.contact.another_answers()
         name, what = self._state.model.name, error.what or 'it'
         return DriveError(Cause.OTHER_MODEL, error=str(error), model=name, what=what)

@@ -125,7 +125,7 @@ class Controller:
                 self._bus.cancel(self._enabling)
         elif before is ControlState.PROCEDURE and self._control.access is not None:
             self._control.access.abort()
-        if self._control.state is ControlState.IDLE and not self._state.connected:
+        if self._control.state is ControlState.IDLE and not self._state.contact.connected:
             self._control.dispatch(ControlEvent.LOST)
         self._state.hooks.changed()
 
@@ -159,7 +159,7 @@ class Controller:
 
     def _require_no_known_fault(self) -> None:
         """Make sure that the drive had no fault last: it outlasts the stop that it causes."""
-        if self._state.connected and self._state.status is not None:
+        if self._state.contact.connected and self._state.status is not None:
             require_no_fault(self._state, self._state.status)
 
     def require_newer(self, requested_at: float) -> None:
@@ -548,7 +548,7 @@ class Controller:
     def close(self, why: Report) -> None:
         """Stop the motor if it may run, and let nothing start it any more."""
         self._control.close()
-        if self._control.stop_owed or (self.may_run and self._state.params.recognition.holds):
+        if self._control.stop_owed or (self.may_run and self._state.contact.is_recognised):
             self._sequence.start(why)
 
     async def _require_recognised(self, patience: float = 0.0) -> None:

@@ -58,7 +58,7 @@ class Procedures:
     def require(self, procedure: Procedure | Reset) -> None:
         """Make sure that a procedure may begin."""
         controller, state = self.controller, self._state
-        if not state.connected:
+        if not state.contact.connected:
             raise DriveError(Cause.NOT_CONNECTED, address=state.settings.address)
         require_known(procedure, state.model)
         profile = state.model.profile

@@ -343,8 +343,8 @@ class Setpoint:
         limited = self._limited(request)
         due_at = self._due_at(request)
         self._want(limited, due_at)
-        unanswered = not self._state.responsive and limited == self._unanswered
-        if unanswered or not self._params.recognition.holds:
+        unanswered = not self._state.contact.responsive and limited == self._unanswered
+        if unanswered or not self._state.contact.is_recognised:
             self._waits_for_answer = True
             if limited == 0:
                 self._note_waiting(limited, due_at)
@@ -463,7 +463,7 @@ class Setpoint:
         """
         # the poll finds out at once whether it responds, in the time that a silent drive may
         # take from its neighbours
-        self._params.count(error)
+        self._state.contact.count(error)
         if not isinstance(error, Refused):
             self._note_in_vain(address, self._sent, self._sent_due, _try(error))
         self._waits_for_answer = True
@@ -506,12 +506,12 @@ class Setpoint:
         A drive that answers nothing at all ought to be lost by then, for a better reason.
         """
         now, seconds = self._bus.now(), self._state.settings.lost_after
-        silences, unit = self._bus.silences, self._state.settings.address
+        contact = self._state.contact
         if self._slot.pending and self._counts(self._request):
             self._note_waiting(self._limited(self._request), self._due_at(self._request))
-        is_held = not self._params.recognition.holds
+        is_held = not contact.is_recognised
         for one in self._in_vain.values():
-            silent = silences.is_silent(unit) and silences.last_frame_at(unit) <= one.since
+            silent = contact.is_silent_since(one.since)
             least = _TRIES if one.value else _TRIES_OF_0
             tried = is_held or max(one.tries, self._bus.writes_in_vain) >= least
             if not tried and one.tries <= (1 if one.value else 0):

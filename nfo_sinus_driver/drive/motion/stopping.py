@@ -11,7 +11,7 @@ import enum
 import math
 from typing import NamedTuple
 
-from nfo_sinus_driver.bus import SWAP_TIME, Priority, Task
+from nfo_sinus_driver.bus import Priority, Task
 from nfo_sinus_driver.catalog import ControlMethod, InverterStatus, Removal, State
 from nfo_sinus_driver.drive.known import drive_state
 from nfo_sinus_driver.drive.known.control_state import ControlEvent
@@ -27,9 +27,6 @@ _RETRY_PERIOD = 0.2
 _LOST_RETRY_PERIOD = 0.5
 #: How often it is looked whether a lost drive is there that may not be written to any more, s.
 _LOOK_AGAIN_PERIOD = 1.0
-#: How often a stop is written that nothing answers, from when it became due, whether another drive
-#: may be there by then or not.
-_BLIND_STOPS = 2
 #: After how many attempts without an answer a stop is written without what it would read before.
 _READ_IN_VAIN = 2
 #: How much longer than its own time-out a drive is left alone, s.
@@ -105,6 +102,7 @@ class StopSequence:
         self._bus = state.bus
         self._unit = state.settings.address
         self._state = state
+        self._contact = state.contact
         self._method = method
         self._control = state.control
         self._look = look
@@ -118,10 +116,6 @@ class StopSequence:
         self._tried_at = -math.inf
         #: How often there was a new reason; an earlier attempt does not confirm it.
         self._reasons = 0
-        #: When it became due to a drive that was known, and for how long the driver had paused by
-        #: then, s; and how often it may be written since although nothing answers.
-        self._due_at, self._paused = -math.inf, 0.0
-        self._blind_left = 0
         #: The present attempt has written something; and that was acknowledged, a word made without
         #: what is in the drive: what cannot be read before a stop cannot be read after it either.
         self._wrote = self._removed_blind = False
@@ -175,7 +169,7 @@ class StopSequence:
     def external_stop(self, why: Report) -> Iterator[None]:
         """Keep the state of a stop while an operation stops the motor by other means."""
         self._external += 1
-        self._note_due()
+        self._contact.stop_is_due()
         self._control.dispatch(ControlEvent.STOP, why)
         try:
             yield
@@ -196,8 +190,7 @@ class StopSequence:
         if self._control.blocked and self._bus.now() > self._tried_at + _RETRY_PERIOD:
             self.restart()
         if self._task is None:
-            self._blind_left = 0
-            self._note_due()
+            self._contact.stop_begins()
             self._was_left_alone, self._failure = False, None
             self._begun_at = self._bus.now()
             self._tried_at = -math.inf
@@ -218,7 +211,7 @@ class StopSequence:
         if self._task is None:
             self.start(why)
         else:
-            self._note_due()
+            self._contact.stop_is_due()
             self._tried_at = -math.inf
             self._begun_at = self._bus.now()
             self._sent_at = self._forced_at = math.inf
@@ -226,12 +219,6 @@ class StopSequence:
             self._reasons += 1
             self._control.dispatch(ControlEvent.FAULT_OVER)
             self._bus.wake(self._task)
-
-    def _note_due(self) -> None:
-        """Judge what may be written of a stop that becomes due now."""
-        if self._state.params.recognition.allows_stop:
-            self._due_at, self._paused = self._bus.now(), self._bus.paused
-            self._blind_left = _BLIND_STOPS
 
     async def wait_confirmed(self, patience: float | None = None) -> None:
         """
@@ -251,9 +238,9 @@ class StopSequence:
             tried = self._tried_at > -math.inf
             if patience is None:
                 late = self._bus.now() > begun + drive_state.TIMEOUT
-                late = late or (tried and not self._state.connected)
+                late = late or (tried and not self._contact.connected)
             else:
-                if self._state.connected and not tried:
+                if self._contact.connected and not tried:
                     # where a line has many to stop, its turn is yet to come
                     started = min(self._bus.now(), begun + patience)
                 else:
@@ -325,7 +312,7 @@ class StopSequence:
         while self._control.blocked:
             await self._bus.sleep(_RETRY_PERIOD)
             status = self._state.status
-            if not self._state.connected:
+            if not self._contact.connected:
                 # one that is only being connected to has no polls yet
                 return
             if status is not None and not status.faulted:
@@ -339,15 +326,15 @@ class StopSequence:
         unanswered = isinstance(self._failure, LinkError) and not isinstance(
             self._failure, (Refused, PortError, NoData)
         )
-        blind = unanswered and self._blind_left and not self._acknowledged
+        blind = unanswered and self._contact.stops_blind and not self._acknowledged
         if outcome is _Outcome.IGNORED or blind:
             return
         if isinstance(self._failure, DriveError) and self._failure.report == self._not_known:
             # it may not be written to any more since the attempt began: it is looked for
             return
-        if not self._state.connected:
+        if not self._contact.connected:
             await self._leave_alone()
-        elif self._is_lost or self._bus.now() >= self._due:
+        elif self._contact.is_silent_for_long or self._bus.now() >= self._due:
             # tries that have not helped so far must not keep the line from all others
             await self._bus.sleep(_RETRY_PERIOD)
         elif outcome is _Outcome.BUSY:
@@ -365,14 +352,14 @@ class StopSequence:
         """
         timeout, now = self._state.timeout, self._bus.now()
         own = timeout.shortest if timeout.stops_motor else 0.0
-        if not own or self._may_write:
-            pause = _LOST_RETRY_PERIOD if self._may_write else _LOOK_AGAIN_PERIOD
+        if not own or self._contact.may_stop:
+            pause = _LOST_RETRY_PERIOD if self._contact.may_stop else _LOOK_AGAIN_PERIOD
             if self._bus.silences.is_in_noise(now) and not self._acknowledged:
                 # in noise something is there, and may not have the stop
                 pause = drive_state.LOOK_PERIOD
             pause = self._state.pause_before_timeout(pause, own)
             await self._bus.sleep(pause, or_opening=True)
-            if not own or self._may_write:
+            if not own or self._contact.may_stop:
                 return
             now = self._bus.now()
         silences = self._bus.silences
@@ -389,24 +376,12 @@ class StopSequence:
     @property
     def waits_to_look(self) -> bool:
         """The drive gets no other request than its stop, and the look before it."""
-        answers = self._may_write and not self._bus.silences.is_silent(self._unit)
-        return self._task is not None and not (self._state.connected or answers)
-
-    @property
-    def _may_write(self) -> bool:
-        """A stop may be written: it is known what is there, or was when the stop became due."""
-        silences = self._bus.silences
-        if self._state.params.recognition.allows_stop:
-            return True
-        # the stops of all others may go before the second one
-        longest = SWAP_TIME + silences.round_in_vain
-        in_time = self._bus.now() <= self._due_at + longest
-        in_time &= self._bus.paused <= self._paused + SWAP_TIME
-        return self._blind_left > 0 and in_time and self._due_at >= silences.away_at
+        answers = self._contact.may_stop and not self._contact.is_silent
+        return self._task is not None and not (self._contact.connected or answers)
 
     @property
     def _not_known(self) -> Report:
-        return self._state.params.recognition.error(_NO_ANSWER_YET).report
+        return self._contact.not_recognised(_NO_ANSWER_YET).report
 
     async def find(self) -> None:
         """
@@ -415,26 +390,19 @@ class StopSequence:
         :raises LinkError: it does not answer.
         :raises DriveError: another one is there.
         """
-        if self._may_write:
+        if self._contact.may_stop:
             return
         self._ignored = 0
         try:
             await self._look()
         except DriveError as error:
-            raise self._state.params.recognition.error(error.report) from error
+            raise self._contact.not_recognised(error.report) from error
 
     def require_same(self) -> None:
         """Make sure, at the moment of sending, that a stop may be written (DriveError: not)."""
-        if not self._may_write:
+        if not self._contact.may_stop:
             raise DriveError(self._not_known)
         self._wrote = True
-
-    @property
-    def _is_lost(self) -> bool:
-        """The drive has been silent for ``lost_after``: the next poll will find it lost."""
-        settings = self._state.settings
-        silent = self._bus.silences.lasts(self._unit, self._bus.now())
-        return silent >= settings.lost_after
 
     async def _attempt(self, before: _Outcome) -> _Outcome:
         reasons, self._acknowledged = self._reasons, False
@@ -521,9 +489,9 @@ class StopSequence:
         except PortError:
             raise
         except LinkError as error:
-            if self._wrote or not self._state.connected:
+            if self._wrote or not self._contact.connected:
                 # else what is read before a stop had no answer
-                self._blind_left -= self._blind_left > 0
+                self._contact.stop_in_vain()
             if not isinstance(error, (NoAnswer, DamagedAnswer)):
                 raise
             self._unanswered += 1
@@ -566,7 +534,7 @@ class StopSequence:
     def _is_blind(self) -> bool:
         """Nothing answers, and the bus had control of the drive when something did."""
         status = self._state.status
-        silent = not self._state.connected or self._bus.silences.is_dead(self._bus.now())
+        silent = self._contact.is_gone
         # what is read before a stop was read in vain
         silent |= self._unanswered >= _READ_IN_VAIN and not self._wrote
         return silent and status is not None and status.from_bus

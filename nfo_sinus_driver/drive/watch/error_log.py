@@ -306,7 +306,7 @@ class ErrorLogMonitor:
     async def _watch_repeatedly(self) -> None:
         state = self._state
         while True:
-            there = state.connected and state.responsive
+            there = state.contact.connected and state.contact.responsive
             if there:
                 try:
                     await self._read_log()

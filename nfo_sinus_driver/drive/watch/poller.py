@@ -15,6 +15,7 @@ from typing import TypeVar
 from nfo_sinus_driver.bus import Priority, Task, Watch
 from nfo_sinus_driver.catalog import InverterStatus, Role
 from nfo_sinus_driver.drive.known.changes import ParameterChange
+from nfo_sinus_driver.drive.known.contact import MODE, STATUS, ContactEvent
 from nfo_sinus_driver.drive.known.diagnosis import Conditions, explain_failure, explain_fault
 from nfo_sinus_driver.drive.known.drive_state import DriveState
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report, Severity
@@ -26,7 +27,6 @@ from nfo_sinus_driver.drive.motion.setpoint import Setpoint
 from nfo_sinus_driver.link import (
     Interrupted,
     LinkError,
-    NoAnswer,
     NoData,
     PortError,
     Refused,
@@ -77,43 +77,6 @@ _MODE_TURNS = 60
 #: How often a read beside the status is tried in one poll: what the driver has to know, and what it
 #: measures, which did not fail just before.
 _TRIES, _MEASURED_TRIES = 3, 2
-#: The reads without which a poll fails, and anything in it.
-_STATUS, _MODE, _POLL = 'status', 'control mode', 'poll'
-
-
-class _Failures:
-    """
-    Since when each read of a poll has failed, s of one clock.
-
-    Failures of several reads, one after the other, are one: each began with the first of them,
-    when its answer failed to come, as a silence does.
-
-    :ivar newest: the last one.
-    """
-
-    def __init__(self) -> None:
-        self._since: dict[str, float] = {}
-        self._all_since = math.inf
-        self.newest: LinkError | DriveError = NoAnswer()
-
-    def note(self, what: str, now: float, error: LinkError | DriveError) -> None:
-        """Note that a read failed."""
-        self.newest = error
-        self._all_since = min(self._all_since, now)
-        self._since[what] = min(self._since.get(what, math.inf), self._all_since)
-
-    def lasts(self, what: str, now: float) -> float:
-        """Return for how long a read has failed, s; 0: it has not."""
-        return now - self._since.get(what, now)
-
-    def end(self, what: str) -> None:
-        """Note that a read was answered."""
-        self.forget(what)
-        self._all_since = math.inf
-
-    def forget(self, what: str) -> None:
-        """Note that something is over that is no read: it ends no failures of reads."""
-        self._since.pop(what, None)
 
 
 class Poller:
@@ -135,6 +98,7 @@ class Poller:
         self._bus = state.bus
         self._unit = state.settings.address
         self._state = state
+        self._contact = state.contact
         self._params = state.params
         self._setpoint = setpoint
         self._controller = controller
@@ -152,11 +116,8 @@ class Poller:
         self.snapshot = take_snapshot(state, setpoint)
         #: When it was published, s; its own time is that of its status.
         self._shown_at = -math.inf
-        self._failures = _Failures()
         #: How often in a row it could not be connected to.
         self._failed_reconnects = 0
-        #: A PLC answers that has no new data from the drive.
-        self._behind_plc = False
         #: When a value was last asked for, pauses of the worker aside, and how long it took, s:
         #: long, where the line is full.
         self._requested_at = self._turn = 0.0
@@ -204,7 +165,7 @@ class Poller:
         something else: on a full line that may take long.
         """
         state, params = self._state, self._params
-        if self._task is None or not state.connected or not reply.data:
+        if self._task is None or not state.contact.connected or not reply.data:
             return
         place = params.address(state.reader.word_key)
         if self._bus.answer(self._task, self._unit, place, reply):
@@ -226,7 +187,7 @@ class Poller:
 
     def restarted(self) -> None:
         """Note that the drive has restarted: it is lost until it is connected to again."""
-        if self._task is None or not self._state.connected:
+        if self._task is None or not self._contact.connected:
             return
         self._begin_anew(DriveError(Cause.RESTARTED))
 
@@ -250,11 +211,11 @@ class Poller:
 
     def poll_soon(self) -> None:
         """Find out at once whether a drive responds that did not answer another request."""
-        if not self._state.connected:
+        if not self._contact.connected:
             return
-        if self._fails_for_long(_STATUS):
+        if self._contact.fails_for_long(STATUS):
             # the read that waits for its turn would come too late
-            self._begin_anew(self._failures.newest)
+            self._begin_anew(self._contact.newest_failure)
         self.wake()
 
     def read_mode_soon(self) -> None:
@@ -265,7 +226,6 @@ class Poller:
     def connected(self) -> None:
         """Reset the counts of failures: the drive is connected."""
         self._bus.recorder.connected(self._unit)
-        self._failures = _Failures()
         self._failed_reconnects = 0
         self._complaint = None
         self._received = None
@@ -277,7 +237,7 @@ class Poller:
             started = self._bus.now()
             due = started >= polled_at + self._period
             try:
-                if not self._state.connected:
+                if not self._contact.connected:
                     if not self._waits_to_look:
                         await self._connect()
                         # nothing is measured yet: it is polled at once
@@ -287,20 +247,20 @@ class Poller:
                 else:
                     await self._read_status()
                     self._publish_changed()
-                if self._state.connected and not self._params.recognition.holds:
+                if self._contact.connected and not self._contact.is_recognised:
                     # it was silent for long, or this driver stood still: is it still the same?
                     await self._recogniser.recognise(Priority.POLL)
-                self._failures.forget(_POLL)
+                self._contact.poll_passed()
             except (LinkError, DriveError) as error:
                 self._on_poll_failed(error)
             except Exception as error:
                 # a drive that is no longer watched must not go on running
                 self._on_poll_failed(DriveError(Cause.DRIVER_ERROR, error=repr(error)))
             if due:
-                if self._state.connected and self.active and polled_at > 0:
+                if self._contact.connected and self.active and polled_at > 0:
                     self._bus.recorder.cycle(self._unit, started - polled_at)
                 polled_at = started
-            lost = not self._state.connected
+            lost = not self._contact.connected
             await self._bus.sleep(self._pause(polled_at), or_opening=lost)
 
     async def _keep_alive(self) -> None:
@@ -314,10 +274,10 @@ class Poller:
         asked_after = -math.inf
         while True:
             latest = state.timeout.seconds * _LATEST_SHARE
-            if not state.connected or not latest or self._bus.is_quiet:
+            if not state.contact.connected or not latest or self._bus.is_quiet:
                 await self._bus.sleep(_WATCH_PERIOD)
                 continue
-            frame_at = self._bus.silences.last_frame_at(self._unit)
+            frame_at = self._contact.last_frame_at
             left = frame_at + latest - self._bus.now()
             if left <= 0 and frame_at != asked_after:
                 asked_after = frame_at
@@ -330,12 +290,12 @@ class Poller:
         if self._waits_to_look:
             # as soon as it was seen the rest is read
             return _WATCH_PERIOD
-        if not state.connected:
+        if not state.contact.connected:
             # a drive that stays silent costs its neighbours less and less
             pause = min(_RECONNECT_PERIOD * self._failed_reconnects, _SLOWEST_RECONNECT)
             pause = state.pause_before_timeout(pause, state.timeout.seconds)
             # the life counter goes on, else the PLC takes the driver for dead
-            return min(pause, self._period) if self._behind_plc else pause
+            return min(pause, self._period) if self._contact.behind_plc else pause
         pause = polled_at + self._period - self._bus.now()
         # however low the poll rate, a motor that runs is watched, and so is one whose run
         # command may still be active, for it would start when its fault ends
@@ -348,7 +308,7 @@ class Poller:
     def _waits_to_look(self) -> bool:
         """It is lost, and gets no request but that of its stop."""
         waits = self._controller is not None and self._controller.waits_to_look
-        return waits and not self._behind_plc
+        return waits and not self._contact.behind_plc
 
     @property
     def _may_restart(self) -> bool:
@@ -358,7 +318,7 @@ class Poller:
     @property
     def _priority(self) -> Priority:
         """The priority of what a poll reads."""
-        urgent = self._may_restart and not self._state.responsive
+        urgent = self._may_restart and not self._contact.responsive
         return Priority.LOOK if urgent else Priority.POLL
 
     @property
@@ -399,12 +359,6 @@ class Poller:
         return self._bus.now() - self._bus.paused
 
     @property
-    def _silent_for_long(self) -> bool:
-        """It has answered no request for ``lost_after``."""
-        silent = self._bus.silences.lasts(self._unit, self._bus.now())
-        return silent >= self._state.settings.lost_after
-
-    @property
     def _may_start(self) -> bool:
         """A motor at standstill may start by the next set-point."""
         measured = self._state.measurements
@@ -428,7 +382,7 @@ class Poller:
         if control.stop_owed and not control.enabled:
             # the driver waits for the status to change
             return 0.0
-        if self._state.missed_since_status:
+        if self._contact.missed_since_poll:
             # it may have been switched off and on
             return 0.0
         return self._slow_period
@@ -459,14 +413,14 @@ class Poller:
             )
 
         paused = self._bus.paused
-        while (status := await self._try(_STATUS, read)) is None:
+        while (status := await self._try(STATUS, read)) is None:
             # what was read before stays valid
             continue
         self._status_paused = paused
         if self._received is taken:
             self._received = None
         state.require_fresh(status)
-        state.status_read()
+        self._contact.note_poll()
         reported = self._controller is not None and self._controller.on_status(status)
         self._report_fault(status, reported)
         self._conditions.take(status)
@@ -547,7 +501,7 @@ class Poller:
             return measurements.last(role).value
         key = state.model.key(role)
         try:
-            tries = 1 if self._failures.lasts(key, self._running) else _MEASURED_TRIES
+            tries = 1 if self._contact.is_failing(key) else _MEASURED_TRIES
             value = await self._read(
                 key, lambda: measurements.measure(key, self._priority, state.status), tries
             )
@@ -557,7 +511,7 @@ class Poller:
         except Refused:
             value = NAN
         except LinkError:
-            if self._silent_for_long:
+            if self._contact.is_silent_for_long:
                 raise
             value = NAN
         if value is None:
@@ -573,7 +527,7 @@ class Poller:
         state = self._state
         before = state.control_mode
         mode = await self._read(
-            _MODE, lambda: state.read_control_mode(self._priority, retry=False), _TRIES
+            MODE, lambda: state.read_control_mode(self._priority, retry=False), _TRIES
         )
         if mode not in (None, before) and self._controller:
             # before it is published: a set-point never has the unit of another mode
@@ -608,28 +562,21 @@ class Poller:
         except (PortError, Refused, Interrupted, NoData):
             raise
         except LinkError as error:
-            self._state.unanswered()
+            self._contact.dispatch(ContactEvent.MISSED)
             self._check_silence(asked_at, self._bus.now())
-            self._failures.note(what, self._running, error)
-            if self._silent_for_long or self._fails_for_long(what):
+            if self._contact.read_failed(what, error):
                 raise
             self._bus.recorder.retry(self._unit)
             return None
-        self._failures.end(what)
-        self._state.answered()
+        self._contact.read_answered(what)
         self._setpoint.answered()
         return answer
 
-    def _fails_for_long(self, what: str) -> bool:
-        """Return whether a read has failed for ``lost_after``, whatever else was answered."""
-        return self._failures.lasts(what, self._running) >= self._state.settings.lost_after
-
     def _check_silence(self, asked_at: float, now: float) -> None:
         """Report a silence of more than one lost answer to what may have to stop the motor."""
-        silences = self._bus.silences
         # it has begun before the request that was in vain just now
-        if self._controller is not None and silences.lasts(self._unit, asked_at) >= 0:
-            self._controller.silent(now - silences.last_frame_at(self._unit))
+        if self._controller is not None and self._contact.was_silent_at(asked_at):
+            self._controller.silent(now - self._contact.last_frame_at)
 
     def _paused(self, seconds: float) -> None:
         """Note that the driver did not run for so long, s."""
@@ -644,13 +591,11 @@ class Poller:
     def _look_for_loss(self) -> float:
         """Treat the drive as lost once it is silent for too long; return by when it may be, s."""
         state, now = self._state, self._bus.now()
-        if not state.connected or self._task is None:
+        if not state.contact.connected or self._task is None:
             return math.inf
         # a motor that may run is watched all the time
-        silences = self._bus.silences
-        since = silences.silent_since(self._unit, is_watched=state.control.stop_owed)
-        lost_at = since + state.settings.lost_after
-        if not (silences.is_silent(self._unit) or silences.was_asked_since_silent(self._unit)):
+        lost_at = self._contact.lost_at(is_watched=state.control.stop_owed)
+        if not self._contact.was_asked_itself:
             # it is only the others that were asked in vain
             look_at = lost_at - min(_LOOK_BEFORE_LOSS, state.settings.lost_after / 2)
             if now < look_at:
@@ -665,29 +610,21 @@ class Poller:
 
     def _on_poll_failed(self, error: LinkError | DriveError) -> None:
         state = self._state
-        state.unanswered()
-        self._behind_plc = isinstance(error, NoData) or _is(error, Cause.OLD_DATA)
-        if not state.connected:
+        is_lost = self._contact.poll_failed(error)
+        if not self._contact.connected:
             self._failed_reconnects += 1
             if isinstance(error, DriveError) and error.report != self._complaint:
                 # what keeps the drive from being used is reported once
                 self._complaint = error.report
                 state.notify(Severity.ERROR, error.report)
             return
-        self._failures.note(_POLL, self._running, error)
-        # one that answers, but gives no status, cannot be watched either
-        unwatched = any(map(self._fails_for_long, (_STATUS, _MODE, _POLL)))
-        # these have been waited out, or cannot be
-        at_once = self._behind_plc or isinstance(error, (PortError, Interrupted))
-        another = isinstance(error, DriveError) and not self._params.recognition.holds
-        at_once = at_once or another
-        if at_once or self._silent_for_long or unwatched:
+        if is_lost:
             self._mark_lost(error)
 
     def _mark_lost(self, error: LinkError | DriveError) -> None:
         """Treat the drive as lost until it can be connected to again, and report why."""
         state = self._state
-        state.lost()
+        self._contact.dispatch(ContactEvent.LOST)
         why = explain_failure(error, state)
         self._bus.recorder.cycle(self._unit, math.nan)
         in_use = self._controller is not None and self._controller.lost(why)
@@ -720,7 +657,7 @@ class Poller:
         state = self._state
         if self._task is None:
             return
-        if state.connected:
+        if state.contact.connected:
             # a stop may have read it since
             is_old = state.status is not None and state.status.at < self._bus.resumed_at
             # on a slow line one may be enabled before it is measured for the first time
@@ -728,7 +665,7 @@ class Poller:
             if is_old or not is_shown:
                 # it is read, or measured for the first time, at once
                 return
-        snapshot = self._snapshot(state.status if state.connected else None, polled=False)
+        snapshot = self._snapshot(state.status if state.contact.connected else None, polled=False)
         if not snapshot.shows_the_same(self.snapshot):
             self._show(snapshot)
 
@@ -748,7 +685,7 @@ class Poller:
             pause = left if left > 0 else _SHOW_PERIOD
             waits = left <= 0 and paused == self._bus.paused and control.stopping
             # one that was lost has shown nothing since that could be shown again
-            known = self._state.connected and self.snapshot.connected
+            known = self._contact.connected and self.snapshot.connected
             if waits and known and self._task is not None:
                 self._publish(self._state.status)
 
@@ -780,10 +717,6 @@ class Poller:
         )
 
 
-def _is(error: Exception, cause: Cause) -> bool:
-    return isinstance(error, DriveError) and error.report.cause is cause
-
-
 def take_snapshot(
     state: DriveState,
     setpoint: Setpoint,
@@ -796,7 +729,7 @@ def take_snapshot(
     polled: bool = True,
 ) -> Snapshot:
     """Return a snapshot; without a status while the drive is not connected."""
-    common = (state.connected, setpoint.following, state.settings.method)
+    common = (state.contact.connected, setpoint.following, state.settings.method)
     if status is None:
         return Snapshot(state.bus.now(), *common, stop=stop, polled=polled)
     code = status.listed

@@ -91,7 +91,7 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
         if not rate:
             for role in unpolled:
                 measurements.note(role, NAN)
-        if rate and state.connected and state.responsive and not yields():
+        if rate and state.contact.connected and state.contact.responsive and not yields():
             try:
                 keys = map(key_of, (*fast, *unpolled))
                 named = state.measured_keys

@@ -171,7 +171,7 @@ def control_mode(drive: Drive) -> str:
     """Return the control mode of a drive, or a ValueError that says why it is not known."""
     mode = drive.snapshot.control_mode
     if not mode:
-        lost = drive.identity is not None and not drive.state.connected
+        lost = drive.identity is not None and not drive.state.contact.connected
         raise ValueError('the drive is lost' if lost else 'the drive has not been read yet')
     return mode
 

@@ -25,8 +25,9 @@ from nfo_sinus_driver.link import PROTOCOLS
 PACKAGE = Path(__file__).resolve().parents[3] / 'nfo_sinus_driver'
 DRIVE = sorted((PACKAGE / 'drive').rglob('*.py'))
 REPORTING = [*DRIVE, *(path for room in ('cli', 'node') for path in (PACKAGE / room).rglob('*.py'))]
-#: What the table of control means, drawn in the docs; and how to write a setting that is wrong.
-WITH_SENTENCES = {'control_state.py', 'events.py', 'settings.py'}
+#: What the tables of contact and control mean, drawn in the docs; and how to write a setting that
+#: is wrong.
+WITH_SENTENCES = {'contact.py', 'control_state.py', 'events.py', 'settings.py'}
 #: Mistakes in the program, and wrong values: they are reported as NOT_POSSIBLE.
 SPEAKING = {'AssertionError', 'ValueError', 'debug', 'exception'}
 WORD = re.compile(r"(?:^| )\(?[a-z][a-z'-]*[:,.;)]?(?= |$)")

@@ -74,7 +74,7 @@ def test_a_number_that_cannot_be_read_stops_no_status(tmp_path: Path, what: str)
         rig.spoil(what, 'line.fault', 1000, written=False)
         rig.far.trip(7)
         rig.pass_time(2.0)
-        assert rig.drive.state.connected and not rig.drive.following
+        assert rig.drive.state.contact.connected and not rig.drive.following
         shown = rig.drive.snapshot
         assert shown.text == 'Fault' and shown.status is not None and shown.status.faulted
         assert not rig.notes.said(Cause.LOST)

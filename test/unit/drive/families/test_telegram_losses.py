@@ -146,12 +146,12 @@ def test_life_counter_goes_on_while_only_the_drive_is_lost(
             channel.program.drive_time = 60.0
             rig.pass_time(10.0)
             del channel.exchange
-        assert not rig.drive.state.connected
+        assert not rig.drive.state.contact.connected
         assert all(alive)
         rig.looked = lambda: None
         # at the rate of the polls
         assert len(counts) > 0.7 * 10.0 * rig.drive.settings.poll_rate
-        rig.wait_until(lambda: rig.drive.state.connected)
+        rig.wait_until(lambda: rig.drive.state.contact.connected)
         rig.assert_only_enable_helps()
 
 

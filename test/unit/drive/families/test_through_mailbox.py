@@ -751,7 +751,7 @@ def test_a_line_cut_in_the_middle_of_a_request_loses_nothing_and_blocks_no_stop(
         rig.wait_until(lambda: not rig.far.motor.driven, 3.0)
         rig.wait_until(asked.done)
         # the drive has one of the two, and the driver knows which
-        rig.wait_until(lambda: rig.drive.state.connected)
+        rig.wait_until(lambda: rig.drive.state.contact.connected)
         assert rig.far.writes[ACCEL] <= 2
         rig.wait_until(lambda: rig.drive.parameters.values[ACCEL] == rig.far.peek(ACCEL), 90.0)
         rig.answer(rig.drive.parameters.change({ACCEL: 11.0}))

@@ -238,7 +238,7 @@ def test_a_drive_that_is_switched_off_makes_no_pause(connection: str) -> None:
         rig.pass_time(30.0)
         assert rig.bus.remarks == ()
         rig.line.unplug()
-        rig.wait_until(lambda: rig.drives[2].state.connected, 20.0)
+        rig.wait_until(lambda: rig.drives[2].state.contact.connected, 20.0)
         assert rig.bus.remarks == ()
 
 

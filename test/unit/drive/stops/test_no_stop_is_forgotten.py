@@ -16,7 +16,7 @@ def test_a_drive_that_is_left_alone_while_it_runs_is_stopped() -> None:
     with Rig() as rig:
         rig.drive.activate()
         connecting = rig.drive.connect(parameters=True)
-        rig.wait_until(lambda: rig.drive.state.connected)
+        rig.wait_until(lambda: rig.drive.state.contact.connected)
         # an enable need not wait for the end of the reading
         rig.drive.enable()
         rig.wait_until(lambda: rig.drive.following)

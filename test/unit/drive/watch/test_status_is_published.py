@@ -98,7 +98,7 @@ def test_a_drive_that_is_there_again_is_shown_so_and_measured(connection: str) -
         rig.far.power_cycle(4.0)
         rig.wait_until(lambda: not shown(rig).connected, 10.0)
         before = len(rig.notes.snapshots)
-        rig.wait_until(lambda: rig.drive.state.connected, 20.0)
+        rig.wait_until(lambda: rig.drive.state.contact.connected, 20.0)
         rig.pass_time(SOON)
         assert shown(rig).connected and shown(rig).status is not None
         assert any(one.connected and one.polled for one in rig.notes.snapshots[before:])
