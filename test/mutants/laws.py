@@ -30,6 +30,7 @@ PORTS = 'test_link_ports.py'
 #: Whether a motor follows its set-points, and why it stopped.
 MOTOR_FOLLOWS = 'test_motor_follows.py'
 WRITES_UNANSWERED = 'test_writes_unanswered.py'
+CONTACT_TABLE = ('test_contact_table.py',)
 WHY_STOPPED = 'test_why_stopped.py'
 #: What is tested of a driver that stood still, and of a drive whose status cannot be read.
 STANDS_STILL = 'test_driver_stands_still.py'
@@ -1454,6 +1455,30 @@ LAWS = (
         '        return self._is_same_since(newest, to_stop=True)',
         '        return True',
         (RECOGNITION, '-k', 'in_the_place_of'),
+    ),
+    Mutant(
+        11,
+        'what was recognised stays so where another drive answers',
+        'Contact.another_answers',
+        '        self._recognised_at = self._looked_at = math.nan',
+        '        pass',
+        CONTACT_TABLE,
+    ),
+    Mutant(
+        11,
+        'a stop is written to a silent drive however long ago it became due',
+        'Contact.may_stop',
+        'return self.stops_blind and in_time and self._stop_due_at',
+        'return self.stops_blind and self._stop_due_at',
+        CONTACT_TABLE,
+    ),
+    Mutant(
+        3,
+        'a drive whose polls are not answered is lost at the first one that is',
+        'Contact.poll_failed',
+        'return at_once or another or self.is_silent_for_long or unwatched',
+        'return at_once or another',
+        CONTACT_TABLE,
     ),
     Mutant(
         11,
