@@ -170,7 +170,7 @@ async def set_up(
             try:
                 return await Request(unit, step, priority, require_wanted)
             except LinkError as error:
-                if isinstance(error, Refused) and error.code != Refused.BUSY:
+                if isinstance(error, Refused) and not error.is_busy:
                     return None
                 if isinstance(error, PortError) or not left:
                     raise

@@ -539,6 +539,11 @@ class Refused(LinkError):
         text = _REFUSALS.get(code, 'the drive refused')
         super().__init__(reason or f'{text} (exception {code})')
 
+    @property
+    def is_busy(self) -> bool:
+        """The drive has done nothing, and may take the same request the next moment."""
+        return self.code == self.BUSY
+
     def of(self, what: str) -> Refused:
         """Return the same refusal, of something that is named."""
         return Refused(self.code, self._reason, what)

@@ -96,7 +96,7 @@ class DriveTimeout:
         except ValueError:
             return None
         except Refused as error:
-            if error.code == Refused.BUSY:
+            if error.is_busy:
                 raise
             return None
 

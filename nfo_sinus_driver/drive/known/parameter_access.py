@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
 from fractions import Fraction
+from typing import NamedTuple
 
 from nfo_sinus_driver.bus import Bus, ByAddress, Priority
 from nfo_sinus_driver.catalog import Access, Family, Parameter, Role, Value, profile
@@ -30,7 +31,7 @@ from nfo_sinus_driver.link import (
 
 #: How often a request to a busy drive is repeated, s, and how many times.
 _BUSY_PERIOD = 0.05
-_BUSY_TRIES = 10
+_BUSY_REPEATS = 10
 #: The space of the addresses of the drive itself, and all that is reached by the mailbox of a PLC.
 _OWN = 'drive_address'
 _BY_MAILBOX = frozenset((MAILBOX, _OWN))
@@ -42,6 +43,21 @@ _DENIALS = 2
 _READINGS = 3
 #: Parameters of different sizes that are safe to read at any time.
 _RESYNC_READS = (Role.STATUS_CODE, Role.STATUS_WORD, Role.OPERATING_TIME)
+
+
+class Patience(NamedTuple):
+    """
+    How often a request is repeated before its error counts.
+
+    A stop has none: it repeats itself, by what each try has shown (:mod:`..motion.stopping`). Nor
+    has a set-point: the next one takes its turn (:mod:`..motion.setpoint`).
+
+    :ivar silent: while it gets no answer, or a damaged one.
+    :ivar busy: while the drive answers that it is busy; it has done nothing then.
+    """
+
+    silent: int
+    busy: int
 
 
 class ParameterAccess:
@@ -264,7 +280,8 @@ class ParameterAccess:
     async def acknowledge(self, key: str, priority: Priority) -> Value:
         """Read a parameter whose reading acknowledges, once: an operator has requested it."""
         assert self._acknowledges(key), key
-        reply = await self._ask(Read(self.address(key), once=True), priority, retry=False)
+        read = Read(self.address(key), once=True)
+        reply = await self._ask(read, priority, self._patience(priority, retry=False))
         return self.value(key, reply.data)
 
     async def acknowledge_and_write(self, key: str, step: profile.Write) -> None:
@@ -275,7 +292,7 @@ class ParameterAccess:
         """
         assert self._acknowledges(key), key
         both = ReadThenWrite(self.address(key), *self.target(step))
-        await self._ask(both, Priority.STOP, retry=False)
+        await self._ask(both, Priority.STOP, Patience(silent=0, busy=0))
 
     async def write(
         self,
@@ -299,10 +316,9 @@ class ParameterAccess:
             reply = await self._ask(
                 Write(address, data),
                 priority,
-                step.retry,
+                self._patience(priority, step.retry, at_head=step.head),
                 require_wanted,
                 permit,
-                patient=step.head,
             )
             return reply.data or data
         except Refused as error:
@@ -321,7 +337,8 @@ class ParameterAccess:
     ) -> None:
         """Write the bytes of a parameter, whatever its range."""
         try:
-            await self._ask(Write(self.address(key), data), priority, retry)
+            write = Write(self.address(key), data)
+            await self._ask(write, priority, self._patience(priority, retry))
         finally:
             self.rest()
 
@@ -332,7 +349,7 @@ class ParameterAccess:
     async def read_from(self, address: Address, priority: Priority, *, retry: bool = True) -> bytes:
         """Read the bytes at an address."""
         there = Read(address._replace(block=self._block))
-        return (await self._ask(there, priority, retry)).data
+        return (await self._ask(there, priority, self._patience(priority, retry))).data
 
     def is_odd(self, key: str) -> bool:
         """Return whether the last value of a parameter is impossible, read more than once."""
@@ -353,9 +370,9 @@ class ParameterAccess:
         """
         if self._acknowledges(key):
             raise ValueError(f'{key} is not just read: that acknowledges a fault')
-        there = Read(self.address(key))
+        there, patience = Read(self.address(key)), self._patience(priority, retry)
         try:
-            reply = await self._ask(there, priority, retry)
+            reply = await self._ask(there, priority, patience)
         except Refused as error:
             if error.code in NONE_SUCH and self.model[key].option:
                 self._denials[key] = [*self._denials.get(key, ()), error][-_DENIALS:]
@@ -368,7 +385,7 @@ class ParameterAccess:
                 self._odd[key] = reply.data
                 break
             before = reply.data
-            reply = await self._ask(there, priority, retry)
+            reply = await self._ask(there, priority, patience)
             readings += 1
         return reply
 
@@ -384,15 +401,22 @@ class ParameterAccess:
         text = profile.refusals.get(code)
         return refusal if text is None else Refused(code, f'{text} (exception {code})')
 
+    def _patience(self, priority: Priority, retry: bool, *, at_head: bool = False) -> Patience:
+        """
+        Return how often a request is repeated.
+
+        :param at_head: it goes ahead of all else, and is no stop, which is repeated by its caller.
+        """
+        waits = retry or at_head or priority > Priority.LOOK
+        return Patience(self._retries if retry else 0, _BUSY_REPEATS if waits else 0)
+
     async def _ask(
         self,
         operation: Read | Write | ReadThenWrite,
         priority: Priority,
-        retry: bool,
+        patience: Patience,
         require_wanted: Callable[[], None] = lambda: None,
         permit: Callable[[], None] | None = None,
-        *,
-        patient: bool = False,
     ) -> Reply:
         there = operation.address
         if there.space == _OWN:
@@ -412,7 +436,8 @@ class ParameterAccess:
                 at = Address(MAILBOX, pnu, None, 2, False, there.block)
                 step = Read(at) if word is None else Write(at, word.to_bytes(2, 'big'))
                 # the PLC does nothing twice, so what is lost of it may be repeated
-                return self._ask(step, priority, True, require_same, permit)
+                repeated = self._patience(priority, retry=True)
+                return self._ask(step, priority, repeated, require_same, permit)
 
             word = None if isinstance(operation, Read) else int.from_bytes(operation.data, 'big')
             return await self._by_address.access(there.index, word, ask)
@@ -430,9 +455,7 @@ class ParameterAccess:
                 require_wanted()
         else:
             require = require_wanted
-        tries = 1 + self._retries if retry else 1
-        # a busy drive has done nothing; a stop that is sent once is repeated by its caller
-        busy = _BUSY_TRIES if patient or retry or priority > Priority.LOOK else 0
+        silent, busy = patience
         while True:
             try:
                 return await self._bus.ask(self._unit, operation, priority, require)
@@ -441,12 +464,12 @@ class ParameterAccess:
                 return Reply(error.data, self.now())
             except (NoAnswer, DamagedAnswer) as error:
                 self.contact.count(error)
-                tries -= 1
-                if not tries:
+                if not silent:
                     raise
+                silent -= 1
             except Refused as refusal:
                 meant = self._meant(refusal)
-                if meant.code != Refused.BUSY or not busy:
+                if not (meant.is_busy and busy):
                     raise meant from None
                 busy -= 1
                 await self._bus.sleep(_BUSY_PERIOD)

@@ -240,7 +240,7 @@ class Recogniser:
 
     def _meant(self, error: Refused) -> LinkError | DriveError:
         """Return what it means that the drive refuses what every one of its family has."""
-        if error.code == Refused.BUSY:
+        if error.is_busy:
             return error
         if error.code in NONE_SUCH:
             self._params.contact.another_answers()

@@ -477,7 +477,7 @@ class Setpoint:
 
     def _may_be_busy(self, error: Refused) -> bool:
         """Return whether a refusal only means that the drive is busy, and not for long yet."""
-        if error.code != Refused.BUSY:
+        if not error.is_busy:
             return False
         now = self._bus.now()
         self._busy_since = min(self._busy_since, now)

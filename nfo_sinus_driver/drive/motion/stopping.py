@@ -483,7 +483,7 @@ class StopSequence:
             )
         except Refused as error:
             self._unanswered = self._ignored = 0
-            is_busy = error.code == Refused.BUSY and self._bus.now() < self._due
+            is_busy = error.is_busy and self._bus.now() < self._due
             self._refusals += not is_busy
             return _Sent(error, is_busy)
         except PortError:

@@ -311,7 +311,7 @@ class ErrorLogMonitor:
                 try:
                     await self._read_log()
                 except Refused as error:
-                    if error.code != Refused.BUSY:
+                    if not error.is_busy:
                         # a request for what it lacks may make a Classic drive stop the motor
                         state.notify(Severity.INFO, Cause.LOG_NOT_WATCHED, error=str(error))
                         return
