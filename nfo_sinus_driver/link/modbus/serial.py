@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
+import math
 import time
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from nfo_sinus_driver.link.foreign_traffic import DOUBTFUL
 from nfo_sinus_driver.link.interface import (
@@ -17,6 +18,7 @@ from nfo_sinus_driver.link.interface import (
     Clock,
     DamagedAnswer,
     LineSettings,
+    LinkError,
     NeverSilent,
     NoAnswer,
     NotReady,
@@ -56,6 +58,28 @@ _MOST_PAUSE = 0.2
 _PAUSES = 3
 #: Bytes in the answer to a read of two registers.
 _TWO_REGISTERS = 7
+
+
+class _Came(NamedTuple):
+    """
+    What came of a request.
+
+    :ivar answer: what it means; of no use where there is an error.
+    :ivar arrived: when it came, s.
+    :ivar error: why there is none, or what it says in its place.
+    :ivar frame: its bytes.
+    :ivar is_surplus: more bytes came than the answer has.
+    :ivar late: one of its kind might have come from before.
+    :ivar asked_too: another master has sent the same request, which is answered, too.
+    """
+
+    answer: Any
+    arrived: float
+    error: LinkError | None
+    frame: bytes
+    is_surplus: bool
+    late: bool
+    asked_too: bool
 
 
 class SerialLink(RequestLink[Request[Any]], ModbusLink):
@@ -317,49 +341,63 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self._has_other_value = False
         self._others.sent(request, self._now())
         self._send(request, frame)
-        reader = self._reader(request)
-        asked_too = False
-        try:
-            try:
-                answer, arrived = self._receive(request, reader, frame)
-            except Refused:
-                self._note_answer(request, refusal_head(request), reader.frame)
-                raise
-            else:
-                self._note_answer(request, request.answer_head, reader.frame)
-            finally:
-                late = request.answer_head in self._late.quarantined(request.unit, self._now())
-                asked_too = self._take_others(request, reader, frame)
-        except (NoAnswer, DamagedAnswer) as error:
-            self._note_missing(request, error)
+        came = self._await_answer(request, frame)
+        if came.error is None:
+            self._take_answer(request, came)
+        elif isinstance(came.error, (NoAnswer, DamagedAnswer)):
+            self._note_missing(request, came.error)
             self._seconds.unanswered(request, self._now())
             self._late.expect(request, self._now())
-            raise
-        except (AnotherValue, Refused) as error:
-            refused = isinstance(error, Refused)
-            self._doubtful = refused and self._is_doubtful(refusal_head(request))
-            self._release(request, asked_too=asked_too)
-            self.pauses.answered(request.unit, type(request), self._now())
-            if refused:
-                length = len(reader.frame) * self._settings.char_time
-                self._late.note(request, reader.frame, self._now(), length)
-            raise
+        elif isinstance(came.error, (AnotherValue, Refused)):
+            self._take_refusal(request, came)
+        if came.error is not None:
+            raise came.error
+        return came.answer, came.arrived
+
+    def _await_answer(self, request: Request[Any], frame: bytes) -> _Came:
+        """Wait for the answer to a request that was sent; return what came of it."""
+        reader = self._reader(request)
+        answer, arrived, error = None, math.nan, None
+        try:
+            answer, arrived = self._receive(request, reader, frame)
+        except LinkError as failure:
+            error = failure
+        if error is None:
+            self._note_answer(request, request.answer_head, reader.frame)
+        elif isinstance(error, Refused):
+            self._note_answer(request, refusal_head(request), reader.frame)
+        late = request.answer_head in self._late.quarantined(request.unit, self._now())
+        asked_too = self._take_others(request, reader, frame)
+        return _Came(answer, arrived, error, reader.frame, bool(reader.received), late, asked_too)
+
+    def _take_answer(self, request: Request[Any], came: _Came) -> None:
+        """Note that a request was answered, and what else may come by that."""
+        late, arrived = came.late, came.arrived
         self._doubtful = self._is_doubtful(request.answer_head, late)
         self._others.took(request)
-        length = len(reader.frame) * self._settings.char_time
-        self._late.note(request, reader.frame, arrived, length)
+        length = len(came.frame) * self._settings.char_time
+        self._late.note(request, came.frame, arrived, length)
         self.pauses.answered(request.unit, type(request), arrived)
-        self._release(request, late=late, asked_too=asked_too)
+        self._release(request, late=late, asked_too=came.asked_too)
         if not late and self._late.repeated is None:
             # and the request has left, even where the port is faster than its settings say
             self._line_end = arrived
         if self._has_run and not self._doubtful:
             self._late.took(request.unit, arrived - self._sent_at - length)
         twice = self._seconds.silence(request.unit, arrived) > 0.0
-        if late or (reader.received and not self._doubtful and not twice):
+        if late or (came.is_surplus and not self._doubtful and not twice):
             # it may answer an earlier write of the same, or answer twice: one more may come
             self._late.note_unrequested(self._now())
-        return answer, arrived
+
+    def _take_refusal(self, request: Request[Any], came: _Came) -> None:
+        """Note that a request was refused, or that the drive answers that it has another value."""
+        is_refusal = isinstance(came.error, Refused)
+        self._doubtful = is_refusal and self._is_doubtful(refusal_head(request))
+        self._release(request, asked_too=came.asked_too)
+        self.pauses.answered(request.unit, type(request), self._now())
+        if is_refusal:
+            length = len(came.frame) * self._settings.char_time
+            self._late.note(request, came.frame, self._now(), length)
 
     def _is_second(self, frame: bytes, message: bytes) -> bool:
         # it came when the line was last in use, and not when it had been silent since
