@@ -814,7 +814,7 @@ LAWS = (
     Mutant(
         9,
         'an idle bus is silent longer than the time-out of the drive',
-        'Poller._period',
+        'PollPlan.period',
         '                period = min(period, timeout * _KEEP_ALIVE_SHARE)',
         '                pass',
         ('test_poll_schedule.py', '-k', 'striking'),
@@ -1395,7 +1395,7 @@ LAWS = (
     Mutant(
         3,
         'the poll of a lost drive keeps its own time-out from striking',
-        'Poller._waits_to_look',
+        'PollPlan._waits_to_look',
         '        return waits and not self._contact.behind_plc',
         '        return False',
         (LINES, '-k', 'no_poll_of'),

@@ -24,6 +24,7 @@ from nfo_sinus_driver.drive.known.settings import MONITOR
 from nfo_sinus_driver.drive.known.snapshot import NAN, NOT_MEASURED, Measured, Snapshot
 from nfo_sinus_driver.drive.motion.controller import Controller
 from nfo_sinus_driver.drive.motion.setpoint import Setpoint
+from nfo_sinus_driver.drive.watch.poll_plan import WATCH_PERIOD, PollPlan, Turn
 from nfo_sinus_driver.link import (
     Interrupted,
     LinkError,
@@ -37,43 +38,19 @@ from nfo_sinus_driver.link import (
 _log = logging.getLogger(__name__)
 _T = TypeVar('_T')
 
-#: How often a drive is polled while its node is not active, s.
-_INACTIVE_PERIOD = 0.5
-#: How often an idle one is polled at most while another one is read for the first time, s.
-_YIELDING_PERIOD = 2.0
-#: How often the control mode is read, and what scales set-points, while no motor at standstill may
-#: start by one, s; and once in so many times what only scales measured values.
-_MODE_PERIOD = 1.0
-_ALL_SCALES = 10
-#: How often the status is read at least while the motor runs, s; and of a drive that keeps its run
-#: command without power: so two requests of the least time without it get no answer.
-_WATCH_PERIOD = 0.2
-_RESTART_WATCH_PERIOD = 0.1
-#: How often a drive that is lost is tried again, at first and at last, s.
-_RECONNECT_PERIOD = 1.0
-_SLOWEST_RECONNECT = 4.0
-#: The bus is silent for no more than this share of the drive's own time-out.
-_KEEP_ALIVE_SHARE = 1 / 3
-#: After this share of it the drive gets a request ahead of all but stops and set-points.
+#: After this share of its own time-out the drive gets a request ahead of all but stops and
+#: set-points.
 _LATEST_SHARE = 0.5
 #: How long before the silence of all others passes for its own a drive is asked itself, s, and for
 #: how long its turn is waited for, where a request to another one took all of that time.
 _LOOK_BEFORE_LOSS, _LOOKED_FOR = 0.4, 0.2
 #: What is measured in every control mode.
 _BASIC = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED)
-#: How often the rest of a poll is read, s: the other one of frequency and speed, and an inverter
-#: status that the status word gives no reason to read. All that the driver reacts to shows in
-#: that word: fault, control lost, a stop, the current limit.
-_SLOW_PERIOD = 0.1
-#: On a full line, where each read waits for its turn, once in so many turns of this drive: so two
-#: reads that every poll takes become 2.4 at most, with the control mode, which changes least.
-_SLOW_TURNS = 15
 #: A motor is at its speed while the controlled quantity changes by no more than this share from
 #: poll to poll; else frequency and speed are both measured each time.
 _STEADY = 0.02
 #: How often what is known is published while a stop keeps polls from their turns, s.
 _SHOW_PERIOD = 0.25
-_MODE_TURNS = 60
 #: How often a read beside the status is tried in one poll: what the driver has to know, and what it
 #: measures, which did not fail just before.
 _TRIES, _MEASURED_TRIES = 3, 2
@@ -110,20 +87,14 @@ class Poller:
         #: Asks the drive before the silence of all others passes for its own.
         self._look_task: Task | None = None
         self._looked_at = -math.inf
-        #: Poll at full rate.
-        self.active = False
+        #: When it is polled, and what is read.
+        self._plan = PollPlan(state, setpoint, controller)
         #: The newest poll.
         self.snapshot = take_snapshot(state, setpoint)
         #: When it was published, s; its own time is that of its status.
         self._shown_at = -math.inf
-        #: How often in a row it could not be connected to.
-        self._failed_reconnects = 0
-        #: When a value was last asked for, pauses of the worker aside, and how long it took, s:
-        #: long, where the line is full.
-        self._requested_at = self._turn = 0.0
-        #: When was last read what changes rarely: control mode and scales; and how often it was.
-        self._rare_read_at = 0.0
-        self._rare_reads = 1
+        #: When a value was last asked for, pauses of the worker aside, s.
+        self._requested_at = 0.0
         self._complaint: Report | None = None
         #: A status word that came with a set-point, and has not been checked yet.
         self._received: Reply | None = None
@@ -138,6 +109,16 @@ class Poller:
     def begun(self) -> bool:
         """It is polling."""
         return self._task is not None
+
+    @property
+    def active(self) -> bool:
+        """It polls at full rate."""
+        return self._plan.active
+
+    @property
+    def yields(self) -> bool:
+        """Whether it polls seldom while another drive's settings are first read."""
+        return self._plan.yields
 
     def begin(self) -> None:
         """Poll from now on."""
@@ -195,12 +176,12 @@ class Poller:
         """Treat the drive as lost until it is connected to again, and poll anew."""
         self._bus.cancel(self._task)
         self._mark_lost(error)
-        self._failed_reconnects = 0
+        self._plan.connected()
         self.begin()
 
     def set_active(self, active: bool) -> None:
         """Poll at full rate, or only so that the drive stays watched."""
-        self.active = active
+        self._plan.set_active(active)
         if active:
             self.wake()
 
@@ -220,13 +201,13 @@ class Poller:
 
     def read_mode_soon(self) -> None:
         """Read the control mode with the next poll: it may be another one now."""
-        self._rare_read_at = -math.inf
+        self._plan.read_rare_soon()
         self.wake()
 
     def connected(self) -> None:
         """Reset the counts of failures: the drive is connected."""
         self._bus.recorder.connected(self._unit)
-        self._failed_reconnects = 0
+        self._plan.connected()
         self._complaint = None
         self._received = None
         self._state.measurements.forget()
@@ -235,18 +216,18 @@ class Poller:
         polled_at = -math.inf
         while True:
             started = self._bus.now()
-            due = started >= polled_at + self._period
+            turn = self._plan.turn(polled_at)
             try:
-                if not self._contact.connected:
-                    if not self._waits_to_look:
+                match turn:
+                    case Turn.CONNECT:
                         await self._connect()
                         # nothing is measured yet: it is polled at once
-                        due, polled_at = False, started - self._period
-                elif due:
-                    await self._poll()
-                else:
-                    await self._read_status()
-                    self._publish_changed()
+                        polled_at = started - self._plan.period
+                    case Turn.POLL:
+                        await self._poll()
+                    case Turn.STATUS:
+                        await self._read_status()
+                        self._publish_changed()
                 if self._contact.connected and not self._contact.is_recognised:
                     # it was silent for long, or this driver stood still: is it still the same?
                     await self._recogniser.recognise(Priority.POLL)
@@ -256,12 +237,12 @@ class Poller:
             except Exception as error:
                 # a drive that is no longer watched must not go on running
                 self._on_poll_failed(DriveError(Cause.DRIVER_ERROR, error=repr(error)))
-            if due:
+            if turn is Turn.POLL:
                 if self._contact.connected and self.active and polled_at > 0:
                     self._bus.recorder.cycle(self._unit, started - polled_at)
                 polled_at = started
             lost = not self._contact.connected
-            await self._bus.sleep(self._pause(polled_at), or_opening=lost)
+            await self._bus.sleep(self._plan.pause(polled_at), or_opening=lost)
 
     async def _keep_alive(self) -> None:
         """
@@ -275,7 +256,7 @@ class Poller:
         while True:
             latest = state.timeout.seconds * _LATEST_SHARE
             if not state.contact.connected or not latest or self._bus.is_quiet:
-                await self._bus.sleep(_WATCH_PERIOD)
+                await self._bus.sleep(WATCH_PERIOD)
                 continue
             frame_at = self._contact.last_frame_at
             left = frame_at + latest - self._bus.now()
@@ -284,108 +265,10 @@ class Poller:
                 await self._be_heard()
             await self._bus.sleep(left if left > 0 else latest / 2)
 
-    def _pause(self, polled_at: float) -> float:
-        """Return how long to wait until the next poll, s."""
-        state = self._state
-        if self._waits_to_look:
-            # as soon as it was seen the rest is read
-            return _WATCH_PERIOD
-        if not state.contact.connected:
-            # a drive that stays silent costs its neighbours less and less
-            pause = min(_RECONNECT_PERIOD * self._failed_reconnects, _SLOWEST_RECONNECT)
-            pause = state.pause_before_timeout(pause, state.timeout.seconds)
-            # the life counter goes on, else the PLC takes the driver for dead
-            return min(pause, self._period) if self._contact.behind_plc else pause
-        pause = polled_at + self._period - self._bus.now()
-        # however low the poll rate, a motor that runs is watched, and so is one whose run
-        # command may still be active, for it would start when its fault ends
-        if self._may_restart:
-            return min(pause, _RESTART_WATCH_PERIOD)
-        watched = state.control.stopping or self._setpoint.following
-        return min(pause, _WATCH_PERIOD) if watched else pause
-
-    @property
-    def _waits_to_look(self) -> bool:
-        """It is lost, and gets no request but that of its stop."""
-        waits = self._controller is not None and self._controller.waits_to_look
-        return waits and not self._contact.behind_plc
-
-    @property
-    def _may_restart(self) -> bool:
-        """After a moment without power the motor would run again, as if nothing had been."""
-        return bool(self._state.model.profile.keeps_run) and self._setpoint.following
-
-    @property
-    def _priority(self) -> Priority:
-        """The priority of what a poll reads."""
-        urgent = self._may_restart and not self._contact.responsive
-        return Priority.LOOK if urgent else Priority.POLL
-
-    @property
-    def _period(self) -> float:
-        settings = self._state.settings
-        rate = settings.poll_rate
-        if settings.idle_poll_rate and self._is_idle:
-            rate = settings.idle_poll_rate
-        period = 1 / rate if rate else 0.0
-        if not self.active:
-            period = _INACTIVE_PERIOD
-        if self.yields:
-            period = max(period, _YIELDING_PERIOD)
-        state = self._state
-        for timeout in (state.timeout.seconds, state.plc_time):
-            if timeout:
-                period = min(period, timeout * _KEEP_ALIVE_SHARE)
-        return period
-
-    @property
-    def yields(self) -> bool:
-        """Whether it polls seldom while another drive's settings are first read."""
-        return self._bus.reads_another_first(self._unit) and self._is_idle
-
-    @property
-    def _is_idle(self) -> bool:
-        """The motor is at standstill, and nothing was begun that may change that."""
-        status = self._state.status
-        if self._state.control.stop_owed or status is None or status.driven:
-            return False
-        # a motor that coasts is not driven; what is not measured is NaN, and no greater than 0
-        measured = self._state.measurements
-        return not any(abs(value) > 0 for value in (measured.frequency, measured.speed))
-
     @property
     def _running(self) -> float:
         """The time, but for pauses of the worker, s."""
         return self._bus.now() - self._bus.paused
-
-    @property
-    def _may_start(self) -> bool:
-        """A motor at standstill may start by the next set-point."""
-        measured = self._state.measurements
-        return self._setpoint.following and 0 in (measured.frequency, measured.speed)
-
-    @property
-    def _rare_is_due(self) -> bool:
-        """What changes rarely is to be read again."""
-        period = max(_MODE_PERIOD, _MODE_TURNS * self._turn)
-        return self._bus.now() - self._rare_read_at > period
-
-    @property
-    def _slow_period(self) -> float:
-        """How old the values may be that not every poll reads, s."""
-        return max(_SLOW_PERIOD, _SLOW_TURNS * self._turn)
-
-    @property
-    def _code_holds(self) -> float:
-        """How long an inverter status counts while the status word stays the same, s."""
-        control = self._state.control
-        if control.stop_owed and not control.enabled:
-            # the driver waits for the status to change
-            return 0.0
-        if self._contact.missed_since_poll:
-            # it may have been switched off and on
-            return 0.0
-        return self._slow_period
 
     def _alarming(self, status: InverterStatus) -> bool:
         """Return whether a status may have to stop the motor."""
@@ -403,13 +286,13 @@ class Poller:
             # once: both words of a status are of one moment, so they are repeated together
             nonlocal received
             word, received = received, None
-            alarming, code_for = self._alarming, self._code_holds
+            alarming, code_for = self._alarming, self._plan.code_holds
             if word is not None:
                 return await state.reader.complete(
-                    word, self._priority, alarming=alarming, code_for=code_for
+                    word, self._plan.priority, alarming=alarming, code_for=code_for
                 )
             return await state.reader.read(
-                self._priority, retry=False, alarming=alarming, code_for=code_for
+                self._plan.priority, retry=False, alarming=alarming, code_for=code_for
             )
 
         paused = self._bus.paused
@@ -430,15 +313,11 @@ class Poller:
         state = self._state
         last = state.measurements.last(state.controlled).value
         status = await self._read_status()
-        rare = self._rare_is_due
-        every = rare and self._rare_reads % _ALL_SCALES == 0
-        # it can only change at standstill
-        due, started = rare or self._may_start, self._bus.now()
-        answered = due and await self._read_mode(status)
-        answered = answered and await self._check_scales(all_of_them=every)
-        if rare and answered:
-            self._rare_read_at = started
-            self._rare_reads += 1
+        reads, started = self._plan.reads, self._bus.now()
+        answered = reads.mode and await self._read_mode(status)
+        answered = answered and await self._check_scales(all_of_them=reads.every_scale)
+        if reads.is_regular and answered:
+            self._plan.rare_read(started)
         actual = state.controlled
         steady = True
         if actual is not None and not self._is_slow(actual):
@@ -446,7 +325,7 @@ class Poller:
             steady = abs(now - last) <= _STEADY * max(abs(now), abs(last))
         for role in _BASIC:
             age = self._bus.now() - state.measurements.last(role).at
-            due = age >= self._slow_period or not steady
+            due = age >= self._plan.slow_period or not steady
             if role is not actual and due and not self._is_slow(role):
                 await self._measure(role)
         if self._bus.paused == self._status_paused:
@@ -468,7 +347,7 @@ class Poller:
         keys = scales.keys if all_of_them else scales.of(target.key) if target else ()
         for key in keys:
             before = scales.found.get(key)
-            read = functools.partial(scales.read_one, key, self._priority)
+            read = functools.partial(scales.read_one, key, self._plan.priority)
             try:
                 now = await self._read(key, read, _TRIES)
             except Refused:
@@ -503,7 +382,7 @@ class Poller:
         try:
             tries = 1 if self._contact.is_failing(key) else _MEASURED_TRIES
             value = await self._read(
-                key, lambda: measurements.measure(key, self._priority, state.status), tries
+                key, lambda: measurements.measure(key, self._plan.priority, state.status), tries
             )
         except (PortError, Interrupted):
             # raised once only: the status that is read next would show a drive that was stopped
@@ -519,7 +398,7 @@ class Poller:
             return measurements.last(role).value
         measurements.note(role, value)
         if role in state.model.roles:
-            self._turn = self._running - self._requested_at
+            self._plan.measured(self._running - self._requested_at)
         return value
 
     async def _read_mode(self, status: InverterStatus) -> bool:
@@ -527,7 +406,7 @@ class Poller:
         state = self._state
         before = state.control_mode
         mode = await self._read(
-            MODE, lambda: state.read_control_mode(self._priority, retry=False), _TRIES
+            MODE, lambda: state.read_control_mode(self._plan.priority, retry=False), _TRIES
         )
         if mode not in (None, before) and self._controller:
             # before it is published: a set-point never has the unit of another mode
@@ -612,7 +491,7 @@ class Poller:
         state = self._state
         is_lost = self._contact.poll_failed(error)
         if not self._contact.connected:
-            self._failed_reconnects += 1
+            self._plan.connecting_failed()
             if isinstance(error, DriveError) and error.report != self._complaint:
                 # what keeps the drive from being used is reported once
                 self._complaint = error.report
