@@ -12,11 +12,11 @@ import math
 from nfo_sinus_driver.catalog.family import Family
 from nfo_sinus_driver.catalog.status import Fact, Kind, Meaning, State, StatusCode
 
-#: By so much a frequency has to fall, Hz: less is what it wobbles by.
-_FALL = 0.1
+#: By so much a frequency has to fall, Hz: a motor that keeps its speed shows no more.
+WOBBLE = 0.1
 #: A frequency that was seen to fall, and has not risen since, counts as falling so long, s: the
 #: slowest ramp, of 2000 s, falls by so much in 4 s.
-_FALLS_FOR = 5.0
+FALLS_WITHIN = 5.0
 #: Of what has not happened: when it began, and when it was over.
 NEVER = (-math.inf, -math.inf)
 #: Stands for an inverter status that has not been read; no drive has it.
@@ -69,7 +69,7 @@ class InverterStatus:
             crest, fell = (size, self.at), NEVER
         elif size == crest[0]:
             crest = size, self.at
-        elif size < crest[0] - _FALL:
+        elif size < crest[0] - WOBBLE:
             crest, fell = (size, self.at), (crest[1], self.at)
         return replace(self, frequency=frequency, crest=crest, fell=fell)
 
@@ -197,7 +197,7 @@ class InverterStatus:
         """It runs on a command from the bus, and may not be on its way to a stop."""
         # without a status word nothing distinguishes a stop from a lower reference
         may_stop = self.word is None and self.means(Meaning.SLOWING)
-        falls = self.fell[1] >= self.at - _FALLS_FOR
+        falls = self.fell[1] >= self.at - FALLS_WITHIN
         slows = self.by_frequency and (self.frequency == 0 or falls)
         return self.runs_by_bus and not may_stop and not slows
 

@@ -1244,7 +1244,7 @@ LAWS = (
         2,
         'a motor that does not slow down without set-points goes on',
         'FollowingCheck._goes_on',
-        'return self._after_expiry.take(abs(frequency), at)',
+        'return self._after_expiry.has_ended(abs(frequency), at)',
         'return False',
         (MOTOR_FOLLOWS,),
     ),

@@ -12,6 +12,7 @@ from nfo_sinus_driver.bus import Cancelled
 from nfo_sinus_driver.catalog import Fact, InverterStatus, Kind, Meaning, State
 from nfo_sinus_driver.drive.known.drive_state import SHORTEST_POWER_OFF, DriveState
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.drive.known.movement import FALL_AFTER_SILENCE
 from nfo_sinus_driver.link import (
     GatewayFault,
     GatewayLate,
@@ -148,11 +149,11 @@ def explain_fall(
     if state.plc_time:
         # the PLC answers all the time, and a drive that is back may catch a coasting motor
         silent = away >= _LIFE_STOOD + state.contact.usual_interval
-        most = min(was - _LEAST_FALL, was * _CAUGHT)
+        most = min(was - FALL_AFTER_SILENCE, was * _CAUGHT)
     else:
         silent, most = state.contact.missed_before_poll and away >= SHORTEST_POWER_OFF, was / 2
     # where the frequency is not read with the status, it is NaN and does not fall
-    if not (silent and was >= _LEAST_FALL and abs(status.frequency) < most):
+    if not (silent and was >= FALL_AFTER_SILENCE and abs(status.frequency) < most):
         return None
     return state.report(
         Cause.SLOWER_AFTER_SILENCE,
@@ -167,8 +168,6 @@ def explain_fall(
 _LIFE_STOOD = 0.2
 #: A motor that is caught turns at no more than this share of its speed before.
 _CAUGHT = 0.95
-#: A smaller fall of the frequency may be a fluctuation, Hz.
-_LEAST_FALL = 0.5
 #: How long a condition has to be absent before it is reported again, s.
 _AGAIN_AFTER = 10.0
 

@@ -12,8 +12,8 @@ from typing import Protocol
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Fact, Family, InverterStatus, Role
 from nfo_sinus_driver.catalog.status import FREQUENCY, SPEED
-from nfo_sinus_driver.drive.known.direction import Direction
 from nfo_sinus_driver.drive.known.events import Cause, Severity
+from nfo_sinus_driver.drive.known.movement import Direction
 from nfo_sinus_driver.drive.known.parameter_access import ParameterAccess
 from nfo_sinus_driver.drive.known.snapshot import NOT_MEASURED, Measured
 

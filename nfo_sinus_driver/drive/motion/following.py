@@ -12,17 +12,16 @@ from nfo_sinus_driver.catalog import Fact, Meaning
 from nfo_sinus_driver.catalog.status import FREQUENCY, SPEED
 from nfo_sinus_driver.drive.known.drive_state import DriveState
 from nfo_sinus_driver.drive.known.events import Cause, Report, Severity
+from nfo_sinus_driver.drive.known.movement import (
+    FALLS_WITHIN,
+    STANDS_FOR,
+    STANDSTILL,
+    STEP,
+    Fall,
+    Standing,
+)
 from nfo_sinus_driver.drive.motion.setpoint import NO_TURN, Setpoint, sign
 
-#: How much a frequency has to fall, Hz, and within how long, s: the slowest ramp, of 2000 s, falls
-#: by 0.1 in 4 s, and no drive shows it in greater steps.
-_FALL = 0.04
-_FALLS_WITHIN = 5.0
-#: A slower motor stands still, or its frequency fluctuates, Hz.
-_STANDSTILL = 0.5
-#: How long a motor may stand against its set-points where no status shows whether it has a run
-#: command, s: at the slowest ramp of 600 s it has begun to turn by then.
-_STANDS_FOR = 2.0
 #: From here on a motor counts as turning backwards, Hz: slip and measuring errors show less.
 _BACKWARDS = 2.0
 #: How long a drive may take to begin to follow another set-point, s.
@@ -47,20 +46,6 @@ _STEADY_FOR, _STEADY = 8.0, 0.1
 _COMPARED = {FREQUENCY.mode: (FREQUENCY.role, 1.0), SPEED.mode: (SPEED.role, 30.0)}
 
 
-class _DecelerationCheck:
-    """A frequency or speed that ought to fall."""
-
-    def __init__(self) -> None:
-        self.least = math.inf
-        self._fell_at = math.inf
-
-    def take(self, size: float, at: float, wobble: float = _FALL) -> bool:
-        """Take a size; return whether it has not fallen for longer than any ramp takes."""
-        if size < self.least - wobble:
-            self.least, self._fell_at = size, at
-        return at - self._fell_at > _FALLS_WITHIN
-
-
 class _Shown(NamedTuple):
     """What a status shows; the speed in Hz, whatever its direction."""
 
@@ -82,14 +67,14 @@ class FollowingCheck:
 
     def begin(self) -> None:
         """Begin again."""
-        self._after_expiry = _DecelerationCheck()
-        self._backwards = _DecelerationCheck()
-        self._beyond = _DecelerationCheck()
+        self._after_expiry = Fall()
+        self._backwards = Fall()
+        self._beyond = Fall()
         #: The direction of all recent set-points; 0: none, or both.
         self._direction = 0
         self._wrong_polls = 0
-        #: Since when the motor stands, s.
-        self._stands_since = math.inf
+        #: Against its set-points.
+        self._standing = Standing()
         #: The speed from which the drive slows it down, below its set-points.
         self._falls_from = 0.0
         self._reported = self._scale_reported = False
@@ -129,7 +114,7 @@ class FollowingCheck:
         turning = self._state.measurements.turning
         now = frequency / turning.hertz
         return cause and self._state.report(
-            cause, now=now, unit=turning.unit, seconds=_FALLS_WITHIN
+            cause, now=now, unit=turning.unit, seconds=FALLS_WITHIN
         )
 
     def _has_not_changed(self, frequency: float, at: float, unit: float) -> bool:
@@ -153,19 +138,19 @@ class FollowingCheck:
                 self._stale, self._stale_turn = before if must else None, turn
         stale = self._stale
         limited = status.means(Meaning.CURRENT_LIMIT) or Fact.LIMIT_ACTIVE in status.facts
-        changed = stale is None or stale[:2] != shown[:2] or abs(stale.size - shown.size) > _FALL
+        changed = stale is None or stale[:2] != shown[:2] or abs(stale.size - shown.size) > STEP
         if stale is None or changed or limited:
             self._stale = None
             return False
         # what has ceased is looked at for itself
-        return not self._setpoint.ceased and at - self._stale_turn.at > _FALLS_WITHIN
+        return not self._setpoint.ceased and at - self._stale_turn.at > FALLS_WITHIN
 
     def _goes_on(self, frequency: float, at: float) -> bool:
         """Return whether it does not slow down, although set-points have ceased and 0 is due."""
-        if not self._setpoint.ceased or not abs(frequency) > _STANDSTILL:
-            self._after_expiry = _DecelerationCheck()
+        if not self._setpoint.ceased or not abs(frequency) > STANDSTILL:
+            self._after_expiry = Fall()
             return False
-        return self._after_expiry.take(abs(frequency), at)
+        return self._after_expiry.has_ended(abs(frequency), at)
 
     def _stands(self, frequency: float, at: float) -> bool:
         """
@@ -174,13 +159,11 @@ class FollowingCheck:
         A motor that passes standstill on its way to the other direction stands for a moment.
         """
         status = self._state.status
-        if status is None or status.runs or not status.may_run or frequency != 0:
-            self._stands_since = math.inf
-            return False
-        self._stands_since = min(self._stands_since, at)
-        least, most = self._setpoint.range_since(at - _STANDS_FOR)
+        hidden = status is not None and status.may_run and not status.runs
+        since = self._standing.note(at, hidden and frequency == 0)
+        least, most = self._setpoint.range_since(at - STANDS_FOR)
         wanted = max(least, -most) * self._state.measurements.turning.hertz
-        return wanted > _STANDSTILL and at - self._stands_since > _STANDS_FOR
+        return wanted > STANDSTILL and at - since > STANDS_FOR
 
     def _turns_back(self, frequency: float, at: float, least: float, most: float) -> bool:
         """
@@ -197,12 +180,12 @@ class FollowingCheck:
             direction = -1
         if direction != self._direction:
             # a motor that ramps down from the other direction has not begun at standstill
-            self._direction, self._backwards, self._wrong_polls = direction, _DecelerationCheck(), 0
+            self._direction, self._backwards, self._wrong_polls = direction, Fall(), 0
         if not direction:
             return False
         back = -direction * frequency
-        endless = self._backwards.take(max(back, 0.0), at)
-        begun = self._backwards.least < _STANDSTILL
+        endless = self._backwards.has_ended(max(back, 0.0), at)
+        begun = self._backwards.least < STANDSTILL
         self._wrong_polls = self._wrong_polls + 1 if back > _BACKWARDS and (begun or endless) else 0
         # one impossible value stops no motor
         return self._wrong_polls > 1
@@ -230,9 +213,9 @@ class FollowingCheck:
         """Report a motor that turns faster than its set-point, and write that again."""
         size, margin = abs(value), _BEYOND_BY * unit
         if not size > most * (1 + _BEYOND) + margin:
-            self._beyond, self._reported = _DecelerationCheck(), False
+            self._beyond, self._reported = Fall(), False
             return
-        endless = self._beyond.take(size, at, _FALL * unit)
+        endless = self._beyond.has_ended(size, at, STEP * unit)
         if self._reported or not (endless or size > self._beyond.least + margin):
             return
         self._reported = True

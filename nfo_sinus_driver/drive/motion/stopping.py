@@ -18,6 +18,7 @@ from nfo_sinus_driver.drive.known.control_state import ControlEvent
 from nfo_sinus_driver.drive.known.diagnosis import report_of
 from nfo_sinus_driver.drive.known.drive_state import DriveState
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report, Severity
+from nfo_sinus_driver.drive.known.movement import RAMP_SHOWS_BY, STANDSTILL, Standing
 from nfo_sinus_driver.drive.known.steps import run_steps
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, NoData, PortError, Refused
 
@@ -37,13 +38,9 @@ _COMPLAINT_PERIOD = 5.0
 _LONGEST_COMPLAINT_PERIOD = 60.0
 #: After how many stops in a row without an answer the drive is tried with other requests.
 _UNANSWERED_BEFORE_FORCE = 3
-#: The slowest ramp, of 2000 s, shows in the frequency by then, s, however coarse that is.
-_RAMP_SHOWS_BY = 7.0
 #: How long a motor that was released may show its speed without a fall, s, until it is reported
 #: that this is not clear.
 _CLEAR_BY = 2.0
-#: A slower motor stands still, or what is measured fluctuates, Hz.
-_STANDSTILL = 0.5
 #: How long a drive may go on showing its run command at standstill, s, its braking not counted.
 _SHOWN_FOR = 1.5
 _NO_ANSWER_YET = Report(Cause.NO_ANSWER_YET)
@@ -135,8 +132,8 @@ class StopSequence:
         #: From when on a drive that has taken it and does not confirm it is stopped by force, and
         #: when one has first taken that.
         self._force_at = self._forced_at = math.inf
-        #: When it was first seen that the motor stands and the run command does, too.
-        self._stood_at = math.inf
+        #: While the run command does, too.
+        self._standing = Standing()
         #: How long the drive may go on showing that, s.
         self.shown_for = _SHOWN_FOR
         #: The last status with a speed since the stop.
@@ -152,7 +149,7 @@ class StopSequence:
     @property
     def coasts(self) -> bool:
         """The last stop left a motor that still turned when its speed was measured last."""
-        return self._measured is not None and abs(self._measured.frequency) > _STANDSTILL
+        return self._measured is not None and abs(self._measured.frequency) > STANDSTILL
 
     @property
     def waits(self) -> bool:
@@ -195,7 +192,8 @@ class StopSequence:
             self._begun_at = self._bus.now()
             self._tried_at = -math.inf
             self._unconfirmed = _NO_ANSWER_YET
-            self._sent_at = self._force_at = self._forced_at = self._stood_at = math.inf
+            self._sent_at = self._force_at = self._forced_at = math.inf
+            self._standing = Standing()
             self._measured = self.unclear = None
             self._refusals = self._unanswered = self._ignored = 0
             self.forced = False
@@ -549,14 +547,15 @@ class StopSequence:
         if failure is not None:
             # the line may have come back only after the first one
             return self._ignored > 1
-        shows_at = min(self._sent_at + _RAMP_SHOWS_BY, self._force_at)
+        shows_at = min(self._sent_at + RAMP_SHOWS_BY, self._force_at)
         ramps = status.driven and not status.ramp_hidden
         if status.by_frequency and ramps and not status.keeps_running:
             # set-point 0 leads it to standstill, whatever the run command does
             shows_at = self._force_at
         if status.stands_running:
             # it may be braked first, or magnetised for a while
-            shows_at = max(shows_at, self._stands_since(status) + self.shown_for)
+            stands_since = self._standing.note(status.at, status.stands_running)
+            shows_at = max(shows_at, stands_since + self.shown_for)
         # a status from before, kept by a PLC, does not show whether the motor ramps down
         return status.at > self._sent_at and self._bus.now() >= shows_at
 
@@ -643,9 +642,4 @@ class StopSequence:
         # on its ramp it shows a run, too
         braking = await self._state.read_stop_braking()
         self.shown_for = _SHOWN_FOR + braking
-        return status.at >= self._stands_since(status) + braking
-
-    def _stands_since(self, status: InverterStatus) -> float:
-        """Return when the motor was first seen to stand while a run was shown; infinite: never."""
-        self._stood_at = min(self._stood_at, status.at) if status.stands_running else math.inf
-        return self._stood_at
+        return status.at >= self._standing.note(status.at, status.stands_running) + braking
