@@ -80,7 +80,8 @@ def _statuses() -> dict[str, DiagnosticStatus]:
     found: dict[str, DiagnosticStatus] = {}
 
     def take(array: DiagnosticArray) -> None:
-        found.update({one.name: one for one in array.status if one.name.endswith(_ENDS)})
+        of_driver = [status for status in array.status if status.name.endswith(_ENDS)]
+        found.update({status.name: status for status in of_driver})
 
     context = Context()
     rclpy.init(context=context)

@@ -74,7 +74,7 @@ _QOS = {
     BusStatistics: RELIABLE,
     ErrorLogEntry: KEPT,
 }
-_TYPES = {f'nfo_sinus_msgs/msg/{one.__name__}': one for one in _QOS}
+_TYPES = {f'nfo_sinus_msgs/msg/{message_type.__name__}': message_type for message_type in _QOS}
 _TRIGGER = 'std_srvs/srv/Trigger'
 #: The name while it is not known yet which node a publisher belongs to.
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'
@@ -261,7 +261,7 @@ class GraphSource:
 
     def _look_around(self, now: float) -> None:
         for topic, types in self._node.get_topic_names_and_types():
-            type_ = next((_TYPES[one] for one in types if one in _TYPES), None)
+            type_ = next((_TYPES[offered] for offered in types if offered in _TYPES), None)
             if type_ is None:
                 continue
             for publisher in self._node.get_publishers_info_by_topic(topic):
@@ -357,7 +357,7 @@ class GraphSource:
                 if answer.success:
                     # earlier calls, which will perhaps never be answered, are settled by it
                     self._failed.pop(call.who, None)
-                    waiting = [one for one in waiting if one.who != call.who]
+                    waiting = [earlier for earlier in waiting if earlier.who != call.who]
                     self._note(Level.INFO, call.who, f'{call.service}: {answer.message}')
                 else:
                     self._fail(call.who, f'{call.service}: {answer.message}')
@@ -394,7 +394,8 @@ def _drive_view(node: _DriverNode, now: float) -> DriveView:
     measured = Measured()
     fresh = max(_GONE_AFTER, 2 * node.telemetry_gap)
     if node.telemetry is not None and now - node.telemetry_at <= fresh:
-        values = {one.name: getattr(node.telemetry, one.name) for one in fields(Measured)}
+        names = [quantity.name for quantity in fields(Measured)]
+        values = {name: getattr(node.telemetry, name) for name in names}
         measured = Measured(**values)
     return DriveView(
         node.name,

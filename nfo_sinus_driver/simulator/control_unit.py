@@ -56,7 +56,8 @@ class Variant:
     def options(cls) -> tuple[Option, ...]:
         """Return what can be chosen."""
         return tuple(
-            Option(one.name, one.metadata['text'], one.metadata['choices']) for one in fields(cls)
+            Option(declared.name, declared.metadata['text'], declared.metadata['choices'])
+            for declared in fields(cls)
         )
 
 

@@ -185,7 +185,7 @@ class Line(Wire):
 
     def _free(self, address: int) -> float:
         """Return when a drive that has answers on their way may begin the next, a new frame."""
-        ends = (one.at for one in self._deliveries if one.answer.address == address)
+        ends = (delivery.at for delivery in self._deliveries if delivery.answer.address == address)
         return max(ends, default=float('-inf')) + self.timing.t35
 
     def _schedule(self, at: float, answer: _Answer, until: int) -> None:

@@ -160,7 +160,7 @@ class RegisterMap:
         if 'bit' in node:
             return 0, 1 << node.integer('bit')
         if 'bits' in node:
-            low, high = (int(one.scalar or 0) for one in node['bits'].items)
+            low, high = (int(item.scalar or 0) for item in node['bits'].items)
             return low, ((1 << max(high - low + 1, 0)) - 1) << low
         return 0, node.integer('mask', WORD)
 
@@ -172,7 +172,7 @@ class RegisterMap:
         inverted = 'except' in node
         listed = node.get('except') if inverted else node.get('values')
         numbers = [node.get('value'), *listed.items]
-        raw = [int(one.scalar) for one in numbers if isinstance(one.scalar, int)]
+        raw = [int(item.scalar) for item in numbers if isinstance(item.scalar, int)]
         values = {(value & WORD) << shift for value in raw}
         outside = [value for value in values if value & ~mask]
         if outside:
@@ -218,8 +218,8 @@ class RegisterMap:
     def status(self, conditions: Iterable[PlacedCondition], block: Node) -> StatusPlace:
         """Return where the status stands, with a parameter that reads it as one."""
         found = list(conditions)
-        wanted = {one.register for one in found}
-        if any(one.coil for one in found):
+        wanted = {condition.register for condition in found}
+        if any(condition.coil for condition in found):
             return self._coils(found, block)
         if 'register' in block:
             first = self.register(block['register'])
@@ -253,14 +253,15 @@ class RegisterMap:
         )
         name = f'status (register {self.written(first[0])})'
         self.made[STATUS_KEY] = internal(STATUS_KEY, name, address, Access.READ)
-        return StatusPlace(tuple(one for run in blocks for one in run), inputs=self._inputs)
+        registers = tuple(register for run in blocks for register in run)
+        return StatusPlace(registers, inputs=self._inputs)
 
     def _coils(self, conditions: Sequence[PlacedCondition], block: Node) -> StatusPlace:
-        if not all(one.coil for one in conditions):
+        if not all(condition.coil for condition in conditions):
             self._problems.add(
                 block.line, 'the status stands in registers and in coils: only one of both is read'
             )
-        coils = [one.register for one in conditions if one.coil]
+        coils = [condition.register for condition in conditions if condition.coil]
         first = min(coils)
         count = 16 if max(coils) - first < 16 else 32
         if max(coils) - first >= count:
@@ -269,7 +270,7 @@ class RegisterMap:
         address = Address('modbus', 'coil', first, None, codec, Fraction(1), '')
         name = f'status (coil {first + self._coil_numbering})'
         self.made[STATUS_KEY] = internal(STATUS_KEY, name, address, Access.READ)
-        registers = [one.register for one in conditions]
+        registers = [condition.register for condition in conditions]
         return StatusPlace((*range(first, first + count), *registers), coils=True)
 
     # --- values ---
@@ -318,7 +319,7 @@ class RegisterMap:
     def _with_bits(self, node: Node, what: str, codec: str, *, writable: bool) -> str:
         if 'bits' not in node:
             return codec
-        low, high = (int(one.scalar or 0) for one in node['bits'].items)
+        low, high = (int(item.scalar or 0) for item in node['bits'].items)
         if not codec.startswith('uint') or not low <= high < codec_of(codec).size * 8:
             self._problems.add(node.line, f'{what} has no bits {low} to {high}')
             return codec

@@ -65,9 +65,9 @@ class BusContext:
 
     def stop_beside(self, names: Collection[str], why: Report) -> None:
         """Stop the motors of drives because another one stops; called on the bus."""
-        for one in self.drives:
-            if one.name in names:
-                one.drive.stop_beside(why)
+        for managed in self.drives:
+            if managed.name in names:
+                managed.drive.stop_beside(why)
 
     def subscribe(
         self, node: Node, topics: Mapping[str, tuple[type, Callable[[Any, Origin], None]]]

@@ -126,7 +126,7 @@ class DriveParameters:
         Read-only ones with the value of the drive are left out: so a dump can be loaded.
         """
         coerced = [self._coerced(parameter) for parameter in parameters]
-        return [one for one in coerced if not self._is_read_only(one.name)]
+        return [parameter for parameter in coerced if not self._is_read_only(parameter.name)]
 
     def _is_read_only(self, name: str) -> bool:
         drive = self._drive
@@ -163,7 +163,11 @@ class DriveParameters:
         drive = self._drive
         if drive is None or self._outside != threading.get_ident():
             return ()
-        wanted = {one.name: one.value for one in parameters if one.name in self._declared}
+        wanted = {
+            parameter.name: parameter.value
+            for parameter in parameters
+            if parameter.name in self._declared
+        }
         return self._change(drive, wanted) if wanted else ()
 
     def put_back(self, changes: Sequence[ParameterChange]) -> None:

@@ -127,7 +127,9 @@ class DeclaredControlUnit(ControlUnit):
         drive, get = self._drive, self.memory.get
         if drive.holder is not None and get(drive.holder[0]) not in drive.holder[1]:
             return False
-        return not self.local and all(get(one.key) == one.value for one in drive.requires)
+        return not self.local and all(
+            get(required.key) == required.value for required in drive.requires
+        )
 
     # ---- what it shows ----
 
@@ -179,7 +181,7 @@ class DeclaredControlUnit(ControlUnit):
             if name in drive.facts
         ]
         wishes += [
-            (condition, is_fault and one.code == fault, 10) for condition, one in drive.flags
+            (condition, is_fault and flag.code == fault, 10) for condition, flag in drive.flags
         ]
         for order in self._orders.values():
             if order.shows is not None:
@@ -221,7 +223,8 @@ class DeclaredControlUnit(ControlUnit):
     def trip(self, code: int, *, cause_present: bool = False) -> None:
         """Let a fault happen, or a warning (ValueError: the drive cannot show it)."""
         if self.memory.model.status_code(code).kind is Kind.FAULT and not self._can_show(code):
-            known = ', '.join(str(drive_number(one)) for one in (*self._drive.faults, *self._flags))
+            listed = (*self._drive.faults, *self._flags)
+            known = ', '.join(str(drive_number(fault)) for fault in listed)
             raise ValueError(f'its status cannot show fault {code}: its file has {known}')
         super().trip(code, cause_present=cause_present)
 
@@ -326,7 +329,7 @@ class DeclaredControlUnit(ControlUnit):
         if self._time_out and self._silent_for > self._time_out and (self._run or self.faults):
             self._silent_for = 0.0
             self._run = False
-            lost = [one.code for one in self._drive.faults.values() if one.line]
+            lost = [fault.code for fault in self._drive.faults.values() if fault.line]
             if lost and not self.faults:
                 self.trip(lost[0])
             self.settle()

@@ -58,7 +58,7 @@ class Server(modbus.Requests):
     def read(self, register: int, count: int) -> tuple[int, ...]:
         """Read registers, whatever stands in them; one that is none is refused."""
         self._check_count(count)
-        return tuple(self._word(one) for one in range(register, register + count))
+        return tuple(self._word(number) for number in range(register, register + count))
 
     def _word(self, register: int) -> int:
         status = self._file.status

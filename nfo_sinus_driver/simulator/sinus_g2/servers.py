@@ -276,7 +276,7 @@ class CanopenServer(canopen.Server):
 
     def entries(self) -> Entries:
         """Return the parameters and the error log."""
-        found = {(index, sub): self._entry(one) for index, sub, one in self._places()}
+        found = {(index, sub): self._entry(place) for index, sub, place in self._places()}
         arrays = {index for index, sub in found if sub} - {index for index, sub in found if not sub}
         for index in arrays:
             most = max(sub for other, sub in found if other == index)
