@@ -112,11 +112,11 @@ def _node(random: Random, frames: int) -> None:
         identifier = random.choice((0x601, 0x601, 0x601, 0x000, 0x701, 0x77F, 0x602))
         frame = Frame(identifier, data, random.random() < 0.1)
         said = [*node.act(now), *node.receive(frame, now)]
-        answers = [one for one in said if one.identifier == 0x580 + _NODE]
-        others = {one.identifier for one in said} - {0x580 + _NODE}
+        answers = [heard for heard in said if heard.identifier == 0x580 + _NODE]
+        others = {heard.identifier for heard in said} - {0x580 + _NODE}
         assert others <= {0x080 + _NODE, 0x700 + _NODE}, f'frames of no known kind: {others}'
         asked = identifier == 0x600 + _NODE and not frame.remote
-        assert len(answers) <= asked and all(len(one.data) == 8 for one in answers)
+        assert len(answers) <= asked and all(len(heard.data) == 8 for heard in answers)
         for answer in answers:
             if data[0] >> 5 in (1, 2):
                 assert answer.data[1:4] == data[1:4], 'an answer about another object'

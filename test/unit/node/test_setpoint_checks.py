@@ -19,7 +19,7 @@ Given = tuple[float, Origin, float]
 def noticed(messages: Iterable[Given]) -> set[str]:
     """The topics that are named while messages come in, each with its time and its value."""
     sources, found = Sources(), set[str]()
-    for now, origin, value in sorted(messages, key=lambda one: one[0]):
+    for now, origin, value in sorted(messages, key=lambda message: message[0]):
         found |= sources.take(origin, value, now)
     return found
 
