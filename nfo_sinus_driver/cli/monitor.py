@@ -259,7 +259,7 @@ class LineSource:
         self._closing.set()
         self._thread.join(_LAST_READING)
 
-    def look(self) -> Picture:
+    def next_picture(self) -> Picture:
         """Return what was read last."""
         notes = [self._notes.get() for _ in range(self._notes.qsize())]
         now = time.monotonic()

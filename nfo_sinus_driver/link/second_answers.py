@@ -124,7 +124,7 @@ class SecondAnswers:
         """Return whether no silence helps: what a unit reports is not believed."""
         return self.silence(unit, now) > 0.0 and self._units[unit].failures >= _GIVES_UP
 
-    def take(self, unit: int, frame: bytes, now: float, message: bytes = b'') -> bool:
+    def take_frame(self, unit: int, frame: bytes, now: float, message: bytes = b'') -> bool:
         """Return whether a frame that answers no open request is a second answer; note it."""
         record = self._units.get(unit)
         if record is None or not record.recent:

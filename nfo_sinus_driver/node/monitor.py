@@ -102,7 +102,7 @@ class _Topics:
         """Return whether there is a topic of a type."""
         return any(known is type_ for known, _ in self._subscriptions)
 
-    def take(self) -> Iterator[Any]:
+    def take_messages(self) -> Iterator[Any]:
         """Return the messages since the last call, oldest of each topic first."""
         for subscription in self._subscriptions.values():
             while True:
@@ -210,14 +210,14 @@ class GraphSource:
 
     # --- as a source of pictures --------------------------------------------------------------
 
-    def look(self) -> Picture:
+    def next_picture(self) -> Picture:
         """Return what the nodes have published."""
         now = time.monotonic()
         if now - self._looked_around_at >= _DISCOVERY_PERIOD:
             self._looked_around_at = now
             self._look_around(now)
         for node in self._driver_nodes.values():
-            for message in node.topics.take():
+            for message in node.topics.take_messages():
                 self._take(node, message, now)
         self._read_log(now)
         self._send_stops(now)
@@ -313,7 +313,8 @@ class GraphSource:
             self._note(Level.WARNING, node.name, text, stamp or math.nan)
 
     def _read_log(self, now: float) -> None:
-        self._log_lines += [(now, line) for line in self._rosout.take() if line.level in _LEVELS]
+        lines = self._rosout.take_messages()
+        self._log_lines += [(now, line) for line in lines if line.level in _LEVELS]
         names = {name.lstrip('/').replace('/', '.'): name for name in self._driver_nodes}
         waiting = []
         for came_at, line in self._log_lines:

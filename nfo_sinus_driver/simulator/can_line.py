@@ -118,7 +118,7 @@ class CanLine(Wire):
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that were read at ``now``."""
-        for said in self._adapter.take(data):
+        for said in self._adapter.take_bytes(data):
             if isinstance(said, Frame):
                 # every node that has power acknowledges it, also one that is not meant
                 sent = self._carries(now) and any(drive.listening for drive in self._drives)

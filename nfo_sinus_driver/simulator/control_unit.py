@@ -190,7 +190,7 @@ class ControlUnit(abc.ABC):
         """How long it is set to wait before it answers (s)."""
         return 0.0
 
-    def heard(self) -> None:
+    def note_frame(self) -> None:
         """Record that a valid frame for this drive arrived."""
 
     # ---- for tests and people ----

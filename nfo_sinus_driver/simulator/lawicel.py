@@ -60,7 +60,7 @@ class Adapter:
 
     # ---- from the computer ----
 
-    def take(self, data: bytes) -> Iterator[bytes | Frame]:
+    def take_bytes(self, data: bytes) -> Iterator[bytes | Frame]:
         """
         Take bytes from the computer.
 

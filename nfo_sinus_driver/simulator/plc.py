@@ -299,7 +299,7 @@ class Unit:
         return True
 
     @staticmethod
-    def heard() -> None:
+    def note_frame() -> None:
         """Record a frame; it means nothing to a PLC, its program watches the life counter."""
 
     def advance_to(self, now: float) -> None:

@@ -158,7 +158,7 @@ class Layout:
     """
     What a source reports, as rows for a screen of any size, and what the keys do.
 
-    :param source: asked by :meth:`look`, which should be called every :data:`PERIOD`.
+    :param source: asked by :meth:`take_picture`, which should be called every :data:`PERIOD`.
     """
 
     def __init__(self, source: Source) -> None:
@@ -174,9 +174,9 @@ class Layout:
         self._notes: deque[Note] = deque(maxlen=_MOST_NOTES)
         self._quantities = list(_QUANTITIES)
 
-    def look(self) -> None:
+    def take_picture(self) -> None:
         """Take the next picture."""
-        self._picture = picture = self._source.look()
+        self._picture = picture = self._source.next_picture()
         self._drives = sorted(picture.drives, key=lambda drive: natural(drive.name))
         for drive in self._drives:
             past = self._history.setdefault(drive.name, deque(maxlen=_REMEMBERED))

@@ -42,11 +42,11 @@ def _adapter(random: Random, frames: int) -> None:
             else:
                 stream += line
         adapter = Adapter()
-        list(adapter.take(_REOPEN))
+        list(adapter.take_bytes(_REOPEN))
         found: list[Frame] = []
         answered = 0
         for piece in mutator.pieces(stream):
-            for said in adapter.take(piece):
+            for said in adapter.take_bytes(piece):
                 if isinstance(said, Frame):
                     found.append(said)
                     said = adapter.tried(said, sent=True)
@@ -55,7 +55,7 @@ def _adapter(random: Random, frames: int) -> None:
         right = list(_frames_of(lines))
         assert found == right, f'{found} instead of {right}'
         assert answered == sum(line != b'' for line in lines), 'a line has one answer'
-        list(adapter.take(_REOPEN))
+        list(adapter.take_bytes(_REOPEN))
         assert adapter.on_bus(125_000), 'it does not come back'
 
 

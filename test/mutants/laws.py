@@ -741,7 +741,7 @@ LAWS = (
     Mutant(
         8,
         'a segment that is repeated is taken twice',
-        'Transfer.take',
+        'Transfer.take_message',
         '            if message[0] & _TOGGLE != self._toggle:',
         '            if False:',
         ('test_sdo.py',),
@@ -861,7 +861,7 @@ LAWS = (
     Mutant(
         2,
         'a setting of a described drive is its run command',
-        'Registers.take',
+        'Registers.note_use',
         '                if not together and ',
         '                if False and ',
         ('test_descriptions.py', '-k', 'exclude_each_other'),

@@ -320,7 +320,7 @@ class _Reader:
             read_key = SETPOINT_READ_KEY
             index, line = self._map.register(node['read_register']), node['read_register'].line
             count = address.codec.size // 2
-            self._map.registers.take(Use.VALUE, what, line, 'register', index, count)
+            self._map.registers.note_use(Use.VALUE, what, line, 'register', index, count)
             shifted = replace(address, index=index)
             name = f'set-point (register {node["read_register"].written})'
             made[read_key] = settings.scaled(

@@ -134,7 +134,7 @@ class RegisterMap:
         # a whole word may be a value as well, and its highest bit the sign of one
         if mask not in (WORD, _SIGN):
             space = 'coil' if coil else self._status_space
-            self.registers.take(Use.BITS, what, node.line, space, number)
+            self.registers.note_use(Use.BITS, what, node.line, space, number)
         return PlacedCondition(number, coil, mask, values, inverted, node.line)
 
     def _bits(
@@ -189,7 +189,7 @@ class RegisterMap:
         register, count = self.register(node), len(words)
         for number, word in enumerate(words, register):
             use = Use.COMMAND if word else Use.ZERO
-            self.registers.take(use, what, node.line, 'register', number)
+            self.registers.note_use(use, what, node.line, 'register', number)
         key = f'line.r{register:04x}' + (f'_{count}' if count > 1 else '')
         self._make(key, self._writes, register, f'uint{16 * count}_be', f'register {node.written}')
         return key
@@ -197,7 +197,7 @@ class RegisterMap:
     def coil_key(self, what: str, node: Node) -> str:
         """Return the key of a coil."""
         coil = self.coil(node)
-        self.registers.take(Use.COMMAND, what, node.line, 'coil', coil)
+        self.registers.note_use(Use.COMMAND, what, node.line, 'coil', coil)
         key = f'line.coil_{coil}'
         self._make(key, 'coil', coil, 'uint8', f'coil {node.written}')
         return key
@@ -286,7 +286,7 @@ class RegisterMap:
             )
         if 'coil' in node:
             coil = self.coil(node['coil'])
-            self.registers.take(use, what, node.line, 'coil', coil)
+            self.registers.note_use(use, what, node.line, 'coil', coil)
             return Address('modbus', 'coil', coil, None, codec_of('uint8'), factor, '')
         if 'register' not in node:
             self._problems.add(node.line, f'{what} says not where: add register or coil')
@@ -303,7 +303,7 @@ class RegisterMap:
         if space == 'input' and writable:
             self._problems.add(node.line, f'{what}: an input register cannot be written')
         if 'bits' not in node:
-            self.registers.take(use, what, node.line, space, register, made.size // 2)
+            self.registers.note_use(use, what, node.line, space, register, made.size // 2)
         return Address('modbus', space, register, None, made, factor, '')
 
     def _check_wide(self, node: Node, what: str, register: int, *, writable: bool) -> None:

@@ -191,7 +191,7 @@ class ForeignModbus:
         requests = self._open_requests.pop(unit, ())
         return [kind for request in requests for kind in _kinds(request.message)]
 
-    def hear(self, data: bytes, now: float) -> bool:
+    def hear_bytes(self, data: bytes, now: float) -> bool:
         """Take bytes that are no answer to us; those of no frame are kept for a while."""
         if now > self._heard_at + self._response_timeout:
             self._rest += self._take_buffer()

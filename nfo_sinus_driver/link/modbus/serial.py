@@ -293,7 +293,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             # a request of another master may be in it, and its answer still to come
             until = now + self._late.longest(request.unit)
             while data := self._listen(until):
-                self._another.hear(data, self._now())
+                self._another.hear_bytes(data, self._now())
             super()._await_gap(request)
         return stray or second
 
@@ -342,12 +342,12 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             self.pauses.answered(request.unit, type(request), self._now())
             if refused:
                 length = len(reader.frame) * self._settings.char_time
-                self._late.note(request, reader.frame, self._now(), length)
+                self._late.note_reply(request, reader.frame, self._now(), length)
             raise
         self._doubtful = self._is_doubtful(request.answer_head, late)
         self._others.took(request)
         length = len(reader.frame) * self._settings.char_time
-        self._late.note(request, reader.frame, arrived, length)
+        self._late.note_reply(request, reader.frame, arrived, length)
         self.pauses.answered(request.unit, type(request), arrived)
         self._release(request, late=late, asked_too=asked_too)
         if not late and self._late.repeated is None:
@@ -363,7 +363,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
     def _is_second(self, frame: bytes, message: bytes) -> bool:
         # it came when the line was last in use, and not when it had been silent since
-        is_second = self._seconds.take(message[0], frame, self._line_end, message)
+        is_second = self._seconds.take_frame(message[0], frame, self._line_end, message)
         self._second_came |= is_second
         return is_second
 
@@ -389,7 +389,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             stray = b''
         self._stray = bool(stray)
         if stray:
-            self._another.hear(stray, now)
+            self._another.hear_bytes(stray, now)
         return came_back and not alone
 
     def _is_doubtful(self, kind: bytes, late: bool = False) -> bool:

@@ -57,7 +57,7 @@ class BusContext:
     diagnose: list[Callable[[], DiagnosticStatus]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.publish_queue.put_every(PERIOD, self.graph_watch.look)
+        self.publish_queue.put_every(PERIOD, self.graph_watch.look_at_graph)
 
     def expect(self, names: Sequence[str]) -> None:
         """Note the names of the drives that will be added."""

@@ -94,7 +94,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             lambda: self.get_parameter('gear_ratio').value,
         )
         self._drive_parameters = DriveParameters(self)
-        queue, follow = context.publish_queue, self._drive_parameters.note
+        queue, follow = context.publish_queue, self._drive_parameters.note_changes
         wording = Wording(self)
         reporter = Reporter(self, queue, wording, joint, lambda: self.managed, follow)
         #: The drive of the node.

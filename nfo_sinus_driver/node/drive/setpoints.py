@@ -171,7 +171,7 @@ class Setpoints:
             return
         if self._managed.drive.following:
             self._logged_idle = False
-            self._warn_of_two(self._sources.take(origin, value, time.monotonic()))
+            self._warn_of_two(self._sources.take_setpoint(origin, value, time.monotonic()))
         elif not self._logged_idle and self._managed.drive.snapshot.connected:
             # before that an enable would be refused
             self._logged_idle = True

@@ -78,7 +78,7 @@ class DriveParameters:
             )
             self._declared.add(key)
         # changes in between
-        self.note(self._declared)
+        self.note_changes(self._declared)
 
     def undeclare(self) -> None:
         """Undeclare them: what the drive has is not known any more."""
@@ -93,7 +93,7 @@ class DriveParameters:
             with writable(self._node, key):
                 self._node.undeclare_parameter(key)
 
-    def note(self, keys: Collection[str]) -> None:
+    def note_changes(self, keys: Collection[str]) -> None:
         """Have parameters follow the drive; may be called from any thread."""
         with self._lock:
             self._changed.update(keys)

@@ -80,14 +80,14 @@ class DeclaredControlUnit(ControlUnit):
         address = self._drive.parameters[direction.key].at('modbus')
         return address.index, address.space == 'coil'
 
-    def take(self, place: Place, word: int) -> None:
+    def take_word(self, place: Place, word: int) -> None:
         """Take a word, or a coil, that is a command."""
         if not self.obeys and self.variant.in_local != 'keeps':
             if self.variant.in_local == 'refuses':
                 raise Refused(Reason.STATE, 'the line has no control')
             return
         self._words[place] = word
-        done = {name for name, order in self._orders.items() if order.take(place, word)}
+        done = {name for name, order in self._orders.items() if order.take_word(place, word)}
         self._turn(place, word)
         for name in ('run', 'stop', 'quick_stop', 'coast', 'release', 'reset'):
             if name in done:
@@ -334,7 +334,7 @@ class DeclaredControlUnit(ControlUnit):
                 self.trip(lost[0])
             self.settle()
 
-    def heard(self) -> None:
+    def note_frame(self) -> None:
         """Begin to count anew."""
         self._silent_for = 0.0
 

@@ -400,7 +400,7 @@ class TelegramServer(telegram1.Server):
             word = sum(bit for given, bit in _CONTROL.items() if stw1 & given)
             unit.take_telegram(self._by_level(word), setpoint)
         else:
-            unit.fieldbus.heard()
+            unit.fieldbus.note_telegram()
         return int(self._zsw1(stw1)), unit.actual
 
     def _profile(self) -> ChannelEntries:

@@ -20,7 +20,7 @@ def noticed(messages: Iterable[Given]) -> set[str]:
     """The topics that are named while messages come in, each with its time and its value."""
     sources, found = Sources(), set[str]()
     for now, origin, value in sorted(messages, key=lambda message: message[0]):
-        found |= sources.take(origin, value, now)
+        found |= sources.take_setpoint(origin, value, now)
     return found
 
 

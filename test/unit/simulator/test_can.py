@@ -56,7 +56,7 @@ OK, NO = b'\r', b'\a'
 def said(adapter, line, *, sent=True):
     """Return what an adapter answers to a line."""
     answer = b''
-    for what in adapter.take(line + b'\r'):
+    for what in adapter.take_bytes(line + b'\r'):
         answer += adapter.tried(what, sent=sent) if isinstance(what, Frame) else what
     return answer
 
@@ -140,7 +140,7 @@ def test_frames_as_lines():
         adapter = opened()
         assert adapter.text_of(frame, 0.0) == line
         assert opened(b'Z1').text_of(frame, 61.5) == line[:-1] + b'05DC\r'
-        assert list(adapter.take(line)) == [frame]
+        assert list(adapter.take_bytes(line)) == [frame]
 
 
 def test_acceptance_filters():
@@ -164,16 +164,16 @@ def test_lines_in_any_pieces(data):
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
     adapter = opened()
     pieces = [stream[a:b] for a, b in zip([0, *cuts], [*cuts, len(stream)], strict=True)]
-    assert [what for piece in pieces for what in adapter.take(piece)] == frames
+    assert [what for piece in pieces for what in adapter.take_bytes(piece)] == frames
 
 
 @given(st.lists(st.binary(max_size=60), max_size=10))
 def test_rubbish_is_refused_and_does_no_harm(pieces):
     adapter = opened()
     for piece in pieces:
-        for what in adapter.take(piece):
+        for what in adapter.take_bytes(piece):
             assert isinstance(what, Frame) or len(what) <= 8
-    list(adapter.take(b'\rC\rS4\rO\r'))
+    list(adapter.take_bytes(b'\rC\rS4\rO\r'))
     assert adapter.on_bus(125_000)
 
 
@@ -301,7 +301,7 @@ def uploaded(node):
     """Return the object as the driver reads it."""
     upload = Upload(5, *PLACE)
     while upload.request is not None:
-        assert upload.take(node.answer(upload.request))
+        assert upload.take_message(node.answer(upload.request))
     return upload.value
 
 

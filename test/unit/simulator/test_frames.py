@@ -95,7 +95,7 @@ def arrived(protocol, *chunks, pause=0.001):
     out = []
     for number, chunk in enumerate(chunks):
         out += receive.feed(chunk, pause * number)
-    out += receive.take(1000)
+    out += receive.take_frames(1000)
     return [frame.data for frame in out]
 
 
@@ -142,12 +142,12 @@ def test_a_paced_frame_is_there_when_the_line_has_carried_it():
     frame = FRAMES[RTU]
     assert not list(receive.feed(frame + WRITE, 10.0))
     assert receive.due == pytest.approx(10 + 8 * CHARACTER)
-    assert not list(receive.take(10 + 7.9 * CHARACTER))
-    (first,) = receive.take(10 + 8 * CHARACTER)
+    assert not list(receive.take_frames(10 + 7.9 * CHARACTER))
+    (first,) = receive.take_frames(10 + 8 * CHARACTER)
     assert (first.data, first.first) == (frame, 10.0)
     assert first.last == pytest.approx(10 + 8 * CHARACTER)
     assert receive.due == pytest.approx(10 + (8 + len(WRITE)) * CHARACTER)
-    (second,) = receive.take(11.0)
+    (second,) = receive.take_frames(11.0)
     assert (second.data, second.first) == (WRITE, pytest.approx(10 + 8 * CHARACTER))
 
 
@@ -161,7 +161,7 @@ def test_after_rubbish_silence_makes_a_fresh_start():
             assert not list(receive.feed(rubbish, 0.0))
             later = len(rubbish) * character + T35 + 0.003
             assert receive.due <= later
-            found = [*receive.feed(frame, later), *receive.take(later + 1)]
+            found = [*receive.feed(frame, later), *receive.take_frames(later + 1)]
             assert [taken.data for taken in found] == [rubbish, frame]
             assert receive.due is None
     receive = receiver()
@@ -180,12 +180,12 @@ def test_no_byte_is_lost_or_made_up_and_a_frame_after_silence_is_found(protocol,
     for data, pause in chunks:
         found += receive.feed(data, now)
         now += pause
-    found += receive.take(now + 100)
+    found += receive.take_frames(now + 100)
     assert b''.join(frame.data for frame in found) == b''.join(data for data, _ in chunks)
     for frame in found:
         protocol.unwrap(frame.data)
         assert frame.first <= frame.last
     for frame, following in itertools.pairwise(found):
         assert frame.last <= following.last
-    out = [*receive.feed(FRAMES[protocol], now + 200), *receive.take(now + 300)]
+    out = [*receive.feed(FRAMES[protocol], now + 200), *receive.take_frames(now + 300)]
     assert [frame.data for frame in out] == [FRAMES[protocol]]

@@ -45,9 +45,9 @@ class View:
         self.stopped: list[str] = []
         self._picture = Picture(drives, {'/bus': _LINE}, ())
         self._layout = Layout(self)
-        self._layout.look()
+        self._layout.take_picture()
 
-    def look(self) -> Picture:
+    def next_picture(self) -> Picture:
         return self._picture
 
     def stop(self, name: str) -> None:
@@ -58,7 +58,7 @@ class View:
 
     def change(self, **what: object) -> None:
         self._picture = replace(self._picture, **what)  # type: ignore[arg-type]
-        self._layout.look()
+        self._layout.take_picture()
         self._picture = replace(self._picture, notes=())
 
     def press(self, *keys: str) -> None:

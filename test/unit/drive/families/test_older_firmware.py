@@ -248,14 +248,14 @@ def test_control_that_was_stopped_meanwhile_is_not_taken_again(rig: Older) -> No
 
 def test_a_run_command_that_the_drive_has_kept_is_removed(rig: Older) -> None:
     # no manual says that MODE = Stop ends it
-    take = rig.far.control_unit.take
+    take = rig.far.control_unit.hand_control_to
 
     def keeps(source: Any) -> None:
         take(source)
         if source.value == 'scmd':
             rig.far.control_unit.scmd = Scmd.FIELDBUS
 
-    rig.far.control_unit.take = keeps
+    rig.far.control_unit.hand_control_to = keeps
     rig.far.memory.set('status.frq_set', 20.0)
     rig.change(accel=6.0)
     assert rig.has('accel') == [6.0]
