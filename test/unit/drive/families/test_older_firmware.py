@@ -551,7 +551,7 @@ def test_current_limit_is_no_stop() -> None:
         status = rig.drive.snapshot.status
         assert rig.drive.snapshot.text == 'Cur Limt' and rig.drive.following
         assert status.runs_by_bus and status.kind is Kind.ALARM
-        assert sum('the current limit' in one.text for one in rig.notes.events) == 1
+        assert sum('the current limit' in event.text for event in rig.notes.events) == 1
         assert rig.answer(rig.drive.stop()).startswith('stop')
         # one that takes it away is noticed all the same
         rig.far.motor.load = 0.3
