@@ -30,7 +30,7 @@ def _tables() -> str:
     events = []
     for event in ControlEvent:
         after = [TRANSITIONS.get((state, event)) for state in ControlState]
-        cells = [event.name, event.value, *(target.name if target else '' for target in after)]
+        cells = [event.name, event.value, *(one.name if one else '' for one in after)]
         events.append(f'| {" | ".join(cells)} |\n')
     return ''.join((
         '| state | what it is |\n|---|---|\n', *states,
