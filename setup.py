@@ -36,11 +36,12 @@ def require_messages():
     prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
     # for --symlink-install this file is a link
     here = Path(__file__).resolve().parent
-    if any((Path(one) / marker).exists() for one in prefixes) or not (here / 'msg_defs').is_dir():
+    built = any((Path(prefix) / marker).exists() for prefix in prefixes)
+    if built or not (here / 'msg_defs').is_dir():
         return
     # in the workspace: a clone may be a link in it; in PWD colcon has a folder below it
     below = Path(os.environ.get('PWD', os.sep)).resolve()
-    sources = [one / 'src' for one in (below, *below.parents) if (one / 'src').is_dir()]
+    sources = [folder / 'src' for folder in (below, *below.parents) if (folder / 'src').is_dir()]
     inside = not sources or sources[0].parent in here.parents
     beside = here.parent if inside else sources[0]
     messages = os.path.relpath(here / 'msg_defs', beside.resolve())

@@ -71,8 +71,9 @@ def _delays(rig: Rig, what: str, count: int) -> dict[str, float]:
         word = int(Scmd.STOP)
         if what == 'setpoints':
             word = int.from_bytes(_MODEL['status.frq_set'].quantise(value, 'modbus'), 'big')
-        came = [one for one in written.get((drive + 1, word), ()) if at <= one < at + _LOST]
-        delays += [one - at for one in came[:1]]
+        moments = written.get((drive + 1, word), ())
+        came = [moment for moment in moments if at <= moment < at + _LOST]
+        delays += [moment - at for moment in came[:1]]
     if not delays:
         raise RuntimeError(f'none of the {what} came to the line')
     return {

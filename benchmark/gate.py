@@ -41,7 +41,7 @@ def measured(runs: int) -> Figures:
     found: dict[str, dict[str, list[float]]] = {}
     for _ in range(runs):
         for title, ratios in _ratios():
-            print(title, {name: round(one, 3) for name, one in ratios.items()}, file=sys.stderr)
+            print(title, {name: round(ratio, 3) for name, ratio in ratios.items()}, file=sys.stderr)
             for name, value in ratios.items():
                 found.setdefault(title, {}).setdefault(name, []).append(value)
     return {

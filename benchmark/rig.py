@@ -237,7 +237,7 @@ class Rig(contextlib.ExitStack):
 
         def watched() -> Window:
             now = time.monotonic()
-            frames = [one for one in self.frames() if start <= one.first < now]
+            frames = [frame for frame in self.frames() if start <= frame.first < now]
             core = (cpu_time(self.master.pid) - cost) / (now - start)
             return Window(frames, now - start, core)
 

@@ -63,7 +63,7 @@ def main() -> None:
             for _ in range(times):
                 for title, figures in (quick if options.quick else whole)():
                     found.setdefault(title, []).append(figures)
-                    print(title, {name: round(one, 3) for name, one in figures.items()},
+                    print(title, {name: round(figure, 3) for name, figure in figures.items()},
                           file=sys.stderr, flush=True)
             text = f'{_circumstances(times)}\n\n{_table(columns, found)}'
             print(f'{group}\n\n{text}\n')

@@ -84,8 +84,8 @@ class Base:
             for rim, gear_ratio in zip(rims, self.gear_ratios, strict=True)
         ]
         # both are slowed down alike: the robot keeps to its curve
-        excess = max(1.0, *(abs(one) / self.max_frequency for one in wanted))
-        return [one / excess for one in wanted]
+        excess = max(1.0, *(abs(frequency) / self.max_frequency for frequency in wanted))
+        return [frequency / excess for frequency in wanted]
 
 
 class Robot:

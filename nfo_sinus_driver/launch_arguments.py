@@ -95,7 +95,7 @@ def parameter_file(given: str, config: Path) -> str:
         return str(own)
     looked = [str(path.absolute())]
     if not path.is_absolute():
-        names = ', '.join(sorted(str(one.relative_to(config)) for one in config.rglob('*.yaml')))
+        names = ', '.join(sorted(str(file.relative_to(config)) for file in config.rglob('*.yaml')))
         looked.append(f'{config}, which has {names}')
     raise ValueError(f'params_file:={given}: there is no such file; looked in {"; ".join(looked)}')
 

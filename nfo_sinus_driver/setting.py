@@ -86,7 +86,7 @@ def setting(default: _T, text: str, low: float | None = None, high: float = 0.0,
 def settings_of(class_: type) -> dict[str, Setting]:
     """Return the settings that are fields of a dataclass, by name."""
     return {
-        one.name: replace(one.metadata['setting'], name=one.name)
-        for one in fields(class_)
-        if 'setting' in one.metadata
+        declared.name: replace(declared.metadata['setting'], name=declared.name)
+        for declared in fields(class_)
+        if 'setting' in declared.metadata
     }

@@ -102,19 +102,19 @@ def _line(row: Row) -> str:
 
 
 def _served(row: Row) -> Iterator[str]:
-    for one in served_by(row):
-        file, _, anchor = one.partition('#')
-        yield f'[{_title(file, anchor)}]({one})' if file.endswith('.md') else f'`{one}`'
+    for place in served_by(row):
+        file, _, anchor = place.partition('#')
+        yield f'[{_title(file, anchor)}]({place})' if file.endswith('.md') else f'`{place}`'
 
 
 def served_by(row: Row) -> list[str]:
     """Return each thing by which a row is served: a name that is typed, or a place in the docs."""
-    return [one.strip() for one in row['served_by'].split(';') if one.strip()]
+    return [part.strip() for part in row['served_by'].split(';') if part.strip()]
 
 
 def shown_by(row: Row) -> list[str]:
     """Return each test that shows a row: ``unit/link/test_frames.py::test_a_frame``."""
-    return [one.strip() for one in row['shown_by'].split(';') if one.strip()]
+    return [part.strip() for part in row['shown_by'].split(';') if part.strip()]
 
 
 def _title(file: str, anchor: str) -> str:

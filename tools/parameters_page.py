@@ -233,7 +233,7 @@ def _anchor(title: str, taken: Sequence[str]) -> str:
 def _addresses() -> tuple[_Column, ...]:
     """Return the columns of all numberings that any family has."""
     parameters = [parameter for name in families() for parameter in load_family(name).values()]
-    spaces = [address.space for one in parameters for address in one.addresses.values()]
+    spaces = [address.space for parameter in parameters for address in parameter.addresses.values()]
     return (
         *map(_column, dict.fromkeys((*_SPACES, *spaces))),
         ('From', lambda row: '' if row.since is None else _number(row.since)),

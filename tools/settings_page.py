@@ -33,11 +33,12 @@ def page() -> str:
 
 
 def _rows(settings: Mapping[str, Setting]) -> list[str]:
-    fixed = all(one.change == FIXED for one in settings.values())
+    fixed = all(setting.change == FIXED for setting in settings.values())
     rows = ['|---|---|---|---|\n' if fixed else '|---|---|---|---|---|\n']
-    for name, one in settings.items():
-        cells = [f'`{name}`', _default(one.default), _range(one), _code(one.description)]
-        cells += [] if fixed else [one.change]
+    for name, setting in settings.items():
+        cells = [f'`{name}`', _default(setting.default), _range(setting)]
+        cells += [_code(setting.description)]
+        cells += [] if fixed else [setting.change]
         rows.append('|' + '|'.join(f' {cell} ' if cell else ' ' for cell in cells) + '|\n')
     return rows
 
@@ -50,10 +51,11 @@ def _default(default: object) -> str:
     return f"`{default or repr('')}`" if isinstance(default, str) else str(default)
 
 
-def _range(one: Setting) -> str:
-    span = f'{one.low:g} to {one.high:g} {one.unit}'.strip() if one.low is not None else ''
-    choices = ', '.join(f'`{choice}`' for choice in one.choices)
-    return '; '.join(filter(None, (span, choices, _code(one.also))))
+def _range(setting: Setting) -> str:
+    has_span = setting.low is not None
+    span = f'{setting.low:g} to {setting.high:g} {setting.unit}'.strip() if has_span else ''
+    choices = ', '.join(f'`{choice}`' for choice in setting.choices)
+    return '; '.join(filter(None, (span, choices, _code(setting.also))))
 
 
 def _code(text: str) -> str:

@@ -93,7 +93,7 @@ def nodes() -> list[tuple[str, ast.AST]]:
 def texts(node: ast.AST) -> Iterator[tuple[str, ...]]:
     """Yield the fixed parts of texts and f-strings; what logging puts in is a value, too."""
     if isinstance(node, ast.JoinedStr):
-        values = [one.value if isinstance(one, ast.Constant) else '%s' for one in node.values]
+        values = [part.value if isinstance(part, ast.Constant) else '%s' for part in node.values]
         yield tuple(re.split('%[sdr]', ''.join(map(str, values))))
     elif isinstance(node, ast.Constant) and isinstance(node.value, str):
         yield tuple(re.split('%[sdr]', node.value))

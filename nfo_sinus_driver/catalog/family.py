@@ -162,7 +162,7 @@ class Family(Mapping[str, Parameter]):
             return ''
         sizes = sorted(8 * address.codec.size for address in self[key].addresses.values())
         # another bus may have it in more bits
-        size = next((one for one in sizes if abs(value) < 2**one), sizes[-1])
+        size = next((width for width in sizes if abs(value) < 2**width), sizes[-1])
         word = value % 2**size
         bits = [str(bit) for bit in range(size) if word >> bit & 1]
         named = f': bit{"s" * (len(bits) > 1)} {", ".join(bits)}' if bits else ''
@@ -186,7 +186,7 @@ class Family(Mapping[str, Parameter]):
         """Return the keys of the group that the parameter with a role is in, if there is one."""
         key = self.key(role)
         group = self[key].group if key else ''
-        return frozenset(one for one, parameter in self.items() if parameter.group == group)
+        return frozenset(member for member, parameter in self.items() if parameter.group == group)
 
     @functools.cached_property
     def communication(self) -> frozenset[str]:
@@ -208,7 +208,7 @@ class Family(Mapping[str, Parameter]):
     @functools.cached_property
     def scaling(self) -> frozenset[str]:
         """The keys of the parameters that set-points or measured values are multiplied by."""
-        named = {one.scale for one in self.values() if one.scale in self}
+        named = {parameter.scale for parameter in self.values() if parameter.scale in self}
         return frozenset(named | {self.key(role) for role in _SCALING if role in self.roles})
 
     def can_be(self, key: str, value: Value) -> bool:
@@ -456,7 +456,7 @@ def _with_mailbox(own: Family, whole: Family, method: str) -> Family:
     """
     profile = own.profile
     begins = {
-        write.key for one in profile.methods.values() for write in one.procedures.values()
+        write.key for control in profile.methods.values() for write in control.procedures.values()
     }
     protocol, addressing = profile.mailbox, profile.methods[method].addressing
 

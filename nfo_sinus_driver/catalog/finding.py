@@ -68,8 +68,8 @@ def find(text: str) -> str:
     if is_described(text) or os.sep in text:
         return _file(Path(text).expanduser().absolute(), text)
     found: dict[str, list[Found]] = {}
-    for one in every():
-        found.setdefault(one.name, []).append(one)
+    for candidate in every():
+        found.setdefault(candidate.name, []).append(candidate)
     if text not in found:
         path = Path(text).absolute()
         if path.is_file():

@@ -150,7 +150,7 @@ Step = Read | Write | Acknowledge | AcknowledgeThenWrite | Until | Hold | Wait
 Steps = Generator[Step, Any, _T]
 
 
-def one(step: Step) -> Steps[Any]:
+def one_step(step: Step) -> Steps[Any]:
     """Return a sequence of one step."""
     return (yield step)
 

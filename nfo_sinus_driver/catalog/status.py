@@ -321,4 +321,4 @@ SPEED = Quantity('Speed', 'rpm', Role.ACTUAL_SPEED, 1 / 60)
 TORQUE = Quantity('Torque', '%', Role.ACTUAL_TORQUE)
 PROCESS_VALUE = Quantity('PI-Reg', '', Role.ACTUAL_PROCESS_VALUE)
 #: By the control mode.
-QUANTITIES = {one.mode: one for one in (FREQUENCY, SPEED, TORQUE, PROCESS_VALUE)}
+QUANTITIES = {quantity.mode: quantity for quantity in (FREQUENCY, SPEED, TORQUE, PROCESS_VALUE)}

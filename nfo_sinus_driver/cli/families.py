@@ -92,8 +92,9 @@ def notes(family: catalog.Family) -> list[str]:
             'motor, and add keeps_run: true or keeps_run: false; with true a silence of 0.4 s '
             'stops the motor'
         )
-    addresses = [one.at('modbus') for one in family.values() if 'modbus' in one.addresses]
-    registers = [one.index for one in addresses if one.space != 'coil']
+    parameters = [parameter for parameter in family.values() if 'modbus' in parameter.addresses]
+    addresses = [parameter.at('modbus') for parameter in parameters]
+    registers = [address.index for address in addresses if address.space != 'coil']
     if min(registers, default=0) >= _PRINTED_FROM:
         found.append(
             f'its registers are sent as {min(registers)} and above: if the first one that its '
@@ -109,8 +110,8 @@ def notes(family: catalog.Family) -> list[str]:
 
 def put_families() -> None:
     """Print all families that are found, and where."""
-    found = sorted(every(), key=lambda one: one.name)
-    rows = [(one.name, one.title, one.of, one.place) for one in found]
+    found = sorted(every(), key=lambda family: family.name)
+    rows = [(family.name, family.title, family.of, family.place) for family in found]
     put_columns([('family', 'title', 'found in', 'place'), *rows])
 
 

@@ -211,7 +211,7 @@ class _Parser(argparse.ArgumentParser):
         for action in self._actions:
             if isinstance(action, argparse._SubParsersAction):
                 parsers += action.choices.values()
-        return {option for one in parsers for option in one._option_string_actions}
+        return {option for parser in parsers for option in parser._option_string_actions}
 
     def require_options(self, words: Sequence[str]) -> None:
         """Make sure that there are all options that were typed, or shortened, as argparse does."""
@@ -220,5 +220,5 @@ class _Parser(argparse.ArgumentParser):
             name = word.partition('=')[0]
             if word == '--':
                 return
-            if name.startswith('--') and not any(one.startswith(name) for one in known):
+            if name.startswith('--') and not any(option.startswith(name) for option in known):
                 self.error(f'there is no option {name}{did_you_mean(name, known)}')

@@ -212,7 +212,7 @@ def _figures(name: str, of: Statistics) -> list[str]:
         of.round_trip_max,
     )
     counts = (of.transactions, of.timeouts, of.damaged, of.refused, of.retries)
-    shown = ['-' if math.isnan(one) else f'{1000 * one:.1f}' for one in times]
+    shown = ['-' if math.isnan(seconds) else f'{1000 * seconds:.1f}' for seconds in times]
     return [name, f'{100 * of.utilisation:.0f} %', *shown, *map(str, counts)]
 
 
@@ -259,7 +259,7 @@ class LineSource:
         self._closing.set()
         self._thread.join(_LAST_READING)
 
-    def look(self) -> Picture:
+    def next_picture(self) -> Picture:
         """Return what was read last."""
         notes = [self._notes.get() for _ in range(self._notes.qsize())]
         now = time.monotonic()

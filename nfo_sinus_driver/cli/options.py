@@ -105,7 +105,7 @@ def add_setting(group: argparse._ActionsContainer, name: str, option: str, **mor
     given: dict[str, Any] = {'type': value, 'metavar': option.rpartition('-')[2].upper()}
     also = setting.also
     if setting.choices:
-        offered = [one for one in setting.choices if one not in (MONITOR, AUTO)]
+        offered = [choice for choice in setting.choices if choice not in (MONITOR, AUTO)]
         # what it says more is of those that are not offered here
         also = also if len(offered) == len(setting.choices) else ''
         given = {'choices': offered}

@@ -238,11 +238,11 @@ def shown(value: Value | None, unit: str) -> str:
     return '-' if value is None else f'{show(value)} {unit}'.rstrip()
 
 
-def same(one: Value | None, other: Value | None) -> bool:
+def same(value: Value | None, other: Value | None) -> bool:
     """Return whether two values are the same; 5 is 5.0, but on is not 1."""
-    if isinstance(one, bool) or isinstance(other, bool):
-        return one is other
-    return one == other
+    if isinstance(value, bool) or isinstance(other, bool):
+        return value is other
+    return value == other
 
 
 def is_barred(key: str, model: Family, options: argparse.Namespace) -> bool:
@@ -283,10 +283,10 @@ def require_settings(names: Iterable[str], model: Family) -> Mapping[str, Parame
     others = [model[name] for name in strange if name in model]
     if others:
         lines = (
-            f'{one.key} is only read: nfo-sinus get shows it'
-            if one.access is Access.READ
-            else f'{one.key} is no setting: the driver itself writes it'
-            for one in others
+            f'{parameter.key} is only read: nfo-sinus get shows it'
+            if parameter.access is Access.READ
+            else f'{parameter.key} is no setting: the driver itself writes it'
+            for parameter in others
         )
         raise CliError(listed(f'nothing was written to the {model.name}:', lines))
     require_names(names, settings, model.name, NOTHING)

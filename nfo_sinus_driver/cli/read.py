@@ -342,7 +342,7 @@ class Set(Verb):
             if options.json:
                 _put_values({name: settings[name] for name in wanted}, values)
                 return 0
-            changed = {one.key: one for one in changes}
+            changed = {made.key: made for made in changes}
             for name in wanted:
                 as_it_was = f'{name}: {shown(values[name], settings[name].unit)}, as it was'
                 put(str(changed.get(name, as_it_was)))

@@ -380,8 +380,8 @@ def _sides(options: argparse.Namespace) -> tuple[_Side, _Side]:
     files, against = options.files, options.against
     model = load_family(options.model)
     if len(files) == 2 and against is None:
-        one, other = (_meant(read_file(name), model) for name in files)
-        return _side(one), _side(other)
+        first, other = (_meant(read_file(name), model) for name in files)
+        return _side(first), _side(other)
     if len(files) == 1 and against is None:
         return _with_drive(_meant(read_file(files[0]), model), options)
     if not files and against is not None:

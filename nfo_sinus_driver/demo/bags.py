@@ -104,9 +104,9 @@ def topics(folder: Path) -> list[tuple[str, str]]:
     """Return the topics of a bag that have messages, with their types."""
     with reading():
         return [
-            (str(one['topic_metadata']['name']), str(one['topic_metadata']['type']))
-            for one in metadata(folder)['topics_with_message_count']
-            if one['message_count']
+            (str(topic['topic_metadata']['name']), str(topic['topic_metadata']['type']))
+            for topic in metadata(folder)['topics_with_message_count']
+            if topic['message_count']
         ]
 
 

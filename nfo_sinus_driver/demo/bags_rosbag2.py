@@ -88,9 +88,9 @@ def read(folder: Path, wanted: Set[str]) -> Iterator[tuple[str, int, Any]]:
     reader = SequentialCompressionReader() if compressed else SequentialReader()
     reader.open(StorageOptions(uri=str(folder)), _AS_THEY_ARE)
     types = {
-        one.name: class_of(one.type)
-        for one in reader.get_all_topics_and_types()
-        if one.name in wanted
+        listed.name: class_of(listed.type)
+        for listed in reader.get_all_topics_and_types()
+        if listed.name in wanted
     }
     while reader.has_next():
         topic, data, stamp = reader.read_next()

@@ -75,7 +75,7 @@ class Writer:
 def read(folder: Path, wanted: Set[str]) -> Iterator[tuple[str, int, Any]]:
     """Yield topic, time of receipt (ns) and message."""
     with AnyReader([folder]) as reader:
-        chosen = [one for one in reader.connections if one.topic in wanted]
+        chosen = [connection for connection in reader.connections if connection.topic in wanted]
         for connection, stamp, data in reader.messages(chosen):
             yield connection.topic, stamp, reader.deserialize(data, connection.msgtype)
 

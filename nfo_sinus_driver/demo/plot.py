@@ -374,7 +374,7 @@ def _standing(followed: Curve, unit: str) -> Iterator[Span]:
     # NaN, where nothing is followed, is a value of its own
     groups = [
         (next(group)[0], what)
-        for what, group in itertools.groupby(points, lambda one: f'{one[1]:+.3g}')
+        for what, group in itertools.groupby(points, lambda point: f'{point[1]:+.3g}')
     ]
     ends = [*(time for time, _ in groups[1:]), *followed.times[-1:]]
     for (begin, what), end in zip(groups, ends, strict=True):

@@ -57,7 +57,8 @@ class Curve:
     def broken_at(self, moments: Iterable[float]) -> Curve:
         """Return a curve without a line through moments at which nothing is known."""
         gaps = ((moment, math.nan) for moment in moments)
-        points = sorted((*zip(self.times, self.values, strict=True), *gaps), key=lambda one: one[0])
+        known = zip(self.times, self.values, strict=True)
+        points = sorted((*known, *gaps), key=lambda point: point[0])
         return Curve([time for time, _ in points], [value for _, value in points])
 
 
@@ -285,19 +286,21 @@ class _Reader:
 
     def _calls_of(self, name: str, events: Sequence[Any]) -> Iterator[Call]:
         """Yield each call once; client and server may both have published it."""
-        answers = {_call_id(one): one.response[0].message for one in events if len(one.response)}
+        answers = {
+            _call_id(event): event.response[0].message for event in events if len(event.response)
+        }
         known = set()
-        for one in events:
-            if len(one.request) and _call_id(one) not in known:
-                known.add(_call_id(one))
-                off = not getattr(one.request[0], 'data', True)
-                time = self._since(_nanoseconds(one.info.stamp))
-                yield Call(time, f'{name} off' if off else name, answers.get(_call_id(one), ''))
+        for event in events:
+            if len(event.request) and _call_id(event) not in known:
+                known.add(_call_id(event))
+                off = not getattr(event.request[0], 'data', True)
+                time = self._since(_nanoseconds(event.info.stamp))
+                yield Call(time, f'{name} off' if off else name, answers.get(_call_id(event), ''))
 
     def _logged(self) -> Iterator[Call]:
         """Yield what the log says of calls of the drive, and of all drives of its line."""
         namespace = self._drive.rpartition('/')[0]
-        names = [one.strip('/').replace('/', '.') for one in (self._drive, f'{namespace}/{_BUS}')]
+        names = [name.strip('/').replace('/', '.') for name in (self._drive, f'{namespace}/{_BUS}')]
         for _, message in self._messages.get('/rosout', ()):
             if message.name in names and _CALLED_BY in message.msg:
                 called, _, outcome = message.msg.partition(': ')
@@ -310,7 +313,7 @@ def _is_of(drives: Sequence[str], topic: str) -> bool:
         return True
     node, _, name = topic.removesuffix(_EVENT).rpartition('/')
     if topic.endswith(_EVENT):
-        return node in drives or node in {f'{one.rpartition("/")[0]}/{_BUS}' for one in drives}
+        return node in drives or node in {f'{drive.rpartition("/")[0]}/{_BUS}' for drive in drives}
     return node in drives and name in _READ
 
 

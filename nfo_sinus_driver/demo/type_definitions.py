@@ -46,7 +46,7 @@ def definition_of(name: str) -> str:
 def hash_of(name: str) -> str:
     """Return the hash of a type, ``RIHS01_…``."""
     described = json.loads(_file(name.removesuffix('_Event'), '.json').read_text())
-    hashes = {one['type_name']: one['hash_string'] for one in described['type_hashes']}
+    hashes = {entry['type_name']: entry['hash_string'] for entry in described['type_hashes']}
     return str(hashes[name])
 
 

@@ -137,7 +137,7 @@ class ForeignPairs:
         """Await no more answers: the port is closed."""
         self._own = self._open = None
 
-    def hear(self, data: bytes, now: float) -> bool:
+    def hear_bytes(self, data: bytes, now: float) -> bool:
         """Take all bytes that come; return whether any message of another exchange is in them."""
         found = False
         for message in self._reader.feed(data):

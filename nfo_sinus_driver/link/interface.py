@@ -267,8 +267,8 @@ class LineProtocol:
     @property
     def unit_spans(self) -> str:
         """The addresses that a drive may have, such as ``0 to 247, 255``."""
-        last = [one for one in self.units if one + 1 not in self.units]
-        first = [one for one in self.units if one - 1 not in self.units]
+        last = [unit for unit in self.units if unit + 1 not in self.units]
+        first = [unit for unit in self.units if unit - 1 not in self.units]
         spans = zip(first, last, strict=True)
         return ', '.join(f'{low}' if low == high else f'{low} to {high}' for low, high in spans)
 

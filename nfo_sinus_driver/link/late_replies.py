@@ -175,7 +175,7 @@ class LateReplies(Generic[_Request, _Kind]):
         if self._last is not None:
             self.expect(self._last, now)
 
-    def note(self, request: _Request, reply: bytes, now: float, length: float) -> None:
+    def note_reply(self, request: _Request, reply: bytes, now: float, length: float) -> None:
         """
         Note a reply of a unit, for it may come again.
 

@@ -197,8 +197,8 @@ class _Unit:
     def rests_until(self) -> float:
         """Return until when it is asked nothing, s."""
         pauses = (
-            one.pause(own=True)
-            for (wrote, _), one in self.learners.items()
+            learner.pause(own=True)
+            for (wrote, _), learner in self.learners.items()
             if self.wrote or not wrote
         )
         return self.answered_at + max(self.gap, *pauses)
@@ -207,19 +207,19 @@ class _Unit:
         """Return how long after any answer it is asked nothing, s."""
         if self.in_vain == self.probe_at:
             return _LONGEST
-        return max(one.pause(own=False) for one in self.learners.values())
+        return max(learner.pause(own=False) for learner in self.learners.values())
 
     def kept(self, *, own: bool) -> float:
         """Return the longest pause of a kind that is known to help, s."""
-        stages = (_STAGES[one.kept] for one in self.learners.values())
+        stages = (_STAGES[learner.kept] for learner in self.learners.values())
         return max(stage.seconds if stage.own is own else 0.0 for stage in stages)
 
     def forget(self) -> None:
         """Begin anew with what has not helped."""
         self.sent, self.in_vain, self.probe_at = None, 0, _MANY
         self.lost.clear()
-        for one in self.learners.values():
-            one.in_vain = False
+        for learner in self.learners.values():
+            learner.in_vain = False
 
 
 class Pauses:
@@ -260,7 +260,7 @@ class Pauses:
 
     def silence(self, unit: int) -> float:
         """Return how long the line is silent before a request to a unit, s; 0: as usual."""
-        return max(self._least, *(one.gap for one in self._heard_by(unit)))
+        return max(self._least, *(record.gap for record in self._heard_by(unit)))
 
     def kept_silent(self, unit: int) -> float:
         """Return how long a request to a unit keeps the line silent before it, s; 0: as usual."""
@@ -275,7 +275,7 @@ class Pauses:
 
     def rests_until(self, unit: int) -> float:
         """Return until when a unit is asked nothing, while others may be."""
-        return max(one.rests_until() for one in self._heard_by(unit))
+        return max(record.rests_until() for record in self._heard_by(unit))
 
     def ready_at(self, unit: int) -> float:
         """Return when a request to a unit may be sent."""
@@ -284,59 +284,59 @@ class Pauses:
     def round(self, units: Iterable[int]) -> float:
         """Return how much of a round in which each unit is asked once is pauses, s."""
         asked = [self._of(unit) for unit in units]
-        silences = sum(max(self._least, one.gap, one.kept(own=False)) for one in asked)
-        return max((silences, *(one.kept(own=True) for one in asked)))
+        silences = sum(max(self._least, record.gap, record.kept(own=False)) for record in asked)
+        return max((silences, *(record.kept(own=True) for record in asked)))
 
     # --- what the line tells ------------------------------------------------------------------
 
     def sent(self, unit: int, now: float, *, writes: bool) -> None:
         """Note a request at the moment when it begins."""
-        one = self._of(unit)
-        one.writes, one.sent = writes, None
+        record = self._of(unit)
+        record.writes, record.sent = writes, None
         line = now - self._answered_at
         if line < _NEARLY * _LONGEST:
-            own = now - one.answered_at
-            learner = one.learners[one.wrote, own > line]
-            one.sent = learner, _Sent(own, line)
+            own = now - record.answered_at
+            learner = record.learners[record.wrote, own > line]
+            record.sent = learner, _Sent(own, line)
 
     def answered(self, unit: int, kind: type[object], now: float) -> None:
         """Note that a unit has answered the last request to it."""
-        one = self._of(unit)
-        self._answered_at = one.answered_at = now
-        one.wrote = one.writes
-        one.known.add(kind)
-        lost, one.lost = one.lost, []
-        one.in_vain, one.probe_at = 0, _MANY
+        record = self._of(unit)
+        self._answered_at = record.answered_at = now
+        record.wrote = record.writes
+        record.known.add(kind)
+        lost, record.lost = record.lost, []
+        record.in_vain, record.probe_at = 0, _MANY
         if lost:
             units = self._units.values()
-            usual = max(one.kept(own=own) for one in units for own in (True, False))
+            usual = max(other.kept(own=own) for other in units for own in (True, False))
             for learner, request in lost:
                 learner.count_loss(request, usual)
-        if one.sent is not None and not lost:
-            learner, request = one.sent
+        if record.sent is not None and not lost:
+            learner, request = record.sent
             if learner.count_answer(request):
                 self._tell(_learnt(unit, _STAGES[learner.kept]))
-        one.sent = None
+        record.sent = None
 
     def unanswered(self, unit: int, kind: type[object]) -> None:
         """Note that a unit has not answered the last request to it."""
-        one = self._of(unit)
-        sent, one.sent = one.sent, None
-        if one.in_vain >= one.probe_at:
-            one.probe_at *= 2
+        record = self._of(unit)
+        sent, record.sent = record.sent, None
+        if record.in_vain >= record.probe_at:
+            record.probe_at *= 2
         if sent is None:
             # it was not too early: the unit is not there
-            one.lost.clear()
+            record.lost.clear()
             return
-        one.in_vain += 1
+        record.in_vain += 1
         # what it has never answered it may not know
-        if kind in one.known and len(one.lost) < _MANY:
-            one.lost.append(sent)
+        if kind in record.known and len(record.lost) < _MANY:
+            record.lost.append(sent)
 
     def forget_failures(self) -> None:
         """Try again what has not helped: the line is another one, perhaps."""
-        for one in self._units.values():
-            one.forget()
+        for record in self._units.values():
+            record.forget()
 
     def _of(self, unit: int) -> _Unit:
         if unit not in self._units:
@@ -344,7 +344,7 @@ class Pauses:
         return self._units[unit]
 
     def _learnt(self, unit: int) -> float:
-        return max(one.learnt() for one in self._heard_by(unit))
+        return max(record.learnt() for record in self._heard_by(unit))
 
     def _heard_by(self, unit: int) -> Iterable[_Unit]:
         if unit == self._broadcast and self._units:

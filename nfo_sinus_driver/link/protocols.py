@@ -121,9 +121,9 @@ BIT_RATES = tuple(sorted({rate for each in PROTOCOLS.values() for rate in each.b
 #: Which addresses a drive may have, as text.
 ADDRESSES = '; '.join(
     dict.fromkeys(
-        f'{one.name if one is MODBUS_TCP else one.addressing} {one.unit_spans}'
-        + f' ({one.point_to_point}: alone on its line)' * (one.point_to_point is not None)
-        for one in PROTOCOLS.values()
+        f'{protocol.name if protocol is MODBUS_TCP else protocol.addressing} {protocol.unit_spans}'
+        + f' ({protocol.point_to_point}: alone on its line)' * (protocol.point_to_point is not None)
+        for protocol in PROTOCOLS.values()
     )
 )
 

@@ -119,7 +119,7 @@ class ForeignTraffic(Protocol):
     def open_until(self, unit: int) -> float:
         """Return until when an answer of a unit may be to another master; 0: it is not."""
 
-    def hear(self, data: bytes, now: float) -> bool:
+    def hear_bytes(self, data: bytes, now: float) -> bool:
         """Take bytes; return whether they are known to be of another exchange."""
 
     def clear(self) -> None:
@@ -295,7 +295,7 @@ class RequestLink(ABC, Generic[_Request]):
             came += data
             until = min(max(least, self._line_end + silence), give_up)
         if came:
-            self._another.hear(came, self._now())
+            self._another.hear_bytes(came, self._now())
         return came, self._now() >= until
 
     @property
@@ -400,7 +400,7 @@ class RequestLink(ABC, Generic[_Request]):
         stray = False
         while True:
             data, now, silent = self._await_silence(gap, wait, is_write, least)
-            if data and not self._another.hear(data, now):
+            if data and not self._another.hear_bytes(data, now):
                 stray = True
                 self._note_unrequested(data, request)
             if not is_write and self.stop_waits():
@@ -412,7 +412,7 @@ class RequestLink(ABC, Generic[_Request]):
                 break
             # requests of another master are answered first
             if data := self._read_line(until) if is_write else self._listen(until):
-                self._another.hear(data, self._now())
+                self._another.hear_bytes(data, self._now())
                 gap = least
         self._take_late(request, now)
         return stray

@@ -101,63 +101,63 @@ class SecondAnswers:
     def answered(self, request: Request, frame: bytes, now: float, head: bytes = b'') -> None:
         """Note an answer to us, and how its message begins: another that does is like it."""
         self.last_unit = unit = request.unit
-        one = self._units.get(unit)
-        if one is None:
-            one = self._units[unit] = _Unit()
-        one.recent.append((frame, now, request))
-        one.head = head
-        one.number += 1
+        record = self._units.get(unit)
+        if record is None:
+            record = self._units[unit] = _Unit()
+        record.recent.append((frame, now, request))
+        record.head = head
+        record.number += 1
 
     def unanswered(self, request: Request, now: float) -> None:
         """Note that no answer has come: it may be late."""
-        one = self._units.get(request.unit)
-        if one is not None:
-            one.late = {other: until for other, until in one.late.items() if until > now}
-            one.late[request] = now + self._memory
+        record = self._units.get(request.unit)
+        if record is not None:
+            record.late = {other: until for other, until in record.late.items() if until > now}
+            record.late[request] = now + self._memory
 
     def silence(self, unit: int, now: float) -> float:
         """Return how long the line is silent before and after a reading, s; 0: as usual."""
-        one = self._units.get(unit)
-        return one.silence if one is not None and now < one.until else 0.0
+        record = self._units.get(unit)
+        return record.silence if record is not None and now < record.until else 0.0
 
     def is_refused(self, unit: int, now: float) -> bool:
         """Return whether no silence helps: what a unit reports is not believed."""
         return self.silence(unit, now) > 0.0 and self._units[unit].failures >= _GIVES_UP
 
-    def take(self, unit: int, frame: bytes, now: float, message: bytes = b'') -> bool:
+    def take_frame(self, unit: int, frame: bytes, now: float, message: bytes = b'') -> bool:
         """Return whether a frame that answers no open request is a second answer; note it."""
-        one = self._units.get(unit)
-        if one is None or not one.recent:
+        record = self._units.get(unit)
+        if record is None or not record.recent:
             return False
-        last, last_at, _ = one.recent[-1]
+        last, last_at, _ = record.recent[-1]
         again = [
-            at for answer, at, to in one.recent
-            if answer == frame and not one.may_be_late(to, now)
+            at for answer, at, to in record.recent
+            if answer == frame and not record.may_be_late(to, now)
         ]
-        is_like = one.head and message.startswith(one.head)
-        if not again and (not is_like or now < max(one.late.values(), default=now)):
+        is_like = record.head and message.startswith(record.head)
+        if not again and (not is_like or now < max(record.late.values(), default=now)):
             return False
         delay = now - (again or [last_at])[-1]
         if delay > self._memory:
             return False
-        if one.number != one.seen:
-            one.in_row = one.in_row + 1 if one.number <= one.seen + _NEAR else 1
-            one.seen = one.number
-        self._learn(one, longer_than(delay), now, same=frame == last)
-        if one.in_row >= _SURE:
+        if record.number != record.seen:
+            record.in_row = record.in_row + 1 if record.number <= record.seen + _NEAR else 1
+            record.seen = record.number
+        self._learn(record, longer_than(delay), now, same=frame == last)
+        if record.in_row >= _SURE:
             self._tell(_twice(unit))
         return True
 
-    def _learn(self, one: _Unit, needed: float, now: float, *, same: bool) -> None:
-        if now >= one.until:
-            one.silence, one.failures = 0.0, 0
-        if not one.silence:
-            if needed <= _SHORT or one.in_row >= _SURE:
-                one.silence = min(needed, self._most)
-        elif same and needed <= one.silence:
-            one.failures = 0
-        elif one.silence < self._most:
-            one.silence = min(max(2 * one.silence, needed), self._most)
+    def _learn(self, record: _Unit, needed: float, now: float, *, same: bool) -> None:
+        if now >= record.until:
+            record.silence, record.failures = 0.0, 0
+        if not record.silence:
+            if needed <= _SHORT or record.in_row >= _SURE:
+                record.silence = min(needed, self._most)
+        elif same and needed <= record.silence:
+            record.failures = 0
+        elif record.silence < self._most:
+            record.silence = min(max(2 * record.silence, needed), self._most)
         else:
-            one.failures += 1
-        one.until = now + SUSPECT_FOR
+            record.failures += 1
+        record.until = now + SUSPECT_FOR

@@ -79,8 +79,9 @@ def _statuses() -> dict[str, DiagnosticStatus]:
     """Return the newest status of each line and drive, collected once for check and report."""
     found: dict[str, DiagnosticStatus] = {}
 
-    def take(array: DiagnosticArray) -> None:
-        found.update({one.name: one for one in array.status if one.name.endswith(_ENDS)})
+    def take_statuses(array: DiagnosticArray) -> None:
+        of_driver = [status for status in array.status if status.name.endswith(_ENDS)]
+        found.update({status.name: status for status in of_driver})
 
     context = Context()
     rclpy.init(context=context)
@@ -88,7 +89,7 @@ def _statuses() -> dict[str, DiagnosticStatus]:
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     try:
-        node.create_subscription(DiagnosticArray, '/diagnostics', take, 100)
+        node.create_subscription(DiagnosticArray, '/diagnostics', take_statuses, 100)
         until = time.monotonic() + _LISTENS
         while (left := until - time.monotonic()) > 0:
             executor.spin_once(left)

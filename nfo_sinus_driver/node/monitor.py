@@ -74,7 +74,7 @@ _QOS = {
     BusStatistics: RELIABLE,
     ErrorLogEntry: KEPT,
 }
-_TYPES = {f'nfo_sinus_msgs/msg/{one.__name__}': one for one in _QOS}
+_TYPES = {f'nfo_sinus_msgs/msg/{message_type.__name__}': message_type for message_type in _QOS}
 _TRIGGER = 'std_srvs/srv/Trigger'
 #: The name while it is not known yet which node a publisher belongs to.
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'
@@ -102,7 +102,7 @@ class _Topics:
         """Return whether there is a topic of a type."""
         return any(known is type_ for known, _ in self._subscriptions)
 
-    def take(self) -> Iterator[Any]:
+    def take_messages(self) -> Iterator[Any]:
         """Return the messages since the last call, oldest of each topic first."""
         for subscription in self._subscriptions.values():
             while True:
@@ -210,14 +210,14 @@ class GraphSource:
 
     # --- as a source of pictures --------------------------------------------------------------
 
-    def look(self) -> Picture:
+    def next_picture(self) -> Picture:
         """Return what the nodes have published."""
         now = time.monotonic()
         if now - self._looked_around_at >= _DISCOVERY_PERIOD:
             self._looked_around_at = now
             self._look_around(now)
         for node in self._driver_nodes.values():
-            for message in node.topics.take():
+            for message in node.topics.take_messages():
                 self._take(node, message, now)
         self._read_log(now)
         self._send_stops(now)
@@ -261,7 +261,7 @@ class GraphSource:
 
     def _look_around(self, now: float) -> None:
         for topic, types in self._node.get_topic_names_and_types():
-            type_ = next((_TYPES[one] for one in types if one in _TYPES), None)
+            type_ = next((_TYPES[offered] for offered in types if offered in _TYPES), None)
             if type_ is None:
                 continue
             for publisher in self._node.get_publishers_info_by_topic(topic):
@@ -313,7 +313,8 @@ class GraphSource:
             self._note(Level.WARNING, node.name, text, stamp or math.nan)
 
     def _read_log(self, now: float) -> None:
-        self._log_lines += [(now, line) for line in self._rosout.take() if line.level in _LEVELS]
+        lines = self._rosout.take_messages()
+        self._log_lines += [(now, line) for line in lines if line.level in _LEVELS]
         names = {name.lstrip('/').replace('/', '.'): name for name in self._driver_nodes}
         waiting = []
         for came_at, line in self._log_lines:
@@ -357,7 +358,7 @@ class GraphSource:
                 if answer.success:
                     # earlier calls, which will perhaps never be answered, are settled by it
                     self._failed.pop(call.who, None)
-                    waiting = [one for one in waiting if one.who != call.who]
+                    waiting = [earlier for earlier in waiting if earlier.who != call.who]
                     self._note(Level.INFO, call.who, f'{call.service}: {answer.message}')
                 else:
                     self._fail(call.who, f'{call.service}: {answer.message}')
@@ -394,7 +395,8 @@ def _drive_view(node: _DriverNode, now: float) -> DriveView:
     measured = Measured()
     fresh = max(_GONE_AFTER, 2 * node.telemetry_gap)
     if node.telemetry is not None and now - node.telemetry_at <= fresh:
-        values = {one.name: getattr(node.telemetry, one.name) for one in fields(Measured)}
+        names = [quantity.name for quantity in fields(Measured)]
+        values = {name: getattr(node.telemetry, name) for name in names}
         measured = Measured(**values)
     return DriveView(
         node.name,

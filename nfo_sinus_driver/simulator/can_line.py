@@ -118,7 +118,7 @@ class CanLine(Wire):
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that were read at ``now``."""
-        for said in self._adapter.take(data):
+        for said in self._adapter.take_bytes(data):
             if isinstance(said, Frame):
                 # every node that has power acknowledges it, also one that is not meant
                 sent = self._carries(now) and any(drive.listening for drive in self._drives)
@@ -155,7 +155,7 @@ class CanLine(Wire):
 
     def _unplugged(self) -> None:
         self._adapter.restart()
-        self._waiting = [one for one in self._waiting if one.sender is not _Else.MASTER]
+        self._waiting = [waiting for waiting in self._waiting if waiting.sender is not _Else.MASTER]
 
     # ---- inside ----
 
@@ -178,15 +178,16 @@ class CanLine(Wire):
         """Return which frame gets the bus next, and when its end is there."""
         if not self._waiting:
             return None
-        begin = max(self._busy_until, min(one.since for one in self._waiting))
+        begin = max(self._busy_until, min(waiting.since for waiting in self._waiting))
         # the adapter sends in order: of its frames only the first takes part
-        masters = next((one for one in self._waiting if one.sender is _Else.MASTER), None)
+        of_master = (waiting for waiting in self._waiting if waiting.sender is _Else.MASTER)
+        masters = next(of_master, None)
         ready = (
-            one
-            for one in self._waiting
-            if one.since <= begin and (one.sender is not _Else.MASTER or one is masters)
+            waiting
+            for waiting in self._waiting
+            if waiting.since <= begin and (waiting.sender is not _Else.MASTER or waiting is masters)
         )
-        first = min(ready, key=lambda one: one.precedence)
+        first = min(ready, key=lambda waiting: waiting.precedence)
         bits = can_frames.bits(first.frame)
         # each time that it is damaged, an error frame is in its place, and it comes again
         again = first.note.count('damaged') * (bits + can_frames.ERROR_BITS)

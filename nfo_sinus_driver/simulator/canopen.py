@@ -239,7 +239,7 @@ class Server(abc.ABC):
     def _asked(self, request: bytes, now: float) -> Iterator[Frame]:
         if self.state is State.STOPPED:
             return
-        self.drive.heard()
+        self.drive.note_frame()
         self.established()
         answer = self._sdo.answer(request)
         # a write may have begun the heartbeat, or ended it
@@ -254,7 +254,7 @@ class Server(abc.ABC):
             self.lost()
             yield self._boot_up(now)
         elif data[0] in _ENTERED:
-            self.drive.heard()
+            self.drive.note_frame()
             self.state = _ENTERED[Command(data[0])]
 
     def _boot_up(self, now: float) -> Frame:
@@ -293,7 +293,7 @@ class Server(abc.ABC):
         life = self._set.guard_ms * self._set.life_factor * _MILLISECOND
         if life and not self._set.beat:
             self._set.watch_until = now + life
-        self.drive.heard()
+        self.drive.note_frame()
         if self._set.beat or not self._profile.guards:
             # heartbeat and guarding exclude each other
             return

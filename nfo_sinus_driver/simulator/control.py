@@ -54,7 +54,7 @@ def require_free(path: str) -> None:
 
 def typed(verb: str, *values: object, **flags: bool) -> list[str]:
     """Return an injection as it is typed; a value that is a boolean is on or off."""
-    texts = [('off', 'on')[one] if isinstance(one, bool) else str(one) for one in values]
+    texts = [('off', 'on')[value] if isinstance(value, bool) else str(value) for value in values]
     # behind the dashes alone a negative number is no option
     chosen = [f'--{name}' for name, on in flags.items() if on]
     return [verb, *chosen, *(['--', *texts] if texts else [])]

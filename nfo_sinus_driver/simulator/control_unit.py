@@ -56,7 +56,8 @@ class Variant:
     def options(cls) -> tuple[Option, ...]:
         """Return what can be chosen."""
         return tuple(
-            Option(one.name, one.metadata['text'], one.metadata['choices']) for one in fields(cls)
+            Option(declared.name, declared.metadata['text'], declared.metadata['choices'])
+            for declared in fields(cls)
         )
 
 
@@ -189,7 +190,7 @@ class ControlUnit(abc.ABC):
         """How long it is set to wait before it answers (s)."""
         return 0.0
 
-    def heard(self) -> None:
+    def note_frame(self) -> None:
         """Record that a valid frame for this drive arrived."""
 
     # ---- for tests and people ----

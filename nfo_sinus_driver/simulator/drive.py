@@ -113,9 +113,9 @@ class SimulatedDrive:
         """Whether it is set to this protocol, speed and format."""
         return self.control_unit.hears(protocol, timing)
 
-    def heard(self) -> None:
+    def note_frame(self) -> None:
         """Record that a valid frame addressed to this drive arrived."""
-        self.control_unit.heard()
+        self.control_unit.note_frame()
 
     def read_raw(self, key: str) -> int:
         """Read a parameter as the bus does, a number of the memory, side effects included."""
@@ -233,7 +233,7 @@ class SimulatedDrive:
         self._boot_left = 0.0
         self.boots += 1
         self.control_unit.boot()
-        self.heard()
+        self.note_frame()
         self.control_unit.settle()
 
     @property

@@ -119,7 +119,7 @@ def _kinds() -> Sequence[SimulatedFamily]:
 
 def every_injection() -> Mapping[str, Injection]:
     """Return what can be made to happen to a drive of any family."""
-    return functools.reduce(operator.or_, (one.injections for one in _kinds()), INJECTIONS)
+    return functools.reduce(operator.or_, (kind.injections for kind in _kinds()), INJECTIONS)
 
 
 def every_option() -> Collection[Option]:

@@ -89,8 +89,8 @@ class Faults:
         """Return an entry of the log as the catalog's ErrorLogArea has it; 0 if it is empty."""
         if entry >= len(self.log):
             return 0
-        one = self.log[entry]
-        return one.code << 24 | int(10 * one.op_time) & 0xFFFFFF
+        logged = self.log[entry]
+        return logged.code << 24 | int(10 * logged.op_time) & 0xFFFFFF
 
     def restart(self) -> None:
         """Forget the faults whose cause is gone, as a power cycle does; the log stays."""

@@ -64,7 +64,8 @@ class Target:
     @property
     def channel(self) -> Channel:
         """The drive as the PLC has it."""
-        return next(one for one in self.plc.channels.values() if one.drive is self.drive)
+        channels = self.plc.channels.values()
+        return next(channel for channel in channels if channel.drive is self.drive)
 
 
 class Injection:
@@ -215,9 +216,9 @@ def add_verbs(parser: argparse.ArgumentParser, injections: Mapping[str, Injectio
     """Let a parser take the words of an injection: its name as ``verb``, and its arguments."""
     verbs = parser.add_subparsers(dest='verb', metavar='VERB', required=True)
     for name, injection in injections.items():
-        one = verbs.add_parser(name, help=injection.text, description=injection.text)
+        verb = verbs.add_parser(name, help=injection.text, description=injection.text)
         for argument_, how in injection.arguments:
-            one.add_argument(argument_, **how)
+            verb.add_argument(argument_, **how)
     return verbs
 
 

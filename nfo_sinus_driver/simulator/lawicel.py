@@ -60,7 +60,7 @@ class Adapter:
 
     # ---- from the computer ----
 
-    def take(self, data: bytes) -> Iterator[bytes | Frame]:
+    def take_bytes(self, data: bytes) -> Iterator[bytes | Frame]:
         """
         Take bytes from the computer.
 
@@ -155,11 +155,12 @@ class Adapter:
         first = frame.data[0] if frame.data and not frame.remote else None
         high = head.to_bytes(2, 'big')
         code, mask = self._code, self._mask
-        one = _matches(high, code, bytes((mask[0], mask[1] | 0x0F)))
-        if one and first is not None:
+        passes = _matches(high, code, bytes((mask[0], mask[1] | 0x0F)))
+        if passes and first is not None:
             byte = bytes(((code[1] & 0x0F) << 4 | code[3] & 0x0F,))
-            one = _matches(bytes((first,)), byte, bytes(((mask[1] & 0x0F) << 4 | mask[3] & 0x0F,)))
-        return one or _matches(high, code[2:], bytes((mask[2], mask[3] | 0x0F)))
+            ignored = bytes(((mask[1] & 0x0F) << 4 | mask[3] & 0x0F,))
+            passes = _matches(bytes((first,)), byte, ignored)
+        return passes or _matches(high, code[2:], bytes((mask[2], mask[3] | 0x0F)))
 
 
 def _matches(seen: bytes, code: bytes, mask: bytes) -> bool:

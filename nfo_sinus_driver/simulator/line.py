@@ -105,7 +105,7 @@ class Line(Wire):
             self._handle(arrived)
 
     def _act(self, now: float) -> None:
-        for arrived in self._receiver.take(now):
+        for arrived in self._receiver.take_frames(now):
             self._handle(arrived)
         while self._deliveries and self._deliveries[0].at <= now:
             self._deliver(heapq.heappop(self._deliveries), now)
@@ -135,7 +135,7 @@ class Line(Wire):
                 if self.any_counts and request.whole:
                     station.advance_to(arrived.last)
                     if self._hears(station):
-                        station.heard()
+                        station.note_frame()
                 continue
             there = True
             station.advance_to(arrived.last)
@@ -144,7 +144,7 @@ class Line(Wire):
             # carrying it out may change them
             address, wait = station.address, station.response_time
             if request.whole:
-                station.heard()
+                station.note_frame()
             frame = self.protocol.answer(station, request)
             if frame:
                 answered = True
@@ -185,7 +185,7 @@ class Line(Wire):
 
     def _free(self, address: int) -> float:
         """Return when a drive that has answers on their way may begin the next, a new frame."""
-        ends = (one.at for one in self._deliveries if one.answer.address == address)
+        ends = (delivery.at for delivery in self._deliveries if delivery.answer.address == address)
         return max(ends, default=float('-inf')) + self.timing.t35
 
     def _schedule(self, at: float, answer: _Answer, until: int) -> None:
@@ -280,16 +280,16 @@ class Receiver:
     def feed(self, data: bytes, now: float) -> Iterator[Arrived]:
         """Take bytes that were read at ``now``; return what is complete by then."""
         # what the silence before these bytes has ended does not belong to them
-        yield from self.take(now)
+        yield from self.take_frames(now)
         begin = max(now, self._end)
         if not self._buffer:
             self._first = now
             self._begin = begin
         self._end = begin + len(data) * self._character
         self._buffer += data
-        yield from self.take(now)
+        yield from self.take_frames(now)
 
-    def take(self, now: float) -> Iterator[Arrived]:
+    def take_frames(self, now: float) -> Iterator[Arrived]:
         """Return what is complete at ``now``."""
         while self._buffer:
             length, end = self._next()
@@ -302,7 +302,7 @@ class Receiver:
 
     @property
     def due(self) -> float | None:
-        """When :meth:`take` will have something; ``None`` while nothing has arrived."""
+        """When :meth:`take_frames` will have something; ``None`` while nothing has arrived."""
         return self._next()[1] if self._buffer else None
 
     def _next(self) -> tuple[int, float]:

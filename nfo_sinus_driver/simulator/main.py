@@ -320,7 +320,7 @@ def _state(client: Client, addresses: Sequence[int]) -> Mapping[Any, Any]:
     """Return the state of one drive, or those of several or all by address."""
     if len(addresses) == 1:
         return client.state(addresses[0])
-    return {one: client.state(one) for one in addresses} or client.states()
+    return {address: client.state(address) for address in addresses} or client.states()
 
 
 def _which_parser() -> Parser:

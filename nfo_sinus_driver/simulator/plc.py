@@ -224,20 +224,21 @@ class Plc:
             raise ValueError(f'{drive.model.name} does not speak {TELEGRAM}')
         server.longer = self.setting.longer_telegram
         shipped, clock = program(), lambda: self._now
-        one = shipped['FB_RosTelegram1'](clock)
-        one.lost_clears, one.lost_sets = server.lost_clears, server.lost_sets
-        one.ros_time, one.drive_time = self.setting.ros_time, self.setting.drive_time
-        one.layout = self.setting.layout
+        telegram = shipped['FB_RosTelegram1'](clock)
+        telegram.lost_clears, telegram.lost_sets = server.lost_clears, server.lost_sets
+        telegram.ros_time, telegram.drive_time = self.setting.ros_time, self.setting.drive_time
+        telegram.layout = self.setting.layout
         mailbox = shipped['FB_RosMailbox'](clock)
         records = Records(shipped['FB_RosParameter'](clock), self.setting.access_time)
         return Channel(
-            drive, server, unit, register, one, mailbox, records, self.setting.released
+            drive, server, unit, register, telegram, mailbox, records, self.setting.released
         )
 
     @property
     def units(self) -> list[Unit]:
         """The units that it is to its master."""
-        return [Unit(self, unit) for unit in sorted({one.unit for one in self.channels.values()})]
+        numbers = {channel.unit for channel in self.channels.values()}
+        return [Unit(self, number) for number in sorted(numbers)]
 
     @property
     def answer_time(self) -> float:
@@ -298,7 +299,7 @@ class Unit:
         return True
 
     @staticmethod
-    def heard() -> None:
+    def note_frame() -> None:
         """Record a frame; it means nothing to a PLC, its program watches the life counter."""
 
     def advance_to(self, now: float) -> None:
@@ -314,7 +315,7 @@ class Registers(modbus.Requests):
     def __init__(self, plc: Plc, unit: int) -> None:
         if not plc.setting.write_and_read:
             self.functions -= {modbus.WRITE_AND_READ}
-        self._channels = [one for one in plc.channels.values() if one.unit == unit]
+        self._channels = [channel for channel in plc.channels.values() if channel.unit == unit]
 
     def read(self, register: int, count: int) -> tuple[int, ...]:
         """Return registers of a block (Refused: ADDRESS)."""

@@ -53,7 +53,7 @@ class Station(Interface):
     def hears(self, protocol: str, timing: Timing) -> bool:
         """Whether it is set to this protocol, speed and format."""
 
-    def heard(self) -> None:
+    def note_frame(self) -> None:
         """Record that a valid frame addressed to it arrived."""
 
     def advance_to(self, now: float) -> None:

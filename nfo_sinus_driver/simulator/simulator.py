@@ -88,9 +88,9 @@ class Simulator:
             address: simulated_drive(model, address, serial_number=number, **options)
             for address, number in itertools.zip_longest(addresses, serial_numbers)
         }
-        for drive, one in itertools.product(self.drives.values(), endpoints):
-            if one.tables not in drive.servers:
-                raise ValueError(f'{model} does not speak {one.protocol}')
+        for drive, endpoint in itertools.product(self.drives.values(), endpoints):
+            if endpoint.tables not in drive.servers:
+                raise ValueError(f'{model} does not speak {endpoint.protocol}')
         self.plc = _plc_before(self.drives, endpoints, plc)
         self._injections = {**INJECTIONS, **load(model).injections}
         self._parser = _parser_of(model)
@@ -107,10 +107,10 @@ class Simulator:
             if control:
                 require_free(control)
             self.lines = []
-            for number, one in enumerate(endpoints):
-                port = one.open()
+            for number, endpoint in enumerate(endpoints):
+                port = endpoint.open()
                 stack.callback(port.hang_up)
-                line = one.wire(
+                line = endpoint.wire(
                     port,
                     drives,
                     drives if self.plc is None else self.plc.units,
@@ -142,8 +142,8 @@ class Simulator:
         """Begin to serve."""
         self._wake_read, self._wake_write = os.pipe()
         now = time.monotonic()
-        for one in self._moving:
-            one.advance_to(now)
+        for moving in self._moving:
+            moving.advance_to(now)
         self._thread = threading.Thread(target=self._run, name='simulated line', daemon=True)
         self._thread.start()
 
@@ -240,9 +240,9 @@ class Simulator:
                     tick = due + _HURRY
                 else:
                     # one drive at a time, so that an answer never waits for all of them
-                    one = turn.pop(0)
-                    turn.append(one)
-                    one.advance_to(now)
+                    moving = turn.pop(0)
+                    turn.append(moving)
+                    moving.advance_to(now)
                     tick = now + _TICK / len(turn)
 
     @property
@@ -264,8 +264,8 @@ def _require_possible(addresses: Sequence[int], endpoints: Sequence[Endpoint]) -
     for address in addresses:
         if addresses.count(address) > 1:
             raise ValueError(f'address {address} is given twice')
-        for one in endpoints:
-            one.check(address)
+        for endpoint in endpoints:
+            endpoint.check(address)
     if not addresses:
         raise ValueError('a line needs a drive')
 
@@ -279,10 +279,10 @@ def _plc_before(
         if len(endpoints) > 1:
             raise ValueError(f'{protocol}: behind a PLC drives have no other line')
         return Plc(drives, setting or PlcSetting())
-    if setting is not None or any(one.through_plc for one in endpoints):
+    if setting is not None or any(endpoint.through_plc for endpoint in endpoints):
         raise ValueError(f'there is no PLC on a line of {protocol}')
     for drive in drives.values():
-        drive.control_unit.set_to([(one.spoken, one.timing) for one in endpoints])
+        drive.control_unit.set_to([(endpoint.spoken, endpoint.timing) for endpoint in endpoints])
     return None
 
 

@@ -33,7 +33,7 @@ _BEGINNINGS = {'BOOL': 'False', 'TON': 'Ton(clock)'} | dict.fromkeys(
     (*_REGISTER, 'BYTE', 'TIME'), '0'
 )
 _FUNCTIONS: dict[str, Callable[..., int]] = {
-    'NOT': lambda one: not one if isinstance(one, bool) else one ^ 0xFFFF,
+    'NOT': lambda operand: not operand if isinstance(operand, bool) else operand ^ 0xFFFF,
     'SHL': lambda word, by: word << by & 0xFFFF,
     'SHR': lambda word, by: word >> by,
     'WORD_TO_BYTE': lambda word: word & 0xFF,
@@ -110,10 +110,10 @@ class _Text:
 
     def __init__(self, text: str, name: str) -> None:
         comments = re.compile(r'\(\*.*?\*\)', re.DOTALL)
-        lines = comments.sub(lambda one: '\n' * one[0].count('\n'), text).split('\n')
+        lines = comments.sub(lambda comment: '\n' * comment[0].count('\n'), text).split('\n')
         self._name = name
         self._words: list[tuple[str, int]] = [
-            (word, at) for at, one in enumerate(lines, 1) for word in _WORD.findall(one)
+            (word, at) for at, line in enumerate(lines, 1) for word in _WORD.findall(line)
         ]
         self._words.append(('', len(lines)))
         self._at = 0

@@ -88,7 +88,7 @@ class FieldbusWatch:
     def __init__(self) -> None:
         self._unheard: float | None = None
 
-    def heard(self) -> None:
+    def note_telegram(self) -> None:
         """Record a telegram."""
         self._unheard = 0.0
 

@@ -100,8 +100,8 @@ def fitted(row: Row, width: int, *, fill: bool = False) -> Row:
     left = width
     for text, style in row:
         # what a drive or an operator has named may be anything
-        text = ''.join(one if one.isprintable() else ' ' for one in text)
-        wide = [_columns_of(one) for one in text]
+        text = ''.join(character if character.isprintable() else ' ' for character in text)
+        wide = [_columns_of(character) for character in text]
         if sum(wide) > left:
             kept = sum(end < left for end in itertools.accumulate(wide))
             fits.append((f'{text[:kept]}…'[:left], style))
@@ -158,7 +158,7 @@ class Layout:
     """
     What a source reports, as rows for a screen of any size, and what the keys do.
 
-    :param source: asked by :meth:`look`, which should be called every :data:`PERIOD`.
+    :param source: asked by :meth:`take_picture`, which should be called every :data:`PERIOD`.
     """
 
     def __init__(self, source: Source) -> None:
@@ -174,9 +174,9 @@ class Layout:
         self._notes: deque[Note] = deque(maxlen=_MOST_NOTES)
         self._quantities = list(_QUANTITIES)
 
-    def look(self) -> None:
+    def take_picture(self) -> None:
         """Take the next picture."""
-        self._picture = picture = self._source.look()
+        self._picture = picture = self._source.next_picture()
         self._drives = sorted(picture.drives, key=lambda drive: natural(drive.name))
         for drive in self._drives:
             past = self._history.setdefault(drive.name, deque(maxlen=_REMEMBERED))
@@ -237,8 +237,8 @@ class Layout:
             left = _filled(self._table(room), room)
             right = _filled(self._full(width - _TABLE_WIDTH - 2, room), room)
             body = [
-                [*fitted(one, _TABLE_WIDTH, fill=True), ('│ ', 'dim'), *other]
-                for one, other in zip(left, right, strict=True)
+                [*fitted(row, _TABLE_WIDTH, fill=True), ('│ ', 'dim'), *other]
+                for row, other in zip(left, right, strict=True)
             ]
         else:
             table = self._table(room * 45 // 100)
@@ -303,7 +303,7 @@ class Layout:
         drive = self._drives[self._at]
         figures = '' if drive.line is None else f'line: {_figures(drive.line)}'
         line = wrapped([(figures, 'dim')], width)
-        rows = [row for one in _in_full(drive) for row in wrapped(one, width)]
+        rows = [row for whole in _in_full(drive) for row in wrapped(whole, width)]
         # a small plot rather than all figures of the line
         plots = self._plots(drive, width, max(2, height - len(rows) - len(line)))
         return [*rows, *plots, *line]
@@ -311,8 +311,8 @@ class Layout:
     def _plots(self, drive: DriveView, width: int, rows: int) -> Iterable[Row]:
         """Return the plot that was chosen, and the next ones where there is room for them."""
         height = max(1, min(_PLOT_HEIGHT, rows - 1))
-        plots = (self._plot(drive, one, width - 10, height) for one in self._quantities)
-        return itertools.chain(*[one for one in plots if one][: rows // (height + 1)])
+        plots = (self._plot(drive, quantity, width - 10, height) for quantity in self._quantities)
+        return itertools.chain(*[drawn for drawn in plots if drawn][: rows // (height + 1)])
 
     def _plot(self, drive: DriveView, quantity: str, width: int, height: int) -> list[Row]:
         name, unit, decimals, least = _QUANTITIES[quantity]
@@ -369,7 +369,7 @@ def _in_full(drive: DriveView) -> Iterator[Row]:
     )
     known = [f'{name}{text}' for name, value, text in cells if not math.isnan(value)]
     # a row ends only where a value does
-    yield [('  '.join(one.replace(' ', '\N{NO-BREAK SPACE}') for one in known), '')]
+    yield [('  '.join(figure.replace(' ', '\N{NO-BREAK SPACE}') for figure in known), '')]
 
 
 def _figures(line: Figures) -> str:

@@ -118,7 +118,7 @@ class Source(Protocol):
     #: Why nothing can be stopped from here; empty: it can.
     only_looks: str
 
-    def look(self) -> Picture:
+    def next_picture(self) -> Picture:
         """Return what is so now."""
 
     def stop(self, name: str) -> None:

@@ -64,7 +64,7 @@ def _run(window: curses.window, layout: Layout, ended: threading.Event) -> None:
     while not ended.is_set() and sys.stdin.isatty():
         if time.monotonic() >= due:
             due = time.monotonic() + PERIOD
-            layout.look()
+            layout.take_picture()
         _fit(window)
         _draw(window, layout, styles)
         window.timeout(max(0, round(1000 * (due - time.monotonic()))))

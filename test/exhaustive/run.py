@@ -226,7 +226,7 @@ class Tree:
         self._machine, self._jobs, self._done = machine, jobs, done
         self._parts, self._pairs = parts, len(parts) > 1
         self._faults = tuple(faults)
-        self._faults_of_reads = tuple(one for one in self._faults if one != REFUSALS[-1])
+        self._faults_of_reads = tuple(fault for fault in self._faults if fault != REFUSALS[-1])
         self._asked, self._number = -1, 0
         self._met = Counter[tuple[str, str, bool]]()
         self._case: Case = ()
@@ -304,7 +304,7 @@ def main() -> int:
             # a call is the second thing there
             continue
         if options.case:
-            split = (one.partition(':') for one in options.case)
+            split = (pair.partition(':') for pair in options.case)
             case = tuple((int(at), fault) for at, _, fault in split)
             complaint = complaint_of(run_of(machines[name], Given(case)))
             print(f'{name}: {complaint or "nothing is wrong"}')
@@ -327,7 +327,7 @@ def _parts_of(options: argparse.Namespace) -> list[tuple[int, int]]:
 
 def _try_all(machine: Machine, options: argparse.Namespace) -> int:
     with tempfile.TemporaryFile() as done:
-        faults = [one for one in faults_of(machine) if one in (options.fault or [one])]
+        faults = [fault for fault in faults_of(machine) if fault in (options.fault or [fault])]
         Tree(machine, faults, _parts_of(options), options.jobs, done.fileno()).run()
         done.seek(0)
         ends = done.read()

@@ -85,11 +85,11 @@ def _judged(seed: int, case: int) -> Iterable[Finding]:
 def _allocated() -> int:
     # what a cache keeps is bounded, and fills slowly; a frozen one would not be found
     gc.unfreeze()
-    for one in gc.get_objects():
+    for found in gc.get_objects():
         # its type, for some objects raise at whatever they are asked
-        if type(one) is functools._lru_cache_wrapper:
-            one.cache_clear()
+        if type(found) is functools._lru_cache_wrapper:
+            found.cache_clear()
     # the newest object may be of a case: it would keep all that it knows
-    del one
+    del found
     gc.collect()
     return sys.getallocatedblocks()

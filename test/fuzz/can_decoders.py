@@ -107,7 +107,7 @@ def _sdo(random: Random, frames: int) -> None:
         outcome: object = _WAITS
         for message in stream:
             try:
-                upload.take(message)
+                upload.take_message(message)
             except Refused as refused:
                 outcome = str(refused)[-10:-2]
             except DamagedAnswer:

@@ -325,11 +325,11 @@ _EOT = 0x04
 #: An ACK or NAK whose address may be the last digit of what broke off before it: taken for nothing.
 _MAY_BE_REMAINS = re.compile(rb'[0-9A-Fa-f][\x06\x15]')
 _KINDS: Mapping[str, Callable[[judges.Classic], classic.Message]] = {
-    'enquiry': lambda one: classic.Enquiry(one.unit, one.number),
-    'select': lambda one: classic.Select(one.unit, one.number, one.word),
-    'value': lambda one: classic.Value(one.unit, one.number, one.word),
-    'ack': lambda one: classic.Ack(one.unit),
-    'nak': lambda one: classic.Nak(one.unit),
+    'enquiry': lambda read: classic.Enquiry(read.unit, read.number),
+    'select': lambda read: classic.Select(read.unit, read.number, read.word),
+    'value': lambda read: classic.Value(read.unit, read.number, read.word),
+    'ack': lambda read: classic.Ack(read.unit),
+    'nak': lambda read: classic.Nak(read.unit),
 }
 
 
@@ -341,17 +341,17 @@ def _judge_classic(
     spans: list[tuple[int, int]] = []
     end = 0
     for message in found:
-        for one in readable:
+        for read in readable:
             # behind an EOT that ends nothing an answer is a part of something else
-            is_answer = stream[one.begin] != _EOT
-            part = is_answer and one.begin > end and stream[one.begin - 1] == _EOT
-            if one.begin >= end and not part and _KINDS[one.kind](one) == message:
+            is_answer = stream[read.begin] != _EOT
+            part = is_answer and read.begin > end and stream[read.begin - 1] == _EOT
+            if read.begin >= end and not part and _KINDS[read.kind](read) == message:
                 break
         else:
             raise AssertionError(f'{message} is not among the bytes, or was found twice')
-        spans.append((one.begin, one.end))
-        end = one.end
-        _judge_answers(message, one, random)
+        spans.append((read.begin, read.end))
+        end = read.end
+        _judge_answers(message, read, random)
     for begin, end in intact:
         before = stream[begin - 1 : begin]
         if before == bytes((_EOT,)) or (before and _MAY_BE_REMAINS.match(stream, begin)):
@@ -360,15 +360,15 @@ def _judge_classic(
         assert overlapped, f'the message at {begin} was not found'
 
 
-def _judge_answers(message: classic.Message, one: judges.Classic, random: Random) -> None:
-    unit = random.choice((0, 1, one.unit))
-    number = random.choice((0x29, one.number))
+def _judge_answers(message: classic.Message, read: judges.Classic, random: Random) -> None:
+    unit = random.choice((0, 1, read.unit))
+    number = random.choice((0x29, read.number))
     for request, kinds in (
         (classic.Enquiry(unit, number), ('value', 'nak')),
         (classic.Select(unit, number, 1), ('ack', 'nak')),
     ):
-        right = unit in (0, one.unit) and one.kind in kinds
-        right = right and (one.kind != 'value' or one.number == number)
+        right = unit in (0, read.unit) and read.kind in kinds
+        right = right and (read.kind != 'value' or read.number == number)
         assert classic.answers(message, request) == right, f'{message} answers {request}?'
 
 
@@ -431,40 +431,40 @@ def _judge_movitrac(request: movitrac.Request, stream: bytes, mutator: Mutator) 
             if not movitrac.answers(answer, request):
                 continue
             right = [
-                one for one in judges.movitrac_frames(fed)
-                if one.begin >= taken and one.kind in (wanted, 'nack')
-                if answer == _MOVITRAC_ANSWERS[one.kind](one)
+                frame for frame in judges.movitrac_frames(fed)
+                if frame.begin >= taken and frame.kind in (wanted, 'nack')
+                if answer == _MOVITRAC_ANSWERS[frame.kind](frame)
             ]
             assert right, f'{answer} from a damaged frame'
             if right[0].kind != 'value':
-                right = [one for one in right if _is_behind_a_glitch(fed[: one.begin])]
+                right = [frame for frame in right if _is_behind_a_glitch(fed[: frame.begin])]
                 before = fed[taken:].hex(' ')
                 assert right, f'an ACK or NACK was believed behind remains: {before}'
             assert right[0].kind != 'value' or right[0].number == request.index, f'{answer}?'
             taken = right[0].end
         assert len(reader.rest) <= _MOST_KEPT, 'the reader keeps more than a frame'
         readable = list(judges.movitrac_frames(fed))
-        for one in readable:
-            if (one.kind, one.number) != (wanted, request.index) or one.begin < taken:
+        for frame in readable:
+            if (frame.kind, frame.number) != (wanted, request.index) or frame.begin < taken:
                 continue
             # two frames that can be read in the same bytes: the first one counts
-            overlapped = any(other.begin < one.begin < other.end for other in readable)
-            assert overlapped, f'the value at {one.begin} was not found'
+            overlapped = any(other.begin < frame.begin < other.end for other in readable)
+            assert overlapped, f'the value at {frame.begin} was not found'
 
 
 def _is_behind_a_glitch(before: bytes) -> bool:
     """Return whether an ACK or NACK counts: before it, whole frames and then next to nothing."""
-    ends = [0, *(one.end for one in judges.movitrac_frames(before))]
+    ends = [0, *(frame.end for frame in judges.movitrac_frames(before))]
     junk = [before[end:] for end in ends]
     return any(
-        len(one) <= _GLITCH and judges.MOVITRAC_STARTS.isdisjoint(one) for one in junk
+        len(piece) <= _GLITCH and judges.MOVITRAC_STARTS.isdisjoint(piece) for piece in junk
     )
 
 
 _MOVITRAC_ANSWERS: Mapping[str, Callable[[judges.Movitrac], movitrac.Message]] = {
-    'value': lambda one: movitrac.Data(one.number, one.value),
-    'ack': lambda one: movitrac.Ack(),
-    'nack': lambda one: movitrac.Nack(one.number),
+    'value': lambda frame: movitrac.Data(frame.number, frame.value),
+    'ack': lambda frame: movitrac.Ack(),
+    'nack': lambda frame: movitrac.Nack(frame.number),
 }
 
 

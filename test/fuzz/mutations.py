@@ -103,8 +103,8 @@ class Mutator:
         return frame[:at] + middle + frame[at:]
 
     def _swap(self, frame: bytes, others: Sequence[bytes]) -> bytes:
-        one, two = sorted((self._at(frame), self._at(frame)))
-        return frame[:one] + frame[two:] + frame[one:two]
+        begin, end = sorted((self._at(frame), self._at(frame)))
+        return frame[:begin] + frame[end:] + frame[begin:end]
 
     def _count(self, frame: bytes, others: Sequence[bytes]) -> bytes:
         """Change one byte a little: where it is a length or a count, that is wrong now."""

@@ -42,11 +42,11 @@ def _adapter(random: Random, frames: int) -> None:
             else:
                 stream += line
         adapter = Adapter()
-        list(adapter.take(_REOPEN))
+        list(adapter.take_bytes(_REOPEN))
         found: list[Frame] = []
         answered = 0
         for piece in mutator.pieces(stream):
-            for said in adapter.take(piece):
+            for said in adapter.take_bytes(piece):
                 if isinstance(said, Frame):
                     found.append(said)
                     said = adapter.tried(said, sent=True)
@@ -55,7 +55,7 @@ def _adapter(random: Random, frames: int) -> None:
         right = list(_frames_of(lines))
         assert found == right, f'{found} instead of {right}'
         assert answered == sum(line != b'' for line in lines), 'a line has one answer'
-        list(adapter.take(_REOPEN))
+        list(adapter.take_bytes(_REOPEN))
         assert adapter.on_bus(125_000), 'it does not come back'
 
 
@@ -112,11 +112,11 @@ def _node(random: Random, frames: int) -> None:
         identifier = random.choice((0x601, 0x601, 0x601, 0x000, 0x701, 0x77F, 0x602))
         frame = Frame(identifier, data, random.random() < 0.1)
         said = [*node.act(now), *node.receive(frame, now)]
-        answers = [one for one in said if one.identifier == 0x580 + _NODE]
-        others = {one.identifier for one in said} - {0x580 + _NODE}
+        answers = [heard for heard in said if heard.identifier == 0x580 + _NODE]
+        others = {heard.identifier for heard in said} - {0x580 + _NODE}
         assert others <= {0x080 + _NODE, 0x700 + _NODE}, f'frames of no known kind: {others}'
         asked = identifier == 0x600 + _NODE and not frame.remote
-        assert len(answers) <= asked and all(len(one.data) == 8 for one in answers)
+        assert len(answers) <= asked and all(len(heard.data) == 8 for heard in answers)
         for answer in answers:
             if data[0] >> 5 in (1, 2):
                 assert answer.data[1:4] == data[1:4], 'an answer about another object'

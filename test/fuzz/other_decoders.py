@@ -139,11 +139,11 @@ def _classic_request(random: Random) -> bytes:
 
 def _classic_body(frame: bytes) -> tuple[int, bytes] | None:
     """Return a Classic message that is right; what is wrong with others the drive itself says."""
-    for one in judges.classic_messages(frame):
-        is_request = one.kind in _PREFIX and (one.begin, one.end) == (0, len(frame))
+    for message in judges.classic_messages(frame):
+        is_request = message.kind in _PREFIX and (message.begin, message.end) == (0, len(frame))
         # a drive knows the prefix in upper case only
-        if is_request and frame[_PREFIX[one.kind]] == ord('E'):
-            return one.unit, frame
+        if is_request and frame[_PREFIX[message.kind]] == ord('E'):
+            return message.unit, frame
     return None
 
 

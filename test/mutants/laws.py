@@ -196,8 +196,8 @@ LAWS = (
         2,
         'the run command is not removed before an acknowledgement',
         'ModeScmd.stop',
-        'one(Write(self._command, Scmd.STOP, retry=False))',
-        'one(Read(MODE))',
+        'one_step(Write(self._command, Scmd.STOP, retry=False))',
+        'one_step(Read(MODE))',
         (NO_RESTART, '-k', 'fault_and_ack'),
     ),
     Mutant(
@@ -742,7 +742,7 @@ LAWS = (
     Mutant(
         8,
         'a segment that is repeated is taken twice',
-        'Transfer.take',
+        'Transfer.take_message',
         '            if message[0] & _TOGGLE != self._toggle:',
         '            if False:',
         ('test_sdo.py',),
@@ -767,7 +767,7 @@ LAWS = (
         8,
         'a reading follows an answer at once that may come twice',
         'SecondAnswers.silence',
-        '        return one.silence if one is not None and now < one.until else 0.0',
+        '        return record.silence if record is not None and now < record.until else 0.0',
         '        return 0.0',
         ('test_two_answers.py',),
     ),
@@ -862,7 +862,7 @@ LAWS = (
     Mutant(
         2,
         'a setting of a described drive is its run command',
-        'Registers.take',
+        'Registers.note_use',
         '                if not together and ',
         '                if False and ',
         ('test_descriptions.py', '-k', 'exclude_each_other'),

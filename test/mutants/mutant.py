@@ -74,7 +74,7 @@ class Mutant:
         for where, old, new in ((self.where, self.old, self.new), *self.also):
             file, begin, end = _found(root, where, old)
             places = re.finditer(re.escape(old), _text(file, begin, end))
-            edits.setdefault(file, []).extend((begin + one.start(), old, new) for one in places)
+            edits.setdefault(file, []).extend((begin + place.start(), old, new) for place in places)
         for file, changes in edits.items():
             text = file.read_text(encoding='utf-8')
             for at, old, new in sorted(changes, reverse=True):
@@ -87,7 +87,7 @@ class Mutant:
 
         :raises ValueError: there is no such test file, or several of that name.
         """
-        return [_test_file(root, one) if one.endswith('.py') else one for one in self.tests]
+        return [_test_file(root, test) if test.endswith('.py') else test for test in self.tests]
 
 
 def _test_file(root: Path, name: str) -> str:
@@ -132,10 +132,10 @@ def _definitions(node: ast.AST, within: str) -> Iterator[tuple[str, int, int]]:
         first = getattr(child, 'lineno', 1)
         if isinstance(child, (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
             names = [child.name]
-            first = min([first, *(one.lineno for one in child.decorator_list)])
+            first = min([first, *(decorator.lineno for decorator in child.decorator_list)])
         elif isinstance(child, (ast.Assign, ast.AnnAssign)):
             targets = child.targets if isinstance(child, ast.Assign) else [child.target]
-            names = [one.id for one in targets if isinstance(one, ast.Name)]
+            names = [target.id for target in targets if isinstance(target, ast.Name)]
         for name in names:
             yield f'{within}{name}', first, child.end_lineno or first
         if isinstance(child, ast.ClassDef):

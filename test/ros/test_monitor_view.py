@@ -78,13 +78,15 @@ def test_a_stop_waits_until_its_service_is_discovered(bench: Bench) -> None:
     client = bench.client().connected()
     source = GraphSource(client.node.context)
     try:
-        wait_until(lambda: source.look().drives, 'the drive is found', period=0.25)
+        wait_until(lambda: source.next_picture().drives, 'the drive is found', period=0.25)
         with client.run_at(20.0):
             # as on a busy machine, where its topics come before its services
             source._driver_nodes['/nfo_sinus'].stop = None
             source.stop('/nfo_sinus')
             wait_until(
-                lambda: source.look() and not simulator.state()['turning'], 'it stands', period=0.25
+                lambda: source.next_picture() and not simulator.state()['turning'],
+                'it stands',
+                period=0.25,
             )
     finally:
         source.close()

@@ -33,11 +33,11 @@ class Aggregator:
 
     def groups(self, status: str) -> set[str]:
         """Return the groups in which a status is shown."""
-        return {path for path, one in _leaves(self._top) if _matches(one, status)}
+        return {path for path, leaf in _leaves(self._top) if _matches(leaf, status)}
 
     def expected(self) -> set[str]:
         """Return the statuses of which the absence is an error."""
-        return {name for _, one in _leaves(self._top) for name in one.get('expected', ())}
+        return {name for _, leaf in _leaves(self._top) for name in leaf.get('expected', ())}
 
     def level(self, statuses: Mapping[str, int]) -> int:
         """Return the level of ``/diagnostics_toplevel_state`` for the levels of all statuses."""
@@ -51,52 +51,52 @@ class Aggregator:
 
 
 def _children(group: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    for name, one in group.get('analyzers', group).items():
-        if isinstance(one, dict):
-            assert one['type'] in (_GROUP, _GENERIC) and one['path'], name
+    for name, analyzer in group.get('analyzers', group).items():
+        if isinstance(analyzer, dict):
+            assert analyzer['type'] in (_GROUP, _GENERIC) and analyzer['path'], name
             # it is read as a double, and another number ends the node
-            assert isinstance(one.get('timeout', 5.0), float), name
-            yield name, one
+            assert isinstance(analyzer.get('timeout', 5.0), float), name
+            yield name, analyzer
 
 
-def _loads(one: dict[str, Any]) -> bool:
+def _loads(analyzer: dict[str, Any]) -> bool:
     """Return whether an analyzer loads: ``expected`` alone is no way to find a status (#656)."""
-    if one['type'] == _GROUP:
-        return all(_loads(child) for _, child in _children(one))
-    return any(one.get(way) for way in ('regex', 'startswith', 'contains'))
+    if analyzer['type'] == _GROUP:
+        return all(_loads(child) for _, child in _children(analyzer))
+    return any(analyzer.get(way) for way in ('regex', 'startswith', 'contains'))
 
 
 def _refused(group: dict[str, Any]) -> Iterator[str]:
-    for name, one in _children(group):
-        if not _loads(one):
+    for name, analyzer in _children(group):
+        if not _loads(analyzer):
             yield name
-            if one['type'] == _GROUP:
-                yield from _refused(one)
+            if analyzer['type'] == _GROUP:
+                yield from _refused(analyzer)
 
 
 def _leaves(group: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    for _, one in _children(group):
-        if not _loads(one):
+    for _, analyzer in _children(group):
+        if not _loads(analyzer):
             continue
-        if one['type'] == _GROUP:
-            yield from ((f'{one["path"]}/{path}', leaf) for path, leaf in _leaves(one))
+        if analyzer['type'] == _GROUP:
+            yield from ((f'{analyzer["path"]}/{path}', leaf) for path, leaf in _leaves(analyzer))
         else:
-            yield one['path'], one
+            yield analyzer['path'], analyzer
 
 
-def _matches(one: dict[str, Any], status: str) -> bool:
+def _matches(analyzer: dict[str, Any], status: str) -> bool:
     return (
-        any(re.fullmatch(pattern, status) for pattern in one.get('regex', ()))
-        or any(status.startswith(text) for text in one.get('startswith', ()))
-        or any(text in status for text in one.get('contains', ()))
+        any(re.fullmatch(pattern, status) for pattern in analyzer.get('regex', ()))
+        or any(status.startswith(text) for text in analyzer.get('startswith', ()))
+        or any(text in status for text in analyzer.get('contains', ()))
     )
 
 
 def _levels(group: dict[str, Any], statuses: Mapping[str, int]) -> Iterator[int]:
     """Yield the level of each analyzer; STALE beside another level is an error."""
-    for _, one in _leaves(group):
+    for _, analyzer in _leaves(group):
         # what is expected is there from the beginning, and STALE
-        items = dict.fromkeys(one.get('expected', ()), STALE)
-        items |= {name: level for name, level in statuses.items() if _matches(one, name)}
+        items = dict.fromkeys(analyzer.get('expected', ()), STALE)
+        items |= {name: level for name, level in statuses.items() if _matches(analyzer, name)}
         worst = max(items.values(), default=STALE)
         yield ERROR if worst == STALE and set(items.values()) - {STALE} else worst

@@ -80,7 +80,7 @@ def _number(
     if kind is float:
         beyond.append(low + steps[0] / 2)
     counts = {kind(end): int(end / count) for end in (low, high)}
-    return counts, float(steps[0]), tuple(kind(one) for one in beyond)
+    return counts, float(steps[0]), tuple(kind(cell) for cell in beyond)
 
 
 def _list(labels: Mapping[int, str]) -> _Range:
@@ -114,7 +114,7 @@ def of_g2(protocol: str, dialect: str = '2.03') -> Mapping[str, Ends]:
             continue
         place, type_, *scaling = line.cells
         printed, decimals, unit, when = old.get(id_, [''] * 4)
-        places = tuple(int(one, 16) for one in re.findall(r'E?([0-9A-F]{4})h?', place))
+        places = tuple(int(number, 16) for number in re.findall(r'E?([0-9A-F]{4})h?', place))
         if type_ == 'ENUM':
             labels = manual_g2.labels_of(line.parameters[0], line)
             known = re.findall(r'= (\d+)', printed)
@@ -124,7 +124,7 @@ def of_g2(protocol: str, dialect: str = '2.03') -> Mapping[str, Ends]:
         else:
             count = _count_of(scaling)
             # whole numbers are those that no bus divides
-            whole = not any('/' in cell for one in (classic, modbus) for cell in one[key].cells[2:])
+            whole = not any('/' in cell for row in (classic, modbus) for cell in row[key].cells[2:])
             low, high = manual_g2.counts_of(printed)
             old_count = Fraction(1, 10 ** int(decimals or 0))
             if key == 'serial.address':

@@ -431,7 +431,7 @@ class LineLaws:
 
     def _judge_answers(self, number: int, unit: _Unit) -> None:
         """Judge S5, of what is answered."""
-        for answer in [one for one in unit.answers if one.done()]:
+        for answer in [future for future in unit.answers if future.done()]:
             unit.answers.remove(answer)
             if answer.exception() is None and self._turns(number):
                 self._break('S5', number, 'is answered as stopped at', self._clock.now)
@@ -466,9 +466,9 @@ class LineLaws:
                         unit.strays_since)
         new = notes.events[self._events[number] :]
         self._events[number] = len(notes.events)
-        if any(says(one.text, Cause.SETPOINT_TIMED_OUT) for one in new):
+        if any(says(event.text, Cause.SETPOINT_TIMED_OUT) for event in new):
             unit.ramps_from = now
-        if any(says(one.text, Cause.SETPOINTS_AGAIN) for one in new) or not self._turns(number):
+        if any(says(event.text, Cause.SETPOINTS_AGAIN) for event in new) or not self._turns(number):
             unit.ramps_from = math.inf
         if now > unit.ramps_from + patience:
             self._break('S5', number, 'is told as ramping to a stop, and turns since',

@@ -189,7 +189,7 @@ class LineRun:
         # what was called for just now comes first
         rig.pass_time(_STEADY)
         rig.wait_until(
-            lambda: all(one.snapshot.connected and not one.stop_unconfirmed for one in drives)
+            lambda: all(drive.snapshot.connected and not drive.stop_unconfirmed for drive in drives)
         )
         for unit, far in rig.fars.items():
             if far.faults:
@@ -213,7 +213,8 @@ class LineRun:
     def _until_told(self) -> None:
         """Let all motors turn for a while, and until each is told as enabled."""
         self.rig.pass_time(_STEADY)
-        self.rig.wait_until(lambda: all(one.snapshot.enabled for one in self.rig.drives.values()))
+        drives = self.rig.drives.values()
+        self.rig.wait_until(lambda: all(drive.snapshot.enabled for drive in drives))
 
     def begin_with_another_driver(self) -> None:
         """End the driver, if it has not ended, and begin with another one."""

@@ -114,7 +114,7 @@ def lines_of(table: int) -> Iterator[Line]:
             names = PAIRS.get(squashed(name), [squashed(name)]) if table > 5 else [squashed(name)]
             # the set-points stand in Status and among the words of control [C28]
             groups = (group, 'status') if group == 'fieldbus' else (group,)
-            keys = [(where, one) for one in names for where in groups]
+            keys = [(where, printed) for printed in names for where in groups]
             found = [known[key] for key in keys if key in known]
             assert len(found) == len(names), f'table {table}: unknown: {name} of {group}'
             yield Line(found, name, cells)
@@ -350,7 +350,7 @@ def range_in(row: Parameter, cells: list[str]) -> Iterator[Fact]:
     elif row.key == 'motor.i_limt':
         yield 'range', (None, None, Fraction('0.01')), (*bounds, row.minimum)  # I-magn + 1
     elif row.is_setting:
-        scaled = tuple(None if one is None else Fraction(one, 10**decimals) for one in bounds)
+        scaled = tuple(None if bound is None else Fraction(bound, 10**decimals) for bound in bounds)
         yield 'range', scaled, (row.minimum, row.maximum)
     yield 'unit', cells[5].replace('Unit*', ''), row.unit
     if row.key == 'status.trq_act':

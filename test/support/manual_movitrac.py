@@ -93,7 +93,7 @@ def meaning_of(line: Line) -> str:
         text = line.meaning.replace('$', '').replace('\\dots', '...').replace('10 ⁸ -1', '99999999')
         return text.replace('-2^{31} ', '-2147483648').replace('2^{31} - 1', '2147483647')
     number = REFERENCES.get(reference[1], reference[1])
-    return meaning_of(next(one for one in lines() if one.number == number))
+    return meaning_of(next(other for other in lines() if other.number == number))
 
 
 def typed(printed: str) -> str:
@@ -123,7 +123,7 @@ def labels_of(line: Line) -> dict[int, str]:
     text = meaning_of(line)
     group = {'60': '600', '61': '611'}.get(line.number[:2])
     if group is not None:
-        text = '\n'.join(one.meaning for one in lines() if one.number[:2] == line.number[:2])
+        text = '\n'.join(other.meaning for other in lines() if other.number[:2] == line.number[:2])
     return labels_in(text)
 
 
@@ -202,7 +202,7 @@ def conversion_list_of_movitrac() -> Iterator[Fact]:
     numbers: dict[int, set[str]] = {}
     for line in lines():
         numbers.setdefault(line.index, set()).add(line.number)
-    for index, (code, number) in {int(one): rest for one, *rest in triples}.items():
+    for index, (code, number) in {int(first): rest for first, *rest in triples}.items():
         yield f'index {index}', int(code, 16), index
         printed = set(re.findall(r'\b\d{3}\b', number)) or {'-'}
         yield f'numbers of {index}', printed, printed & numbers[index]

@@ -197,7 +197,7 @@ class Notes:
     def said(self, what: str | Cause, severity: Severity | None = None) -> bool:
         """Return whether an event says this."""
         return any(
-            says(one.text, what) for one in self.events if severity in (None, one.severity)
+            says(event.text, what) for event in self.events if severity in (None, event.severity)
         )
 
 
@@ -480,7 +480,7 @@ class Rig:
 
     def enable(self, *addresses: int) -> None:
         """Enable some drives, or all."""
-        for future in [self.drives[one].enable() for one in addresses or self.drives]:
+        for future in [self.drives[address].enable() for address in addresses or self.drives]:
             answer = self.answer(future)
             assert 'enabled' in answer, answer
         # what is asked for in the very moment of enabling does not come after it

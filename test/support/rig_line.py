@@ -233,7 +233,9 @@ class Line:
 
     def unplug(self, *addresses: int) -> None:
         """Take drives off the line; all others are on it."""
-        self.wire.stations = [one for one in self._stations if one.address not in addresses]
+        self.wire.stations = [
+            station for station in self._stations if station.address not in addresses
+        ]
 
     def exchange(self, model: str) -> SimulatedDrive:
         """Put another drive in the place of the only one, switched on and at standstill."""

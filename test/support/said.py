@@ -52,9 +52,9 @@ def said(what: Any) -> Said:
 def _causes(report: Report) -> Iterator[Cause]:
     yield report.cause
     for value in report.values.values():
-        for one in value if isinstance(value, tuple) else (value,):
-            if isinstance(one, Report):
-                yield from _causes(one)
+        for part in value if isinstance(value, tuple) else (value,):
+            if isinstance(part, Report):
+                yield from _causes(part)
 
 
 @contextlib.contextmanager

@@ -51,7 +51,9 @@ def unsettled(samples: Sequence[Sample]) -> list[str]:
     found = []
     for what, most in MOST_GROWTH.items():
         # the median: one that is there for a moment is no leak
-        before, after = (statistics.median(getattr(one, what) for one in part) for part in parts)
+        before, after = (
+            statistics.median(getattr(sample, what) for sample in part) for part in parts
+        )
         if after - before > most:
             found.append(
                 f'{what} does not settle: {before:g} in the third quarter of the time, '

@@ -43,7 +43,7 @@ def allowed(path: Path) -> Policy:
                 if rule.tag is ElementTree.Comment:
                     continue
                 child, qualifiers = RULES[str(rule.tag)]
-                names = [str(one.text) for one in rule if one.tag == child]
+                names = [str(element.text) for element in rule if element.tag == child]
                 assert len(set(names)) == len(rule) and set(rule.attrib) <= qualifiers, rule.attrib
                 assert all(re.fullmatch(r'~?(/\w+)+', name) for name in names), names
                 for qualifier, what in rule.attrib.items():

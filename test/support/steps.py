@@ -32,8 +32,8 @@ class Wait:
 
     def __eq__(self, step: object) -> bool:
         assert isinstance(step, Until)
-        fulfilled = all(step.condition(one) for one in self._reached)
-        return fulfilled and not any(step.condition(one) for one in self._not_by)
+        fulfilled = all(step.condition(state) for state in self._reached)
+        return fulfilled and not any(step.condition(state) for state in self._not_by)
 
     __hash__ = None  # type: ignore[assignment]
 

@@ -126,7 +126,7 @@ def mailbox_complaints(
 
 def words(frames: Iterable[Mapping[str, Any]], unit: int = 1) -> list[int]:
     """Return the control words that were written to a block, each once in a row."""
-    return [word for word, _ in groupby(one.stw1 for one in exchanges(frames, unit))]
+    return [word for word, _ in groupby(exchange.stw1 for exchange in exchanges(frames, unit))]
 
 
 class Judge(abc.ABC):
@@ -280,5 +280,9 @@ def violations(
     """Return what is wrong with all that was written to the block of a unit."""
     judge = JUDGES[model]()
     frames = list(frames)
-    found = [wrong for one in exchanges(frames, unit, start) for wrong in judge.complaints(one)]
+    found = [
+        wrong
+        for exchange in exchanges(frames, unit, start)
+        for wrong in judge.complaints(exchange)
+    ]
     return [*found, *mailbox_complaints(frames, model, unit, start)]

@@ -103,9 +103,9 @@ def _behind_a_late_answer(frames: list[Frame], number: int) -> bool:
     """Return whether a request was given up just before: a late one keeps no gap to the next."""
     near = frames[max(0, number - _NEAR) : number]
     return any(
-        one['direction'] == 'request' and other['first'] - one['last'] >= _GIVEN_UP
-        for one, other in itertools.pairwise(near)
-        if 'first' in other and 'last' in one
+        frame['direction'] == 'request' and other['first'] - frame['last'] >= _GIVEN_UP
+        for frame, other in itertools.pairwise(near)
+        if 'first' in other and 'last' in frame
     )
 
 

@@ -40,7 +40,8 @@ class Typed:
 
 def typed(program: str) -> list[Typed]:
     """Return all commands of the pages that begin with a program, in their order."""
-    return [one for page in PAGES for one in _of(page) if one.text.split()[0] == program]
+    every = [command for page in PAGES for command in _of(page)]
+    return [command for command in every if command.text.split()[0] == program]
 
 
 def _of(page: Path) -> Iterator[Typed]:

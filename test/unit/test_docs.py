@@ -36,7 +36,8 @@ def read(path: Path) -> str:
 def topics_and_services() -> set[str]:
     """The names that the nodes give their topics and services."""
     sources = map(read, (PACKAGE / 'node').rglob('*.py'))
-    return {name for one in sources for name in re.findall(r"'(~/[a-z_]+|/diagnostics)'", one)}
+    named = re.compile(r"'(~/[a-z_]+|/diagnostics)'")
+    return {name for source in sources for name in named.findall(source)}
 
 
 def executables() -> set[str]:
@@ -51,7 +52,8 @@ def launch_arguments(paths: Iterable[Path] = LAUNCH_FILES) -> set[str]:
 
 def options(parser: argparse.ArgumentParser) -> set[str]:
     """The options of a parser, and its verbs with theirs."""
-    found = {name for one in parser._actions for name in one.option_strings if name[:2] == '--'}
+    names = [name for action in parser._actions for name in action.option_strings]
+    found = {name for name in names if name[:2] == '--'}
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             found |= set(action.choices).union(*map(options, action.choices.values()))
@@ -87,13 +89,17 @@ def headings(text: str) -> set[str]:
     """The anchors of a page; a title that comes again has a number behind it."""
     titles = re.findall(r'^#+ (.+)$', text, re.MULTILINE)
     plain = [re.sub(r'[^\w -]', '', title.lower()).replace(' ', '-') for title in titles]
-    again = [f'{one}-{plain[:at].count(one)}' for at, one in enumerate(plain) if one in plain[:at]]
+    again = [
+        f'{anchor}-{plain[:at].count(anchor)}'
+        for at, anchor in enumerate(plain)
+        if anchor in plain[:at]
+    ]
     return {*plain, *again}
 
 
 def named_targets(text: str) -> set[str]:
     """The make targets that a page speaks of."""
-    return {one.split()[1] for one in code_of(text) if re.match(r'make [a-z]', one)}
+    return {line.split()[1] for line in code_of(text) if re.match(r'make [a-z]', line)}
 
 
 def broken_links(page: Path, text: str) -> Iterator[str]:
@@ -118,7 +124,7 @@ def missing(page: Path, text: str) -> set[str]:
         *({*parameters} - SETTINGS - launch_arguments() - NO_PARAMETERS),
         *({*started} - executables()),
         *({*launched} - {path.name for path in LAUNCH_FILES}),
-        *(one for one in files if not ((ROOT / one).exists() or (PACKAGE / one).exists())),
+        *(file for file in files if not ((ROOT / file).exists() or (PACKAGE / file).exists())),
     }
 
 
@@ -157,7 +163,8 @@ def test_messages_are_documented() -> None:
     assert {name for name in names if not re.search(rf'\b{name}\b', page)} == set()
     for name in ('DriveStatus', 'InvSt', 'Telemetry', 'BusStatistics'):
         found = fields(read(MSG_DEFS / 'msg' / f'{name}.msg')) - {'header'}
-        assert len(found) > 5 and {one for one in found if f'`{one}`' not in page} == set(), name
+        assert len(found) > 5, name
+        assert {field for field in found if f'`{field}`' not in page} == set(), name
 
 
 def test_what_a_page_names_exists() -> None:

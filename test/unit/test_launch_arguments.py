@@ -119,6 +119,6 @@ def test_launch_fails_where_the_driver_has() -> None:
     context = SimpleNamespace(asyncio_loop=SimpleNamespace(call_exception_handler=handled.append))
     for status in (0, 2, -9):
         fail_with_driver(SimpleNamespace(returncode=status), context)
-    assert [one['message'].split(',')[0] for one in handled] == [
+    assert [event['message'].split(',')[0] for event in handled] == [
         'the driver has ended with status 2', 'the driver has ended with status -9'
     ]

@@ -59,8 +59,8 @@ def violations(path: str, source: str) -> Iterator[str]:
     docstrings = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
     for node in nodes:
         if isinstance(node, ast.ImportFrom) and node.module == package:
-            files = {one.stem for one in folder.iterdir()}
-            own = [one.name for one in node.names if one.name not in files]
+            files = {file.stem for file in folder.iterdir()}
+            own = [alias.name for alias in node.names if alias.name not in files]
             yield from (f'imports {name} of its own package, a circle' for name in own)
         elif isinstance(node, ast.Call) and WITHOUT_TIME.match(path):
             if ast.unparse(node.func).startswith('time.'):
@@ -77,10 +77,10 @@ def sends(path: str, source: str) -> bool:
     """Whether a module has a bus write something, or set up its watch."""
     found = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom)]
     names = {
-        one.name
+        alias.name
         for node in found
         if (node.module or '').startswith('nfo_sinus_driver.link')
-        for one in node.names
+        for alias in node.names
     }
     sending = SENDS & names or 'bus.watch(' in source
     return bool(sending) and not path.startswith(('bus/', 'link/', 'simulator/'))

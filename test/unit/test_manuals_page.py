@@ -48,7 +48,7 @@ def is_there(name: str, family: Family) -> bool:
     if setting in SETTINGS:
         return not value or value in _choices(setting, family)
     ways = [load_family(family.name, method) for method in family.profile.methods]
-    return any(fnmatch.filter(readable(one), name) for one in ways)
+    return any(fnmatch.filter(readable(way), name) for way in ways)
 
 
 def _is_offered(topic: str, field: str = '') -> bool:
@@ -113,7 +113,7 @@ def test_a_row_says_what_serves_it_or_why_it_is_not_served() -> None:
     ]
     assert wrong == []
     whole = [(row['manual'], row['place'], row['what']) for row in ROWS]
-    assert [one for one in whole if whole.count(one) > 1] == []
+    assert [entry for entry in whole if whole.count(entry) > 1] == []
 
 
 #: What gives the text of the manuals to a test; without it that is skipped.
@@ -124,8 +124,8 @@ def reads_manuals(named: str) -> bool:
     """Whether a test is skipped where the manuals are not beside the clone."""
     file, _, name = named.partition('::')
     tree = ast.parse(read(ROOT / 'test' / file))
-    (test,) = (one for one in ast.walk(tree) if getattr(one, 'name', '') == name)
-    names = {one.id for one in ast.walk(test) if isinstance(one, ast.Name)}
+    (test,) = (node for node in ast.walk(tree) if getattr(node, 'name', '') == name)
+    names = {node.id for node in ast.walk(test) if isinstance(node, ast.Name)}
     return not names.isdisjoint(READS_MANUALS)
 
 

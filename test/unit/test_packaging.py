@@ -82,7 +82,7 @@ def missing(folders: tuple[str, ...], depends: set[str]) -> Iterator[str]:
 def depends(package: Path, *kinds: str) -> set[str]:
     """The keys of a package.xml, of these kinds."""
     root = ElementTree.parse(package).getroot()
-    return {str(one.text) for kind in kinds for one in root.findall(kind)}
+    return {str(element.text) for kind in kinds for element in root.findall(kind)}
 
 
 EXEC = depends(ROOT / 'package.xml', 'depend', 'exec_depend')
@@ -97,7 +97,7 @@ def test_the_extras_of_pip_have_what_the_commands_without_ros_import() -> None:
     setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
     (found,) = re.findall(r'extras_require=(\{.*?\n    \}),', setup, re.DOTALL)
     extras = {
-        name: {re.split('[>=]', one)[0].lower() for one in needed}
+        name: {re.split('[>=]', requirement)[0].lower() for requirement in needed}
         for name, needed in ast.literal_eval(found).items()
     }
     # where the name for pip is not that of the module
@@ -107,7 +107,8 @@ def test_the_extras_of_pip_have_what_the_commands_without_ros_import() -> None:
         ('simulator', ('catalog', 'families', 'simulator')),
     ):
         folders = [ROOT / 'nfo_sinus_driver' / room for room in rooms]
-        modules = {name for one in folders for path in one.rglob('*.py') for name in imported(path)}
+        files = [path for folder in folders for path in folder.rglob('*.py')]
+        modules = {name for path in files for name in imported(path)}
         needed = modules - {'nfo_sinus_driver'}
         assert {for_pip.get(name, name) for name in needed} == extras[extra], extra
 
@@ -132,7 +133,7 @@ def test_the_judge_sees_what_is_missing(tmp_path: Path) -> None:
 @BOTH
 def test_a_package_says_who_maintains_it_where_it_is_and_under_which_license(package: Path) -> None:
     root = ElementTree.parse(package / 'package.xml').getroot()
-    maintainers = [(one.text, one.get('email')) for one in root.findall('maintainer')]
+    maintainers = [(element.text, element.get('email')) for element in root.findall('maintainer')]
     first = ElementTree.parse(ROOT / 'package.xml').getroot().find('maintainer')
     assert first is not None and maintainers == [(first.text, first.get('email'))]
     # an address that no one reads
@@ -140,7 +141,7 @@ def test_a_package_says_who_maintains_it_where_it_is_and_under_which_license(pac
     assert not re.search(r'example\.(org|com|net)', text)
     assert root.findtext('author') == 'The nfo_sinus_driver authors'
     # of all pages that a reader could be sent to only those of the repository exist by then
-    urls = {one.get('type'): str(one.text) for one in root.findall('url')}
+    urls = {element.get('type'): str(element.text) for element in root.findall('url')}
     assert not urls or urls['website'] == urls['repository']
     address_known = urls and not str(first.get('email')).endswith('.example')
     security = (ROOT / 'SECURITY.md').read_text(encoding='utf-8')
@@ -156,10 +157,10 @@ def test_what_package_xml_says_is_in_the_order_of_rep_149(package: Path) -> None
     order = ('name', 'version', 'description', 'maintainer', 'license', 'url', 'author')
     late = ('group_depend', 'member_of_group', 'export')
     places = [
-        order.index(one.tag) if one.tag in order
-        else len(order) + 1 + late.index(one.tag) if one.tag in late
+        order.index(element.tag) if element.tag in order
+        else len(order) + 1 + late.index(element.tag) if element.tag in late
         else len(order)
-        for one in root
+        for element in root
     ]
     assert places == sorted(places)
 

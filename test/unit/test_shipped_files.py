@@ -64,7 +64,7 @@ def longest_end(shutdown_timeout: float) -> float:
 def test_a_driver_that_is_ended_has_time_to_stop_every_motor() -> None:
     default = DriveSettings(address=1).shutdown_timeout
     # as all three say: twice the longest, plus 20 s
-    assert all(longest_end(one) <= 2 * one + 20 for one in (default, 100.0))
+    assert all(longest_end(seconds) <= 2 * seconds + 20 for seconds in (default, 100.0))
     for name, pattern in GRACE.items():
         times = [float(found) for found in re.findall(pattern, read(name))]
         assert times and min(times) >= 2 * default + 20, name
@@ -82,7 +82,7 @@ def test_what_is_to_end_the_driver_reaches_it_and_stops_the_motors() -> None:
         (found,) = re.findall(rf'\n{setting}(\w+)\n', read(name))
         assert signal.Signals[found] in ENDING, name
     in_the_image = re.findall(r'`([^`]+)` \(set in the image\)', read('docs/container.md'))
-    assert in_the_image and all(f'{one}\n' in read('Dockerfile') for one in in_the_image)
+    assert in_the_image and all(f'{line}\n' in read('Dockerfile') for line in in_the_image)
 
 
 def test_systemd_takes_the_service() -> None:
@@ -101,7 +101,7 @@ def test_container_and_ci_make_a_workspace_as_the_readme_says() -> None:
     commands = re.findall(rf'^    ((?:{begin}).*)$', read('README.md'), re.MULTILINE)
     assert len(commands) == 3
     for name in ('Dockerfile', CI):
-        assert [one for one in commands if one not in read(name)] == [], name
+        assert [command for command in commands if command not in read(name)] == [], name
 
 
 def test_an_edited_file_costs_the_image_no_new_download() -> None:
@@ -146,9 +146,9 @@ def test_the_hooks_before_a_commit_check_what_make_checks() -> None:
     (local,) = yaml.safe_load(read('.pre-commit-config.yaml'))['repos']
     assert local['repo'] == 'local'
     # whatever files are in a commit, and with the tools that were set up
-    assert all(one['language'] == 'system' for one in local['hooks'])
-    assert not any(one['pass_filenames'] for one in local['hooks'])
-    hooks = {one['entry'] for one in local['hooks']}
+    assert all(hook['language'] == 'system' for hook in local['hooks'])
+    assert not any(hook['pass_filenames'] for hook in local['hooks'])
+    hooks = {hook['entry'] for hook in local['hooks']}
     rules = re.findall(r'^(?:lint|types):.*\n((?:\t.*\n)+)', read('Makefile'), re.MULTILINE)
     checks = re.findall(r'^\t@(\.venv/bin/[^\n>]+?)(?: >.*)?$', ''.join(rules), re.MULTILINE)
     assert len(rules) == 2 and hooks == set(checks)
@@ -180,7 +180,7 @@ def test_foxglove_shows_every_panel_and_the_answer_to_a_stop() -> None:
     panels = layout['configById']
     assert sorted(leaves(layout['layout'])) == sorted(panels)
     # only so its answer is shown, which may be that the stop is not confirmed
-    assert all(one['editingMode'] for name, one in panels.items() if 'CallService!' in name)
+    assert all(panel['editingMode'] for name, panel in panels.items() if 'CallService!' in name)
 
 
 def test_plotjuggler_subscribes_to_what_it_draws() -> None:

@@ -52,20 +52,20 @@ def the_file(files: Path) -> Path:
 
 
 def test_what_is_put_back_is_forgotten_and_nothing_is_left(files: Path) -> None:
-    one = folder()
-    assert one.read(DRIVE).result() == {}
-    one.write(DRIVE, {}).result()
+    kept = folder()
+    assert kept.read(DRIVE).result() == {}
+    kept.write(DRIVE, {}).result()
     assert not files.exists()
-    one.write(DRIVE, BORROWED).result()
+    kept.write(DRIVE, BORROWED).result()
     # only its owner reads it
     assert stat.S_IMODE(the_file(files).stat().st_mode) == 0o600
     assert stat.S_IMODE(files.stat().st_mode) == 0o700
-    assert one.read(DRIVE).result() == BORROWED
-    one.write(DRIVE, {'a.b': ('Ramp', 'No')}).result()
-    one.write('another', BORROWED).result()
-    assert one.read(DRIVE).result() == {'a.b': ('Ramp', 'No')}
+    assert kept.read(DRIVE).result() == BORROWED
+    kept.write(DRIVE, {'a.b': ('Ramp', 'No')}).result()
+    kept.write('another', BORROWED).result()
+    assert kept.read(DRIVE).result() == {'a.b': ('Ramp', 'No')}
     for drive in (DRIVE, 'another'):
-        one.write(drive, {}).result()
+        kept.write(drive, {}).result()
     assert list(files.iterdir()) == []
 
 
@@ -87,10 +87,10 @@ def test_what_a_program_has_is_its_own_until_it_is_killed(files: Path) -> None:
 
 
 def test_numbers_and_switches_come_back_as_they_were(files: Path) -> None:
-    one = folder()
-    one.write(DRIVE, BORROWED).result()
+    kept = folder()
+    kept.write(DRIVE, BORROWED).result()
     # the way through the file
-    one._hold(DRIVE, None)
+    kept._hold(DRIVE, None)
     found = folder().read(DRIVE).result()
     assert found == BORROWED
     assert all(
@@ -112,23 +112,23 @@ def test_numbers_and_switches_come_back_as_they_were(files: Path) -> None:
     ],
 )
 def test_a_damaged_file_is_said_and_replaced(files: Path, content: str) -> None:
-    one = folder()
-    one.write(DRIVE, BORROWED).result()
-    one._hold(DRIVE, None)
+    kept = folder()
+    kept.write(DRIVE, BORROWED).result()
+    kept._hold(DRIVE, None)
     the_file(files).write_text(content, encoding='utf-8', errors='surrogateescape')
-    one = folder()
+    kept = folder()
     with pytest.raises(OSError, match='is damaged'):
-        one.read(DRIVE).result()
-    one.write(DRIVE, BORROWED).result()
-    assert one.read(DRIVE).result() == BORROWED
+        kept.read(DRIVE).result()
+    kept.write(DRIVE, BORROWED).result()
+    assert kept.read(DRIVE).result() == BORROWED
 
 
 @pytest.mark.parametrize('what', ['link', 'dangling link', 'pipe', 'folder'])
 def test_nothing_goes_through_what_is_no_file(files: Path, tmp_path: Path, what: str) -> None:
-    one = folder()
-    one.write(DRIVE, BORROWED).result()
+    kept = folder()
+    kept.write(DRIVE, BORROWED).result()
     path = the_file(files)
-    one.write(DRIVE, {}).result()
+    kept.write(DRIVE, {}).result()
     target = tmp_path / 'target'
     if what == 'pipe':
         os.mkfifo(path)
@@ -149,8 +149,8 @@ def test_nothing_goes_through_what_is_no_file(files: Path, tmp_path: Path, what:
 def test_a_disk_that_takes_nothing_leaves_what_was_there(
     files: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one = folder()
-    one.write(DRIVE, BORROWED).result()
+    kept = folder()
+    kept.write(DRIVE, BORROWED).result()
     before = the_file(files).read_bytes()
 
     def full(descriptor: int) -> None:
@@ -158,9 +158,9 @@ def test_a_disk_that_takes_nothing_leaves_what_was_there(
 
     monkeypatch.setattr(os, 'fsync', full)
     with pytest.raises(OSError, match='No space left'):
-        one.write(DRIVE, {'a.b': (1, 2)}).result()
+        kept.write(DRIVE, {'a.b': (1, 2)}).result()
     assert the_file(files).read_bytes() == before
-    assert one.read(DRIVE).result() == BORROWED
+    assert kept.read(DRIVE).result() == BORROWED
 
 
 def test_without_a_folder_it_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -188,8 +188,8 @@ def test_no_caller_waits_for_the_disk(files: Path, monkeypatch: pytest.MonkeyPat
         sync(descriptor)
 
     monkeypatch.setattr(os, 'fsync', slow)
-    one = StateFolder('')
-    written, read = one.write(DRIVE, BORROWED), one.read(DRIVE)
+    kept = StateFolder('')
+    written, read = kept.write(DRIVE, BORROWED), kept.read(DRIVE)
     assert not written.done() and not read.done()
     answers.set()
     assert written.result(60.0) is None

@@ -58,10 +58,10 @@ def spoken(name: str, node: ast.AST) -> Iterator[Parts]:
         yield from texts(node.value)
     elif isinstance(node, ast.Call):
         # also a method of a log that is handed over
-        called = {getattr(one, 'attr', '') for one in node.args} | {name_of(node.func)}
+        called = {getattr(argument, 'attr', '') for argument in node.args} | {name_of(node.func)}
         called -= {'ValueError'} if name in NEVER_SHOWN else set()
         if called & SPEAKING or ast.unparse(node.func) == 'failed.append':
-            yield from (parts for one in node.args for parts in texts(one))
+            yield from (parts for argument in node.args for parts in texts(argument))
 
 
 def entries(page: str) -> list[str]:
@@ -108,9 +108,9 @@ def test_by_a_cause_without_a_remedy_nothing_is_wrong() -> None:
     assert [group for group in others if not group[2] or group[0] == title] == []
     calls = [node for _, node in nodes() if isinstance(node, ast.Call)]
     graver = {
-        name_of(one)
+        name_of(part)
         for call in calls if name_of(call.func) in ('DriveError', 'notify')
-        and ast.unparse(call.args[0]) != 'Severity.INFO' for one in ast.walk(call)
+        and ast.unparse(call.args[0]) != 'Severity.INFO' for part in ast.walk(call)
     }
     assert {'CANNOT_STOP', 'NOT_CONNECTED'} <= graver
     handed_on = {'LINE_FAILED', 'NOT_POSSIBLE', 'NOT_CHANGED', 'SEVERAL'}

@@ -39,13 +39,13 @@ _OUTPUT = re.compile(r'^nfo-sinus: ')
 
 
 def commands(program: str) -> list[Typed]:
-    found = [one for one in typed(program) if not _MADE_UP.search(one.text)]
-    return [one for one in found if not _OUTPUT.match(one.text)]
+    found = [command for command in typed(program) if not _MADE_UP.search(command.text)]
+    return [command for command in found if not _OUTPUT.match(command.text)]
 
 
 def by_page(found: list[Typed]) -> list[list[Typed]]:
     """Those of a page belong together: one uses the file that another leaves."""
-    return [list(group) for _, group in itertools.groupby(found, key=lambda one: one.page)]
+    return [list(group) for _, group in itertools.groupby(found, key=lambda command: command.page)]
 
 
 def _simulator(arguments: list[str]) -> subprocess.Popen[str]:
@@ -70,7 +70,7 @@ def simulated(arguments: list[str]) -> Iterator[subprocess.Popen[str]]:
 
 
 def test_there_are_such_commands() -> None:
-    verbs = {parse(shlex.split(one.text)[1:]).verb for one in commands('nfo-sinus')}
+    verbs = {parse(shlex.split(command.text)[1:]).verb for command in commands('nfo-sinus')}
     assert {'scan', 'info', 'set', 'dump', 'load', 'run', 'monitor', 'ack'} <= verbs
     assert len(commands('simulator')) > 5
 
@@ -85,9 +85,9 @@ def test_the_command_line_of_a_page_runs_as_it_is_typed(
     monkeypatch.chdir(tmp_path)
     # those over one line after the other, on a line of their own
     for number, (protocol, model) in enumerate(dict.fromkeys(map(_line_of, page))):
-        mine = [one for one in page if _line_of(one) == (protocol, model)]
+        mine = [command for command in page if _line_of(command) == (protocol, model)]
         link = str(tmp_path / f'line{number}')
-        named = {parse(shlex.split(one.text)[1:]).address for one in mine}
+        named = {parse(shlex.split(command.text)[1:]).address for command in mine}
         arguments = ['--protocol', protocol, '--model', model, '--link', link]
         if protocol == 'canopen':
             arguments += ['--baud-rate', '125000']

@@ -69,7 +69,7 @@ class StepReader:
 
     def read(self, node: Node, name: str) -> Steps:
         """Return the steps of a list."""
-        found = [self._step(one, name) for one in node.items]
+        found = [self._step(item, name) for item in node.items]
         return tuple(step for step in found if step is not None)
 
     def _step(self, node: Node, name: str) -> Step | None:
@@ -110,7 +110,7 @@ class StepReader:
         place = self._place(node, name)
         if place is None:
             return None
-        words = [int(one.scalar or 0) & WORD for one in node['values'].items]
+        words = [int(item.scalar or 0) & WORD for item in node['values'].items]
         if len(words) > 1 and 16 not in self._map.functions:
             self._problems.add(
                 node.line, f'{name} writes several registers, and the line has no function 16'
@@ -280,7 +280,7 @@ class CommandLists:
         if stop is None or not takes_back(left, stop):
             # the last word of an edge is 0
             steps = self._lists['run'] if left[0] == 0 else ()
-            written = (one for step in steps for one in self._words(step))
+            written = (written_word for step in steps for written_word in self._words(step))
             yield from (_RunWord(word, 0) for at, word, _ in written if at == place and word)
             return
         words = [left]

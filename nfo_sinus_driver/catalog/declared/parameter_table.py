@@ -110,8 +110,8 @@ class _Table:
         if key == 'choices':
             return Node(dict(self._labels(text, line)), line, key)
         if key == 'bits':
-            ends = [scalar_of(one, line, self._problems) for one in text.split('-')]
-            return Node([Node(one, line) for one in ends], line, key)
+            ends = [scalar_of(end, line, self._problems) for end in text.split('-')]
+            return Node([Node(end, line) for end in ends], line, key)
         if key == 'while_running':
             if text not in _WHEN:
                 self._problems.add(line, f'when is {text!r}: choose one of {", ".join(_WHEN)}')
@@ -121,7 +121,7 @@ class _Table:
         return Node(scalar, line, key, written=text)
 
     def _labels(self, text: str, line: int) -> Iterator[tuple[str, Node]]:
-        pairs = [one.partition('=') for one in text.split('|')]
+        pairs = [pair.partition('=') for pair in text.split('|')]
         codes = [code for code, _, _ in pairs]
         for code, equals, label in pairs:
             if not equals:

@@ -49,7 +49,7 @@ SETPOINT_KEY = 'line.setpoint'
 SETPOINT_READ_KEY = 'line.setpoint_read'
 #: With a number behind it.
 IDENTITY_KEY = 'line.identity'
-_MODES = {one.unit: one.mode for one in (FREQUENCY, SPEED)}
+_MODES = {quantity.unit: quantity.mode for quantity in (FREQUENCY, SPEED)}
 #: Where faults that are bits begin to be counted.
 _FLAGS_FROM = 100
 _MOST_FAULTS = 64
@@ -94,11 +94,11 @@ class _Reader:
         flags = list(self._flags(faults))
         self._conditions = dict(self._facts())
         steps = StepReader(root, self._map, settings, self._problems)
-        running = [one for name, one in self._conditions.items() if name == 'running']
-        of_flags = (one for one, _ in flags)
+        running = [condition for name, condition in self._conditions.items() if name == 'running']
+        of_flags = (condition for condition, _ in flags)
         conditions = [*running, *self._conditions.values(), *of_flags, *steps.awaited()]
         status = self._map.status(conditions, root['status'].get('block'))
-        facts = {name: one.in_place(status) for name, one in self._conditions.items()}
+        facts = {name: condition.in_place(status) for name, condition in self._conditions.items()}
         self._require_apart(facts)
         self._require_exclusive(facts, status)
         steps.use(status)
@@ -135,10 +135,10 @@ class _Reader:
             enable_input=control.text('enable_input').removeprefix('the '),
             codes=codes,
             faults=faults,
-            flags=tuple((one.in_place(status), fault) for one, fault in flags),
+            flags=tuple((condition.in_place(status), fault) for condition, fault in flags),
             alarm=self._alarm(root.get('alarms')),
             timeout=self._timeout(settings),
-            defaults={**{key: one for key, (one, *_) in identify.items()}, **settings.defaults},
+            defaults={**{key: first for key, (first, *_) in identify.items()}, **settings.defaults},
             pole_pairs=root.get('motor').integer('pole_pairs'),
             accel=settings.known(root.get('simulated').get('accel')),
             decel=settings.known(root.get('simulated').get('decel')),
@@ -148,13 +148,13 @@ class _Reader:
     def _line_defaults(self, node: Node) -> LineDefaults:
         write = {6: (6,), 16: (16,)}.get(node.integer('write'), (6, 16))
         texts = self._numbered(node.get('exceptions'))
-        busy = [one.scalar for one in node.get('busy').items]
+        busy = [item.scalar for item in node.get('busy').items]
         return LineDefaults(
             node.text('protocol', LineDefaults.protocol), node.integer('baud_rate'),
             node.text('char_format'), node.integer('address'), _sentence(node, 'check'), write,
             node.integer('most_registers', 123),
             {code: str(text.scalar).rstrip(' .;:') for code, text in texts},
-            frozenset(one for one in busy if isinstance(one, int)),
+            frozenset(number for number in busy if isinstance(number, int)),
             float(node.number('gap') or 0), float(node.number('after_write') or 0),
         )
 
@@ -188,10 +188,10 @@ class _Reader:
             opposite = Condition(fact.mask, fact.values, not fact.inverted)
             bit = fact.mask & (fact.mask - 1) == 0
             turned = Condition(fact.mask, frozenset({fact.mask, 0} - fact.values)) if bit else None
-            for one in (opposite, turned):
-                if one in seen and {name, seen[one]} != {'remote', 'local'}:
+            for contrary in (opposite, turned):
+                if contrary in seen and {name, seen[contrary]} != {'remote', 'local'}:
                     self._problems.add(
-                        line, f'{name} is true whenever {seen[one]} is not: say one of both'
+                        line, f'{name} is true whenever {seen[contrary]} is not: say one of both'
                     )
 
     def _require_exclusive(self, facts: Mapping[str, Condition], status: StatusPlace) -> None:
@@ -202,7 +202,7 @@ class _Reader:
                     continue
                 fact, at_once = facts[name], facts[other]
                 within = not at_once.mask & ~fact.mask
-                shared = [one for one in fact.values if within and at_once.holds(one)]
+                shared = [value for value in fact.values if within and at_once.holds(value)]
                 if shared and fact.names_numbers:
                     first, second = self._conditions[name], self._conditions[other]
                     number = self._written(name, min(shared) >> status.shift(first.register))
@@ -218,7 +218,9 @@ class _Reader:
         node = self._root['status'][name]
         low = int(node['bits'].items[0].scalar or 0) if 'bits' in node else 0
         listed = [node['value']] if 'value' in node else node['values'].items
-        return next(one.written for one in listed if (int(one.scalar or 0) & WORD) << low == bits)
+        return next(
+            item.written for item in listed if (int(item.scalar or 0) & WORD) << low == bits
+        )
 
     def _require_one_holder(self, control: Node, settings: Settings) -> None:
         shown_by = [name for name in ('remote', 'local') if name in self._conditions]
@@ -240,7 +242,7 @@ class _Reader:
         if status.holds(address):
             low, high = 0, 15
             if 'bits' in node:
-                low, high = (int(one.scalar or 0) for one in node['bits'].items)
+                low, high = (int(item.scalar or 0) for item in node['bits'].items)
             shift = status.shift(address.index) + low
             bits = max(high - low + 1, 0)
             return FaultCodes(((1 << bits) - 1) << shift, shift, none, in_status=True)
@@ -262,18 +264,18 @@ class _Reader:
     def _numbered(self, node: Node) -> Iterator[tuple[int, Node]]:
         """Yield what stands under numbers; one that stands twice, be it in two forms, is wrong."""
         lines: dict[int, int] = {}
-        for text, one in node.mapping.items():
+        for text, entry in node.mapping.items():
             try:
                 number = number_of(text)
             except ValueError as error:
-                self._problems.add(one.line, f'{error}: write it without zeros in front')
+                self._problems.add(entry.line, f'{error}: write it without zeros in front')
                 continue
             if number in lines:
                 self._problems.add(
-                    one.line, f'{text} stands in line {lines[number]} already: remove one of both'
+                    entry.line, f'{text} stands in line {lines[number]} already: remove one of both'
                 )
-            lines[number] = one.line
-            yield number, one
+            lines[number] = entry.line
+            yield number, entry
 
     def _flags(self, faults: Mapping[int, Fault]) -> Iterator[tuple[PlacedCondition, Fault]]:
         flags = self._root.get('faults').get('flags')
@@ -318,7 +320,7 @@ class _Reader:
             read_key = SETPOINT_READ_KEY
             index, line = self._map.register(node['read_register']), node['read_register'].line
             count = address.codec.size // 2
-            self._map.registers.take(Use.VALUE, what, line, 'register', index, count)
+            self._map.registers.note_use(Use.VALUE, what, line, 'register', index, count)
             shifted = replace(address, index=index)
             name = f'set-point (register {node["read_register"].written})'
             made[read_key] = settings.scaled(
@@ -379,7 +381,7 @@ class _Reader:
             name = f'register {node["register"].written}'
             self._map.made[key] = internal(key, name, address, Access.READ)
             given = [node['value']] if 'value' in node else list(node.get('values').items)
-            values = tuple(one.scalar for one in given if isinstance(one.scalar, int))
+            values = tuple(item.scalar for item in given if isinstance(item.scalar, int))
             if ('value' in node) is ('values' in node):
                 self._problems.add(node.line, 'identify needs value or values, one of both')
             for value in values:
@@ -439,12 +441,12 @@ class _Reader:
             self._problems.add(node.line, f'{key} has to be written and read (access: rw)')
         conditions: dict[str, Sequence[Value]] = {}
         action = [node['action']] if 'action' in node else []
-        for one in (*action, *node.get('requires').items):
-            what = settings.known(one['parameter'])
+        for item in (*action, *node.get('requires').items):
+            what = settings.known(item['parameter'])
             if what == key or what in conditions:
-                self._problems.add(one.line, f'{what} stands in timeout twice')
+                self._problems.add(item.line, f'{what} stands in timeout twice')
             elif what:
-                conditions[what] = tuple(self._timeout_values(one, what, settings))
+                conditions[what] = tuple(self._timeout_values(item, what, settings))
         return Timeout(key, conditions)
 
     def _timeout_values(self, node: Node, key: str, settings: Settings) -> Iterator[Value]:
@@ -455,8 +457,8 @@ class _Reader:
         if len(given) != 1:
             self._problems.add(node.line, f'{key}: one of value and values is needed')
             return
-        for one in given[0].items or [given[0]]:
-            value = settings.value(key, one)
+        for item in given[0].items or [given[0]]:
+            value = settings.value(key, item)
             if value is not None:
                 yield value
 

@@ -134,7 +134,7 @@ class RegisterMap:
         # a whole word may be a value as well, and its highest bit the sign of one
         if mask not in (WORD, _SIGN):
             space = 'coil' if coil else self._status_space
-            self.registers.take(Use.BITS, what, node.line, space, number)
+            self.registers.note_use(Use.BITS, what, node.line, space, number)
         return PlacedCondition(number, coil, mask, values, inverted, node.line)
 
     def _bits(
@@ -160,7 +160,7 @@ class RegisterMap:
         if 'bit' in node:
             return 0, 1 << node.integer('bit')
         if 'bits' in node:
-            low, high = (int(one.scalar or 0) for one in node['bits'].items)
+            low, high = (int(item.scalar or 0) for item in node['bits'].items)
             return low, ((1 << max(high - low + 1, 0)) - 1) << low
         return 0, node.integer('mask', WORD)
 
@@ -172,7 +172,7 @@ class RegisterMap:
         inverted = 'except' in node
         listed = node.get('except') if inverted else node.get('values')
         numbers = [node.get('value'), *listed.items]
-        raw = [int(one.scalar) for one in numbers if isinstance(one.scalar, int)]
+        raw = [int(item.scalar) for item in numbers if isinstance(item.scalar, int)]
         values = {(value & WORD) << shift for value in raw}
         outside = [value for value in values if value & ~mask]
         if outside:
@@ -189,7 +189,7 @@ class RegisterMap:
         register, count = self.register(node), len(words)
         for number, word in enumerate(words, register):
             use = Use.COMMAND if word else Use.ZERO
-            self.registers.take(use, what, node.line, 'register', number)
+            self.registers.note_use(use, what, node.line, 'register', number)
         key = f'line.r{register:04x}' + (f'_{count}' if count > 1 else '')
         self._make(key, self._writes, register, f'uint{16 * count}_be', f'register {node.written}')
         return key
@@ -197,7 +197,7 @@ class RegisterMap:
     def coil_key(self, what: str, node: Node) -> str:
         """Return the key of a coil."""
         coil = self.coil(node)
-        self.registers.take(Use.COMMAND, what, node.line, 'coil', coil)
+        self.registers.note_use(Use.COMMAND, what, node.line, 'coil', coil)
         key = f'line.coil_{coil}'
         self._make(key, 'coil', coil, 'uint8', f'coil {node.written}')
         return key
@@ -218,8 +218,8 @@ class RegisterMap:
     def status(self, conditions: Iterable[PlacedCondition], block: Node) -> StatusPlace:
         """Return where the status stands, with a parameter that reads it as one."""
         found = list(conditions)
-        wanted = {one.register for one in found}
-        if any(one.coil for one in found):
+        wanted = {condition.register for condition in found}
+        if any(condition.coil for condition in found):
             return self._coils(found, block)
         if 'register' in block:
             first = self.register(block['register'])
@@ -253,14 +253,15 @@ class RegisterMap:
         )
         name = f'status (register {self.written(first[0])})'
         self.made[STATUS_KEY] = internal(STATUS_KEY, name, address, Access.READ)
-        return StatusPlace(tuple(one for run in blocks for one in run), inputs=self._inputs)
+        registers = tuple(register for run in blocks for register in run)
+        return StatusPlace(registers, inputs=self._inputs)
 
     def _coils(self, conditions: Sequence[PlacedCondition], block: Node) -> StatusPlace:
-        if not all(one.coil for one in conditions):
+        if not all(condition.coil for condition in conditions):
             self._problems.add(
                 block.line, 'the status stands in registers and in coils: only one of both is read'
             )
-        coils = [one.register for one in conditions if one.coil]
+        coils = [condition.register for condition in conditions if condition.coil]
         first = min(coils)
         count = 16 if max(coils) - first < 16 else 32
         if max(coils) - first >= count:
@@ -269,7 +270,7 @@ class RegisterMap:
         address = Address('modbus', 'coil', first, None, codec, Fraction(1), '')
         name = f'status (coil {first + self._coil_numbering})'
         self.made[STATUS_KEY] = internal(STATUS_KEY, name, address, Access.READ)
-        registers = [one.register for one in conditions]
+        registers = [condition.register for condition in conditions]
         return StatusPlace((*range(first, first + count), *registers), coils=True)
 
     # --- values ---
@@ -285,7 +286,7 @@ class RegisterMap:
             )
         if 'coil' in node:
             coil = self.coil(node['coil'])
-            self.registers.take(use, what, node.line, 'coil', coil)
+            self.registers.note_use(use, what, node.line, 'coil', coil)
             return Address('modbus', 'coil', coil, None, codec_of('uint8'), factor, '')
         if 'register' not in node:
             self._problems.add(node.line, f'{what} says not where: add register or coil')
@@ -302,7 +303,7 @@ class RegisterMap:
         if space == 'input' and writable:
             self._problems.add(node.line, f'{what}: an input register cannot be written')
         if 'bits' not in node:
-            self.registers.take(use, what, node.line, space, register, made.size // 2)
+            self.registers.note_use(use, what, node.line, space, register, made.size // 2)
         return Address('modbus', space, register, None, made, factor, '')
 
     def _check_wide(self, node: Node, what: str, register: int, *, writable: bool) -> None:
@@ -318,7 +319,7 @@ class RegisterMap:
     def _with_bits(self, node: Node, what: str, codec: str, *, writable: bool) -> str:
         if 'bits' not in node:
             return codec
-        low, high = (int(one.scalar or 0) for one in node['bits'].items)
+        low, high = (int(item.scalar or 0) for item in node['bits'].items)
         if not codec.startswith('uint') or not low <= high < codec_of(codec).size * 8:
             self._problems.add(node.line, f'{what} has no bits {low} to {high}')
             return codec

@@ -64,7 +64,7 @@ class Registers:
         #: What a report has named: one is enough for all the commands that write there.
         self._reported: set[_Taken] = set()
 
-    def take(
+    def note_use(
         self, use: Use, what: str, line: int, space: str, first: int, count: int = 1
     ) -> None:
         """

@@ -113,7 +113,7 @@ class _Checker:
     def _check_scalar(self, node: Node, rule: Mapping[str, Any], where: str) -> None:
         value = node.scalar
         if 'enum' in rule and value not in rule['enum']:
-            allowed = ', '.join(str(one) for one in rule['enum'])
+            allowed = ', '.join(map(str, rule['enum']))
             given = str(value)[:_SHOWN]
             self._problems.add(node.line, f'{where} is {given}: choose one of {allowed}')
         elif isinstance(value, str):

@@ -145,7 +145,7 @@ class Settings:
             return None
         if not self.parameters[key].labels:
             self._problems.add(node.line, f'{key} tells who has control: it needs choices')
-        values = [self.value(key, one) for one in node.get('bus').items]
+        values = [self.value(key, item) for item in node.get('bus').items]
         return key, tuple(value for value in values if value is not None)
 
     def scaled(self, node: Node, parameter: Parameter) -> Parameter:

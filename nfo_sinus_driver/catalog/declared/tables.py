@@ -57,11 +57,12 @@ def status_codes(drive: Description) -> Mapping[int, StatusCode]:
     )
     named = drive.codes is not None and not drive.codes.in_status
     faults = [*drive.faults.values(), *(fault for _, fault in drive.flags), unlisted]
-    codes = [_of_state(drive, code) for code in _TEXTS] + [_of_fault(drive, one) for one in faults]
+    codes = [_of_state(drive, code) for code in _TEXTS]
+    codes += [_of_fault(drive, fault) for fault in faults]
     if named:
         # its number stands elsewhere
         codes[-1] = replace(codes[-1], meanings=codes[-1].meanings | {Meaning.UNNAMED})
-    return {one.code: one for one in codes}
+    return {code.code: code for code in codes}
 
 
 def _of_state(drive: Description, code: Code) -> StatusCode:

@@ -215,7 +215,7 @@ class _Converter:
         if isinstance(node, yaml.MappingNode):
             return Node(dict(self._pairs(node, depth)), line, name)
         if isinstance(node, yaml.SequenceNode):
-            items = [self.node(one, f'{name}', depth + 1) for one in node.value]
+            items = [self.node(item, f'{name}', depth + 1) for item in node.value]
             return Node(items, line, name)
         return Node(self._scalar(node, line), line, name, written=str(node.value))
 

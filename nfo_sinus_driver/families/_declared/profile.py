@@ -87,9 +87,10 @@ class Declared(ControlMethod):
             if not is_remote(drive, word) and drive.facts['running'].holds(word):
                 raise NotPossible('keypad or terminals run the motor: stop it there')
         missing = []
-        for one in drive.requires:
-            if not one.write and (found := (yield Read(one.key))) != one.value:
-                missing.append(f'{one.key} is {found} ({one.text or f"set it to {one.value}"})')
+        for required in drive.requires:
+            if not required.write and (found := (yield Read(required.key))) != required.value:
+                remedy = required.text or f'set it to {required.value}'
+                missing.append(f'{required.key} is {found} ({remedy})')
         if missing:
             raise NotPossible(f'the line has no control: {", ".join(missing)}')
 
@@ -103,9 +104,9 @@ class Declared(ControlMethod):
         drive = self._drive
         yield from try_steps(_carry_out(drive.stop))
         changed = False
-        for one in drive.requires:
-            if one.write and (yield Read(one.key)) != one.value:
-                yield Write(one.key, one.value, stored=True)
+        for required in drive.requires:
+            if required.write and (yield Read(required.key)) != required.value:
+                yield Write(required.key, required.value, stored=True)
                 changed = True
         if changed:
             yield from try_steps(_each(drive.after_write, retry=True))
@@ -239,7 +240,7 @@ def profile_of(drive: Description) -> Profile:
     if drive.holder is not None:
         key, values = drive.holder
         labels = drive.parameters[key].labels.values()
-        holders = {one: Holder.BUS if one in values else Holder.LOCAL for one in labels}
+        holders = {label: Holder.BUS if label in values else Holder.LOCAL for label in labels}
     return Profile(
         title=drive.title,
         enable_input=drive.enable_input or Profile.enable_input,
@@ -252,7 +253,7 @@ def profile_of(drive: Description) -> Profile:
         active_method=_active_method,
         identify=drive.identify,
         most={QUANTITIES[drive.setpoint.mode].role: most},
-        start_settings=frozenset(one.key for one in drive.requires),
+        start_settings=frozenset(required.key for required in drive.requires),
         line=drive.line.factory,
         refusals=drive.line.exceptions,
         busy=drive.line.busy,

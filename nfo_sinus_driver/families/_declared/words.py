@@ -142,8 +142,8 @@ def _is_known(drive: Description, word: int) -> bool:
     }
     standing = [numbers[name] for name in _STANDS if name in numbers]
     return not any(
-        word & one.mask or any(one.mask & other.mask for other in standing)
-        for one in numbers.values()
+        word & condition.mask or any(condition.mask & other.mask for other in standing)
+        for condition in numbers.values()
     )
 
 

@@ -25,7 +25,7 @@ from nfo_sinus_driver.catalog.profile import (
     SetpointTarget,
     Steps,
     Write,
-    one,
+    one_step,
     try_steps,
 )
 from nfo_sinus_driver.catalog.status import StatusCode
@@ -165,21 +165,21 @@ class FunctionBits(ByLine):
     def quick_stop(self, control_mode: str) -> Steps[None]:
         """Release the motor at once, by controller inhibit; control is kept."""
         inhibit = Write(BITS, int(Bits.CONTROLLER_INHIBIT))
-        yield from self._stop_by(one(inhibit), self.target.zero(retry=True))
+        yield from self._stop_by(one_step(inhibit), self.target.zero(retry=True))
 
     def rapid_stop(self, control_mode: str) -> Steps[None]:
         """Take the enable with the direction, so that the motor takes ramp t13 or t23 [C105]."""
         cleared = Write(BITS, 0, retry=False)
-        yield from self._stop_by(one(cleared), self.target.zero(retry=False))
+        yield from self._stop_by(one_step(cleared), self.target.zero(retry=False))
 
     def release(self) -> Steps[None]:
         """Remove function bits and set-point; P841 stays, for another one can start the motor."""
         if (yield from self.in_control()):
-            yield from self._stop_by(one(Write(BITS, 0)), self.target.zero(retry=True))
+            yield from self._stop_by(one_step(Write(BITS, 0)), self.target.zero(retry=True))
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove function bits and set-point while a fault is active, each by itself."""
-        command = yield from try_steps(one(Write(BITS, 0)))
+        command = yield from try_steps(one_step(Write(BITS, 0)))
         setpoint = yield from try_steps(self.zero_setpoint(control_mode))
         if command:
             return Removal.COMMAND

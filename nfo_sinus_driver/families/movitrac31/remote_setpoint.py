@@ -22,7 +22,7 @@ from nfo_sinus_driver.catalog.profile import (
     SetpointTarget,
     Steps,
     Write,
-    one,
+    one_step,
     try_steps,
 )
 from nfo_sinus_driver.catalog.status import StatusCode
@@ -115,8 +115,8 @@ class RemoteSetpoint(ByLine):
         """Write set-point 0, then take control from the terminals, and inhibit the controller."""
         removed = yield from self.remove(control_mode)
         # before, too: where it counts already it does so from the first moment on
-        yield from try_steps(one(Write(BITS, int(Bits.CONTROLLER_INHIBIT))))
-        yield from try_steps(one(Write(CONTROL_MODE, words.REMOTE_CONTROL)))
+        yield from try_steps(one_step(Write(BITS, int(Bits.CONTROLLER_INHIBIT))))
+        yield from try_steps(one_step(Write(CONTROL_MODE, words.REMOTE_CONTROL)))
         return (yield from _inhibit()) or removed is Removal.COMMAND
 
     def release(self) -> Steps[None]:
@@ -126,7 +126,7 @@ class RemoteSetpoint(ByLine):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove function bits and set-point while a fault is active; without one nothing turns."""
-        yield from try_steps(one(Write(BITS, 0)))
+        yield from try_steps(one_step(Write(BITS, 0)))
         setpoint = yield from try_steps(self.zero_setpoint(control_mode))
         return Removal.COMMAND if setpoint else Removal.NOTHING
 
@@ -147,5 +147,5 @@ class RemoteSetpoint(ByLine):
 
 def _inhibit() -> Steps[bool]:
     """Write the controller inhibit; return whether it is taken, and counts."""
-    inhibited = yield from try_steps(one(Write(BITS, int(Bits.CONTROLLER_INHIBIT))))
+    inhibited = yield from try_steps(one_step(Write(BITS, int(Bits.CONTROLLER_INHIBIT))))
     return inhibited and (yield from read_if_there(CONTROL_MODE)) == words.REMOTE_CONTROL

@@ -31,7 +31,7 @@ from nfo_sinus_driver.catalog.profile import (
     Steps,
     Until,
     Write,
-    one,
+    one_step,
     try_steps,
 )
 from nfo_sinus_driver.catalog.status import Meaning, Role, State, StatusCode
@@ -241,7 +241,7 @@ class ModeScmd(_G2):
         [C101].
         """
         zeroes = (target.zero(retry=False) for target in self._targets(control_mode))
-        yield from self._stop_by(one(Write(self._command, Scmd.STOP, retry=False)), *zeroes)
+        yield from self._stop_by(one_step(Write(self._command, Scmd.STOP, retry=False)), *zeroes)
 
     def perhaps_in_control(self) -> Steps[bool]:
         """Return whether the bus may have control: under Inhibit nothing reports."""
@@ -254,7 +254,7 @@ class ModeScmd(_G2):
         """Release the motor at once, as <Stop> on the keypad does; control is given back."""
         # a drive may well refuse a set-point while the bus has no control
         zeroes = (target.zero(retry=True) for target in self._targets(control_mode))
-        yield from self._stop_by(one(Write(MODE, Mode.STOP)), *zeroes)
+        yield from self._stop_by(one_step(Write(MODE, Mode.STOP)), *zeroes)
 
     def release(self) -> Steps[None]:
         """Give control back; never by MODE = Ext, which can start the motor [C43]."""
@@ -263,7 +263,7 @@ class ModeScmd(_G2):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Write SCMD = Stop, set-point 0 and MODE = Stop, and read back what can be read."""
-        command = yield from try_steps(one(Write(self._command, Scmd.STOP)))
+        command = yield from try_steps(one_step(Write(self._command, Scmd.STOP)))
         setpoint = yield from self._remove_setpoint(control_mode)
         command |= yield from self._remove_control()
         if command:
@@ -279,7 +279,7 @@ class ModeScmd(_G2):
 
     def _remove_control(self) -> Steps[bool]:
         """Write MODE = Stop, with which no run command stands; return whether it is."""
-        obeyed = yield from try_steps(one(Write(MODE, Mode.STOP)))
+        obeyed = yield from try_steps(one_step(Write(MODE, Mode.STOP)))
         return obeyed and not (yield from self.perhaps_in_control())
 
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
@@ -410,7 +410,7 @@ class DriveControl(_G2):
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Remove run bits and set-point, quick stop, and take control away by MODE = Stop."""
         obeyed = yield from super().force_stop(control_mode)
-        return (yield from try_steps(one(Write(MODE, Mode.STOP)))) or obeyed
+        return (yield from try_steps(one_step(Write(MODE, Mode.STOP)))) or obeyed
 
     def release(self) -> Steps[None]:
         """
@@ -426,7 +426,7 @@ class DriveControl(_G2):
         """Reset the run bits; where that is refused, write set-point 0 and MODE = Stop."""
         if (yield from try_steps(self._change_or_write(~_RUN, ControlWord(0), retry=True))):
             return Removal.COMMAND
-        released = yield from try_steps(one(Write(MODE, Mode.STOP)))
+        released = yield from try_steps(one_step(Write(MODE, Mode.STOP)))
         if released and not (yield from self.perhaps_in_control()):
             return Removal.COMMAND
         if (yield from try_steps(self.zero_setpoint(control_mode))):

@@ -30,7 +30,7 @@ from nfo_sinus_driver.catalog.profile import (
     Until,
     Wait,
     Write,
-    one,
+    one_step,
     try_steps,
 )
 from nfo_sinus_driver.catalog.status import StatusCode
@@ -204,7 +204,7 @@ class DriveControl(ControlMethod):
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Reset Switch on, then take Enable away, by which the motor is released [C109]."""
         obeyed = yield from try_steps(self._switch_off())
-        return (yield from try_steps(one(Write(CONTROL_WORD, _READY)))) or obeyed
+        return (yield from try_steps(one_step(Write(CONTROL_WORD, _READY)))) or obeyed
 
     def release(self) -> Steps[None]:
         """

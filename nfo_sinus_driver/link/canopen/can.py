@@ -291,7 +291,7 @@ class SocketCan:
         if self._queued_for >= _LEAVES_IN:
             # the bus works, so it has left, or never will
             self._queued = None
-        is_wanted = any((identifier ^ one) & mask == 0 for one, mask in self._wanted)
+        is_wanted = any((identifier ^ wanted) & mask == 0 for wanted, mask in self._wanted)
         if identifier in IDENTIFIERS and length <= MOST_DATA and is_wanted:
             self._come.append(Frame(identifier, data[:length]))
 

@@ -113,7 +113,7 @@ class ForeignSdo:
         """The kinds of answers to its requests since our last one."""
         return frozenset(self._meanwhile)
 
-    def hear(self, frame: Frame, now: float) -> frozenset[Kind]:
+    def hear_frame(self, frame: Frame, now: float) -> frozenset[Kind]:
         """Take a frame; return the kinds of answers that another client may get to it."""
         unit = frame.identifier - sdo.REQUESTS
         if unit not in self._own:
@@ -464,7 +464,7 @@ class CanopenLink:
         if frames:
             self.last_byte_at = now
         for frame in frames:
-            kinds = self._another.hear(frame, now)
+            kinds = self._another.hear_frame(frame, now)
             if kinds:
                 self._late.quarantine(frame.identifier - sdo.REQUESTS, kinds, now)
         restarted = self.supervision.take_frames(frames)
@@ -491,7 +491,7 @@ class CanopenLink:
                 if found is not None and found in transfer.kinds:
                     self._require_certain(transfer, found, now)
                     self._require_one(transfer, frame, sent, now)
-                    if transfer.take(frame.data):
+                    if transfer.take_message(frame.data):
                         return now
                 other += 1
             if now >= deadline:
@@ -526,7 +526,7 @@ class CanopenLink:
         unit = transfer.unit
         # a request and its answer
         soonest = 2 * _FRAME_BITS / self._settings.baud_rate
-        self._late.note(transfer, answer.data, now, 0.0)
+        self._late.note_reply(transfer, answer.data, now, 0.0)
         if self._late.repeated is not None and now < sent + soonest:
             until = sent + max(soonest, self._late.longest(unit))
             while (later := self._now()) < until:

@@ -199,7 +199,7 @@ class Transfer(ABC):
         """The server has begun with segments, and waits for the next one."""
         return self._expected in SEGMENTS and self.request is not None
 
-    def take(self, message: bytes) -> bool:
+    def take_message(self, message: bytes) -> bool:
         """
         Take a message from the node.
 

@@ -184,14 +184,14 @@ class ForeignModbus:
     def open_until(self, unit: int) -> float:
         """Return until when an answer of a unit may be to another master; 0: it is not."""
         requests = self._open_requests.get(unit)
-        return max(one.until for one in requests) if requests else 0.0
+        return max(request.until for request in requests) if requests else 0.0
 
     def take_open(self, unit: int) -> list[bytes]:
         """Return how answers and refusals begin that may still come, for a request goes before."""
         requests = self._open_requests.pop(unit, ())
-        return [kind for one in requests for kind in _kinds(one.message)]
+        return [kind for request in requests for kind in _kinds(request.message)]
 
-    def hear(self, data: bytes, now: float) -> bool:
+    def hear_bytes(self, data: bytes, now: float) -> bool:
         """Take bytes that are no answer to us; those of no frame are kept for a while."""
         if now > self._heard_at + self._response_timeout:
             self._rest += self._take_buffer()

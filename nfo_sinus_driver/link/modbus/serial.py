@@ -317,7 +317,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             # a request of another master may be in it, and its answer still to come
             until = now + self._late.longest(request.unit)
             while data := self._listen(until):
-                self._another.hear(data, self._now())
+                self._another.hear_bytes(data, self._now())
             super()._await_gap(request)
         return stray or second
 
@@ -376,7 +376,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self._doubtful = self._is_doubtful(request.answer_head, late)
         self._others.took(request)
         length = len(came.frame) * self._settings.char_time
-        self._late.note(request, came.frame, arrived, length)
+        self._late.note_reply(request, came.frame, arrived, length)
         self.pauses.answered(request.unit, type(request), arrived)
         self._release(request, late=late, asked_too=came.asked_too)
         if not late and self._late.repeated is None:
@@ -397,11 +397,11 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
         self.pauses.answered(request.unit, type(request), self._now())
         if is_refusal:
             length = len(came.frame) * self._settings.char_time
-            self._late.note(request, came.frame, self._now(), length)
+            self._late.note_reply(request, came.frame, self._now(), length)
 
     def _is_second(self, frame: bytes, message: bytes) -> bool:
         # it came when the line was last in use, and not when it had been silent since
-        is_second = self._seconds.take(message[0], frame, self._line_end, message)
+        is_second = self._seconds.take_frame(message[0], frame, self._line_end, message)
         self._second_came |= is_second
         return is_second
 
@@ -427,7 +427,7 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             stray = b''
         self._stray = bool(stray)
         if stray:
-            self._another.hear(stray, now)
+            self._another.hear_bytes(stray, now)
         return came_back and not alone
 
     def _is_doubtful(self, kind: bytes, late: bool = False) -> bool:

@@ -185,10 +185,10 @@ class Reader:
             shapes = _REQUESTS if self._buffer[0] == _EOT else _ANSWERS
             fit = -1
             shape: tuple[_Chars, ...] = ()
-            for one in shapes:
-                fits = _fit(self._buffer, one)
+            for candidate in shapes:
+                fits = _fit(self._buffer, candidate)
                 if fits > fit:
-                    fit, shape = fits, one
+                    fit, shape = fits, candidate
             message = _decode(self._buffer[:fit]) if fit == len(shape) else None
             if message is not None:
                 found.append(message)
@@ -420,8 +420,10 @@ class ClassicLink(CodecLink):
     ) -> bool:
         # units answer in order: ours was lost, unless this is a late one to us
         return self._another.is_there(now) and any(
-            isinstance(one, Value) and one.unit == request.unit and one.number not in quarantined
-            for one in messages
+            isinstance(message, Value)
+            and message.unit == request.unit
+            and message.number not in quarantined
+            for message in messages
         )
 
     def _deadline(self, deadline: float, now: float) -> float:

@@ -444,7 +444,7 @@ class MovitracLink(CodecLink):
         if not (self._again or foreign):
             return
         if data := self._listen(until):
-            self._another.hear(data, self._now())
+            self._another.hear_bytes(data, self._now())
             raise DamagedAnswer(f'unit {request.unit}: two answers came, one of them is late')
         if self._now() < until:
             raise DamagedAnswer(f'unit {request.unit}: {STOP_WAITS}')

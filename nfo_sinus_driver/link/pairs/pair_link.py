@@ -117,7 +117,7 @@ class CodecLink(RequestLink[Any]):
         if self._another.is_there(now):
             # an answer to that one may be the same
             return False
-        is_second = self._seconds.take(unit, data, self._line_end)
+        is_second = self._seconds.take_frame(unit, data, self._line_end)
         return is_second and self._seconds.silence(unit, now) > 0.0
 
     def _longest_delay(self, unit: int) -> float:
@@ -217,7 +217,7 @@ class CodecLink(RequestLink[Any]):
             if not (data := data or self._read_line(deadline)):
                 break
             now = self._now()
-            self._another.hear(data, now)
+            self._another.hear_bytes(data, now)
             data = self._echo.strip(data)
             if came and looked:
                 # less the time of these bytes themselves; without a look that found none, this

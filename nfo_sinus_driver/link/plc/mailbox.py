@@ -227,7 +227,7 @@ class Mailbox:
     def _first_waiting(self, now: float) -> _Wanted | None:
         """Return what has waited longest, and still waits."""
         waiting = self._waiting.items()
-        self._waiting = {one: at for one, at in waiting if now - at <= _WAITS_FOR}
+        self._waiting = {known: at for known, at in waiting if now - at <= _WAITS_FOR}
         return next(iter(self._waiting), None)
 
     def _step(self, pending: _Pending) -> _Shown | None:

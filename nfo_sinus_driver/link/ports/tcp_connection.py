@@ -64,21 +64,21 @@ class TcpConnection:
             found = socket.getaddrinfo(*self._where, type=socket.SOCK_STREAM)
             _known[self._where] = [(family, address) for family, _, _, _, address in found]
         family, address = _known[self._where][0]
-        self._socket = one = socket.socket(family, socket.SOCK_STREAM)
-        one.setblocking(False)
-        watch_over(one)
+        self._socket = connection = socket.socket(family, socket.SOCK_STREAM)
+        connection.setblocking(False)
+        watch_over(connection)
         try:
-            one.connect(address)  # type: ignore[arg-type]  # as it was found
+            connection.connect(address)  # type: ignore[arg-type]  # as it was found
         except BlockingIOError:
             # it is on its way
             return
 
     def connected(self, until: float) -> bool:
         """Wait for the connection until a moment; return whether it is there."""
-        one = self._open_socket()
+        connection = self._open_socket()
         wait = max(0.0, until - time.monotonic())
-        if not self._is_connected and select.select((), (one,), (), wait)[1]:
-            error = one.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        if not self._is_connected and select.select((), (connection,), (), wait)[1]:
+            error = connection.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
             if error:
                 raise OSError(error, os.strerror(error))
             self._is_connected = True
@@ -90,25 +90,25 @@ class TcpConnection:
 
     def read(self, until: float) -> bytes:
         """Return what has come, or nothing; wait for the first byte until a moment."""
-        one = self._open_socket()
+        connection = self._open_socket()
         wait = max(0.0, until - time.monotonic())
-        if not select.select((one,), (), (), wait)[0]:
+        if not select.select((connection,), (), (), wait)[0]:
             return b''
-        data = one.recv(_READ_SIZE)
+        data = connection.recv(_READ_SIZE)
         if not data:
             raise ConnectionAbortedError('the gateway closed it')
         return data
 
     def close(self, *, discard: bool = False) -> None:
         """Close it; harmless when it is closed already."""
-        one, self._socket = self._socket, None
-        if one is None:
+        connection, self._socket = self._socket, None
+        if connection is None:
             return
         if not self._is_connected and (known := _known.pop(self._where, None)) and known[1:]:
             _known[self._where] = known[1:]
         if discard:
-            discard_unsent(one)
-        one.close()
+            discard_unsent(connection)
+        connection.close()
 
     def _open_socket(self) -> socket.socket:
         if self._socket is None:
@@ -116,16 +116,16 @@ class TcpConnection:
         return self._socket
 
 
-def discard_unsent(one: socket.socket) -> None:
+def discard_unsent(connection: socket.socket) -> None:
     """Have the kernel not keep trying to deliver what has not arrived when it is closed."""
-    one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack('ii', 1, 0))
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack('ii', 1, 0))
 
 
-def watch_over(one: socket.socket) -> None:
+def watch_over(connection: socket.socket) -> None:
     """Have TCP find out by itself that a connection is broken, and send at once."""
-    one.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for option, value in _KEEPALIVE.items():
-        one.setsockopt(socket.IPPROTO_TCP, option, value)
+        connection.setsockopt(socket.IPPROTO_TCP, option, value)
     milliseconds = 1000 * _ACKNOWLEDGE_TIMEOUT
-    one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, milliseconds)
-    one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, milliseconds)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -57,7 +57,7 @@ class BusContext:
     diagnose: list[Callable[[], DiagnosticStatus]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.publish_queue.put_every(PERIOD, self.graph_watch.look)
+        self.publish_queue.put_every(PERIOD, self.graph_watch.look_at_graph)
 
     def expect(self, names: Sequence[str]) -> None:
         """Note the names of the drives that will be added."""
@@ -65,9 +65,9 @@ class BusContext:
 
     def stop_beside(self, names: Collection[str], why: Report) -> None:
         """Stop the motors of drives because another one stops; called on the bus."""
-        for one in self.drives:
-            if one.name in names:
-                one.drive.stop_beside(why)
+        for managed in self.drives:
+            if managed.name in names:
+                managed.drive.stop_beside(why)
 
     def subscribe(
         self, node: Node, topics: Mapping[str, tuple[type, Callable[[Any, Origin], None]]]

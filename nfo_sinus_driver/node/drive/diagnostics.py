@@ -39,7 +39,7 @@ class Diagnosis:
         status = self._status
         status.level, status.name, status.message = level, name, message
         status.hardware_id = hardware_id
-        if [one.key for one in status.values] != [*values]:
+        if [pair.key for pair in status.values] != [*values]:
             status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         for kept, value in zip(status.values, values.values(), strict=True):
             if kept.value != value:

@@ -94,7 +94,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             lambda: self.get_parameter('gear_ratio').value,
         )
         self._drive_parameters = DriveParameters(self)
-        queue, follow = context.publish_queue, self._drive_parameters.note
+        queue, follow = context.publish_queue, self._drive_parameters.note_changes
         wording = Wording(self)
         reporter = Reporter(self, queue, wording, joint, lambda: self.managed, follow)
         #: The drive of the node.
@@ -114,7 +114,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._other_lines = OtherLines(
             self,
             queue,
-            lambda: [one for one in self.managed.settings.stop_with if not self._beside(one)],
+            lambda: [other for other in self.managed.settings.stop_with if not self._beside(other)],
             lambda: self.managed.drive.snapshot.enabled,
         )
         try:
@@ -348,7 +348,11 @@ class DriveNode(LifecycleNodeMixin, Node):
 
     def _settings_with(self, parameters: list[Parameter]) -> DriveSettings:
         """Return the settings as they would be; a ValueError if they make no sense."""
-        changed = {one.name: one.value for one in parameters if one.name in DRIVE_SETTINGS}
+        changed = {
+            parameter.name: parameter.value
+            for parameter in parameters
+            if parameter.name in DRIVE_SETTINGS
+        }
         if not changed:
             # a drive has many of its own, and they come one by one
             return self.managed.settings
@@ -376,8 +380,10 @@ class DriveNode(LifecycleNodeMixin, Node):
             )
 
     def _require_same_scale(self, changed: Mapping[str, object]) -> None:
-        disabled = (one.name for one in DRIVE_SETTINGS.values() if one.change == DISABLED)
-        for name in disabled:
+        for setting in DRIVE_SETTINGS.values():
+            if setting.change != DISABLED:
+                continue
+            name = setting.name
             now = self.get_parameter(name).value
             if changed.get(name, now) == now:
                 continue

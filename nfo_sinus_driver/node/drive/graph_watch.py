@@ -45,7 +45,7 @@ class GraphWatch:
         whole = {node.resolve_topic_name(topic): type_ for topic, type_ in types.items()}
         self._topics.append((node, whole))
 
-    def look(self) -> None:
+    def look_at_graph(self) -> None:
         """Warn of what is new."""
         if not self._topics:
             return

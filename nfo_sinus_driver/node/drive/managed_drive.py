@@ -21,7 +21,7 @@ from nfo_sinus_driver.setting import UNCONFIGURED, settings_of
 
 #: What identifies a drive, or decides how it is commanded, cannot change while it is configured.
 ONLY_UNCONFIGURED = tuple(
-    name for name, one in settings_of(DriveSettings).items() if one.change == UNCONFIGURED
+    name for name, setting in settings_of(DriveSettings).items() if setting.change == UNCONFIGURED
 )
 
 

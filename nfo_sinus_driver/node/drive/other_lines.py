@@ -147,7 +147,7 @@ class OtherLines:
         if not self._enabled():
             self._missing = set()
             return
-        missing = {one for one, client in self._clients.items() if not client.service_is_ready()}
+        missing = {name for name, client in self._clients.items() if not client.service_is_ready()}
         for service in sorted(missing - self._missing):
             self._log.warning(
                 f'{drive_of(service)} does not stop with it: nothing offers {service}; start its '

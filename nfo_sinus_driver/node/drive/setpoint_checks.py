@@ -42,7 +42,7 @@ class Sources:
         #: When a set-point came from another source than the one before, s, and their topics.
         self._changes: deque[tuple[float, frozenset[str]]] = deque(maxlen=_CHANGES)
 
-    def take(self, origin: Origin, value: float, now: float) -> frozenset[str]:
+    def take_setpoint(self, origin: Origin, value: float, now: float) -> frozenset[str]:
         """Take a set-point; return the topics of two sources at once, or nothing."""
         (before, last), self._last = self._last, (origin, value)
         another = origin.topic != before.topic

@@ -171,7 +171,7 @@ class Setpoints:
             return
         if self._managed.drive.following:
             self._logged_idle = False
-            self._warn_of_two(self._sources.take(origin, value, time.monotonic()))
+            self._warn_of_two(self._sources.take_setpoint(origin, value, time.monotonic()))
         elif not self._logged_idle and self._managed.drive.snapshot.connected:
             # before that an enable would be refused
             self._logged_idle = True
@@ -198,7 +198,9 @@ class Setpoints:
 
     def _publishers(self, topic: str) -> str:
         found = self._node.get_publishers_info_by_topic(topic)
-        names = {f'{one.node_namespace.rstrip("/")}/{one.node_name}' for one in found}
+        names = {
+            f'{publisher.node_namespace.rstrip("/")}/{publisher.node_name}' for publisher in found
+        }
         return ' and '.join(sorted(names)) or 'a node that has ended'
 
     def _ignore(self, kind: str, text: str) -> bool:

@@ -74,9 +74,9 @@ class AllDrives:
     def _stop(self, call: Call) -> tuple[list[str], list[str]]:
         """Stop each drive by its address; broadcast to those out of reach, where allowed."""
         why = Report(Cause.STOP_ALL_REQUESTED, by=call)
-        failed, done = self._command(lambda one: _stop_one(one, why), _LONGEST_STOP, call)
+        failed, done = self._command(lambda managed: _stop_one(managed, why), _LONGEST_STOP, call)
         if failed and self._context.bus.protocol.broadcast is not None:
-            if any(one.settings.method == 'monitor' for one in self._context.drives):
+            if any(managed.settings.method == 'monitor' for managed in self._context.drives):
                 failed.append('no stop was broadcast, for a drive here is only monitored')
             else:
                 failed.append(self._broadcast())
@@ -85,7 +85,7 @@ class AllDrives:
     def _broadcast(self) -> str:
         try:
             bus, drives = self._context.bus, self._context.drives
-            broadcast_stop(bus, [one.drive for one in drives]).result(_LONGEST_STOP)
+            broadcast_stop(bus, [managed.drive for managed in drives]).result(_LONGEST_STOP)
         except DriveError as error:
             return drives[0].wording.say(error)
         except Exception as error:

@@ -95,11 +95,12 @@ class BusNode(Node):
     ) -> dict[str, Any]:
         """Declare the settings of the line, as its drives leave the factory where not given."""
         given = {
-            name: coerce(one, known).value for name, one in overrides_of(self).items()
+            name: coerce(parameter, known).value for name, parameter in overrides_of(self).items()
         }
         line = line_of(families, given)
         values = declare(self, {
-            name: replace(one, default=line.get(name, one.default)) for name, one in known.items()
+            name: replace(setting, default=line.get(name, setting.default))
+            for name, setting in known.items()
         })
         # a parameter file may say the factory setting, too
         return values | {name: value for name, value in line.items() if not values[name]}

@@ -33,68 +33,68 @@ _TYPES = {
 def declare(node: Node, settings: Mapping[str, Setting]) -> dict[str, SettingValue]:
     """Declare settings on a node and return their values; a ValueError says which is wrong."""
     overrides = overrides_of(node)
-    for name, one in settings.items():
+    for name, setting in settings.items():
         # the messages of rclpy name no remedy
         given = overrides.get(name)
-        value = one.default if given is None else _coerced(one, given.value)
-        node.declare_parameter(name, value, _descriptor(one), ignore_override=True)
+        value = setting.default if given is None else _coerced(setting, given.value)
+        node.declare_parameter(name, value, _descriptor(setting), ignore_override=True)
     return {name: node.get_parameter(name).value for name in settings}
 
 
 def coerce(parameter: Parameter, settings: Mapping[str, Setting]) -> Parameter:
     """Return a parameter in the type of its setting, if it is one of the settings."""
-    one = settings.get(parameter.name)
-    if one is None or parameter.type_ is Parameter.Type.NOT_SET:
+    setting = settings.get(parameter.name)
+    if setting is None or parameter.type_ is Parameter.Type.NOT_SET:
         return parameter
-    return Parameter(parameter.name, value=_coerced(one, parameter.value))
+    return Parameter(parameter.name, value=_coerced(setting, parameter.value))
 
 
-def _descriptor(one: Setting) -> ParameterDescriptor:
+def _descriptor(setting: Setting) -> ParameterDescriptor:
     """Return what ``ros2 param describe`` shows."""
-    unit = f' ({one.unit})' if one.unit else ''
+    unit = f' ({setting.unit})' if setting.unit else ''
     descriptor = ParameterDescriptor(
-        name=one.name,
-        description=f'{one.description[0].upper()}{one.description[1:]}{unit}',
-        additional_constraints=one.allowed,
-        read_only=one.change == FIXED,
+        name=setting.name,
+        description=f'{setting.description[0].upper()}{setting.description[1:]}{unit}',
+        additional_constraints=setting.allowed,
+        read_only=setting.change == FIXED,
     )
-    if one.low is None:
+    if setting.low is None:
         return descriptor
-    if isinstance(one.default, float):
-        span = FloatingPointRange(from_value=float(one.low), to_value=float(one.high))
+    if isinstance(setting.default, float):
+        span = FloatingPointRange(from_value=float(setting.low), to_value=float(setting.high))
         descriptor.floating_point_range = [span]
     else:
-        span = IntegerRange(from_value=int(one.low), to_value=int(one.high), step=1)
+        span = IntegerRange(from_value=int(setting.low), to_value=int(setting.high), step=1)
         descriptor.integer_range = [span]
     return descriptor
 
 
-def _coerced(one: Setting, given: object) -> SettingValue:
+def _coerced(setting: Setting, given: object) -> SettingValue:
     """
     Return a value in the type of its setting.
 
     An integer for a double is taken, and so is 5.0 for 5; 8E1, eighty in YAML, is a text.
     """
     value = given
-    wanted = type(one.default)
+    wanted = type(setting.default)
     # a list without elements has no type in ROS, and of a file rcl gives nothing for it
-    if one.default == [''] and given in (None, []):
-        value = one.default
+    if setting.default == [''] and given in (None, []):
+        value = setting.default
     if type(given) is int and wanted is float:
         value = float(given)
     elif isinstance(given, float) and wanted is int and given.is_integer():
         value = int(given)
-    elif type(given) is float and one.name == 'char_format':
+    elif type(given) is float and setting.name == 'char_format':
         value = _FORMATS_THAT_ARE_NUMBERS.get(given, given)
     if type(value) is not wanted or not _only_strings(value):
         what = 'is empty' if given is None else f'is {given!r} ({_type_of(given)})'
-        raise ValueError(f'{one.name} {what}: write {_as(wanted, given)}')
-    one.check(value)
+        raise ValueError(f'{setting.name} {what}: write {_as(wanted, given)}')
+    setting.check(value)
     return value
 
 
 def _only_strings(value: object) -> bool:
-    return not isinstance(value, list) or all(isinstance(one, str) for one in value)
+    return not isinstance(value, list) or all(isinstance(element, str) for element in value)
 
 
 def _type_of(value: object) -> str:

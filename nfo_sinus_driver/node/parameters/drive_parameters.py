@@ -78,7 +78,7 @@ class DriveParameters:
             )
             self._declared.add(key)
         # changes in between
-        self.note(self._declared)
+        self.note_changes(self._declared)
 
     def undeclare(self) -> None:
         """Undeclare them: what the drive has is not known any more."""
@@ -93,7 +93,7 @@ class DriveParameters:
             with writable(self._node, key):
                 self._node.undeclare_parameter(key)
 
-    def note(self, keys: Collection[str]) -> None:
+    def note_changes(self, keys: Collection[str]) -> None:
         """Have parameters follow the drive; may be called from any thread."""
         with self._lock:
             self._changed.update(keys)
@@ -126,7 +126,7 @@ class DriveParameters:
         Read-only ones with the value of the drive are left out: so a dump can be loaded.
         """
         coerced = [self._coerced(parameter) for parameter in parameters]
-        return [one for one in coerced if not self._is_read_only(one.name)]
+        return [parameter for parameter in coerced if not self._is_read_only(parameter.name)]
 
     def _is_read_only(self, name: str) -> bool:
         drive = self._drive
@@ -163,7 +163,11 @@ class DriveParameters:
         drive = self._drive
         if drive is None or self._outside != threading.get_ident():
             return ()
-        wanted = {one.name: one.value for one in parameters if one.name in self._declared}
+        wanted = {
+            parameter.name: parameter.value
+            for parameter in parameters
+            if parameter.name in self._declared
+        }
         return self._change(drive, wanted) if wanted else ()
 
     def put_back(self, changes: Sequence[ParameterChange]) -> None:

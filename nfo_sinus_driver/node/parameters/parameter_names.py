@@ -31,7 +31,7 @@ def unknown_parameters(nodes: Iterable[Node]) -> Iterator[str]:
             unknown.setdefault(name, []).append(node)
     for name, nodes_of in sorted(unknown.items()):
         owners = [node for node, names in known.items() if name in names]
-        of_these = {one for node in nodes_of for one in known[node]}
+        of_these = {declared for node in nodes_of for declared in known[node]}
         meant = f'; {owners[0]} has it' if owners else did_you_mean(name, of_these)
         yield (
             f'parameter {name} was given to {", ".join(sorted(nodes_of))}, but there is none of '
@@ -104,7 +104,7 @@ def _sections(tree: yaml.Node | None, prefix: str = '') -> Iterator[str]:
     for key, value in tree.value if isinstance(tree, yaml.MappingNode) else ():
         name = f'{prefix}/{key.value}'.replace('//', '/') if prefix else str(key.value)
         below = value.value if isinstance(value, yaml.MappingNode) else ()
-        if any(one.value == _PARAMETERS for one, _ in below):
+        if any(entry.value == _PARAMETERS for entry, _ in below):
             yield name
         else:
             yield from _sections(value, name)

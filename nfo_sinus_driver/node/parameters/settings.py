@@ -46,4 +46,4 @@ _OF_NODE = (
 )
 
 BUS_SETTINGS = {**settings_of(BusSettings), _DRIVES.name: _DRIVES}
-DRIVE_SETTINGS = {**settings_of(DriveSettings), **{one.name: one for one in _OF_NODE}}
+DRIVE_SETTINGS = {**settings_of(DriveSettings), **{setting.name: setting for setting in _OF_NODE}}

@@ -312,7 +312,8 @@ def _run(
     try:
         # before ROS reads them
         require_files(arguments)
-        starters = [one for one in (parent, process_to_end_with(arguments)) if one is not None]
+        possible = (parent, process_to_end_with(arguments))
+        starters = [starter for starter in possible if starter is not None]
         init_ros(arguments)
         process = DriverProcess(arguments, single_name)
     except (ParameterException, ValueError, *_ARGUMENT_ERRORS) as error:

@@ -217,7 +217,12 @@ def end_all(executors: Iterable[NodeExecutor], timeout: float) -> None:
     deadline = time.monotonic() + timeout
     for executor in executors:
         executor.join(max(0.0, deadline - time.monotonic()))
-    waiter = threading.Thread(target=lambda: [one.finish() for one in executors], daemon=True)
+
+    def finish_all() -> None:
+        for executor in executors:
+            executor.finish()
+
+    waiter = threading.Thread(target=finish_all, daemon=True)
     waiter.start()
     waiter.join(timeout)
 

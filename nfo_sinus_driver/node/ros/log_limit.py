@@ -58,7 +58,7 @@ class ErrorLimit(logging.Filter):
         if not record.exc_info:
             return True
         type_, _, trace = record.exc_info
-        place = [(one.filename, one.lineno) for one in traceback.extract_tb(trace)[-1:]]
+        place = [(frame.filename, frame.lineno) for frame in traceback.extract_tb(trace)[-1:]]
         kind = record.pathname, record.lineno, type_, *place
         left_out = self._limit.left_out(kind, time.monotonic())
         if left_out:

@@ -80,14 +80,14 @@ class DeclaredControlUnit(ControlUnit):
         address = self._drive.parameters[direction.key].at('modbus')
         return address.index, address.space == 'coil'
 
-    def take(self, place: Place, word: int) -> None:
+    def take_word(self, place: Place, word: int) -> None:
         """Take a word, or a coil, that is a command."""
         if not self.obeys and self.variant.in_local != 'keeps':
             if self.variant.in_local == 'refuses':
                 raise Refused(Reason.STATE, 'the line has no control')
             return
         self._words[place] = word
-        done = {name for name, order in self._orders.items() if order.take(place, word)}
+        done = {name for name, order in self._orders.items() if order.take_word(place, word)}
         self._turn(place, word)
         for name in ('run', 'stop', 'quick_stop', 'coast', 'release', 'reset'):
             if name in done:
@@ -127,7 +127,9 @@ class DeclaredControlUnit(ControlUnit):
         drive, get = self._drive, self.memory.get
         if drive.holder is not None and get(drive.holder[0]) not in drive.holder[1]:
             return False
-        return not self.local and all(get(one.key) == one.value for one in drive.requires)
+        return not self.local and all(
+            get(required.key) == required.value for required in drive.requires
+        )
 
     # ---- what it shows ----
 
@@ -179,7 +181,7 @@ class DeclaredControlUnit(ControlUnit):
             if name in drive.facts
         ]
         wishes += [
-            (condition, is_fault and one.code == fault, 10) for condition, one in drive.flags
+            (condition, is_fault and flag.code == fault, 10) for condition, flag in drive.flags
         ]
         for order in self._orders.values():
             if order.shows is not None:
@@ -221,7 +223,8 @@ class DeclaredControlUnit(ControlUnit):
     def trip(self, code: int, *, cause_present: bool = False) -> None:
         """Let a fault happen, or a warning (ValueError: the drive cannot show it)."""
         if self.memory.model.status_code(code).kind is Kind.FAULT and not self._can_show(code):
-            known = ', '.join(str(drive_number(one)) for one in (*self._drive.faults, *self._flags))
+            listed = (*self._drive.faults, *self._flags)
+            known = ', '.join(str(drive_number(fault)) for fault in listed)
             raise ValueError(f'its status cannot show fault {code}: its file has {known}')
         super().trip(code, cause_present=cause_present)
 
@@ -326,12 +329,12 @@ class DeclaredControlUnit(ControlUnit):
         if self._time_out and self._silent_for > self._time_out and (self._run or self.faults):
             self._silent_for = 0.0
             self._run = False
-            lost = [one.code for one in self._drive.faults.values() if one.line]
+            lost = [fault.code for fault in self._drive.faults.values() if fault.line]
             if lost and not self.faults:
                 self.trip(lost[0])
             self.settle()
 
-    def heard(self) -> None:
+    def note_frame(self) -> None:
         """Begin to count anew."""
         self._silent_for = 0.0
 

@@ -62,7 +62,7 @@ class Order:
         """What the drive shows by now, for a step that waits for it."""
         return self._shown.get(self._passed)
 
-    def take(self, place: Place, word: int) -> bool:
+    def take_word(self, place: Place, word: int) -> bool:
         """Take a word that was written; return whether the command is complete by it."""
         if place not in self.places:
             return False

@@ -58,7 +58,7 @@ class Server(modbus.Requests):
     def read(self, register: int, count: int) -> tuple[int, ...]:
         """Read registers, whatever stands in them; one that is none is refused."""
         self._check_count(count)
-        return tuple(self._word(one) for one in range(register, register + count))
+        return tuple(self._word(number) for number in range(register, register + count))
 
     def _word(self, register: int) -> int:
         status = self._file.status
@@ -82,7 +82,7 @@ class Server(modbus.Requests):
         parameter, part = self._at.get(register, (None, 0))
         is_setting = parameter is not None and not parameter.key.startswith('line.r')
         if (register, False) in self._commands and not is_setting:
-            self._unit.take((register, False), words[0])
+            self._unit.take_word((register, False), words[0])
             self.drive.command_writes[f'line.r{register:04x}'] += 1
             self._unit.settle()
             return 1
@@ -134,7 +134,7 @@ class Server(modbus.Requests):
         if value not in (0, _ON):
             raise Refused(Reason.VALUE, f'a coil is not written with {value:04X}h')
         if (coil, True) in self._commands:
-            self._unit.take((coil, True), int(value == _ON))
+            self._unit.take_word((coil, True), int(value == _ON))
             self.drive.command_writes[f'line.coil_{coil}'] += 1
             self._unit.settle()
         elif coil in self._coils:

@@ -48,7 +48,7 @@ def _groups(wishes: Sequence[Wish]) -> Iterator[list[Wish]]:
     while left:
         group = [left.pop(0)]
         mask = group[0][0].mask
-        while found := next((one for one in left if one[0].mask & mask), None):
+        while found := next((wish for wish in left if wish[0].mask & mask), None):
             left.remove(found)
             group.append(found)
             mask |= found[0].mask
@@ -60,8 +60,8 @@ def _candidates(free: int, group: Sequence[Wish]) -> Iterator[int]:
         yield from _submasks(free)
         return
     named = [
-        sorted({0, free & one.mask, *(value & free for value in one.values)})
-        for one, _, _ in group
+        sorted({0, free & condition.mask, *(value & free for value in condition.values)})
+        for condition, _, _ in group
     ]
     for parts in itertools.islice(itertools.product(*named), _MOST_TRIED):
         yield functools.reduce(int.__or__, parts)

@@ -130,7 +130,7 @@ class MovitracControlUnit(ControlUnit):
         """Whether it hears a master: not in master-slave operation on RS-485 [M4 §2.3.2]."""
         return self.variant.interface == 'rs232' or not self.memory.raw(_MASTER_SLAVE)
 
-    def heard(self) -> None:
+    def note_frame(self) -> None:
         """Record a valid frame: the cause of a PC time-out is gone."""
         self._silence = 0.0
         self.faults.end_cause(PC_TIMEOUT)

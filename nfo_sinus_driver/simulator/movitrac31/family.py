@@ -115,9 +115,9 @@ class Server(movitrac.Server):
         self.any_address = self._unit.variant.interface == 'rs232'
         #: What stands there as a whole; some bits of it may have a name of their own.
         self._by_index = {
-            one.at(_PROTOCOL).index: one
-            for one in drive.memory.model.values()
-            if not isinstance(one.at(_PROTOCOL).codec, BitField)
+            parameter.at(_PROTOCOL).index: parameter
+            for parameter in drive.memory.model.values()
+            if not isinstance(parameter.at(_PROTOCOL).codec, BitField)
         }
 
     def enquiry(self, index: int) -> bytes:

@@ -440,7 +440,7 @@ _RULES = (
 def broken(memory: Memory, key: str, raw: int) -> ReturnCode | None:
     """Return why a setting cannot have a raw number as the others stand, ``None`` if it can."""
     setting, _, number = key.rpartition('_')
-    for one, on, other, other_on, code in _RULES:
-        if one == setting and on == bool(raw) and other_on == bool(memory.raw(f'{other}_{number}')):
+    for own, on, other, other_on, code in _RULES:
+        if own == setting and on == bool(raw) and other_on == bool(memory.raw(f'{other}_{number}')):
             return ReturnCode[code.format(number) if '{}' in code else f'{code}_{number}']
     return None

@@ -201,16 +201,16 @@ class SinusControlUnit(ControlUnit):
         """Begin as after power-on: without control. Set-points are in the memory and stay."""
         self.initialised = False
         self._forget_fieldbus()
-        self.take(Source.STOP)
+        self.hand_control_to(Source.STOP)
 
     def boot(self) -> None:
         """End the self-test after power-on; AutoStart hands control to the terminals."""
         self.serial.initialise()
         super().boot()
         if self.memory.raw('control.auto_start'):
-            self.take(Source.EXT)
+            self.hand_control_to(Source.EXT)
 
-    def take(self, source: Source) -> None:
+    def hand_control_to(self, source: Source) -> None:
         """Hand control over; a run command that stood is forgotten."""
         self.source = source
         self.scmd = _STOP
@@ -218,7 +218,7 @@ class SinusControlUnit(ControlUnit):
 
     def press(self, key: str) -> None:
         """Press one of :data:`KEYS`; start is the keypad's own run command."""
-        self.take(KEYS[key])
+        self.hand_control_to(KEYS[key])
         self.settle()
 
     @property
@@ -243,7 +243,7 @@ class SinusControlUnit(ControlUnit):
         if key == 'fieldbus.mode':
             self._write_mode(raw)
             self.mode_ext_writes += raw == _MODE_TERMINALS
-            self.heard()
+            self.note_frame()
         elif key == self.run_command:
             self._write_scmd(raw)
         elif key == 'fieldbus.drive_control':
@@ -333,7 +333,7 @@ class SinusControlUnit(ControlUnit):
         """Forget the run command, from any source; the terminals give theirs all the time."""
         self.scmd = _STOP
         if self.source is Source.KEYPAD:
-            self.take(Source.STOP)
+            self.hand_control_to(Source.STOP)
 
     # ---- the fieldbus ----
 
@@ -344,7 +344,7 @@ class SinusControlUnit(ControlUnit):
         The word counts when it changes: who takes control away, at the keypad or by MODE, keeps
         it until then.
         """
-        self.fieldbus.heard()
+        self.fieldbus.note_telegram()
         self._take_setpoint(setpoint)
         if word != self._telegram:
             self._telegram = word
@@ -387,9 +387,9 @@ class SinusControlUnit(ControlUnit):
         """Whether it is set to this protocol, speed and format."""
         return self.serial.hears(protocol, timing)
 
-    def heard(self) -> None:
+    def note_frame(self) -> None:
         """Record a valid frame: the bus is alive."""
-        self.serial.heard()
+        self.serial.note_frame()
 
     def serial_error(self, what: LineError) -> None:
         """
@@ -413,7 +413,7 @@ class SinusControlUnit(ControlUnit):
         """Let a fault happen; those of the line take control away."""
         super().trip(code, cause_present=cause_present)
         if code in self.faults.of_the_line:
-            self.take(Source.STOP)
+            self.hand_control_to(Source.STOP)
 
     def wait(self, dt: float) -> None:
         """Let ``dt`` seconds pass, of silence too."""

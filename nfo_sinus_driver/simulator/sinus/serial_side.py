@@ -117,7 +117,7 @@ class SerialSide:
             and self.char_format == self._rules(protocol).formats.get(timing.char_format)
         )
 
-    def heard(self) -> None:
+    def note_frame(self) -> None:
         """Record a valid frame: the bus is alive."""
         self._unheard = 0.0
 

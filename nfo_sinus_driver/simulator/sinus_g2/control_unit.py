@@ -160,9 +160,9 @@ class G2ControlUnit(SinusControlUnit):
         self.memory.put(ds402.CONTROL_WORD, 0)
         super().restart()
 
-    def take(self, source: Source) -> None:
+    def hand_control_to(self, source: Source) -> None:
         """Hand control over; a run command that stood is forgotten."""
-        super().take(source)
+        super().hand_control_to(source)
         self.word = RELEASED
         self.tuning = None
         self._tuned = 0
@@ -248,7 +248,7 @@ class G2ControlUnit(SinusControlUnit):
         if word & ControlWord.NET_CTRL:
             self.source = Source.CONTROL_WORD
         elif self.source is Source.CONTROL_WORD:
-            self.take(Source.STOP)
+            self.hand_control_to(Source.STOP)
         self.scmd = Scmd.STOP
         self.word = word
         self._by_profile = False
@@ -262,7 +262,7 @@ class G2ControlUnit(SinusControlUnit):
             self.faults.acknowledge_serial()
         else:
             self.validate('fieldbus.mode')
-        self.take(source)
+        self.hand_control_to(source)
 
     def _command(self, raw: int) -> None:
         if raw != Scmd.STOP or self.variant.stop_in_tuning == 'refused':
@@ -385,7 +385,7 @@ class G2ControlUnit(SinusControlUnit):
         self._settle()
         if self._is_held and self.tuning is None and not self.on_bus and not self.faults.serial:
             # to take control ends a run; bus mode is entered again at once [M0 §6.4]
-            self.take(Source.SCMD)
+            self.hand_control_to(Source.SCMD)
             self._settle()
 
     def _settle(self) -> None:

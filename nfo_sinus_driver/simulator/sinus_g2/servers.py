@@ -276,7 +276,7 @@ class CanopenServer(canopen.Server):
 
     def entries(self) -> Entries:
         """Return the parameters and the error log."""
-        found = {(index, sub): self._entry(one) for index, sub, one in self._places()}
+        found = {(index, sub): self._entry(place) for index, sub, place in self._places()}
         arrays = {index for index, sub in found if sub} - {index for index, sub in found if not sub}
         for index in arrays:
             most = max(sub for other, sub in found if other == index)
@@ -400,7 +400,7 @@ class TelegramServer(telegram1.Server):
             word = sum(bit for given, bit in _CONTROL.items() if stw1 & given)
             unit.take_telegram(self._by_level(word), setpoint)
         else:
-            unit.fieldbus.heard()
+            unit.fieldbus.note_telegram()
         return int(self._zsw1(stw1)), unit.actual
 
     def _profile(self) -> ChannelEntries:

@@ -183,7 +183,7 @@ class SinusHControlUnit(ControlUnit):
 
     def take_telegram(self, word: Stw1, setpoint: int) -> None:
         """Take control word and set-point (0.01 Hz) of a telegram."""
-        self.fieldbus.heard()
+        self.fieldbus.note_telegram()
         if self._lost is Lost.HOLDS:
             self._lost = Lost.NOTHING
         rises = word & ~self.word

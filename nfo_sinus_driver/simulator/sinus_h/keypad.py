@@ -145,9 +145,9 @@ _SETTINGS = (
 
 
 #: The settings by communication address; these are made up, for [M3] prints none.
-KEYS = {0x1100 + number: one.key for number, one in enumerate(_SETTINGS, 1)}
+KEYS = {0x1100 + number: setting.key for number, setting in enumerate(_SETTINGS, 1)}
 
 
 def with_keypad(model: Family) -> Family:
     """Return the tables of the family with the settings that its keypad shows."""
-    return replace(model, parameters={**model, **{one.key: one for one in _SETTINGS}})
+    return replace(model, parameters={**model, **{setting.key: setting for setting in _SETTINGS}})

@@ -91,9 +91,9 @@ class OptimalControlUnit(SinusControlUnit):
         self._running = self._sleeping = False
         super().restart()
 
-    def take(self, source: Source) -> None:
+    def hand_control_to(self, source: Source) -> None:
         """Hand control over; a run command that stood is forgotten."""
-        super().take(source)
+        super().hand_control_to(source)
         if not self.on_bus:
             self._steps.give_up()
 
@@ -117,9 +117,9 @@ class OptimalControlUnit(SinusControlUnit):
             raise Refused(Reason.VALUE, f'MODE = {raw} cannot be written')
         self.validate('fieldbus.mode')
         if raw == Mode.MANUAL:
-            self.take(Source.KEYPAD if self._running else Source.STOP)
+            self.hand_control_to(Source.KEYPAD if self._running else Source.STOP)
         else:
-            self.take(Source.EXT if raw == Mode.AUTO else Source.SCMD)
+            self.hand_control_to(Source.EXT if raw == Mode.AUTO else Source.SCMD)
 
     def _command(self, raw: int) -> None:
         self.scmd = Smode(raw)
@@ -134,7 +134,7 @@ class OptimalControlUnit(SinusControlUnit):
         if faulted and not self.faults:
             self.acknowledged()
         if self.source is Source.CONTROL_WORD and not self._steps.has_control:
-            self.take(Source.STOP)
+            self.hand_control_to(Source.STOP)
 
     def _drop_run_command(self) -> None:
         super()._drop_run_command()
@@ -145,7 +145,7 @@ class OptimalControlUnit(SinusControlUnit):
         super().wait(dt)
         self._steps.wait(dt, self.status_word)
         if self._steps.has_control and not self.on_bus:
-            self.take(Source.CONTROL_WORD)
+            self.hand_control_to(Source.CONTROL_WORD)
 
     @property
     def settled(self) -> bool:

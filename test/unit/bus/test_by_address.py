@@ -148,7 +148,7 @@ def test_what_an_earlier_driver_began_ends_before_the_first_access(drive: Drive)
 
 def test_another_access_waits(drive: Drive, by_address: ByAddress) -> None:
     async def both() -> list[Reply]:
-        accesses = (by_address.access(one, None, drive.ask) for one in (ACC_TIME, OTHER))
+        accesses = (by_address.access(row, None, drive.ask) for row in (ACC_TIME, OTHER))
         return await asyncio.gather(*accesses)
 
     assert [reply.data for reply in asyncio.run(both())] == [b'\0\x32', b'\0\0']

@@ -368,7 +368,7 @@ def test_stops_of_several_units_that_do_not_answer_leave_every_other_turn_to_the
         went.append(taken)
         scheduler.took(_READ if taken is poll else 0.2)
         scheduler.add(taken)
-    assert went == [*stops, *[one for stop in 2 * stops for one in (poll, stop)][:10]]
+    assert went == [*stops, *[task for stop in 2 * stops for task in (poll, stop)][:10]]
 
 
 @pytest.mark.parametrize('kind', [Priority.POLL, *_BACKGROUND])

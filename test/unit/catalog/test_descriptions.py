@@ -165,8 +165,8 @@ TWO_USES = {
 
 @pytest.mark.parametrize('name', TWO_USES)
 def test_no_register_has_two_uses_that_exclude_each_other(tmp_path: Path, name: str) -> None:
-    old, new, one, other = TWO_USES[name]
-    more = '  other.one: {register: 29, type: uint32}\n' if one == 'other.one' else ''
+    old, new, first, other = TWO_USES[name]
+    more = '  other.one: {register: 29, type: uint32}\n' if first == 'other.one' else ''
     more += '  other.coil: {coil: 3, choices: {0: No, 1: Yes}}\n'
     good = GOOD.replace(_PARAMETER, more + _PARAMETER)
     if not more.startswith('  other.one'):
@@ -175,7 +175,7 @@ def test_no_register_has_two_uses_that_exclude_each_other(tmp_path: Path, name: 
     text = good.replace(old, new, 1)
     found = complaints(tmp_path, text)
     (said,) = [line for line in found if 'stand in the same' in line]
-    assert one in said and other in said, said
+    assert first in said and other in said, said
     # both lines are named
     lines = [int(number) for number in re.findall(r'line (\d+)', said)]
     assert len(lines) == 2
@@ -445,11 +445,12 @@ def test_a_bad_file_is_refused_with_its_line_and_a_sentence(tmp_path: Path, name
     assert old in GOOD
     text = GOOD.replace(old, new, 1)
     found = complaints(tmp_path, text)
-    assert any(said in one for one in found), found
-    for one in found:
-        assert re.match(r'.*made_up\.vfd\.yaml(, line \d+)?: \S.*', one), one
+    assert any(said in complaint for complaint in found), found
+    for complaint in found:
+        assert re.match(r'.*made_up\.vfd\.yaml(, line \d+)?: \S.*', complaint), complaint
     # all of them are named at once, at the right place
-    line = int(re.findall(r', line (\d+):', '\n'.join(one for one in found if said in one))[0])
+    right = '\n'.join(complaint for complaint in found if said in complaint)
+    line = int(re.findall(r', line (\d+):', right)[0])
     assert 1 <= line <= text.count('\n') + 1
 
 
@@ -505,7 +506,7 @@ def test_check_names_what_has_no_effect(
     path = tmp_path / 'made_up.vfd.yaml'
     path.write_text(text, encoding='utf-8')
     assert check(str(path))
-    said = [one for one in capsys.readouterr().out.splitlines() if 'has no effect' in one]
+    said = [text for text in capsys.readouterr().out.splitlines() if 'has no effect' in text]
     (line,) = re.findall(rf'line (\d+): {key} has no effect: ', '\n'.join(said))
     assert key in text.splitlines()[int(line) - 1]
 
@@ -532,7 +533,7 @@ def test_a_file_says_what_tells_its_drive_from_others(tmp_path: Path) -> None:
     first, second = family.profile.identify
     assert family.profile.identify == {first: (7,), second: (1, 2)}
     assert (family[first].name, family[second].name) == ('register 0x40', 'register 65')
-    assert not {first, second} & {one.key for one in family.settings}
+    assert not {first, second} & {parameter.key for parameter in family.settings}
 
 
 def test_all_that_is_wrong_is_reported_at_once(tmp_path: Path) -> None:
@@ -588,10 +589,10 @@ def test_a_shipped_file_that_does_not_identify_its_drive_says_so_and_what_was_lo
 
 
 def test_a_shipped_file_without_a_time_out_says_where_the_drive_has_it() -> None:
-    without = [one for one in map(read, SHIPPED.values()) if one.timeout is None]
+    without = [drive for drive in map(read, SHIPPED.values()) if drive.timeout is None]
     assert without
-    for one in without:
-        assert 'time-out' in one.line.check, one.title
+    for drive in without:
+        assert 'time-out' in drive.line.check, drive.title
 
 
 def test_the_schema_is_one_that_editors_understand() -> None:
@@ -631,8 +632,8 @@ def test_whatever_stands_for_a_number_nothing_but_a_sentence_comes(
     assert number in GOOD
     for other in NO_NUMBERS:
         key = re.sub(r'[\d.]+$', '', number)
-        for one in complaints(tmp_path, GOOD.replace(number, key + other, 1)):
-            assert re.match(r'.*made_up\.vfd\.yaml(, line \d+)?: \S.*', one), one
+        for complaint in complaints(tmp_path, GOOD.replace(number, key + other, 1)):
+            assert re.match(r'.*made_up\.vfd\.yaml(, line \d+)?: \S.*', complaint), complaint
 
 
 # --- fuzz ---
@@ -714,7 +715,8 @@ def test_whatever_is_changed_nothing_but_a_sentence_comes(
     try:
         family = load_family(str(path))
     except DescriptionError as error:
-        assert all(re.search(r'fuzzed\.vfd\.yaml(, line \d+)?: \S', one) for one in error.problems)
+        place = re.compile(r'fuzzed\.vfd\.yaml(, line \d+)?: \S')
+        assert all(place.search(problem) for problem in error.problems)
     else:
         assert family.profile.methods
 

@@ -206,9 +206,9 @@ def test_steps_that_the_drive_cannot_take(folder: Path, steps: str, reason: str)
 
 
 def test_the_catalog_knows_no_family() -> None:
-    names = {name for one in families() for name in (one, load_family(one).profile.title)}
+    names = {text for name in families() for text in (name, load_family(name).profile.title)}
     # how to set a parameter is shown by one
-    keys = {key for one in families() for key in load_family(one)} - {'control.accel'}
+    keys = {key for name in families() for key in load_family(name)} - {'control.accel'}
     for path in Path(family.__file__).parent.glob('*.py'):
         text = path.read_text(encoding='utf-8')
         assert {name for name in names | keys if name in text} == set(), path.name

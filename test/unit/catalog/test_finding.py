@@ -41,9 +41,9 @@ def test_by_name(prefix: Path) -> None:
     assert find('delta_vfd_el') == str(DELTA)
     theirs = prefix / 'share' / 'robot' / 'config' / 'theirs.vfd.yaml'
     assert find('theirs') == find('package://robot/config/theirs.vfd.yaml') == str(theirs)
-    found = {one.name: one for one in every()}
+    found = {family.name: family for family in every()}
     assert found['theirs'].of == 'package robot' and found['theirs'].title == 'Delta VFD-EL'
-    assert {one.of for one in found.values()} == {'shipped', 'package robot'}
+    assert {family.of for family in found.values()} == {'shipped', 'package robot'}
 
 
 def test_of_two_with_one_name_that_counts_which_is_shipped_and_both_are_named_once(
@@ -102,7 +102,7 @@ def test_a_bad_line_of_a_package_spoils_no_other_family(
     index = prefix / 'share' / 'ament_index' / 'resource_index' / GROUP / 'robot'
     text = f'{line}\nconfig/theirs.vfd.yaml\n'
     index.write_bytes(text.encode(errors='surrogateescape'))
-    found = {one.name: one for one in every()}
+    found = {family.name: family for family in every()}
     assert found[name].title.startswith('cannot be used: ') and said in found[name].title
     assert found['theirs'].title == 'Delta VFD-EL' and find('theirs')
     with pytest.raises(ValueError, match=said):
@@ -164,7 +164,7 @@ def test_a_family_with_code_is_an_entry_point(
         importlib.metadata, 'entry_points', lambda group: [point] if group == GROUP else []
     )
     assert find('acme') == 'acme'
-    found = {one.name: one for one in every()}
+    found = {family.name: family for family in every()}
     assert found['acme'].of == 'entry point' and found['acme'].title == 'Acme'
     assert load_family('acme').profile.title == 'Acme'
 

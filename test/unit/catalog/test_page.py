@@ -51,7 +51,7 @@ def test_every_parameter_has_its_row() -> None:
         register = f'{modbus.index:04X}h' if modbus else ''
         found = rows_of(f'`{row.key}`')
         if (row.description, register) not in {
-            (one['Meaning'], one.get('Modbus', '')) for one in found
+            (printed['Meaning'], printed.get('Modbus', '')) for printed in found
         }:
             missing.append(row.key)
     assert missing == []
@@ -98,7 +98,7 @@ def test_everything_that_a_drive_keeps_or_measures_is_read_by_the_tool_and_by_ro
         # the driver itself reads the words of the bus
         listed = {row.key for row in rows if row.group != 'Fieldbus'}
         assert listed <= readable(family).keys()
-        assert listed <= {one.key for one in family.measured}
-    only_read = [one for one in load_family('movitrac31').kept if not one.is_setting]
+        assert listed <= {parameter.key for parameter in family.measured}
+    only_read = [row for row in load_family('movitrac31').kept if not row.is_setting]
     part = page().split('### Only read\n')[1].split('### ')[0]
     assert part.count('\n| ') == 2 + len(only_read) == 21

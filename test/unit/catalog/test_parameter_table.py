@@ -149,7 +149,7 @@ def test_a_bad_table_is_refused_with_its_line_and_a_sentence(tmp_path: Path, nam
     assert old in TABLE
     found = _complaints(tmp_path, TABLE.replace(old, new, 1))
     place = f'{tmp_path / "mine.csv"}, line {line}: '
-    assert any(one.startswith(place) and said in one for one in found), found
+    assert any(complaint.startswith(place) and said in complaint for complaint in found), found
 
 
 def test_all_that_is_wrong_in_the_cells_is_reported_at_once(tmp_path: Path) -> None:
@@ -158,8 +158,8 @@ def test_all_that_is_wrong_in_the_cells_is_reported_at_once(tmp_path: Path) -> N
 
 
 def test_what_uses_a_parameter_is_named_in_the_file_itself(tmp_path: Path) -> None:
-    (one,) = _complaints(tmp_path, TABLE.replace('1=Bus', '1=Line').replace(',Bus,', ',Line,'))
-    assert one.startswith(f'{tmp_path / "mine.vfd.yaml"}, line 6: ') and 'none of Keypad' in one
+    (text,) = _complaints(tmp_path, TABLE.replace('1=Bus', '1=Line').replace(',Bus,', ',Line,'))
+    assert text.startswith(f'{tmp_path / "mine.vfd.yaml"}, line 6: ') and 'none of Keypad' in text
 
 
 def test_a_table_that_is_none(tmp_path: Path) -> None:
@@ -167,8 +167,8 @@ def test_a_table_that_is_none(tmp_path: Path) -> None:
         ('others.csv', 'No such file'), ('"a\\0b.csv"', 'no name of a file'),
         ('others.txt', 'NAME.csv'), ('7', 'a mapping'),
     ):
-        (one,) = _complaints(tmp_path, TABLE, name)
-        assert one.startswith(f'{tmp_path / "mine.vfd.yaml"}, line 13: ') and said in one, one
+        (text,) = _complaints(tmp_path, TABLE, name)
+        assert text.startswith(f'{tmp_path / "mine.vfd.yaml"}, line 13: ') and said in text, text
     (tmp_path / 'folder.csv').mkdir()
     assert 'directory' in _complaints(tmp_path, TABLE, 'folder.csv')[0]
     assert 'UTF-8' in _complaints(tmp_path, b'\xff\xfe\x00')[0]
@@ -214,4 +214,4 @@ def _is_read_or_refused(folder: Path, table: bytes) -> None:
         _read(folder, table)
     except DescriptionError as error:
         said = r'mine\.(csv|vfd\.yaml), line \d+: \S'
-        assert all(re.search(said, one) for one in error.problems), error.problems
+        assert all(re.search(said, problem) for problem in error.problems), error.problems

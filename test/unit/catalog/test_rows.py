@@ -200,7 +200,7 @@ def test_every_row_is_one_that_may_be() -> None:
         for key, row in family.items():
             group, _, own = key.partition('.')
             labels = list(row.labels.values())
-            numbers = [one for place in row.addresses.values() for one in place.numbers]
+            numbers = [number for place in row.addresses.values() for number in place.numbers]
             # lists are written with commas between the labels
             plain = [label for label in labels if label == ' '.join(label.split()) != '']
             right = (
@@ -244,7 +244,7 @@ def test_what_acknowledges_and_what_can_only_be_written() -> None:
         ('sinus_g2', 'w', 'fieldbus.drv_ctrl_write_mask'),
         ('sinus_optimal', 'ack', 'fieldbus.inv_st_with_ack'),
         ('sinus_optimal', 'w', 'fieldbus.smode'),
-        *(('sinus_h', 'w', f'telegram.{one}') for one in ('begin', 'next', 'clear', 'setpoint')),
+        *(('sinus_h', 'w', f'telegram.{own}') for own in ('begin', 'next', 'clear', 'setpoint')),
     }
 
 
@@ -360,8 +360,8 @@ def test_two_that_are_one_object_are_distinguished_by_the_sub_index() -> None:
 
 def test_scale_parameters_of_the_drive() -> None:
     # FrqScl and its like are the factors of whole groups [M0 §8.3], [C16]
-    factors = {(row.scale, one.factor) for row in G2.values() if row.scale
-               for one in row.addresses.values()}
+    factors = {(row.scale, address.factor) for row in G2.values() if row.scale
+               for address in row.addresses.values()}
     tenth = Fraction(1, 10)
     assert factors == {('FrqScl', tenth), ('SpdScl', 1), ('TrqScl', 1), ('RegScl', tenth)}
     # it may be set finer, so whole numbers would be too few

@@ -144,7 +144,7 @@ def test_every_parameter_through_a_float32(bits: int) -> None:
     found = [
         (row.key, protocol, raw)
         for row, protocol in PLACES
-        for raw in {raw_of(row, protocol, one) for one in (bits, bits & 0x7FFFFF)}
+        for raw in {raw_of(row, protocol, word) for word in (bits, bits & 0x7FFFFF)}
         if lost_in_a_float32(row, protocol, raw)
     ]
     assert found == []

@@ -58,7 +58,7 @@ def test_how_grave_a_status_code_is() -> None:
 def test_texts_of_older_firmware() -> None:
     for code, entry in G2.status_codes.items():
         old = OLD_TEXTS.get(code, entry.text)
-        shown = [entry.shown(Fraction(one)) for one in ('3.9', '4.27', '4.28', '4.38', '5')]
+        shown = [entry.shown(Fraction(version)) for version in ('3.9', '4.27', '4.28', '4.38', '5')]
         assert shown == [old, old, entry.text, entry.text, entry.text], code
         assert (entry.shown(None), entry.old_text) == (entry.text, old), code
     # SWVer comes as a binary fraction, a hair beside 4.28
@@ -163,8 +163,9 @@ SCMD = (
 def test_codes_of_commands() -> None:
     # [M0 table 18] and [M1]; 3 alone is common [C51], and the three codes are codes of SCMD
     assert {code.name: code.value for code in g2.Scmd} == dict(SCMD)
-    assert {one.name: one.value for one in g2.Mode} == {'INHIBIT': 0, 'STOP': 1, 'EXT': 2, 'BUS': 3}
-    assert {one.name: one.value for one in optimal.Mode} == {'MANUAL': 1, 'AUTO': 2, 'BUS': 3}
+    modes = {'INHIBIT': 0, 'STOP': 1, 'EXT': 2, 'BUS': 3}
+    assert {mode.name: mode.value for mode in g2.Mode} == modes
+    assert {mode.name: mode.value for mode in optimal.Mode} == {'MANUAL': 1, 'AUTO': 2, 'BUS': 3}
     smode = {'STOP': 0, 'TERMINAL': 0x081, 'FIELDBUS': 0x101}
     assert {code.name: code.value for code in optimal.Smode} == smode
     with pytest.raises(ValueError, match='65 is not a valid Smode'):
@@ -437,5 +438,5 @@ def test_the_bits_have_the_last_word() -> None:
         (0x0000, Kind.ALARM, Kind.ALARM, Kind.STATUS),
         (0x0000, Kind.STATUS, Kind.STATUS, Kind.STATUS),
     ):
-        kinds = [one.profile.status_word.kind(word, listed) for one in (G2, OPTIMAL)]
+        kinds = [family.profile.status_word.kind(word, listed) for family in (G2, OPTIMAL)]
         assert kinds == [on_g2, on_optimal], (word, listed)

@@ -46,7 +46,7 @@ def test_a_file_is_never_written_through_a_link_that_was_there(tmp_path: Path) -
     with pytest.raises(UnicodeEncodeError):
         write_file(str(tmp_path / 'drive.yaml'), '\ud800')
     assert (tmp_path / 'drive.yaml').read_text() == 'new'
-    assert {one.name for one in tmp_path.iterdir()} == {'other', 'drive.yaml', 'drive.yaml.part'}
+    assert {path.name for path in tmp_path.iterdir()} == {'other', 'drive.yaml', 'drive.yaml.part'}
 
 
 @settings(max_examples=40, deadline=None)

@@ -25,13 +25,13 @@ from nfo_sinus_driver.simulator.plc import PlcSetting
 Nfo = Callable[..., Done]
 QUICK = PlcSetting(layout=2, cycle=0.002, exchange=0.004, access_time=0.002)
 OVER_MODBUS = {
-    one.key for one in load_family('sinus_g2').settings if 'profibus' in one.addresses
+    row.key for row in load_family('sinus_g2').settings if 'profibus' in row.addresses
 }
 
 
 def behind_plc(make_bench: MakeBench, plc: PlcSetting, **options: Any) -> Bench:
     bench = make_bench(protocol='telegram1', plc=plc, **options)
-    options = [one.replace('telegram1', 'modbus_tcp') for one in bench.options]
+    options = [option.replace('telegram1', 'modbus_tcp') for option in bench.options]
     bench.options = (*options, '--control-method', 'telegram1')
     return bench
 
@@ -117,7 +117,7 @@ def test_all_that_a_sinus_h_tells_is_shown_by_name(
     assert len(names) == 12
     done = nfo(*other.options, 'get', '--json', 'telegram.alarm_info', 'telegram.torque', *names)
     assert done.status == 0, done.err
-    shown = {name: one['value'] for name, one in json.loads(done.out).items()}
+    shown = {name: read['value'] for name, read in json.loads(done.out).items()}
     assert shown.keys() == {'telegram.alarm_info', 'telegram.torque', *names}
     assert shown['telegram.alarm_info'] == 1
     assert (shown['profidrive.fault_number'], shown['profidrive.profile']) == (11, 0x0328)

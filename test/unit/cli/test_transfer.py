@@ -555,17 +555,17 @@ def test_interrupted_at_the_very_end_it_is_done(
 
 
 def test_diff_of_two_files(nfo: Nfo, bench: Bench, tmp_path: Path) -> None:
-    one = parameter_file(tmp_path, {'control.accel': 5, 'control.auto_start': True, 'motor.x': 1})
-    one = one.rename(tmp_path / 'one.yaml')
+    first = parameter_file(tmp_path, {'control.accel': 5, 'control.auto_start': True, 'motor.x': 1})
+    first = first.rename(tmp_path / 'one.yaml')
     other = parameter_file(tmp_path, {'control.accel': 5.0, 'control.auto_start': 1})
-    done = nfo('diff', one, other, '--port', '/dev/no-such-port')
+    done = nfo('diff', first, other, '--port', '/dev/no-such-port')
     assert done.status == 1
     assert [line.split() for line in done.out.splitlines()] == [
-        [str(one), str(other)],
+        [str(first), str(other)],
         ['control.auto_start', 'true', '1'],
         ['motor.x', '1', 'absent'],
     ]
-    assert nfo('diff', one, one) == Done(0, '', '')
+    assert nfo('diff', first, first) == Done(0, '', '')
 
 
 def test_diff_of_drive_and_file(nfo: Nfo, bench: Bench, some: Path) -> None:

@@ -407,7 +407,7 @@ def test_monitor_of_several_drives_shows_each_and_the_line(nfo: Nfo, bench: Benc
     assert requests[0] == requests[1] + requests[2] and min(requests) > 20
     done = nfo('monitor', '--addresses', '1,2', '--count', 2, '--period', 0.05, '--json')
     rows = [json.loads(text) for text in done.out.splitlines()]
-    assert [one['address'] for one in rows] == [1, 2] * 2
+    assert [row['address'] for row in rows] == [1, 2] * 2
     assert rows[0]['statistics']['cycle_time'] is None
     assert rows[2]['statistics']['cycle_time'] > 0.0
     assert rows[2]['statistics']['round_trip_median'] > 0.0
@@ -422,7 +422,7 @@ def test_monitor_reports_which_of_several_drives_is_missing(nfo: Nfo, bench: Ben
     )  # fmt: skip
     assert done.status == 1
     rows = [json.loads(text) for text in done.out.splitlines()]
-    assert [(one['address'], one['connected']) for one in rows] == [(1, True), (2, False)] * 2
+    assert [(row['address'], row['connected']) for row in rows] == [(1, True), (2, False)] * 2
     assert rows[1]['statistics']['timeouts'] == 3
     assert rows[1]['statistics']['retries'] == 2
     assert rows[1]['statistics']['round_trip_min'] is None

@@ -47,7 +47,7 @@ every_stop = pytest.mark.parametrize('stop', STOPS)
 WITHOUT_DIRECTION = ('classic v5.0', 'canopen, no DriveStatus', 'made up')
 #: Where the motor follows set-points of the bus.
 following = pytest.mark.parametrize(
-    'connection', [name for name, one in CONNECTIONS.items() if one.reference == 'fieldbus']
+    'connection', [name for name, kind in CONNECTIONS.items() if kind.reference == 'fieldbus']
 )
 
 
@@ -424,9 +424,9 @@ def test_8_a_bad_line_makes_no_false_reading(connection: str, trouble: str) -> N
                 rig.line.spoil({'late': 'delay'}.get(trouble, trouble))
                 # a MOVITRAC is listened to for long after an answer that is late
                 rig.pass_time(2.0 if connection.startswith('movitrac') else 0.5)
-        found = [one.frequency for one in rig.notes.snapshots[before:]]
+        found = [snapshot.frequency for snapshot in rig.notes.snapshots[before:]]
         assert len(found) > 10
-        assert [one for one in found if abs(one - frequency) > 1.0] == []
+        assert [shown for shown in found if abs(shown - frequency) > 1.0] == []
         assert rig.drive.following
 
 

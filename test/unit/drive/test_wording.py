@@ -70,9 +70,9 @@ def reported_by(call: ast.Call) -> ast.expr | None:
 
 def causes_in(node: ast.AST) -> set[Cause]:
     return {
-        Cause[one.attr]
-        for one in ast.walk(node)
-        if isinstance(one, ast.Attribute) and getattr(one.value, 'id', '') == 'Cause'
+        Cause[part.attr]
+        for part in ast.walk(node)
+        if isinstance(part, ast.Attribute) and getattr(part.value, 'id', '') == 'Cause'
     }
 
 

@@ -107,8 +107,8 @@ def test_control_is_taken_without_a_run_command_and_not_while_it_tunes() -> None
 
 def test_each_step_of_a_run_waits_for_the_one_before() -> None:
     ready, on, runs, faulted = (
-        status(state=one)
-        for one in (
+        status(state=state)
+        for state in (
             State.READY_TO_SWITCH_ON, State.SWITCHED_ON, State.OPERATION_ENABLED, State.FAULTED
         )
     )
@@ -159,7 +159,7 @@ def test_a_fault_is_acknowledged_by_the_edge_or_by_reading() -> None:
 
 
 def test_the_set_point_is_refused_where_it_does_not_mean_rpm() -> None:
-    above, below = (f'fieldbus.vl_dimension_factor_{one}' for one in ('numerator', 'denominator'))
+    above, below = (f'fieldbus.vl_dimension_factor_{part}' for part in ('numerator', 'denominator'))
     least = Read('fieldbus.vl_velocity_min_amount')
     play(METHOD.require_startable(), (Read(above), 1), (Read(below), 1), (least, 0))
     # without the objects there is neither a factor nor a limit

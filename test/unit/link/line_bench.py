@@ -181,8 +181,8 @@ class ModbusDrives(FarEnd):
             return g2_answer(unit)
         if function == 43 and self.identity == 'says':
             # all of it, or one object [M0 §6.2.4]
-            one = {frame[4]: G2[frame[4]]}
-            return device_answer(unit, frame[3], one if frame[3] == 4 else G2)
+            wanted = {frame[4]: G2[frame[4]]}
+            return device_answer(unit, frame[3], wanted if frame[3] == 4 else G2)
         if not asked.size:
             return opinion.exception(unit, function, 1) if self.identity else b''
         words = words_of(self.value(asked.place, asked.size, number))

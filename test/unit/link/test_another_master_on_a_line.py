@@ -127,7 +127,7 @@ class SharedLine:
 
     def answers_of(self, address: Address) -> list[bytes]:
         """Return what the unit said to the requests for this address, ours and others."""
-        asked = [number for number, one in enumerate(self.bench.asked) if one == address.index]
+        asked = [number for number, index in enumerate(self.bench.asked) if index == address.index]
         return [self.bench.answer_of(number) for number in asked]
 
 

@@ -75,10 +75,10 @@ class Adapter:
 
     def read(self, until: float) -> bytes:
         if not self.coming:
-            at = min((one[0] for one in self.late), default=until)
+            at = min((at for at, _ in self.late), default=until)
             self.now = max(self.now, min(at, until))
             self.coming = b''.join(answer for at, answer in self.late if at <= self.now)
-            self.late = [one for one in self.late if one[0] > self.now]
+            self.late = [(at, answer) for at, answer in self.late if at > self.now]
         data, self.coming = self.coming[:3], self.coming[3:]
         return data
 
@@ -433,7 +433,7 @@ def test_a_socket_lets_in_what_is_wanted_and_nothing_else(paper: PaperSocket) ->
     # for the state of a node
     wanted = (0x580, 0xC0000780), (0x600, 0xC0000780)
     let_in = *wanted, (0, 0xC00007FF), (0x40000700, 0xC0000780)
-    expected = b''.join(struct.pack('=II', *one) for one in let_in)
+    expected = b''.join(struct.pack('=II', *frame) for frame in let_in)
     assert paper.options == [
         (socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, expected),
         (socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, struct.pack('=i', 1)),
@@ -610,13 +610,13 @@ def sockets(paper: PaperSocket, monkeypatch: pytest.MonkeyPatch) -> Iterator[lis
 
     monkeypatch.setattr(can.socket, 'socket', make)
     yield sockets
-    for one in sockets:
-        one.close()
+    for opened in sockets:
+        opened.close()
 
 
 def sent(sockets: list[PaperSocket]) -> list[bytes]:
     """Return what was handed to the interface, by any of them."""
-    return [frame for one in sockets for frame in one.sent]
+    return [frame for opened in sockets for frame in opened.sent]
 
 
 @pytest.mark.parametrize('restart', ['it leaves', 'it is lost'])

@@ -100,7 +100,8 @@ def test_an_answer_that_is_overlooked_is_found(monkeypatch: pytest.MonkeyPatch) 
     feed_one = movitrac.Reader.feed
 
     def feed_seldom(reader: movitrac.Reader, data: bytes) -> list[movitrac.Message]:
-        return [one for one in feed_one(reader, data) if not isinstance(one, movitrac.Data)]
+        found = feed_one(reader, data)
+        return [message for message in found if not isinstance(message, movitrac.Data)]
 
     monkeypatch.setattr(movitrac.Reader, 'feed', feed_seldom)
     assert 'was not found' in _what('movitrac')

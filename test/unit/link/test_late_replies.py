@@ -120,7 +120,7 @@ def test_a_question_is_certain_when_each_of_its_replies_is() -> None:
 def take(late: LateReplies[Ask, str], request: Ask, reply: bytes, now: float) -> None:
     """One transaction: a request goes out and is answered."""
     late.sent(request)
-    late.note(request, reply, now, 0.0)
+    late.note_reply(request, reply, now, 0.0)
 
 
 @pytest.mark.parametrize(

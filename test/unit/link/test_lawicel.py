@@ -23,8 +23,9 @@ def heard(*pieces: bytes) -> Output:
     """Return all that a reader hears."""
     reader = Reader()
     each = [reader.feed(piece) for piece in pieces]
-    frames = [frame for one in each for frame in one.frames]
-    return Output(frames, sum(one.done for one in each), sum(one.refused for one in each))
+    frames = [frame for output in each for frame in output.frames]
+    done = sum(output.done for output in each)
+    return Output(frames, done, sum(output.refused for output in each))
 
 
 def pieces_of(data: st.DataObject, stream: bytes) -> list[bytes]:
@@ -52,14 +53,14 @@ def test_every_frame_is_found_in_any_pieces(
     data: st.DataObject, said: list[Frame | bytes], stamps: bool
 ) -> None:
     stream = b''
-    for one in said:
-        line = encode(one) if isinstance(one, Frame) else one
-        if isinstance(one, Frame) and stamps:
+    for what in said:
+        line = encode(what) if isinstance(what, Frame) else what
+        if isinstance(what, Frame) and stamps:
             line = line[:-1] + b'12fe\r'
         stream += line
     found = heard(*pieces_of(data, stream))
-    assert found.frames == [one for one in said if isinstance(one, Frame)]
-    assert found.done == sum(one in (b'\r', b'z\r', b'Z\r') for one in said)
+    assert found.frames == [what for what in said if isinstance(what, Frame)]
+    assert found.done == sum(what in (b'\r', b'z\r', b'Z\r') for what in said)
     assert found.refused == said.count(b'\a')
 
 

@@ -258,7 +258,7 @@ def test_write_and_read_is_two_transactions(way: Way) -> None:
     bench = way()
     reply = bench.link.write_and_read(way.units[0], way.A, way.VALUE, way.B)
     assert reply.data == bench.answer_of()
-    assert [(one.place, one.written is None) for one in bench.requests] == [
+    assert [(request.place, request.written is None) for request in bench.requests] == [
         (way.A.index, False),
         (way.B.index, True),
     ]
@@ -630,7 +630,7 @@ def test_a_write_is_the_very_next_frame(way: Way, fate: Fate) -> None:
         fate = replace(fate, again=0.0)
     bench = way(fate)
     assert bench.read_then_write(way.B, way.A).data == b''
-    assert [(one.place, one.written is None) for one in bench.requests] == [
+    assert [(request.place, request.written is None) for request in bench.requests] == [
         (way.B.index, True),
         (way.A.index, False),
     ]

@@ -281,7 +281,7 @@ def test_a_request_that_is_not_wanted_any_more_makes_room(plc: Plc, block: teleg
     # who wants it later wants another one
     plc.now += 3.0
     assert access(block, plc, ACCEL, b'\0\0\0\1') == b''
-    assert [one[0] for one in plc.done] == [2, 1, 2]
+    assert [done[0] for done in plc.done] == [2, 1, 2]
 
 
 def test_a_plc_without_these_registers_says_what_to_check(plc: Plc, block: telegram.Block) -> None:

@@ -528,13 +528,15 @@ def test_exception_to_another_request_is_passed_over(
     framing: Framing, data: st.DataObject, request: Request[Any]
 ) -> None:
     functions = [3, 6, 16, 17, 23, 43]
-    other = data.draw(st.sampled_from([one for one in functions if one != request.function]))
+    functions = [function for function in functions if function != request.function]
+    other = data.draw(st.sampled_from(functions))
     aliens = (
         opinion.exception(request.unit + 1, request.function, 2),
         opinion.exception(request.unit, other, 2),
     )
     message, wanted = data.draw(answers(request))
-    stream = b''.join(framing.frame(one) for one in (*(alien[:-2] for alien in aliens), message))
+    messages = (*(alien[:-2] for alien in aliens), message)
+    stream = b''.join(map(framing.frame, messages))
     assume(framing.everything(request, stream) == [wanted])
     assert outcome(framing.reader(request), data.draw(pieces(stream))) == wanted
 

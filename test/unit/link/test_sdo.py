@@ -33,7 +33,7 @@ def carry_out(transfer: Transfer, server: Server) -> int:
     while transfer.request is not None:
         answer = server.answer(transfer.request)
         assert answer is not None
-        assert transfer.take(answer), 'this is the answer'
+        assert transfer.take_message(answer), 'this is the answer'
         count += 1
         assert count < 300, 'it never ends'
     return count
@@ -44,7 +44,7 @@ def follows(transfer: Transfer, *lines: str) -> None:
     written = list(messages(*lines))
     for sent, answer in zip(written[::2], written[1::2], strict=True):
         assert transfer.request == sent
-        assert transfer.take(answer)
+        assert transfer.take_message(answer)
     assert transfer.request is None
 
 
@@ -137,7 +137,7 @@ def test_a_transfer_can_be_ended_at_any_time(value: bytes, data: st.DataObject) 
     for _ in range(data.draw(st.integers(1, max(1, len(value) // 7)))):
         assert transfer.request is not None
         answer = server.answer(transfer.request)
-        assert answer is not None and transfer.take(answer)
+        assert answer is not None and transfer.take_message(answer)
     assert transfer.has_begun
     assert server.answer(transfer.abort()) is None
     assert server.ended == [TIMED_OUT]
@@ -171,7 +171,7 @@ def test_an_abort_is_a_refusal_with_its_code(code: int) -> None:
         answer = server.answer(transfer.request)
         assert answer is not None
         with pytest.raises(Refused, match=f'SDO abort {code:08X}h') as refused:
-            transfer.take(answer)
+            transfer.take_message(answer)
         assert transfer.request is None
         if code in ABORT_CODES:
             assert ABORT_CODES[code][1] in str(refused.value)
@@ -179,9 +179,9 @@ def test_an_abort_is_a_refusal_with_its_code(code: int) -> None:
 
 def test_an_abort_between_segments() -> None:
     upload = Upload(UNIT, 0x1008, 0)
-    assert upload.take(bytes.fromhex('41 08 10 00 0A 00 00 00'))
+    assert upload.take_message(bytes.fromhex('41 08 10 00 0A 00 00 00'))
     with pytest.raises(Refused, match='out of memory'):
-        upload.take(bytes.fromhex('80 08 10 00 05 00 04 05'))
+        upload.take_message(bytes.fromhex('80 08 10 00 05 00 04 05'))
     assert upload.request is None
 
 
@@ -197,7 +197,7 @@ def test_what_is_about_another_object_changes_nothing(
         found = kind(message)
         if found is not None and found in transfer.kinds:
             continue
-        assert not transfer.take(message)
+        assert not transfer.take_message(message)
         assert transfer.request == request
 
 
@@ -216,25 +216,25 @@ def test_what_is_about_another_object_changes_nothing(
 )
 def test_what_does_not_answer_a_read(message: str) -> None:
     upload = Upload(UNIT, 0x1000, 0)
-    assert not upload.take(bytes.fromhex(message))
+    assert not upload.take_message(bytes.fromhex(message))
     assert upload.request is not None and upload.value == b''
 
 
 def test_a_segment_sent_twice_is_taken_once() -> None:
     upload = Upload(UNIT, 0x1008, 0)
     first = bytes.fromhex('00 4E 46 4F 20 53 69 6E')
-    assert upload.take(bytes.fromhex('41 08 10 00 0A 00 00 00'))
-    assert upload.take(first)
-    assert not upload.take(first)
-    assert upload.take(bytes.fromhex('19 75 73 21 00 00 00 00'))
+    assert upload.take_message(bytes.fromhex('41 08 10 00 0A 00 00 00'))
+    assert upload.take_message(first)
+    assert not upload.take_message(first)
+    assert upload.take_message(bytes.fromhex('19 75 73 21 00 00 00 00'))
     assert upload.value == b'NFO Sinus!'
 
 
 def test_what_comes_when_all_is_said_is_no_answer() -> None:
     upload = Upload(UNIT, 0x1000, 0)
     answer = bytes.fromhex('43 00 10 00 91 01 0F 00')
-    assert upload.take(answer)
-    assert not upload.take(answer)
+    assert upload.take_message(answer)
+    assert not upload.take_message(answer)
 
 
 @pytest.mark.parametrize(
@@ -251,9 +251,9 @@ def test_an_answer_that_makes_no_sense(answers: list[str], begun: bool) -> None:
     upload = Upload(UNIT, 0x1008, 0)
     *good, bad = messages(*answers)
     for answer in good:
-        assert upload.take(answer)
+        assert upload.take_message(answer)
     with pytest.raises(DamagedAnswer, match='unit 5'):
-        upload.take(bad)
+        upload.take_message(bad)
     # the server may still wait for the next request
     assert upload.has_begun == begun
 
@@ -264,7 +264,7 @@ def test_whatever_comes_it_ends_or_waits(stream: list[bytes]) -> None:
         for message in stream:
             before = transfer.request
             try:
-                taken = transfer.take(message)
+                taken = transfer.take_message(message)
             except (Refused, DamagedAnswer):
                 break
             assert taken or transfer.request == before

@@ -140,7 +140,7 @@ def test_our_count_moves_with_each(plc: Plc, block: telegram.Block) -> None:
     for _ in range(20):
         block.read(STATUS)
     counts = [written[3] for written in plc.written]
-    assert all(one != other for one, other in itertools.pairwise(counts))
+    assert all(count != other for count, other in itertools.pairwise(counts))
 
 
 def test_a_stop_is_one_telegram(plc: Plc, block: telegram.Block) -> None:

@@ -19,8 +19,8 @@ Given = tuple[float, Origin, float]
 def noticed(messages: Iterable[Given]) -> set[str]:
     """The topics that are named while messages come in, each with its time and its value."""
     sources, found = Sources(), set[str]()
-    for now, origin, value in sorted(messages, key=lambda one: one[0]):
-        found |= sources.take(origin, value, now)
+    for now, origin, value in sorted(messages, key=lambda message: message[0]):
+        found |= sources.take_setpoint(origin, value, now)
     return found
 
 

@@ -53,7 +53,7 @@ class ClassicBench:
         if request is None or not self.protocol.concerns(self.drive, request):
             return b''
         if request.whole:
-            self.drive.heard()
+            self.drive.note_frame()
         return self.protocol.answer(self.drive, request)
 
     def read(self, id_, address=1):

@@ -92,7 +92,7 @@ class MovitracBench:
         request = self.protocol.unwrap(frame)
         if request is None or not self.protocol.concerns(self.drive, request):
             return b''
-        self.drive.heard()
+        self.drive.note_frame()
         return self.protocol.answer(self.drive, request)
 
     def ask(self, index):

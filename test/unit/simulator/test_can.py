@@ -56,7 +56,7 @@ OK, NO = b'\r', b'\a'
 def said(adapter, line, *, sent=True):
     """Return what an adapter answers to a line."""
     answer = b''
-    for what in adapter.take(line + b'\r'):
+    for what in adapter.take_bytes(line + b'\r'):
         answer += adapter.tried(what, sent=sent) if isinstance(what, Frame) else what
     return answer
 
@@ -140,7 +140,7 @@ def test_frames_as_lines():
         adapter = opened()
         assert adapter.text_of(frame, 0.0) == line
         assert opened(b'Z1').text_of(frame, 61.5) == line[:-1] + b'05DC\r'
-        assert list(adapter.take(line)) == [frame]
+        assert list(adapter.take_bytes(line)) == [frame]
 
 
 def test_acceptance_filters():
@@ -156,24 +156,24 @@ def test_acceptance_filters():
 
 @given(st.data())
 def test_lines_in_any_pieces(data):
-    frame = st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8))
-    frames = [Frame(*one) for one in data.draw(st.lists(frame, max_size=5))]
+    pairs = st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8))
+    frames = [Frame(*pair) for pair in data.draw(st.lists(pairs, max_size=5))]
     stream = b''.join(
-        f't{one.identifier:03x}{len(one.data)}{one.data.hex()}\r'.encode() for one in frames
+        f't{frame.identifier:03x}{len(frame.data)}{frame.data.hex()}\r'.encode() for frame in frames
     )
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
     adapter = opened()
     pieces = [stream[a:b] for a, b in zip([0, *cuts], [*cuts, len(stream)], strict=True)]
-    assert [what for piece in pieces for what in adapter.take(piece)] == frames
+    assert [what for piece in pieces for what in adapter.take_bytes(piece)] == frames
 
 
 @given(st.lists(st.binary(max_size=60), max_size=10))
 def test_rubbish_is_refused_and_does_no_harm(pieces):
     adapter = opened()
     for piece in pieces:
-        for what in adapter.take(piece):
+        for what in adapter.take_bytes(piece):
             assert isinstance(what, Frame) or len(what) <= 8
-    list(adapter.take(b'\rC\rS4\rO\r'))
+    list(adapter.take_bytes(b'\rC\rS4\rO\r'))
     assert adapter.on_bus(125_000)
 
 
@@ -184,7 +184,7 @@ VENDOR = bytes.fromhex('431810011b000000')
 
 
 def test_a_virtual_interface_of_the_kernel():
-    for name in sorted(one.name for one in Path('/sys/class/net').glob('vcan*')):
+    for name in sorted(path.name for path in Path('/sys/class/net').glob('vcan*')):
         with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as far:
             try:
                 far.bind((name,))
@@ -293,7 +293,7 @@ GOLDEN = (
 def test_golden_frames_of_the_standard():
     for value, requests, expected in GOLDEN:
         server = Server(Objects(bytes.fromhex(value)))
-        answers = [server.answer(bytes.fromhex(one)).hex() for one in requests.split(' ')]
+        answers = [server.answer(bytes.fromhex(request)).hex() for request in requests.split(' ')]
         assert answers == expected.split(' '), requests
 
 
@@ -301,7 +301,7 @@ def uploaded(node):
     """Return the object as the driver reads it."""
     upload = Upload(5, *PLACE)
     while upload.request is not None:
-        assert upload.take(node.answer(upload.request))
+        assert upload.take_message(node.answer(upload.request))
     return upload.value
 
 
@@ -322,5 +322,5 @@ def test_whatever_comes_it_answers_and_begins_anew(value, messages):
     for message in messages:
         assert len(node.answer(message)) == (0 if message[0] >> 5 == 4 else 8)
     # whatever was written has the length of the object
-    assert {len(one) for one in objects.writes} <= {len(value)}
+    assert {len(data) for data in objects.writes} <= {len(value)}
     assert uploaded(node) == objects.value

@@ -372,7 +372,7 @@ def test_identity_and_error_register():
 def test_sizes_are_one_choice_and_no_other_size_is_taken():
     for types, mode in (('table', 2), ('narrow', 1), ('wide', 4)):
         bus = Bus(canopen_types=types)
-        sizes = [len(bus.read(*one)) for one in ((0x2024, 0), (ACCEL, 2), (0x2005, 0))]
+        sizes = [len(bus.read(*place)) for place in ((0x2024, 0), (ACCEL, 2), (0x2005, 0))]
         assert sizes == [mode, 4, 4]
         for size in (1, 2, 4):
             code = bus.write(0x2024, 0, bytes((3,)).ljust(size, b'\0'))

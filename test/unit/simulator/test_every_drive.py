@@ -177,7 +177,7 @@ def test_a_silent_line_is_a_fault_where_all_that_it_takes_is_set(model: str) -> 
     way = WAYS[model]
     drive = run(simulated_drive(model, settings=way.watch), 0.5)
     for _ in range(8):
-        drive.heard()
+        drive.note_frame()
         drive.advance(0.9)
     assert drive.motor.driven
     # it hears nothing either

@@ -24,8 +24,8 @@ SdoClient = canopen.sdo.SdoClient
 #: Generous: nothing here is about speed.
 PATIENCE = 10.0
 
-PLACED = [one for one in load_family('sinus_g2').values() if 'canopen' in one.addresses]
-SETTINGS = [one for one in PLACED if one.is_setting and not one.key.startswith('serial.')]
+PLACED = [row for row in load_family('sinus_g2').values() if 'canopen' in row.addresses]
+SETTINGS = [row for row in PLACED if row.is_setting and not row.key.startswith('serial.')]
 #: The library's data types, by how many bytes and whether there is a sign.
 TYPES = {
     (1, False): objectdictionary.UNSIGNED8,
@@ -47,8 +47,8 @@ def dictionary():
     """Return the objects of a G2 as the library wants them, by the tables."""
     found = objectdictionary.ObjectDictionary()
     arrays = {}
-    for one in PLACED:
-        place = one.at('canopen')
+    for parameter in PLACED:
+        place = parameter.at('canopen')
         what = TYPES[place.codec.size, place.number.signed]
         if place.sub_index is None:
             found.add_object(variable(place.index, 0, what))
@@ -205,11 +205,11 @@ def test_what_its_client_writes_is_what_the_drive_has(parameter, data):
 
 def test_its_client_reads_every_parameter_that_can_be_read():
     client = Here(asked)
-    for one in PLACED:
-        place = one.at('canopen')
+    for parameter in PLACED:
+        place = parameter.at('canopen')
         # "not yet implemented" [M0 table 11]
         refusal = 0x06020000 if place.index in (0x6076, 0x6087) else 0x06010001
-        if one.access is Access.WRITE or refusal == 0x06020000:
+        if parameter.access is Access.WRITE or refusal == 0x06020000:
             with pytest.raises(canopen.SdoAbortedError) as refused:
                 client.upload(place.index, place.sub_index or 0)
             assert refused.value.code == refusal

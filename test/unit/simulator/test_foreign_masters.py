@@ -48,7 +48,7 @@ def test_pymodbus_reads_and_writes_one_drive_by_every_protocol():
     protocols = ('modbus_rtu', 'modbus_ascii', 'modbus_tcp')
     with Simulator(protocol='classic', also=protocols) as simulator:
         clients = [
-            pymodbus_client(*one) for one in zip(protocols, simulator.ports[1:], strict=True)
+            pymodbus_client(*place) for place in zip(protocols, simulator.ports[1:], strict=True)
         ]
         for tenths, writer in enumerate(clients, 50):
             assert not writer.write_registers(ACCEL, [100 * tenths, 0], **UNIT).isError()

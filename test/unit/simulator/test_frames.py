@@ -95,8 +95,8 @@ def arrived(protocol, *chunks, pause=0.001):
     out = []
     for number, chunk in enumerate(chunks):
         out += receive.feed(chunk, pause * number)
-    out += receive.take(1000)
-    return [one.data for one in out]
+    out += receive.take_frames(1000)
+    return [frame.data for frame in out]
 
 
 def test_cutting():
@@ -106,7 +106,7 @@ def test_cutting():
         (RTU, 0.0001, [bytes([byte]) for byte in WRITE], [WRITE]),
         (ASCII, 0.9, [bytes([byte]) for byte in READ_ASCII], [READ_ASCII]),
         (TCP, 0.001, [bytes([byte]) for byte in READ_TCP], [READ_TCP]),
-        *((one, 0.001, [frame + frame], [frame, frame]) for one, frame in FRAMES.items()),
+        *((framing, 0.001, [frame + frame], [frame, frame]) for framing, frame in FRAMES.items()),
         (ASCII, 0.001, [b'xx\r\n' + READ_ASCII], [b'xx\r\n', READ_ASCII]),
         (ASCII, 0.001, [b':0103' + READ_ASCII], [b':0103', READ_ASCII]),
         (ASCII, 1.1, [READ_ASCII[:6], READ_ASCII], [READ_ASCII[:6], READ_ASCII]),
@@ -142,12 +142,12 @@ def test_a_paced_frame_is_there_when_the_line_has_carried_it():
     frame = FRAMES[RTU]
     assert not list(receive.feed(frame + WRITE, 10.0))
     assert receive.due == pytest.approx(10 + 8 * CHARACTER)
-    assert not list(receive.take(10 + 7.9 * CHARACTER))
-    (first,) = receive.take(10 + 8 * CHARACTER)
+    assert not list(receive.take_frames(10 + 7.9 * CHARACTER))
+    (first,) = receive.take_frames(10 + 8 * CHARACTER)
     assert (first.data, first.first) == (frame, 10.0)
     assert first.last == pytest.approx(10 + 8 * CHARACTER)
     assert receive.due == pytest.approx(10 + (8 + len(WRITE)) * CHARACTER)
-    (second,) = receive.take(11.0)
+    (second,) = receive.take_frames(11.0)
     assert (second.data, second.first) == (WRITE, pytest.approx(10 + 8 * CHARACTER))
 
 
@@ -161,11 +161,12 @@ def test_after_rubbish_silence_makes_a_fresh_start():
             assert not list(receive.feed(rubbish, 0.0))
             later = len(rubbish) * character + T35 + 0.003
             assert receive.due <= later
-            found = [*receive.feed(frame, later), *receive.take(later + 1)]
-            assert [one.data for one in found] == [rubbish, frame]
+            found = [*receive.feed(frame, later), *receive.take_frames(later + 1)]
+            assert [taken.data for taken in found] == [rubbish, frame]
             assert receive.due is None
     receive = receiver()
-    out = sum(len(one.data) for n in range(100) for one in receive.feed(b'\xaa' * 100, n * 1e-4))
+    fed = [taken for n in range(100) for taken in receive.feed(b'\xaa' * 100, n * 1e-4)]
+    out = sum(len(taken.data) for taken in fed)
     assert out > 9000, 'endless rubbish is not collected'
 
 
@@ -179,12 +180,12 @@ def test_no_byte_is_lost_or_made_up_and_a_frame_after_silence_is_found(protocol,
     for data, pause in chunks:
         found += receive.feed(data, now)
         now += pause
-    found += receive.take(now + 100)
-    assert b''.join(one.data for one in found) == b''.join(data for data, _ in chunks)
-    for one in found:
-        protocol.unwrap(one.data)
-        assert one.first <= one.last
-    for one, following in itertools.pairwise(found):
-        assert one.last <= following.last
-    out = [*receive.feed(FRAMES[protocol], now + 200), *receive.take(now + 300)]
-    assert [one.data for one in out] == [FRAMES[protocol]]
+    found += receive.take_frames(now + 100)
+    assert b''.join(frame.data for frame in found) == b''.join(data for data, _ in chunks)
+    for frame in found:
+        protocol.unwrap(frame.data)
+        assert frame.first <= frame.last
+    for frame, following in itertools.pairwise(found):
+        assert frame.last <= following.last
+    out = [*receive.feed(FRAMES[protocol], now + 200), *receive.take_frames(now + 300)]
+    assert [frame.data for frame in out] == [FRAMES[protocol]]

@@ -61,18 +61,19 @@ def test_all_protocols_read_the_same():
         for key, raw in (('fieldbus.mode', 3), ('status.frq_set', 123), ('fieldbus.scmd', 0x101)):
             drive.write_raw(key, raw)
         drive.advance(8)
-        for one in drive.model.values():
-            protocols = READ_BY.keys() & one.addresses.keys()
-            if one.access is Access.WRITE or 'modbus' not in protocols:
+        for parameter in drive.model.values():
+            protocols = READ_BY.keys() & parameter.addresses.keys()
+            if parameter.access is Access.WRITE or 'modbus' not in protocols:
                 continue
-            seen = {by: one.decode(READ_BY[by](drive, one.at(by)), by) for by in protocols}
+            read = {by: READ_BY[by](drive, parameter.at(by)) for by in protocols}
+            seen = {by: parameter.decode(raw, by) for by, raw in read.items()}
             first = seen['modbus']
             for by, value in seen.items():
-                if one.kind is float:
-                    step = float(max(one.factor('modbus'), one.factor(by)))
-                    assert value == pytest.approx(first, abs=step + 1e-9), (one.key, by)
+                if parameter.kind is float:
+                    step = float(max(parameter.factor('modbus'), parameter.factor(by)))
+                    assert value == pytest.approx(first, abs=step + 1e-9), (parameter.key, by)
                 else:
-                    assert value == first, (one.key, by)
+                    assert value == first, (parameter.key, by)
 
 
 # ---- what it follows ----

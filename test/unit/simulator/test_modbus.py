@@ -15,7 +15,7 @@ from nfo_sinus_driver.simulator.memory import Reason, Refused
 from nfo_sinus_driver.simulator.modbus import server
 from nfo_sinus_driver.simulator.modbus_frames import ModbusAscii, ModbusRtu, ModbusTcp
 
-ON_MODBUS = [one for one in load_family('sinus_g2').values() if 'modbus' in one.addresses]
+ON_MODBUS = [row for row in load_family('sinus_g2').values() if 'modbus' in row.addresses]
 RTU, ASCII, TCP = ModbusRtu(), ModbusAscii(), ModbusTcp(0.25)
 
 # ---- requests ----
@@ -97,7 +97,7 @@ def ask(drive, request):
 
 def test_every_request_is_answered_as_the_standard_says():
     found = {request: ask(simulated_drive(), request).hex(' ') for request in ANSWERS}
-    assert found == {one: bytes.fromhex(other).hex(' ') for one, other in ANSWERS.items()}
+    assert found == {request: bytes.fromhex(other).hex(' ') for request, other in ANSWERS.items()}
 
 
 def test_nothing_is_written_when_there_is_nothing_to_read():
@@ -191,7 +191,7 @@ def test_a_value_that_the_manual_forbids_is_refused(bench):
 
 
 def test_init_parameters_change_only_while_the_motor_stands(bench):
-    values = {one.key: bench.read(one.key) for one in ON_MODBUS if one.stopped}
+    values = {row.key: bench.read(row.key) for row in ON_MODBUS if row.stopped}
     assert len(values) > 10
 
     def refused():

@@ -261,7 +261,7 @@ def test_a_negative_number_has_its_sign_in_the_first_half_byte():
 @given(st.data())
 def test_whatever_is_written_is_answered(data):
     bench = MovitracBench(interface='rs232', option_card='fpi')
-    known = sorted(one.at('movitrac').index for one in bench.drive.model.values())
+    known = sorted(parameter.at('movitrac').index for parameter in bench.drive.model.values())
     index = data.draw(st.sampled_from(known) | st.integers(0, 0xFFFF))
     # whatever fits in a frame: any bytes, and decimal digits, whole numbers above all
     value = data.draw(

@@ -70,7 +70,7 @@ def test_every_request_is_answered_by_the_manual():
             request: OptimalBench(newer_functions=treatment).ask(request).hex(' ')
             for request in ANSWERS
         }
-        assert found == {one: bytes.fromhex(other).hex(' ') for one, other in ANSWERS.items()}
+        assert found == {asked: bytes.fromhex(answer).hex(' ') for asked, answer in ANSWERS.items()}
     assert (set(words.Mode), set(words.Smode)) == ({1, 2, 3}, {0, 0x081, 0x101})
 
 

@@ -249,7 +249,7 @@ def test_a_unit_hears_everything_and_answers_within_its_time():
     times = [unit.response_time for _ in range(200)]
     assert 0.05 <= min(times) < 0.1
     assert 0.35 < max(times) <= 0.4
-    unit.heard()
+    unit.note_frame()
     assert unit.hears('modbus_rtu', Timing())
     assert unit.listening
 

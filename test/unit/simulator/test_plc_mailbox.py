@@ -28,20 +28,20 @@ class Bench:
         self.cycle()
 
     def cycle(self, *, written=False, write_failed=False, came=None, not_yet=False, failed=False):
-        box, one = self.program, self.parameter
+        box, block = self.program, self.parameter
         box.access = self.access
         for name, value in (
-            ('done', one.done), ('done_result', one.result), ('done_high', one.high),
-            ('done_low', one.low),
+            ('done', block.done), ('done_result', block.result), ('done_high', block.high),
+            ('done_low', block.low),
         ):
             setattr(box, name, value)
         box()
         for name in ('request', 'command', 'pnu', 'sub_index', 'value_high', 'value_low'):
-            setattr(one, name, getattr(box, name))
-        one.written, one.write_failed, one.came = written, write_failed, came is not None
-        one.not_yet, one.read_failed = not_yet, failed
-        one.response = [*(came or b''), *[0] * 16][:16]
-        one()
+            setattr(block, name, getattr(box, name))
+        block.written, block.write_failed, block.came = written, write_failed, came is not None
+        block.not_yet, block.read_failed = not_yet, failed
+        block.response = [*(came or b''), *[0] * 16][:16]
+        block()
         return self.shown
 
     def ask(self, number, command, pnu, sub_index=0, value=0):

@@ -27,11 +27,11 @@ class Bench:
         self.life = 0
 
     def cycle(self, exchanged=True, zsw1=0x1234, actual=-5, more=None, dt=0.01):
-        one = self.program
-        one.exchanged, one.release, one.zsw1, one.actual = exchanged, self.release, zsw1, actual
-        one.more_valid = more is not None
-        one.more1, one.more2, one.more3 = more or (0, 0, 0)
-        one()
+        block = self.program
+        block.exchanged, block.release, block.zsw1 = exchanged, self.release, zsw1
+        block.actual, block.more_valid = actual, more is not None
+        block.more1, block.more2, block.more3 = more or (0, 0, 0)
+        block()
         self.now += dt
 
     def ros(self, stw1, setpoint):
@@ -171,7 +171,7 @@ CYCLES = st.lists(
 def test_no_run_command_passes_without_life_and_release(cycles, lost):
     clears, sets = lost
     bench = Bench(lost_clears=clears, lost_sets=sets)
-    one, block = bench.program, bench.block
+    telegram, block = bench.program, bench.block
     moved, seen = None, None
     for wait, exchanged, bench.release, zsw1, actual, written in cycles:
         bench.now += wait / 1000
@@ -183,10 +183,10 @@ def test_no_run_command_passes_without_life_and_release(cycles, lost):
         seen = block.ros_life
         bench.cycle(exchanged, zsw1, actual, dt=0.0)
         if moved is None or not bench.release:
-            assert not one.stw1 & clears & ~sets
-            assert one.setpoint == 0
-        if moved is not None and one.stw1 & clears & ~sets:
+            assert not telegram.stw1 & clears & ~sets
+            assert telegram.setpoint == 0
+        if moved is not None and telegram.stw1 & clears & ~sets:
             # the cycle that sees it stand still comes after the one that saw it move
             assert bench.now - moved <= 1.0 + 0.7 + 1e-6
-        assert (one.stw1, one.setpoint) == (block.stw1, block.setpoint)
+        assert (telegram.stw1, telegram.setpoint) == (block.stw1, block.setpoint)
         assert block.flags >> 1 == bench.release

@@ -79,11 +79,11 @@ class Rig:
         way = Endpoint(protocol, baud=baud)
         self.words, self.timing = WORDS[protocol], way.timing
         model = self.words.model
-        self.drives = [simulated_drive(model, one, **(drive or {})) for one in addresses]
-        for one in self.drives:
+        self.drives = [simulated_drive(model, address, **(drive or {})) for address in addresses]
+        for simulated in self.drives:
             if set_to_it:
-                one.control_unit.set_to([(way.spoken, way.timing)])
-            one.advance_to(self.now)
+                simulated.control_unit.set_to([(way.spoken, way.timing)])
+            simulated.advance_to(self.now)
         self.port = FakePort(lambda: self.now)
         self.stream = io.StringIO()
         self.line = way.wire(
@@ -116,7 +116,7 @@ class Rig:
 
     @property
     def notes(self):
-        return [one['note'] for one in self.trace]
+        return [frame['note'] for frame in self.trace]
 
 
 def rtu(pdu, address=1):
@@ -144,9 +144,9 @@ def test_paced_it_takes_what_the_line_takes(protocol):
             gap = 0.00175 if words.gap and baud > 19200 else words.gap * character
             asked = 100 + len(words.ask) * character
             start = asked + max(gap, turnaround)
-            (first, one), (last, rest) = rig.port.sent
-            assert (first, one) == (pytest.approx(start + character), words.answer[:1])
-            assert one + rest == words.answer
+            (first, begun), (last, rest) = rig.port.sent
+            assert (first, begun) == (pytest.approx(start + character), words.answer[:1])
+            assert begun + rest == words.answer
             assert last == pytest.approx(start + len(words.answer) * character)
             request, answer = rig.trace
             assert (request['first'], request['last']) == (100, pytest.approx(asked))
@@ -297,11 +297,11 @@ def test_the_trace_shows_every_frame_and_the_gaps():
     rig.ask(seconds=0.25)
     rig.ask(rtu(READ, 7), 0.5)
     rig.ask(b'\x01\x02\x03', 0.5)
-    assert [(one['direction'], one['note'], one['gap']) for one in rig.trace] == [
+    assert [(frame['direction'], frame['note'], frame['gap']) for frame in rig.trace] == [
         ('request', '', None), ('answer', '', 0), ('request', '', 0.25),
         ('request', 'rubbish', 0.5),
     ]  # fmt: skip
-    assert [one['hex'] for one in rig.trace[:2]] == ['010302940001c45e', rtu(STOP).hex()]
+    assert [frame['hex'] for frame in rig.trace[:2]] == ['010302940001c45e', rtu(STOP).hex()]
     rig = Rig('classic')
     rig.ask(b'\x04!\x02E0029=0001\x03r')
     rig.ask()
@@ -475,7 +475,7 @@ def test_a_share_of_the_answers_is_spoiled_by_chance_and_by_the_seed():
         'damage': lambda some: some[0].data != FRAME,
         'delay': lambda some: (some[0].data, some[0].delay) == (FRAME, 0.2),
         'drop': lambda some: some == [],
-        'double': lambda some: [one.data for one in some] == [FRAME, FRAME],
+        'double': lambda some: [frame.data for frame in some] == [FRAME, FRAME],
     }
     for what, is_spoilt in right.items():
         fates = []

@@ -169,13 +169,14 @@ def test_paced_bytes_are_never_early_and_the_trace_can_be_read_meanwhile(
         other.receive(14)
         until(lambda: len(trace.read_text().splitlines()) >= 11)
         frames = [json.loads(line) for line in trace.read_text().splitlines()]
-    found = [(one['direction'], one['hex'][:2]) for one in frames]
+    found = [(frame['direction'], frame['hex'][:2]) for frame in frames]
     assert found == 5 * [('request', '01'), ('answer', '01')] + [('request', '03')]
-    for one, following in itertools.pairwise(frames):
-        assert one['first'] < one['last'] <= following['first']
-        assert following['gap'] == pytest.approx(following['first'] - one['last'])
+    for frame, following in itertools.pairwise(frames):
+        assert frame['first'] < frame['last'] <= following['first']
+        assert following['gap'] == pytest.approx(following['first'] - frame['last'])
     others = [json.loads(line) for line in (folder / 'trace.2').read_text().splitlines()]
-    assert [one['direction'] for one in others] == ['request', 'answer'], 'each line has its own'
+    directions = [frame['direction'] for frame in others]
+    assert directions == ['request', 'answer'], 'each line has its own'
 
 
 def test_the_motor_lives_in_real_time(link):

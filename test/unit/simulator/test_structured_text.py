@@ -62,6 +62,6 @@ def test_type_that_is_not_known_is_refused_with_its_line():
     ],
 )
 def test_operators_bind_as_the_standard_says(expression, value):
-    one = load(_TEXT.format(f'Low := {expression};'), 'one.st')['FB_One'](None)
-    one()
-    assert one.low == value
+    program = load(_TEXT.format(f'Low := {expression};'), 'one.st')['FB_One'](None)
+    program()
+    assert program.low == value

@@ -23,8 +23,8 @@ def test_what_is_slower_than_allowed_is_named(name: str) -> None:
     release = {ONE: dict.fromkeys(ALLOWED, 2.0)}
     limit = 2.0 * ALLOWED[name]
     assert list(REGRESSIONS({ONE: {**release[ONE], name: limit}}, release)) == []
-    (one,) = REGRESSIONS({ONE: {**release[ONE], name: limit + 0.01}}, release)
-    assert one.startswith(f'{ONE}: {name} is') and '2.000' in one
+    (said,) = REGRESSIONS({ONE: {**release[ONE], name: limit + 0.01}}, release)
+    assert said.startswith(f'{ONE}: {name} is') and '2.000' in said
 
 
 def test_what_is_faster_passes_and_what_was_not_measured_does_not() -> None:

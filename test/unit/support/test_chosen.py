@@ -36,7 +36,7 @@ def test_each_value_of_each_axis_has_a_test_and_few_are_more(sizes: list[int]) -
 
 def connections_of(law: str) -> set[str]:
     """Return those over which a law runs."""
-    cells = [(f'{law}[{one}]', {'connection': one}) for one in CONNECTIONS]
+    cells = [(f'{law}[{connection}]', {'connection': connection}) for connection in CONNECTIONS]
     names = chosen(cells)
     return {params['connection'] for name, params in cells if name in names}
 
@@ -51,10 +51,14 @@ def test_each_law_is_tested_over_each_kind_of_connection(law: str) -> None:
 def test_each_connection_is_met_by_several_laws() -> None:
     found = re.findall(r'^def (test_\w+)', LAWS.read_text(encoding='utf-8'), re.MULTILINE)
     laws = [f'test/unit/drive/test_laws.py::{name}' for name in found]
-    cells = [(f'{law}[{one}]', {'connection': one}) for law in laws for one in CONNECTIONS]
+    cells = [
+        (f'{law}[{connection}]', {'connection': connection})
+        for law in laws
+        for connection in CONNECTIONS
+    ]
     names = chosen(cells)
-    for one in CONNECTIONS:
-        assert sum(name.endswith(f'[{one}]') for name in names) > 2, one
+    for connection in CONNECTIONS:
+        assert sum(name.endswith(f'[{connection}]') for name in names) > 2, connection
 
 
 def test_what_is_needed_is_needed_by_a_mutant() -> None:

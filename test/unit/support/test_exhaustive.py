@@ -23,7 +23,7 @@ def test_what_can_go_wrong_can_happen_to_each_machine() -> None:
 
 
 def _complaint(machine: str, *case: tuple[int, str]) -> str:
-    kinds = {one.__name__: one for one in TOOL['EVERY_MACHINE']}
+    kinds = {kind.__name__: kind for kind in TOOL['EVERY_MACHINE']}
     return TOOL['complaint_of'](TOOL['Run'](kinds[machine], TOOL['Given'](case)))
 
 

@@ -43,7 +43,10 @@ def test_what_grows_is_named(growth: dict[str, float], what: str) -> None:
 
 def test_a_pool_that_gets_one_more_thread_has_settled() -> None:
     before = samples()
-    after = [one._replace(threads=one.threads + (n > MINUTES // 2)) for n, one in enumerate(before)]
+    after = [
+        sample._replace(threads=sample.threads + (n > MINUTES // 2))
+        for n, sample in enumerate(before)
+    ]
     assert unsettled(after) == []
 
 

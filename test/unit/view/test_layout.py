@@ -45,9 +45,9 @@ class View:
         self.stopped: list[str] = []
         self._picture = Picture(drives, {'/bus': _LINE}, ())
         self._layout = Layout(self)
-        self._layout.look()
+        self._layout.take_picture()
 
-    def look(self) -> Picture:
+    def next_picture(self) -> Picture:
         return self._picture
 
     def stop(self, name: str) -> None:
@@ -58,7 +58,7 @@ class View:
 
     def change(self, **what: object) -> None:
         self._picture = replace(self._picture, **what)  # type: ignore[arg-type]
-        self._layout.look()
+        self._layout.take_picture()
         self._picture = replace(self._picture, notes=())
 
     def press(self, *keys: str) -> None:
@@ -217,7 +217,7 @@ def test_what_would_control_the_terminal_and_wide_characters_do_no_harm() -> Non
     view = View(replace(_RUNS, status='負荷' * 30, unit='\x1b[2J'))
     view.change(notes=[Note(1.8e9, Level.INFO, '/drive', '\x1b]0;\x07\udc80 a\nb')])
     text = view.text(160, 48)
-    assert not any(ord(one) < 32 for one in text.replace('\n', ''))
+    assert not any(ord(character) < 32 for character in text.replace('\n', ''))
     # two columns each, and one is left
     assert '負荷負荷負荷負…   ' in text
     text.encode()

@@ -23,7 +23,7 @@ from nfo_sinus_driver.catalog.profile import (
     Steps,
     Until,
     Write,
-    one,
+    one_step,
     try_steps,
 )
 from nfo_sinus_driver.catalog.status import Meaning, State, StatusCode
@@ -111,7 +111,7 @@ class Ds402(ControlMethod):
             raise NotPossible(f'control of the drive cannot be taken now ({INHIBITED})')
         if not (yield from self.in_control()):
             yield Write(_MODE, Mode.BUS)
-            yield from try_steps(one(Write(CONTROL_WORD, words.SHUTDOWN, head=True)))
+            yield from try_steps(one_step(Write(CONTROL_WORD, words.SHUTDOWN, head=True)))
             yield Until(lambda status: bool((status.word or 0) & words.Status.REMOTE))
         yield Write(CONTROL_WORD, words.SHUTDOWN)
 
@@ -164,18 +164,18 @@ class Ds402(ControlMethod):
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Switch off, take the voltage away, and take control away by MODE = Stop."""
         obeyed = yield from super().force_stop(control_mode)
-        return (yield from try_steps(one(Write(_MODE, Mode.STOP)))) or obeyed
+        return (yield from try_steps(one_step(Write(_MODE, Mode.STOP)))) or obeyed
 
     def release(self) -> Steps[None]:
         """Give control back by MODE = Stop, if the drive takes it, once the motor stands."""
         if (yield from self.in_control()):
-            yield from try_steps(one(Write(_MODE, Mode.STOP)))
+            yield from try_steps(one_step(Write(_MODE, Mode.STOP)))
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Switch off; where that is refused, MODE = Stop, and set-point 0."""
-        if (yield from try_steps(one(Write(CONTROL_WORD, words.SHUTDOWN)))):
+        if (yield from try_steps(one_step(Write(CONTROL_WORD, words.SHUTDOWN)))):
             return Removal.COMMAND
-        released = yield from try_steps(one(Write(_MODE, Mode.STOP)))
+        released = yield from try_steps(one_step(Write(_MODE, Mode.STOP)))
         if released and not (yield from self.perhaps_in_control()):
             return Removal.COMMAND
         zero = yield from try_steps(self.zero_setpoint(control_mode))
@@ -191,7 +191,7 @@ class Ds402(ControlMethod):
         error = words.error_text((yield from _read(_ERROR_CODE, 0)))
         serial = Meaning.SERIAL_FAILURE in shown.meanings
         if serial and (yield from self.holder()) is not Holder.LOCAL:
-            yield from try_steps(one(Write(_MODE, Mode.STOP)))
+            yield from try_steps(one_step(Write(_MODE, Mode.STOP)))
         reset = yield from try_steps(self._reset_fault())
         if not (reset and (yield from self.perhaps_in_control())):
             yield from self._acknowledge_by_reading(control_mode)
@@ -200,7 +200,7 @@ class Ds402(ControlMethod):
     def _command(self, word: words.ControlWord, control_mode: str, *, retry: bool) -> Steps[None]:
         target = SETPOINTS.get(control_mode)
         zeroes = () if target is None else (target.zero(retry=retry),)
-        yield from self._stop_by(one(Write(CONTROL_WORD, word, retry=retry)), *zeroes)
+        yield from self._stop_by(one_step(Write(CONTROL_WORD, word, retry=retry)), *zeroes)
 
     @staticmethod
     def _reset_fault() -> Steps[None]:

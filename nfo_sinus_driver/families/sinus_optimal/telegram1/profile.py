@@ -16,7 +16,7 @@ from nfo_sinus_driver.catalog.profile import (
     Status as InverterStatus,
     Steps,
     Until,
-    one,
+    one_step,
     try_steps,
 )
 from nfo_sinus_driver.catalog.speed_mode import SpeedMode
@@ -64,7 +64,7 @@ class OptimalTelegram1(Telegram1):
     def force_stop(self, control_mode: str) -> Steps[bool]:
         """Clear Switch on, then take Enable away, by which the motor is released [C109]."""
         yield from self.remove(control_mode)
-        return (yield from try_steps(one(method.begin(self.ready))))
+        return (yield from try_steps(one_step(method.begin(self.ready))))
 
     def stopping(self, word: int) -> int:
         """Return the word that keeps Enable where the motor is driven, so that it ramps."""

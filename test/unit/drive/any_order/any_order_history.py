@@ -110,11 +110,11 @@ class History:
     def command(self, name: str, future: Future[Any]) -> None:
         """Record a command that was given."""
         undisturbed = self._steady
-        waiting = [one for one in self._commands if not one.future.done()]
-        stops = [one for one in waiting if one.name in STOPS and not one.idle]
-        overruled = any(not self._may_be_confirmed(one) for one in stops)
+        waiting = [given for given in self._commands if not given.future.done()]
+        stops = [given for given in waiting if given.name in STOPS and not given.idle]
+        overruled = any(not self._may_be_confirmed(given) for given in stops)
         asked = len(self._rig.asked)
-        turning = [one for one in waiting if one.name in _TURN] + stops
+        turning = [given for given in waiting if given.name in _TURN] + stops
         idle = name in STOPS and not (self.enabled_at or self.standing or turning)
         command = Command(name, future, self.now, asked, undisturbed, overruled, idle)
         self._commands.append(command)

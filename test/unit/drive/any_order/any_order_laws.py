@@ -252,10 +252,11 @@ class Laws(History):
         # the run command of DriveControl takes control, too: from a STOP that it crosses on its way
         crossed = self._taken_away == len(self._rig.asked) - 1
         if crossed and key == CONTROL and not stops:
-            self.enabled_at = next((one.at for one in self._commands if one.name == 'enable'), None)
+            enables = (command.at for command in self._commands if command.name == 'enable')
+            self.enabled_at = next(enables, None)
         # stops go ahead of everything but what each has to read itself
         due = self._stop_due
-        lead = self.shown.lead * max(1, sum(one.name in STOPS for one in self._commands))
+        lead = self.shown.lead * max(1, sum(command.name in STOPS for command in self._commands))
         if stops:
             self._stop_due = None
             self._stop_tried_at, self._tried_in_fault = self.now, bool(self._far.faults)

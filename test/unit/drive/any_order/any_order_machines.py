@@ -443,7 +443,8 @@ class Classic(SinusOrder):
         # why it refused something is asked, which clears the serial fault that a refusal is
         frames = [frame['hex'] for frame in self.rig.line.frames]
         self.rig.acknowledged += sum(
-            frame == _SIO_ERR and any(one.endswith('15') for one in frames[number - 6 : number])
+            frame == _SIO_ERR
+            and any(earlier.endswith('15') for earlier in frames[number - 6 : number])
             for number, frame in enumerate(frames)
         )
         super().teardown()

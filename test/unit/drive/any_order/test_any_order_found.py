@@ -168,7 +168,7 @@ def test_why_it_stops_is_said_although_the_line_is_lost_at_once() -> None:
         rig.pass_time(5.0)
         assert rig.drive.snapshot.connected
         assert not rig.far.motor.driven
-        assert sum('refused' in one.text for one in rig.notes.events) == 1
+        assert sum('refused' in event.text for event in rig.notes.events) == 1
 
 
 @pytest.mark.parametrize('machine', [G2ModeScmd, G2DriveControl])

@@ -153,8 +153,8 @@ class Explored(NamedTuple):
         nexts = defaultdict(list)
         for before, name, after in self.steps:
             if name not in _ILL:
-                one, other = (after, before) if backwards else (before, after)
-                nexts[one].append(other)
+                here, other = (after, before) if backwards else (before, after)
+                nexts[here].append(other)
         reached, queue = set(begin), deque(begin)
         while queue:
             for world in nexts[queue.popleft()]:
@@ -275,10 +275,10 @@ def every_stop_can_end(explored: Explored) -> str:
 
 
 def it_runs_again_after_a_stop(explored: Explored) -> str:
-    runs = [one.after for one in explored.steps if one.enters((State.ENABLED,))]
-    stopped = {one.after for one in explored.steps if one.leaves(_STOPPING)}
+    runs = [step.after for step in explored.steps if step.enters((State.ENABLED,))]
+    stopped = {step.after for step in explored.steps if step.leaves(_STOPPING)}
     again = any(set(explored.way_to(world)) & {'client stops'} for world in runs if world.turns)
-    asked = any(one.before in stopped and one.enters(COMMANDED) for one in explored.steps)
+    asked = any(step.before in stopped and step.enters(COMMANDED) for step in explored.steps)
     return '' if runs and (again or asked) else 'it never runs, or never again'
 
 
@@ -306,7 +306,7 @@ _OF_THE_WHOLE: tuple[Callable[[Explored], str], ...] = (
 def broken(explored: Explored) -> Iterator[str]:
     """Each law that is broken, with its number and the shortest way to where it is."""
     for number, holds in enumerate(_OF_STEPS, 1):
-        step = next((one for one in explored.steps if not holds(one)), None)
+        step = next((step for step in explored.steps if not holds(step)), None)
         if step is not None:
             way = ', '.join([*explored.way_to(step.before), step.name])
             yield f'C{number} {holds.__name__}: {step}, after {way}'

@@ -20,7 +20,9 @@ OVERCURRENT = 101
 DIRECTIONS = Bit.CW | Bit.CCW
 REMOTE = {CONTROL_MODE: 'Remote control'}
 #: What the manual leaves open.
-_OPTIONS = [one for one in load('movitrac31').variant.options() if one.name != 'option_card']
+_OPTIONS = [
+    option for option in load('movitrac31').variant.options() if option.name != 'option_card'
+]
 #: Each switch of the simulated drive, turned alone.
 SWITCHES: Mapping[str, Mapping[str, str]] = {
     'as the manual says': {},

@@ -211,9 +211,9 @@ def test_objects_of_the_profile_are_read_by_their_numbers() -> None:
             entries[place] = dataclasses.replace(entries[place], read=lambda: data)
 
         wanted: dict[str, Any] = {}
-        for number, (name, (index, sub, size, one)) in enumerate(READ_ONLY.items(), 101):
+        for number, (name, (index, sub, size, unit)) in enumerate(READ_ONLY.items(), 101):
             give((index, sub), number, size)
-            wanted[name] = pytest.approx(number * one)
+            wanted[name] = pytest.approx(number * unit)
         for place in ((0x605B, 0), (0x605C, 0)):
             give(place, 0, 2)
         wanted |= dict.fromkeys(('shutdown_option_code', 'disable_operation_code'), 'Release')

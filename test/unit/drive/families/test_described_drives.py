@@ -129,15 +129,15 @@ def test_a_local_drive_is_not_run(name: str) -> None:
             rig.far.control_unit.local = True
             answer = rig.answer(rig.drive.enable())
             assert 'enabled' not in answer or 'not' in answer, answer
-        for one in rig.file.requires:
-            labels = tuple(rig.far.memory.model[one.key].labels.values())
-            other = next((label for label in labels if label != one.value), None)
-            if not labels and isinstance(one.value, int | float):
-                other = one.value + 1
-            if other is not None and not one.write:
-                rig.far.set_from_keypad(one.key, other)
+        for required in rig.file.requires:
+            labels = tuple(rig.far.memory.model[required.key].labels.values())
+            other = next((label for label in labels if label != required.value), None)
+            if not labels and isinstance(required.value, int | float):
+                other = required.value + 1
+            if other is not None and not required.write:
+                rig.far.set_from_keypad(required.key, other)
                 answer = rig.answer(rig.drive.enable())
-                assert one.key in answer, answer
-                rig.far.set_from_keypad(one.key, one.value)
+                assert required.key in answer, answer
+                rig.far.set_from_keypad(required.key, required.value)
         assert not rig.turns
         assert not rig.notes.said(Cause.DRIVER_ERROR)

@@ -95,7 +95,7 @@ def test_a_status_is_read_by_function_04_where_its_file_says_so(tmp_path: Path) 
     status = {**PLAIN['status'], 'table': 'input', 'alarm': {'register': 21, 'bit': 1}}
     with DescribedRig(described(tmp_path, status=status, faults={'register': 20})) as rig:
         rig.connect()
-        asked = [bytes.fromhex(one['hex'])[1] for one in rig.line.frames]
+        asked = [bytes.fromhex(frame['hex'])[1] for frame in rig.line.frames]
         assert 4 in asked
         assert not reads(rig)
         assert 'line.fault' in rig.file.parameters

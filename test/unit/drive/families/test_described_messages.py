@@ -32,7 +32,7 @@ def in_hex(file: Path, *numbers: int) -> Path:
 
 def test_registers_are_named_as_the_file_has_them(tmp_path: Path) -> None:
     rig = DescribedRig(in_hex(described(tmp_path, **HEX), 0x2101))
-    names = {key: one.name for key, one in rig.file.parameters.items()}
+    names = {key: row.name for key, row in rig.file.parameters.items()}
     assert names['line.status'] == 'status (register 0x2101)'
     assert names['line.r0009'] == 'register 10' and names['line.setpoint'] == (
         'set-point (register 11)'
@@ -103,5 +103,5 @@ def test_sentences_of_a_file_end_as_those_of_the_driver(tmp_path: Path) -> None:
         rig.pass_time(0.5)
         shown = rig.drive.snapshot
         assert (shown.description, shown.remedy) == ('Too hot', 'Let it cool')
-        for one in rig.notes.events:
-            assert '.;' not in one.text and '. ;' not in one.text and '.:' not in one.text
+        for event in rig.notes.events:
+            assert '.;' not in event.text and '. ;' not in event.text and '.:' not in event.text

@@ -488,7 +488,7 @@ def test_a_run_command_that_survives_starts_no_motor_when_the_power_is_back(
             assert not rig.turns, off
             stopped = Cause.MAY_HAVE_RESTARTED if off < 1 else Cause.LOST
             assert rig.notes.said(stopped), rig.notes.events
-            assert all(one.following for address, one in rig.drives.items() if address > 1)
+            assert all(drive.following for address, drive in rig.drives.items() if address > 1)
     with DescribedRig(file, poll_rate=poll_rate) as rig:
         rig.turn()
         rig.far.power_cycle(0.5)

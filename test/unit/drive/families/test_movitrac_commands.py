@@ -214,7 +214,7 @@ def test_a_fault_code_with_decimals_is_an_unknown_code() -> None:
         raw = memory.raw
         memory.raw = lambda key: 45 if key == 'status.fault_t0' else raw(key)
         log = rig.result(rig.drive.error_log())
-        assert [(one.code, one.text) for one in log] == [(255, 'unknown code (raw 45)')]
+        assert [(entry.code, entry.text) for entry in log] == [(255, 'unknown code (raw 45)')]
 
 
 # --- 8 bytes, and a sign --------------------------------------------------------------------------
@@ -229,7 +229,7 @@ def test_a_setting_of_8_bytes_is_read_and_written() -> None:
         assert rig.far.memory.get(key) == rig.drive.parameters.values[key] == 100_000
         # the example of [M4 §3.3] in a LONG_SELECT [C106]
         sent = [frame['hex'].upper() for frame in rig.line.frames]
-        assert [one for one in sent if one.startswith('AD')] == ['AD0101070000000108060A00CF']
+        assert [text for text in sent if text.startswith('AD')] == ['AD0101070000000108060A00CF']
         assert '0 is out of range' in rig.answer(rig.drive.parameters.change({key: 0}))
 
 

@@ -19,7 +19,8 @@ SOFTWARE = 'special.software_system'
 
 
 def identity(**parameters: Any) -> Identity:
-    with make(parameters={key.replace('__', '.'): one for key, one in parameters.items()}) as rig:
+    settings = {key.replace('__', '.'): value for key, value in parameters.items()}
+    with make(parameters=settings) as rig:
         rig.connect()
         return rig.drive.identity
 

@@ -99,7 +99,7 @@ def test_a_stop_is_the_next_frame(name: str, busy: bool) -> None:
             rig.answer(future)
             # one transaction is on the line; a stop begins with the bits, or takes the enable, or
             # releases the motor
-            firsts = None, *(int(one).to_bytes(4, 'big') for one in (0, Bit.INHIBIT))
+            firsts = None, *(int(bits).to_bytes(4, 'big') for bits in (0, Bit.INHIBIT))
             if rig.asked[at][1:] not in [(BITS, first) for first in firsts]:
                 wrong[moment] = rig.asked[at]
     assert not wrong

@@ -98,7 +98,7 @@ def not_set(rig: Rig, ends: Ends) -> list[object]:
     cut_off = rig.drive.model.profile.cuts_off.get(ends.name)
     two = [value for value in two if value != cut_off]
     # what is there already is not written
-    for value in sorted(two, key=lambda one: one == before):
+    for value in sorted(two, key=lambda value: value == before):
         if value == parameters.values[ends.name]:
             continue
         rig.result(parameters.change({ends.name: value}))
@@ -139,7 +139,7 @@ def test_both_ends_of_every_setting_are_written_and_read_as_the_manual_has_them(
         assert {name: found for name, found in wrong.items() if found} == {}
         assert len(wrong) == COUNTS[card]
         # an owner may set P841 as the driver itself never does
-        assert all('another P841' in one for one in rig.violations())
+        assert all('another P841' in violation for violation in rig.violations())
         rig.line.frames.clear()
 
 
@@ -156,7 +156,7 @@ def test_a_value_between_two_steps_is_read_as_it_is() -> None:
 
 def rows(table: dict[str, str], card: str) -> list[list[str]]:
     listed = table.get(card, '').split(',')
-    return [one.split(maxsplit=3) for one in listed if one.strip()]
+    return [line.split(maxsplit=3) for line in listed if line.strip()]
 
 
 def shown(
@@ -320,7 +320,7 @@ def test_all_that_is_kept_of_each_of_five_faults_is_read() -> None:
         assert len({*newest_first}) == 6 and warm == newest_first[:5]
         (newest, *_) = rig.result(rig.drive.error_log())
         for part in ('DC link ', 'heat sink ', 'frequency ', 'apparent current ', 'utilization '):
-            assert any(one.startswith(part) for one in newest.readings), part
+            assert any(reading.startswith(part) for reading in newest.readings), part
     assert wrong == []
 
 

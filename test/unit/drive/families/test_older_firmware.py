@@ -248,14 +248,14 @@ def test_control_that_was_stopped_meanwhile_is_not_taken_again(rig: Older) -> No
 
 def test_a_run_command_that_the_drive_has_kept_is_removed(rig: Older) -> None:
     # no manual says that MODE = Stop ends it
-    take = rig.far.control_unit.take
+    take = rig.far.control_unit.hand_control_to
 
     def keeps(source: Any) -> None:
         take(source)
         if source.value == 'scmd':
             rig.far.control_unit.scmd = Scmd.FIELDBUS
 
-    rig.far.control_unit.take = keeps
+    rig.far.control_unit.hand_control_to = keeps
     rig.far.memory.set('status.frq_set', 20.0)
     rig.change(accel=6.0)
     assert rig.has('accel') == [6.0]
@@ -551,7 +551,7 @@ def test_current_limit_is_no_stop() -> None:
         status = rig.drive.snapshot.status
         assert rig.drive.snapshot.text == 'Cur Limt' and rig.drive.following
         assert status.runs_by_bus and status.kind is Kind.ALARM
-        assert sum('the current limit' in one.text for one in rig.notes.events) == 1
+        assert sum('the current limit' in event.text for event in rig.notes.events) == 1
         assert rig.answer(rig.drive.stop()).startswith('stop')
         # one that takes it away is noticed all the same
         rig.far.motor.load = 0.3

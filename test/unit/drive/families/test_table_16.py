@@ -382,7 +382,7 @@ def test_table_16_fault(exits: Exits) -> None:
             rig.far.trip(OVERLOAD)
             rig.pass_time(1.0)
             assert shown(rig) is State.FAULTED and not rig.drive.following
-            assert sum('fault 5 Overload' in one.text for one in rig.notes.events) == 1
+            assert sum('fault 5 Overload' in event.text for event in rig.notes.events) == 1
             assert rig.answer(rig.drive.acknowledge()) == 'acknowledged 5 Overload'
             assert {'AF', 'FD'} <= set(exits) and unit(rig).ack_reads == 0
             require_stopped(rig)

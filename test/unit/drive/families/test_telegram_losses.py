@@ -252,7 +252,9 @@ def test_a_motor_that_turns_without_an_echo_is_stopped_when_the_driver_comes() -
         assert rig.notes.said(Cause.FOUND_RUNNING)
 
 
-@pytest.mark.parametrize('connection', [one for one in CONNECTIONS if one.startswith('telegram1')])
+@pytest.mark.parametrize(
+    'connection', [name for name in CONNECTIONS if name.startswith('telegram1')]
+)
 def test_a_motor_that_is_loaded_is_not_stopped_although_it_is_looked_at_seldom(
     connection: str,
 ) -> None:
@@ -267,5 +269,6 @@ def test_a_motor_that_is_loaded_is_not_stopped_although_it_is_looked_at_seldom(
 
         rig.far.advance_to = loaded  # type: ignore[method-assign]
         rig.pass_time(3.0)
-        assert min(one.actual for one in rig.notes.snapshots[-8:]) < 19 * rig.connection.hertz
+        slowest = min(snapshot.actual for snapshot in rig.notes.snapshots[-8:])
+        assert slowest < 19 * rig.connection.hertz
         assert rig.drive.following, rig.notes.events

@@ -38,7 +38,7 @@ def test_settings_of_a_g2_are_those_that_it_has_over_modbus() -> None:
         rig.connect(parameters=True)
         values = rig.drive.parameters.values
         over_modbus = load_family('sinus_g2')
-        reached = {one.key for one in over_modbus.settings if 'profibus' in one.addresses}
+        reached = {row.key for row in over_modbus.settings if 'profibus' in row.addresses}
         assert set(values) == reached
         for key, value in values.items():
             assert value == rig.far.peek(key), key
@@ -98,9 +98,9 @@ def test_no_command_can_be_reached_by_the_mailbox_but_what_begins_a_procedure() 
     model = load_family('sinus_g2', 'telegram1')
     assert not model['fieldbus.scmd'].is_setting
     written = {
-        one.at('telegram1').index
-        for one in model.values()
-        if one.at('telegram1').space == 'pnu' and one.access is not Access.READ
+        row.at('telegram1').index
+        for row in model.values()
+        if row.at('telegram1').space == 'pnu' and row.access is not Access.READ
     }
     assert len(written) > 100 and COMMANDS & written == {SCMD[0]}
 
@@ -155,11 +155,11 @@ def test_a_trip_of_a_sinus_h_is_named_with_its_remedy(code: int, text: str, reme
         rig.far.trip(code)
         rig.wait_until(lambda: rig.drive.snapshot.text == text, 1.5)
         assert remedy in rig.drive.snapshot.remedy
-        assert [one.code for one in rig.result(rig.drive.error_log())] == [code]
+        assert [entry.code for entry in rig.result(rig.drive.error_log())] == [code]
         assert f'acknowledged {code} {text}' in rig.answer(rig.drive.acknowledge())
         # the present situation is empty now, and the one before it is the newest entry
         rig.pass_time(0.5)
-        assert [one.code for one in rig.result(rig.drive.error_log())] == [code]
+        assert [entry.code for entry in rig.result(rig.drive.error_log())] == [code]
         assert rig.result(rig.drive.error_log(1))[0].code == code
 
 
@@ -182,7 +182,7 @@ def test_every_message_of_a_fault_situation_of_a_sinus_h_is_in_the_log() -> None
                 channel.entries[947, 8 * situation + message] = ParameterEntry(
                     lambda code=code: code
                 )
-        shown = [(one.code, one.readings) for one in rig.result(rig.drive.error_log())]
+        shown = [(entry.code, entry.readings) for entry in rig.result(rig.drive.error_log())]
         assert shown[:2] == [(12, ('also 11 Overcurrent Trip',)), (33, ())]
 
 
@@ -230,7 +230,8 @@ def test_current_torque_and_voltages_of_a_g2_come_by_the_mailbox_one_each_time()
         key_of = {key for _, key, _ in rig.asked[asked:]}
         assert key_of >= set(keys)
         # each is several transactions of a PLC that has other work
-        times = [rig.notes.telemetry[-1].at - one.at for one in rig.notes.telemetry[-12:]]
+        last = rig.notes.telemetry[-1].at
+        times = [last - telemetry.at for telemetry in rig.notes.telemetry[-12:]]
         assert max(times) < 8.0
         assert rig.drive.following
 
@@ -338,7 +339,7 @@ def test_temperatures_times_energy_and_versions_of_a_g2_come_by_the_mailbox_too(
         rig.connect()
         rig.wait_until(lambda: rig.notes.telemetry)
         shown = rig.notes.telemetry[0]
-        wanted = {role: pytest.approx(3 * pnu * one) for role, (pnu, one, _) in SLOW.items()}
+        wanted = {role: pytest.approx(3 * pnu * unit) for role, (pnu, unit, _) in SLOW.items()}
         assert {role: shown.values[role] for role in SLOW} == wanted
         assert [*shown.measured.values()] == pytest.approx(
             [-345, 23.4, 4.38, 4018, 3, 20]
@@ -467,7 +468,7 @@ def test_each_tuning_is_done_by_the_mailbox(procedure: Procedure) -> None:
         after = {key: rig.far.peek(key) for key in rig.far.settings}
         changed = {key: (before[key], after[key]) for key in after if before[key] != after[key]}
         assert changed
-        assert {one.key: (one.old, one.new) for one in result.changes} == changed
+        assert {change.key: (change.old, change.new) for change in result.changes} == changed
         # and it can be enabled as before
         rig.turn(20.0)
 
@@ -760,9 +761,9 @@ def test_a_line_cut_in_the_middle_of_a_request_loses_nothing_and_blocks_no_stop(
 
 def requests_to_mailbox(rig: Rig, since: int) -> int:
     """Return how many requests were sent to the mailbox."""
-    sent = [one for one in list(rig.line.frames)[since:] if one['direction'] == 'request']
-    data = [bytes.fromhex(one['hex']) for one in sent]
-    return sum(int.from_bytes(one[8:10], 'big') >= 16 for one in data)
+    sent = [frame for frame in list(rig.line.frames)[since:] if frame['direction'] == 'request']
+    data = [bytes.fromhex(frame['hex']) for frame in sent]
+    return sum(int.from_bytes(request[8:10], 'big') >= 16 for request in data)
 
 
 def test_what_the_mailbox_asks_writes_no_word_to_the_drive() -> None:

@@ -65,8 +65,8 @@ def clamp(rig: Rig) -> Clamping:
 
 def said_of_others(rig: Rig) -> list[Any]:
     return [
-        one for one in (*rig.bus.remarks, *(event.text for event in rig.notes.events))
-        if says(one, 'master') or says(one, 'opened again') or says(one, 'gateway')
+        text for text in (*rig.bus.remarks, *(event.text for event in rig.notes.events))
+        if says(text, 'master') or says(text, 'opened again') or says(text, 'gateway')
     ]
 
 
@@ -84,9 +84,9 @@ def test_the_value_that_it_answers_is_its_set_point(connection: str) -> None:
         begun = len(rig.asked)
         rig.pass_time(20.0)
         assert rig.drive.following
-        writes = [one for one in rig.asked[begun:] if one[2] is not None]
+        writes = [request for request in rig.asked[begun:] if request[2] is not None]
         assert len(writes) <= 6, 'it is written again as any other'
-        assert len([one for one in rig.notes.events if says(one.text, Cause.SETPOINT_HELD)]) == 1
+        assert sum(says(event.text, Cause.SETPOINT_HELD) for event in rig.notes.events) == 1
         assert not said_of_others(rig)
         assert len(rig.line.opened) == opened
 

@@ -99,7 +99,7 @@ def test_a_stop_is_on_the_wire_at_once_after_that(
         with running(connection) as rig:
             rig.line.stand_still(rig.clock.now + begins, stood)
             took.append(time_to_wire(rig, rig.clock.now + begins + stood + _LATER))
-    assert max(took) <= most, [round(one, 3) for one in took]
+    assert max(took) <= most, [round(seconds, 3) for seconds in took]
 
 
 @every_connection
@@ -137,9 +137,9 @@ def test_all_is_read_as_often_after_that(connection: str) -> None:
                 rig.enable()
             after = asked()
             # of the telemetry some values are read in turn
-            often = (one for one in before if before[one] > 2 * _WHILE)
-            seldom = {one: after[one] for one in often if after[one] < 0.7 * before[one]}
-            assert not seldom, {one: (before[one], after[one]) for one in seldom}
+            often = (key for key in before if before[key] > 2 * _WHILE)
+            seldom = {key: after[key] for key in often if after[key] < 0.7 * before[key]}
+            assert not seldom, {key: (before[key], after[key]) for key in seldom}
 
 
 @every_connection
@@ -153,8 +153,8 @@ def test_nothing_old_is_published_after_that(connection: str) -> None:
             rig.line.later(at + stood, rig.notes.snapshots.clear)
             rig.pass_time(begins + stood + 2.5)
             later = rig.notes.snapshots
-            assert later and all(not one.enabled for one in later)
-            assert all(one.status is None or one.status.faulted for one in later)
+            assert later and all(not snapshot.enabled for snapshot in later)
+            assert all(snapshot.status is None or snapshot.status.faulted for snapshot in later)
 
 
 def stand_still_while_acknowledging(connection: str, fault: int, key: str) -> None:
@@ -202,7 +202,7 @@ def test_what_is_read_anew_after_that_may_be_repeated_as_before() -> None:
         for begins in _MOMENTS:
             rig.line.stand_still(rig.clock.now + begins, _SHORT)
             rig.pass_time(_SHORT + 0.5)
-        assert asked and not [one for one in asked if True in one[2:]]
+        assert asked and not [request for request in asked if True in request[2:]]
 
 
 def test_a_drive_that_was_unplugged_is_found_as_soon_after_that() -> None:
@@ -238,12 +238,12 @@ def test_a_stop_is_on_the_wire_at_once_while_a_drive_is_known_as_slow(connection
             setattr(wire, name, usual)
             rig.pass_time(slow)
             took.append(time_to_wire(rig, rig.clock.now + 0.1 + moment))
-    assert max(took) <= _AT_ONCE, [round(one, 3) for one in took]
+    assert max(took) <= _AT_ONCE, [round(seconds, 3) for seconds in took]
 
 
 # behind a PLC it is not this line that is silent
 @pytest.mark.parametrize(
-    'connection', [name for name, one in CONNECTIONS.items() if one.protocol != 'telegram1']
+    'connection', [name for name, kind in CONNECTIONS.items() if kind.protocol != 'telegram1']
 )
 def test_a_drive_that_was_silent_meanwhile_is_recognised_before_it_is_written_to(
     connection: str,

@@ -72,8 +72,8 @@ class Deaf:
             if frames[at]['direction'] == 'request':
                 continue
             asked = next(
-                bytes.fromhex(one['hex']) for one in reversed(frames[:at])
-                if one['direction'] == 'request' and one['note'] != 'lost'
+                bytes.fromhex(frame['hex']) for frame in reversed(frames[:at])
+                if frame['direction'] == 'request' and frame['note'] != 'lost'
             )
             if self._anyone or self._unit_of(asked) == unit:
                 return frames[at]['last'] if self._after(asked) else -math.inf
@@ -123,7 +123,8 @@ def test_others_are_asked_while_one_rests() -> None:
         deaf.lost.clear()
         rig.asked.clear()
         rig.pass_time(5.0)
-        asked = {unit: sum(one == unit for one, *_ in rig.asked) for unit in rig.drives}
+        units = [unit for unit, *_ in rig.asked]
+        asked = {unit: units.count(unit) for unit in rig.drives}
         assert not deaf.lost
         assert asked[1] >= 35 and asked[2] >= 5 * asked[1]
         # it is learnt of the one alone
@@ -152,7 +153,10 @@ def test_a_stop_waits_for_the_pause_of_its_own_drive_and_of_no_other(
         ends = [rig.drives[unit].stop() for unit in (1, 2)]
         rig.wait_until(lambda: all(end.done() for end in ends), 10.0)
         assert all('stop' in rig.answer(end) for end in ends)
-        first = {unit: min(one.sent for one in written if one.unit == unit) for unit in (1, 2)}
+        first = {
+            unit: min(request.sent for request in written if request.unit == unit)
+            for unit in (1, 2)
+        }
         assert first[2] - began < 0.1
         assert first[1] - began > pause - 0.1
 
@@ -168,7 +172,7 @@ def test_before_each_request_the_line_is_silent_for_request_gap(connection: str)
         assert all('stop' in rig.answer(drive.stop()) for drive in rig.drives.values())
         frames = rig.line.frames
         gaps = [
-            after['first'] - max(one['last'] for one in frames[max(0, at - 3) : at + 1])
+            after['first'] - max(frame['last'] for frame in frames[max(0, at - 3) : at + 1])
             for at, after in enumerate(frames[1:])
             if after['direction'] == 'request'
         ]
@@ -205,17 +209,21 @@ def test_a_file_says_how_long_the_drive_is_left_alone_after_a_parameter(tmp_path
         asked: list[Asked] = []
         rig.told = asked.append
         rig.result(rig.drive.parameters.change({key: 3.0}))
-        at = next(n for n, one in enumerate(asked) if one.key == key and one.data is not None)
+        at = next(
+            n
+            for n, request in enumerate(asked)
+            if request.key == key and request.data is not None
+        )
         written = asked[at].ended
-        later = [one for one in asked[at + 1 :] if one.sent < written + rest]
-        assert {one.unit for one in later} == {2}
+        later = [request for request in asked[at + 1 :] if request.sent < written + rest]
+        assert {request.unit for request in later} == {2}
         # the reading back is the next one
-        assert any(one.unit == 1 and one.sent >= written + rest for one in asked)
+        assert any(request.unit == 1 and request.sent >= written + rest for request in asked)
 
 
 def test_the_shipped_files_have_the_pauses_of_their_makers() -> None:
     lines = {name: read(path).line for name, path in SHIPPED.items()}
-    assert all(one.gap > 0.01 for name, one in lines.items() if name.startswith('delta'))
+    assert all(line.gap > 0.01 for name, line in lines.items() if name.startswith('delta'))
     assert lines['yaskawa_v1000'].gap >= 0.005
     assert lines['yaskawa_v1000'].after_write >= 0.2
 

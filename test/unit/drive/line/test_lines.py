@@ -51,7 +51,7 @@ def test_a_drive_counts_any_message_or_those_to_it(any_counts: bool) -> None:
         rig.turn()
         rig.kill()
         read_of_the_second = next(
-            one['hex'] for one in rig.line.frames if one['hex'].startswith('0203')
+            frame['hex'] for frame in rig.line.frames if frame['hex'].startswith('0203')
         )
         for _ in range(4):
             rig.line.another_sends(bytes.fromhex(read_of_the_second), rig.clock.now)
@@ -123,7 +123,7 @@ def test_behind_a_port_that_is_back_where_it_was_one_look_goes_before_a_stop() -
         rig.asked.clear()
         rig.line.mend()
         rig.wait_until(lambda: not rig.turns)
-        before = list(itertools.takewhile(lambda one: one[2] is None, rig.asked))
+        before = list(itertools.takewhile(lambda request: request[2] is None, rig.asked))
         assert len(before) <= 2, before
 
 

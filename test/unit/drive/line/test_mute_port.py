@@ -20,7 +20,7 @@ from nfo_sinus_driver.drive.broadcast import broadcast_stop
 
 #: Behind a gateway the connection is another one: test_gateways.py.
 BY_PORT = [
-    name for name, one in CONNECTIONS.items() if one.protocol not in ('modbus_tcp', 'telegram1')
+    name for name, kind in CONNECTIONS.items() if kind.protocol not in ('modbus_tcp', 'telegram1')
 ]
 
 

@@ -25,7 +25,7 @@ _SLOW = {'baud': 19200}
 #: The function of Modbus by which a stop is written.
 _WRITE = 6
 #: Those on which the rig has several drives.
-SEVERAL = [name for name, connection in CONNECTIONS.items() if connection.protocol != 'telegram1']
+SEVERAL = [name for name, kind in CONNECTIONS.items() if kind.protocol != 'telegram1']
 
 
 def made(drives: int, connection: str = 'rtu', *, line: Any = _SLOW, **settings: Any) -> Rig:
@@ -38,7 +38,7 @@ def polls(rig: Rig, seconds: float) -> Counter[int]:
     before = {address: len(notes.snapshots) for address, notes in rig.notes_of.items()}
     rig.pass_time(seconds)
     return Counter({
-        address: sum(one.connected for one in notes.snapshots[before[address] :])
+        address: sum(snapshot.connected for snapshot in notes.snapshots[before[address] :])
         for address, notes in rig.notes_of.items()
     })
 
@@ -128,7 +128,7 @@ def test_a_stop_of_a_drive_that_is_lost_goes_out_at_once() -> None:
         sent, requested_at = len(rig.line.frames), rig.clock.now
         stop = rig.drives[8].stop()
         rig.pass_time(1.0)
-        mine = [one for one in rig.line.frames[sent:] if one['hex'].startswith('08')]
+        mine = [frame for frame in rig.line.frames[sent:] if frame['hex'].startswith('08')]
         # behind the transaction on the line, which may be one without a response
         assert mine[0]['hex'].startswith('0806') and mine[0]['last'] - requested_at < 0.3
         assert 'NOT confirmed' in rig.answer(stop)

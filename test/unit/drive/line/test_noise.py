@@ -36,7 +36,7 @@ def made(line: str = 'rtu', **settings: Any) -> Rig:
 
 def ends(rig: Rig) -> list[str]:
     """Return why the driver gave the motor up since the run began, each time."""
-    return [one.text for one in rig.notes.events if one.text.startswith(_ENDS)]
+    return [event.text for event in rig.notes.events if event.text.startswith(_ENDS)]
 
 
 def drown(rig: Rig, seconds: float, after: float = 0.0) -> None:
@@ -47,7 +47,8 @@ def drown(rig: Rig, seconds: float, after: float = 0.0) -> None:
 
 def published(rig: Rig, since: float) -> list[float]:
     """Return when a status of a connected drive was measured since then."""
-    return [one.status.at for one in rig.notes.snapshots if one.status and one.status.at >= since]
+    statuses = [snapshot.status for snapshot in rig.notes.snapshots]
+    return [status.at for status in statuses if status and status.at >= since]
 
 
 def damage(share: float) -> Callable[[bytes], str | None]:
@@ -106,9 +107,9 @@ def test_after_a_burst_it_is_asked_and_the_first_status_comes_at_once(line: str)
             end = rig.clock.now + length
             rig.pass_time(length + 2.0)
             asked = min(
-                one['first']
-                for one in rig.line.frames
-                if one['direction'] == 'request' and one['first'] >= end
+                frame['first']
+                for frame in rig.line.frames
+                if frame['direction'] == 'request' and frame['first'] >= end
             )
             if asked - end > _WAIT.get(line, 0.2) + 0.05:
                 late.append((length, 'asked', asked - end))
@@ -172,7 +173,7 @@ def test_one_damaged_answer_in_each_round_is_no_loss() -> None:
         # and each round was published, with the speed
         seen = rig.notes.snapshots[before:]
         assert len(seen) >= spoiled - 1
-        assert all(one.connected and one.speed == one.speed for one in seen)
+        assert all(snapshot.connected and snapshot.speed == snapshot.speed for snapshot in seen)
 
 
 @pytest.mark.parametrize('key', ['status.frq_act', 'fieldbus.inv_st'])

@@ -140,7 +140,7 @@ def test_a_stop_is_broadcast_only_where_a_drive_was_recognised() -> None:
 # --- after a loss ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('connection', [one for one in CONNECTIONS if one not in READS_FIRST])
+@pytest.mark.parametrize('connection', [name for name in CONNECTIONS if name not in READS_FIRST])
 def test_a_drive_whose_answers_alone_are_lost_is_stopped(connection: str) -> None:
     with Rig(connection) as rig:
         rig.turn()

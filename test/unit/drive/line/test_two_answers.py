@@ -30,7 +30,7 @@ def repeat(rig: Rig, *seconds: float) -> None:
 
     def noted(address: int, frame: bytes, instead: Any) -> list[Any]:
         replies: list[Any] = alter(address, frame, instead)
-        expected.extend(one.data for one in replies)
+        expected.extend(reply.data for reply in replies)
         return replies
 
     def sent(data: bytes) -> None:
@@ -70,13 +70,13 @@ class Told:
 
     def look(self) -> None:
         self.looked()
-        if any('twice' in one for one in self._rig.bus.remarks):
+        if any('twice' in remark for remark in self._rig.bus.remarks):
             self.at = min(self.at, self._rig.clock.now)
 
     @property
     def false(self) -> list[tuple[float, str]]:
         """What was false from then on."""
-        return [one for one in self.judge.false if one[0] > self.at]
+        return [answer for answer in self.judge.false if answer[0] > self.at]
 
 
 def running(connection: str, *seconds: float) -> tuple[Rig, Told]:
@@ -100,7 +100,7 @@ def test_nothing_is_believed_that_was_not_said(connection: str, seconds: float) 
     assert not rig.notes.said(Cause.CHANGED_AT_DRIVE)
     if seconds < 0.1:
         # none is so late that no silence helps: the motor runs on
-        shown = [one for one in rig.notes.snapshots if abs(one.frequency - 20) < 0.3]
+        shown = [snapshot for snapshot in rig.notes.snapshots if abs(snapshot.frequency - 20) < 0.3]
         assert len(shown) > 15
         assert rig.turns
     assert_stopped(rig)

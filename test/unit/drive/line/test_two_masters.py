@@ -104,7 +104,7 @@ def two_masters(
 def any_requests(connection: str, random: Random) -> list[Any]:
     """Return up to four requests that change nothing in the drive."""
 
-    def one() -> Any:
+    def any_request() -> Any:
         register = random.choice([*REGISTERS, random.randrange(0x10000)])
         if connection == 'classic':
             return classic.Enquiry(1, random.choice([0x1E, 0xB6, 0xE9, register]))
@@ -115,7 +115,7 @@ def any_requests(connection: str, random: Random) -> list[Any]:
             ReportSlaveId(1),
         ])
 
-    return [one() for _ in range(random.randrange(1, 5))]
+    return [any_request() for _ in range(random.randrange(1, 5))]
 
 
 @pytest.mark.parametrize('seed', range(24))
@@ -141,11 +141,13 @@ def test_readings_go_on_and_commands_do_what_they_say(
     connection: str, registers: tuple[int, ...]
 ) -> None:
     random = Random(7)
-    rig, hub = two_masters(connection, [Read(1, one, 1) for one in registers], random)
+    rig, hub = two_masters(connection, [Read(1, register, 1) for register in registers], random)
     rig.pass_time(20.0)
-    shown = [one for one in rig.notes.snapshots if abs(one.frequency - 20) < 0.3]
+    shown = [snapshot for snapshot in rig.notes.snapshots if abs(snapshot.frequency - 20) < 0.3]
     assert len(shown) > (200 if connection == 'rtu' else 50)
-    assert all(one.enabled and abs(one.actual - 20) < 0.3 for one in rig.notes.snapshots)
+    assert all(
+        snapshot.enabled and abs(snapshot.actual - 20) < 0.3 for snapshot in rig.notes.snapshots
+    )
     rig.send(None)
     enabled = 0
     for _ in range(6):

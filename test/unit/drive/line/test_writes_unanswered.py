@@ -19,7 +19,7 @@ from support.writes import is_write
 from nfo_sinus_driver.drive import Cause, Severity
 
 #: Where the motor follows set-points of the bus.
-FOLLOWING = [name for name, one in CONNECTIONS.items() if one.reference == 'fieldbus']
+FOLLOWING = [name for name, kind in CONNECTIONS.items() if kind.reference == 'fieldbus']
 #: Where one frame writes and another one reads: to a PLC all goes in one, and it is lost.
 APART = [name for name in FOLLOWING if CONNECTIONS[name].protocol != 'telegram1']
 every_connection = pytest.mark.parametrize('connection', APART)
@@ -71,7 +71,7 @@ def assert_failed(rig: Rig, address: int = 1) -> None:
     snapshot = notes.snapshot
     assert snapshot is not None and not snapshot.enabled
     assert snapshot.connected or (lost and len(rig.fars) > 1)
-    assert not any(says(one.text, 'ramps to a stop') for one in notes.events)
+    assert not any(says(event.text, 'ramps to a stop') for event in notes.events)
 
 
 @every_connection
@@ -90,7 +90,8 @@ def test_a_set_point_that_is_not_acknowledged_has_failed(
         assert_failed(rig)
         for other in range(2, drives + 1):
             assert rig.drives[other].following
-            assert not [one for one in rig.notes_of[other].events if one.severity is Severity.ERROR]
+            events = rig.notes_of[other].events
+            assert not [event for event in events if event.severity is Severity.ERROR]
         # the stop goes on, and is done as soon as a write arrives
         rig.line.plan = lambda frame: None
         rig.wait_until(lambda: not rig.drive.stop_unconfirmed, 2.0)

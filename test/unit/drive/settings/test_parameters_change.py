@@ -607,7 +607,7 @@ def test_a_line_that_is_silent_from_the_beginning_changes_nothing(
         answer = fails(rig, parameters.change({key: value}))
         assert answer.startswith(f'{key}: unit 1 did not answer')
     rig.result(parameters.apply({MAGN: 2, ACCEL: 7}, write=True))
-    reports = [one for one in rig.notes.events if one.text.startswith('not applied from')]
+    reports = [event for event in rig.notes.events if event.text.startswith('not applied from')]
     assert len(reports) == 2
     assert len(parameters.drift) == 2
 

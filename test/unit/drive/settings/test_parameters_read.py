@@ -50,7 +50,7 @@ def far(rig: Rig, *keys: str) -> list[Value]:
 
 def texts(rig: Rig, cause: Cause) -> list[str]:
     """Return what was reported for a cause."""
-    return [one.text for one in rig.notes.events if cause in one.text.causes]
+    return [event.text for event in rig.notes.events if cause in event.text.causes]
 
 
 def refuse(rig: Rig, key: str, code: int = Refused.ILLEGAL_ADDRESS) -> list[str]:
@@ -102,7 +102,7 @@ def test_progress_is_reported_after_pauses_that_grow() -> None:
     # 20 s for all
     with Rig(line={'baud': 1200}, lost_after=5.0) as rig:
         rig.connect(parameters=True)
-        reported = [one.at for one in rig.notes.events if 'of 119 read' in one.text]
+        reported = [event.at for event in rig.notes.events if 'of 119 read' in event.text]
         assert len(reported) == 2
         assert reported[1] - reported[0] == pytest.approx(10.0, abs=0.5)
 
@@ -126,7 +126,7 @@ def test_what_needs_option_cards_is_reported_as_one() -> None:
         rig.connect(parameters=True)
         assert not texts(rig, Cause.SETTING_UNREADABLE)
         (text,) = texts(rig, Cause.OPTIONS_MISSING)
-        every = len(rig.drive.parameters.available([one.key for one in rig.drive.model.kept]))
+        every = len(rig.drive.parameters.available([row.key for row in rig.drive.model.kept]))
         assert text.startswith(f'parameters: {every - READ["movitrac"]} are left out')
 
 

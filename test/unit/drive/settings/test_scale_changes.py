@@ -39,7 +39,7 @@ def watch_speed(rig: Rig, most: float) -> None:
 def assert_stopped_for(rig: Rig, key: str) -> None:
     """The motor was stopped because of this parameter, and only an enable helps."""
     assert not rig.drive.following and not rig.turns
-    (report,) = [one for one in rig.notes.events if Cause.SCALE_CHANGED in one.text.causes]
+    (report,) = [event for event in rig.notes.events if Cause.SCALE_CHANGED in event.text.causes]
     assert report.severity is Severity.WARNING and key in report.text
     rig.looked = lambda: None
 
@@ -137,7 +137,7 @@ def test_by_a_scale_of_0_no_motor_starts_and_every_motor_stops(name: str) -> Non
 @pytest.mark.parametrize(
     ('connection', 'key'),
     [
-        *((one, SPEED_SCALE) for one in ('rtu', 'classic', 'canopen', 'rtu, control word')),
+        *((name, SPEED_SCALE) for name in ('rtu', 'classic', 'canopen', 'rtu, control word')),
         ('canopen, ds402', DIMENSION),
     ],
 )

@@ -35,8 +35,8 @@ class Left:
         self._rig = rig
         self.command, self.setpoint = _COMMANDS[connection], _SETPOINTS[connection]
         unit = rig.far.control_unit
-        self._hand_over = unit.take
-        unit.take = self._keep_command
+        self._hand_over = unit.hand_control_to
+        unit.hand_control_to = self._keep_command
         unit.scmd = type(unit.scmd)(RUN)
         rig.far.memory.set(self.setpoint, 30.0)
         self.driven, self.turned = 0.0, False

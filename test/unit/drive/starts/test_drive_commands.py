@@ -67,7 +67,7 @@ def test_a_stop_says_what_it_finds() -> None:
 def test_a_stop_goes_ahead_of_all_that_waits() -> None:
     with Rig().turn() as rig:
         status = rig.drive.params.address('fieldbus.drive_status')
-        for priority in [one for one in Priority if one is not Priority.STOP] * 20:
+        for priority in [known for known in Priority if known is not Priority.STOP] * 20:
             rig.bus.run(neighbour(rig.bus, status, priority))
         rig.pass_time(0.5)
         begun = len(rig.asked)
@@ -318,7 +318,7 @@ def test_monitor_writes_nothing_at_all() -> None:
         assert drive.snapshot.kind is Kind.FAULT
         rig.answer(drive.deactivate())
         assert rig.answer(drive.disconnect(1.0)) == 'only watched'
-        assert not [one for one in rig.asked if one[2] is not None]
+        assert not [request for request in rig.asked if request[2] is not None]
         assert rig.far.control_unit.ack_reads == 0
 
 
@@ -336,8 +336,8 @@ def test_a_fault_that_was_acknowledged_is_not_published_any_more(connection: str
             rig.enable()
             rig.pass_time(0.2)
             seen = rig.notes.snapshots
-            assert any(one.enabled for one in seen)
-            assert not any(one.status and one.status.faulted for one in seen), phase
+            assert any(snapshot.enabled for snapshot in seen)
+            assert not any(snapshot.status and snapshot.status.faulted for snapshot in seen), phase
 
 
 @pytest.mark.parametrize('connection', ['rtu', 'classic', 'optimal'])
@@ -345,7 +345,7 @@ def test_a_parameter_that_is_only_read_acknowledges_nothing(connection: str) -> 
     with Rig(connection) as rig:
         rig.connect()
         acknowledging = [
-            key for key, one in rig.drive.model.items() if one.access is Access.ACKNOWLEDGE
+            key for key, row in rig.drive.model.items() if row.access is Access.ACKNOWLEDGE
         ]
         rig.far.trip(rig.a_fault)
         rig.pass_time(0.5)
@@ -360,8 +360,8 @@ def test_of_what_tells_why_it_refused_the_flags_alone_are_read_once() -> None:
         rig.connect()
         asked: dict[Address, bool] = {}
 
-        def read(one: Read) -> int:
-            asked[one.address] = one.once
+        def read(step: Read) -> int:
+            asked[step.address] = step.once
             return SIO_FAIL
 
         rig.link._why[1](read, 0)

@@ -171,7 +171,7 @@ def test_telemetry_of_older_firmware() -> None:
         }
         asked = {key for _, key, _ in rig.asked}
         assert rig.drive.state.model.key(Role.OPERATING_TIME) in asked
-        assert not {rig.drive.state.model.key(one) for one in (
+        assert not {rig.drive.state.model.key(role) for role in (
             Role.ENERGY, Role.TOTAL_ENERGY,
         )} & asked
 
@@ -260,11 +260,12 @@ NO_SENSE: list[tuple[dict[str, Any], str]] = [
 
 
 def test_settings_that_make_no_sense() -> None:
-    ranges = {name: one for name, one in settings_of(DriveSettings).items() if one.low is not None}
+    settings = settings_of(DriveSettings)
+    ranges = {name: known for name, known in settings.items() if known.low is not None}
     beyond = [
         ({name: value}, 'allowed are')
-        for name, one in ranges.items()
-        for value in (math.nextafter(one.low, -math.inf), math.nextafter(one.high, math.inf))
+        for name, known in ranges.items()
+        for value in (math.nextafter(known.low, -math.inf), math.nextafter(known.high, math.inf))
     ]
     wrong = []
     for setting, message in [*NO_SENSE, *beyond]:

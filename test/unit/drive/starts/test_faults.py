@@ -47,7 +47,7 @@ def test_every_fault_is_shown_reported_and_acknowledged(connection: str) -> None
             )
             assert listed.remedy
             # reported once, whenever its entry in the log is; and nothing is enabled with it
-            reported = [one.text for one in rig.notes.events if 'error log: ' not in one.text]
+            reported = [event.text for event in rig.notes.events if 'error log: ' not in event.text]
             assert reported == [
                 f'fault {code} {listed.text}: {listed.description}. {listed.remedy}; '
                 'then call ~/fault_ack'
@@ -99,13 +99,14 @@ def test_every_alarm_of_the_optimal_is_shown_and_reported_and_stops_nothing(
             rig.far.trip(code)
             show(rig, code)
             rig.pass_time(0.3)
-            assert [(one.severity, one.text) for one in rig.notes.events] == [(
+            assert [(event.severity, event.text) for event in rig.notes.events] == [(
                 Severity.WARNING,
                 f'alarm {code} {listed.text}: {listed.description}. {listed.remedy}',
             )]
             # never as a status, although bit and code are read one after the other
-            shown = [one for one in rig.notes.snapshots[before:] if one.status.code == code]
-            assert {one.kind for one in shown} == {Kind.ALARM}
+            later = rig.notes.snapshots[before:]
+            shown = [snapshot for snapshot in later if snapshot.status.code == code]
+            assert {snapshot.kind for snapshot in shown} == {Kind.ALARM}
             assert rig.drive.following
             rig.far.faults.acknowledge()
             rig.wait_until(lambda: rig.notes.snapshot.kind is Kind.STATUS, 5.0)
@@ -165,12 +166,12 @@ def test_the_reset_bit_rises_once() -> None:
             if connection == 'rtu, control word':
                 # by the mask: what another master has in its word stays, and nothing is read first
                 masks = [data for _, key, data in rig.asked if key == MASK and data is not None]
-                assert [one[2:].hex() for one in masks] == ['0000', '0080', '0000']
-                words = [one[2] << 8 | one[3] for one in masks]
-                assert not any(one[1] & 0x80 for one in masks)
+                assert [mask[2:].hex() for mask in masks] == ['0000', '0080', '0000']
+                words = [mask[2] << 8 | mask[3] for mask in masks]
+                assert not any(mask[1] & 0x80 for mask in masks)
             else:
                 words = rig.written(WORD)
-            rises = [two & ~one & 0x80 for one, two in itertools.pairwise([0, *words])]
+            rises = [word & ~before & 0x80 for before, word in itertools.pairwise([0, *words])]
             assert sum(map(bool, rises)) == 1 and not words[-1] & 0x80
             assert rig.far.control_unit.ack_reads == 0
 

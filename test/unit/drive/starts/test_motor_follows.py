@@ -18,9 +18,9 @@ import yaml
 from nfo_sinus_driver.drive import Cause, Severity
 from nfo_sinus_driver.families.movitrac31.words import Bits
 
-FOLLOWING = [name for name, one in CONNECTIONS.items() if one.reference == 'fieldbus']
+FOLLOWING = [name for name, kind in CONNECTIONS.items() if kind.reference == 'fieldbus']
 BITS, SIZE = 'fieldbus.function_bits', 'fieldbus.remote_setpoint'
-FORWARD, REVERSE = (int(Bits.ENABLE | one) for one in (Bits.CLOCKWISE, Bits.COUNTER_CLOCKWISE))
+FORWARD, REVERSE = (int(Bits.ENABLE | turn) for turn in (Bits.CLOCKWISE, Bits.COUNTER_CLOCKWISE))
 
 
 def is_setpoint(rig: Rig, key: str) -> bool:
@@ -134,7 +134,7 @@ def test_a_motor_that_does_not_slow_down_after_a_time_out_is_stopped(connection:
         # as it is measured; a speed with the slip of the motor, where its frequency is controlled
         hertz = rig.drive.state.measurements.turning.unit == 'Hz'
         turns = ('20 Hz',) if hertz else ('600 rpm', '590 rpm')
-        assert any(rig.notes.said(f'does not slow down at set-point 0 ({one}') for one in turns)
+        assert any(rig.notes.said(f'does not slow down at set-point 0 ({turn}') for turn in turns)
         assert not rig.drive.following
         # one that has nothing but its set-point is stopped by force, when no ramp is that slow
         rig.wait_until(lambda: not rig.drive.stop_unconfirmed, 10.0)
@@ -267,7 +267,7 @@ def test_a_speed_that_is_a_multiple_of_the_set_point_names_the_scale_once(
         rig.send(value)
         rig.pass_time(20.0)
         assert rig.notes.said(said), rig.notes.events
-        assert sum('another scale' in one.text for one in rig.notes.events) == 1
+        assert sum('another scale' in event.text for event in rig.notes.events) == 1
         assert rig.drive.following
 
 

@@ -166,7 +166,7 @@ def test_everything_is_removed_before_the_acknowledgement() -> None:
             requests = asked(rig, since)
             before = requests[: requests.index((_ACK, None))]
             removed = ((_SCMD, 0), ('status.frq_set', 0), (_MODE, Mode.STOP))
-            stays += [(kind, one) for one in removed if one not in before]
+            stays += [(kind, word) for word in removed if word not in before]
     assert not stays
 
 
@@ -178,7 +178,7 @@ def test_a_serial_fault_is_acknowledged_by_mode_stop_alone() -> None:
         since = len(rig.asked)
         assert 'acknowledged 14' in rig.answer(acknowledged(rig))
         requests = asked(rig, since)
-        written = [one for one in requests if one[1] is not None]
+        written = [request for request in requests if request[1] is not None]
         assert written[0][0] == _MODE
         assert (_ACK, None) not in requests
 

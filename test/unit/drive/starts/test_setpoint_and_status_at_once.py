@@ -25,10 +25,10 @@ def functions(rig: Rig, since: int = 0) -> list[int]:
     """Return by which functions the set-point was written since so many frames, in order."""
     return [
         frame[1]
-        for frame in (bytes.fromhex(one['hex']) for one in requests(rig, since))
-        if (one := understand(frame, 'modbus_rtu')) is not None
-        and one.words is not None
-        and one.place == SETPOINT_REGISTER
+        for frame in (bytes.fromhex(request['hex']) for request in requests(rig, since))
+        if (message := understand(frame, 'modbus_rtu')) is not None
+        and message.words is not None
+        and message.place == SETPOINT_REGISTER
     ]
 
 
@@ -39,7 +39,7 @@ def _plain(frame: dict[str, Any]) -> Any:
 
 
 def requests(rig: Rig, since: int = 0) -> list[dict[str, Any]]:
-    return [one for one in rig.line.frames[since:] if one['direction'] == 'request']
+    return [frame for frame in rig.line.frames[since:] if frame['direction'] == 'request']
 
 
 def asked(rig: Rig, since: int = 0) -> list[tuple[str, int | None]]:
@@ -80,7 +80,7 @@ def test_a_direction_that_changes_without_a_size_goes_by_itself() -> None:
         # less than a step of the drive, in the other direction
         rig.send(0.004)
         rig.pass_time(1.0)
-        sent = [bytes.fromhex(one['hex'])[1] for one in requests(rig, begun)]
+        sent = [bytes.fromhex(frame['hex'])[1] for frame in requests(rig, begun)]
         assert WRITE_SEVERAL in sent and BOTH not in sent
         assert rig.far.control_unit.machine.direction == 1
 
@@ -91,9 +91,10 @@ def test_a_set_point_and_the_status_are_one_transaction_but_zero_of_a_stop() -> 
         rig.drive.set_setpoint(25.0)
         rig.pass_time(0.05)
         sent = [
-            understand(bytes.fromhex(one['hex']), 'modbus_rtu') for one in requests(rig, begun)
+            understand(bytes.fromhex(frame['hex']), 'modbus_rtu') for frame in requests(rig, begun)
         ]
-        assert [one[1:] for one in sent if one is not None and one.words is not None] == [
+        understood = [message for message in sent if message is not None]
+        assert [message[1:] for message in understood if message.words is not None] == [
             (SETPOINT_REGISTER, 1, (250,), (0x258, 2))
         ]
         rig.pass_time(1.0)
@@ -153,7 +154,8 @@ def test_only_the_newest_set_point_is_written_to_one_that_does_not_have_it() -> 
         rig.drive.set_setpoint(30.0)
         rig.pass_time(0.3)
         assert functions(rig, begun)[0] == BOTH
-        written = [one.words for one in map(_plain, requests(rig, begun)) if one is not None]
+        plain = map(_plain, requests(rig, begun))
+        written = [message.words for message in plain if message is not None]
         assert (300,) not in written, 'the newer one had come'
         assert rig.drive.following
 
@@ -174,7 +176,7 @@ def test_a_lost_answer_is_looked_after_before_the_next_set_point() -> None:
         rig.drive.set_setpoint(30.0)
         rig.pass_time(0.5)
         assert rig.drive.following
-        first, again = [n for n, one in enumerate(asked(rig)) if one == (SETPOINT, 300)]
+        first, again = [n for n, request in enumerate(asked(rig)) if request == (SETPOINT, 300)]
         assert (STATUS, None) in asked(rig)[first:again]
         assert functions(rig)[-2:] == [BOTH, BOTH]
 

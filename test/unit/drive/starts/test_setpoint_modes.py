@@ -44,7 +44,11 @@ BOTH = ['rtu', 'rtu, control word']
 both_methods = pytest.mark.parametrize('connection', BOTH)
 every_mode = pytest.mark.parametrize(
     ('connection', 'mode'),
-    [*((one, mode) for one in BOTH for mode in MODES), ('optimal', 'Freque'), ('optimal', 'Speed')],
+    [
+        *((name, mode) for name in BOTH for mode in MODES),
+        ('optimal', 'Freque'),
+        ('optimal', 'Speed'),
+    ],
 )
 
 
@@ -127,7 +131,7 @@ def test_over_classic_one_parameter_takes_the_set_point_of_every_mode(mode: str)
         raw = MODES[mode].value * MODES[mode].steps
         assert rig.written('fieldbus.setpoint')[-1] == raw
         assert b'\x04!\x02E001E=%04X\x03' % raw in {
-            bytes.fromhex(one['hex'])[:-1] for one in rig.line.frames
+            bytes.fromhex(frame['hex'])[:-1] for frame in rig.line.frames
         }
         assert rig.far.memory.raw(rig.far.control_unit.setpoint_key) == raw
         snapshot = rig.drive.snapshot
@@ -188,7 +192,7 @@ def test_limits(connection: str, mode: str) -> None:
             assert rig.drive.snapshot.setpoint == limit
             assert not rig.drive.snapshot.setpoint_clamped
             # said once, not with every message
-            texts = [one.text for one in rig.notes.events if 'is limited to' in one.text]
+            texts = [event.text for event in rig.notes.events if 'is limited to' in event.text]
             assert len(texts) == 1, texts
             assert texts[0].startswith(f'set-point 1e+06 is limited to {limit:g}')
 
@@ -224,12 +228,13 @@ def test_mode_that_is_changed_at_the_keypad_ends_the_enable(
         first = len(rig.notes.snapshots)
         rig.pass_time(8.0)
         assert not rig.far.motor.driven
-        snapshots = [one for one in rig.notes.snapshots[first:] if one.control_mode == after]
+        later = rig.notes.snapshots[first:]
+        snapshots = [snapshot for snapshot in later if snapshot.control_mode == after]
         # everywhere at once: no set-point of the one mode ever has the unit of the other
-        assert {one.unit for one in snapshots} == {MODES[after].unit}
-        assert not any(one.enabled for one in snapshots)
-        assert all(math.isnan(one.setpoint) for one in snapshots)
-        (text,) = [one.text for one in rig.notes.events if 'control mode' in one.text]
+        assert {snapshot.unit for snapshot in snapshots} == {MODES[after].unit}
+        assert not any(snapshot.enabled for snapshot in snapshots)
+        assert all(math.isnan(snapshot.setpoint) for snapshot in snapshots)
+        (text,) = [event.text for event in rig.notes.events if 'control mode' in event.text]
         assert f'the control mode was changed to {after} at the drive' in text
         assert f'set-points are in {MODES[after].unit} now: check what sends them' in text
         assert text.endswith('call ~/enable to go on')
@@ -308,8 +313,9 @@ def test_a_time_out_that_is_to_stay_as_it_is_is_a_decision_that_is_said_once() -
             rig.far.power_cycle()
             rig.pass_time(10.0)
             rig.enable()
-            said = [one for one in rig.notes.events if 'drive_timeout' in one.text]
-            assert [(one.severity, cause in one.text.causes) for one in said] == [(severity, True)]
+            said = [event for event in rig.notes.events if 'drive_timeout' in event.text]
+            (event,) = said
+            assert (event.severity, cause in event.text.causes) == (severity, True)
             assert 'drive_timeout' in said[0].text and ' 0' in said[0].text
             assert timeouts(rig) == (10 * found, 1)
 

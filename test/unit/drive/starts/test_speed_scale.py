@@ -33,7 +33,7 @@ def scaled(connection: str, numerator: int, denominator: int, **settings: float)
 
 @pytest.mark.parametrize(
     ('connection', 'scale'),
-    [*((one, (1, 10)) for one in SCALED_CONNECTIONS), *(('rtu', scale) for scale in SCALES)],
+    [*((name, (1, 10)) for name in SCALED_CONNECTIONS), *(('rtu', scale) for scale in SCALES)],
 )
 def test_speeds_are_in_rpm_whatever_the_scale(connection: str, scale: tuple[int, int]) -> None:
     with scaled(connection, *scale) as rig:
@@ -48,7 +48,7 @@ def test_speeds_are_in_rpm_whatever_the_scale(connection: str, scale: tuple[int,
             )
         # what cannot be a scale is none
         used = scale in ((1, 10), (2, 1))
-        reported = sum(Cause.SPEED_SCALE in one.text.causes for one in rig.notes.events)
+        reported = sum(Cause.SPEED_SCALE in event.text.causes for event in rig.notes.events)
         assert reported == used
         rig.answer(rig.drive.stop())
         # a setting, too
@@ -127,8 +127,8 @@ CHOSEN = {
 def test_a_scale_that_is_chosen_counts_for_set_points_measured_values_and_settings(
     connection: str, scale: str
 ) -> None:
-    one, mode, setpoint, counts, key, value = CHOSEN[scale]
-    settings: dict[str, Any] = {scale: one}
+    unit, mode, setpoint, counts, key, value = CHOSEN[scale]
+    settings: dict[str, Any] = {scale: unit}
     parameters = {'control.mode': mode, 'control.accel': 0.2}
     with Rig(connection, parameters=parameters, **settings) as rig:
         rig.connect(parameters=True)
@@ -137,7 +137,7 @@ def test_a_scale_that_is_chosen_counts_for_set_points_measured_values_and_settin
         rig.pass_time(2.0)
         assert rig.far.memory.raw(rig.far.control_unit.setpoint_key) == counts
         assert rig.drive.snapshot.setpoint == setpoint
-        assert rig.drive.snapshot.actual == pytest.approx(setpoint, abs=3 * one, rel=0.07)
+        assert rig.drive.snapshot.actual == pytest.approx(setpoint, abs=3 * unit, rel=0.07)
         rig.answer(rig.drive.stop())
         rig.result(rig.drive.parameters.change({key: value}))
         assert rig.far.memory.raw(key) == 100

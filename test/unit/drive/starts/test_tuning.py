@@ -29,8 +29,8 @@ every_connection = pytest.mark.parametrize(
     'connection',
     [
         name
-        for name, one in CONNECTIONS.items()
-        if (one.model, one.method) == ('sinus_g2', 'mode_scmd')
+        for name, connection in CONNECTIONS.items()
+        if (connection.model, connection.method) == ('sinus_g2', 'mode_scmd')
     ],
 )
 
@@ -55,7 +55,7 @@ def test_each_procedure_is_done_and_what_it_changed_is_reported(connection: str)
         with Rig(connection, poll_rate=5.0).connect() as rig:
             news: list[tuple[Snapshot, float]] = []
             before = {key: rig.far.peek(key) for key in rig.far.settings}
-            future = rig.drive.tune(procedure, lambda *one, news=news: news.append(one))
+            future = rig.drive.tune(procedure, lambda *told, news=news: news.append(told))
             result = rig.result(future)
             assert result.success and f'{code} {text}' in said(result.how)
             written = rig.written(SCMD)
@@ -63,10 +63,10 @@ def test_each_procedure_is_done_and_what_it_changed_is_reported(connection: str)
             after = {key: rig.far.peek(key) for key in rig.far.settings}
             changed = {key: (before[key], after[key]) for key in after if before[key] != after[key]}
             assert changed
-            assert {one.key: (one.old, one.new) for one in result.changes} == changed
+            assert {change.key: (change.old, change.new) for change in result.changes} == changed
             assert str(result.changes[0]) in said(result)
             # every stage, as the drive reports
-            codes = list(dict.fromkeys(one.status.code for one, _ in news if one.status))
+            codes = list(dict.fromkeys(status.status.code for status, _ in news if status.status))
             assert codes[-1] == code and news[-1][0].text == text
             assert TUNING in codes or procedure is Procedure.CALCULATE
             times = [elapsed for _, elapsed in news]
@@ -139,7 +139,7 @@ def test_the_parameters_are_known_anew_and_not_changed_meanwhile() -> None:
         assert 'the drive is tuning' in message
         result = rig.result(future)
         new = rig.drive.parameters.values['motor.r_stat']
-        assert [(one.key, one.old, one.new) for one in result.changes] == [
+        assert [(change.key, change.old, change.new) for change in result.changes] == [
             ('motor.r_stat', old, new)
         ]
         assert new == rig.far.peek('motor.r_stat') != old

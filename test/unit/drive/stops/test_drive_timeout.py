@@ -39,11 +39,11 @@ def test_9_a_drive_that_is_polled_seldom_gets_a_request_in_time(connection: str)
         begun = rig.clock.now
         rig.pass_time(12.0)
         sent = [
-            one['first'] for one in rig.line.frames
-            if one['direction'] == 'request' and one['first'] > begun
+            frame['first'] for frame in rig.line.frames
+            if frame['direction'] == 'request' and frame['first'] > begun
         ]
         # half the time-out of the drive
-        assert max(two - one for one, two in itertools.pairwise(sent)) <= 1.0
+        assert max(after - before for before, after in itertools.pairwise(sent)) <= 1.0
         assert rig.drive.following and not rig.far.faults
         rig.line.mend()
         # a clean exit leaves no fault behind
@@ -183,8 +183,9 @@ def test_9_a_default_that_the_drive_does_not_take_keeps_no_motor_from_running(
         for _ in range(2):
             rig.enable()
             rig.answer(rig.drive.stop())
-        said = [one for one in rig.notes.events if says(one.text, Cause.OWN_TIMEOUT_NOT_TAKEN)]
-        assert [one.severity for one in said] == [Severity.WARNING]
+        events = rig.notes.events
+        said = [event for event in events if says(event.text, Cause.OWN_TIMEOUT_NOT_TAKEN)]
+        assert [event.severity for event in said] == [Severity.WARNING]
         assert drive_timeout(rig) == 0.0
 
 
@@ -455,7 +456,7 @@ def test_9_a_disk_that_keeps_nothing_prevents_no_enable_and_is_reported_once(
         end(rig)
         assert drive_timeout(rig) == 0.0
         key = rig.drive.state.model.key(Role.COMMUNICATION_TIMEOUT)
-        said = [one.text for one in rig.notes.events if says(one.text, Cause.NOT_REMEMBERED)]
+        said = [event.text for event in rig.notes.events if says(event.text, Cause.NOT_REMEMBERED)]
         assert len(said) == 1 and f'check {key}' in said[0], said
 
 
@@ -482,7 +483,7 @@ def test_9_a_spoilt_file_keeps_no_drive_from_being_connected_to(
         rig.memory = StateFolder('/dev/ttyUSB0', lambda work: work())
         rig.begin()
         rig.connect()
-        said = [one.text for one in rig.notes.events if says(one.text, Cause.NOT_REMEMBERED)]
+        said = [event.text for event in rig.notes.events if says(event.text, Cause.NOT_REMEMBERED)]
         assert [f'check {key}' in text and str(path) in text for text in said] == (
             [True] if borrowed is None else []
         )

@@ -51,7 +51,7 @@ def steps_of(connection: str, stop: str) -> set[tuple[str, bool]]:
         rig.meet = lambda key, data: asked.add((key, data is not None))  # type: ignore[func-returns-value]
         rig.answer(STOPS[stop](rig.drive))
         status = {rig.drive.model.key(role) for role in _TELLS}
-    return {one for one in asked if one[1] or one[0] not in status}
+    return {request for request in asked if request[1] or request[0] not in status}
 
 
 def goes_wrong(connection: str, stop: str, step: tuple[str, bool], how: str) -> str:

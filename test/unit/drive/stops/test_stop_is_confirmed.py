@@ -162,7 +162,7 @@ def test_a_lost_stop_is_repeated_at_once() -> None:
         # nothing between, and no longer than the time-out that shows that it was lost
         assert [stops for _, stops in asked[:3]] == [True] * 3
         times = [at for at, _ in asked[:3]]
-        assert max(two - one for one, two in itertools.pairwise(times)) < 0.22
+        assert max(after - before for before, after in itertools.pairwise(times)) < 0.22
         assert not rig.notes.said(Cause.CANNOT_STOP)
 
 

@@ -115,8 +115,8 @@ _RELEASED: dict[str, dict[str, Any]] = {
     'sinus_h': {'adv.stop_mode': 'Free-Run'},
 }
 _AS_SET = [pytest.param(name, {}, id=f'{name}-as set') for name in CONNECTIONS] + [
-    pytest.param(name, _RELEASED[one.model], id=f'{name}-to release')
-    for name, one in CONNECTIONS.items() if one.model in _RELEASED
+    pytest.param(name, _RELEASED[kind.model], id=f'{name}-to release')
+    for name, kind in CONNECTIONS.items() if kind.model in _RELEASED
 ]
 _WAYS = {
     'stop': lambda drive: drive.stop(),
@@ -137,9 +137,9 @@ _SAYS_RELEASED = (
 def test_a_motor_ramps_or_is_released_as_the_answer_says(
     connection: str, set_to: dict[str, Any], way: str
 ) -> None:
-    one = CONNECTIONS[connection]
-    slow = ramps(one.model, 0.3, 6.0)
-    with Rig(connection, parameters={**slow, **one.parameters, **set_to}, line=QUICK) as rig:
+    made = CONNECTIONS[connection]
+    slow = ramps(made.model, 0.3, 6.0)
+    with Rig(connection, parameters={**slow, **made.parameters, **set_to}, line=QUICK) as rig:
         rig.turn()
         rig.send(None)
         driven: set[bool] = set()
@@ -160,11 +160,11 @@ def test_a_motor_ramps_or_is_released_as_the_answer_says(
 _HAS_NO_RAMP = 'made up'
 
 
-@pytest.mark.parametrize('connection', [one for one in CONNECTIONS if one != _HAS_NO_RAMP])
+@pytest.mark.parametrize('connection', [name for name in CONNECTIONS if name != _HAS_NO_RAMP])
 def test_the_end_waits_for_the_ramp(connection: str) -> None:
-    one = CONNECTIONS[connection]
-    slow = ramps(one.model, 0.3, 3.0)
-    with Rig(connection, parameters={**slow, **one.parameters}, line=QUICK) as rig:
+    made = CONNECTIONS[connection]
+    slow = ramps(made.model, 0.3, 3.0)
+    with Rig(connection, parameters={**slow, **made.parameters}, line=QUICK) as rig:
         rig.turn()
         rig.send(None)
         coasted: list[float] = []
@@ -236,7 +236,7 @@ _COMMANDS = {
     'described, no holder': 'line.rfa00',
 }
 #: The terminals run the motor there, and nothing of the line does.
-_RUN_COMMANDS = [one for one in CONNECTIONS if one != 'movitrac, by terminals']
+_RUN_COMMANDS = [name for name in CONNECTIONS if name != 'movitrac, by terminals']
 
 
 def command_of(connection: str) -> str:
@@ -487,12 +487,12 @@ def test_a_code_that_the_manual_does_not_list_confirms_no_stop(
 
 
 @pytest.mark.parametrize('how', ['stop', 'rapid stop', 'deactivate'])
-@pytest.mark.parametrize('connection', [one for one in _RUN_COMMANDS if 'telegram1' not in one])
+@pytest.mark.parametrize('connection', [name for name in _RUN_COMMANDS if 'telegram1' not in name])
 def test_the_answer_to_a_stop_that_is_not_done_is_the_last_word_on_it(
     connection: str, how: str
 ) -> None:
-    one = CONNECTIONS[connection]
-    with Rig(connection, parameters={**ramps(one.model, 0.3, 6.0), **one.parameters}) as rig:
+    made = CONNECTIONS[connection]
+    with Rig(connection, parameters={**ramps(made.model, 0.3, 6.0), **made.parameters}) as rig:
         rig.turn()
         rig.send(None)
         ignore_the_removal(rig, connection)

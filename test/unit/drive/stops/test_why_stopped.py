@@ -20,7 +20,7 @@ from nfo_sinus_driver.drive.known.stop_reason import reason_of
 _SPEED = 20.0
 _BY = '/teach_pendant'
 #: Where the motor follows set-points; where the drive counts the frames of the driver itself.
-FOLLOWING = {name for name, one in CONNECTIONS.items() if one.reference == 'fieldbus'}
+FOLLOWING = {name for name, kind in CONNECTIONS.items() if kind.reference == 'fieldbus'}
 TIMED = {
     name for name, connection in CONNECTIONS.items()
     if connection.protocol not in ('telegram1', 'canopen')
@@ -53,7 +53,7 @@ def lose_power(rig: Rig) -> None:
 
 def is_setpoint(rig: Rig, key: str) -> bool:
     targets = rig.drive.model.profile.setpoints.values()
-    return key.endswith('setpoint') or any(key in (one.key, one.at) for one in targets)
+    return key.endswith('setpoint') or any(key in (target.key, target.at) for target in targets)
 
 
 def refuse_setpoint(rig: Rig) -> None:
@@ -123,7 +123,7 @@ STOPS = {
     'killed driver': Stop(restart_driver, {_R.NOT_ENABLED}, seconds=5.0),
 }
 _CASES = [
-    (name, stop) for name in CONNECTIONS for stop, one in STOPS.items() if name in one.connections
+    (name, stop) for name in CONNECTIONS for stop, how in STOPS.items() if name in how.connections
 ]
 
 
@@ -139,12 +139,12 @@ def test_after_each_stop_it_is_known_why(connection: str, stop: str) -> None:
 
 
 # the made-up drive has no ramp
-@pytest.mark.parametrize('connection', [one for one in CONNECTIONS if one != 'made up'])
+@pytest.mark.parametrize('connection', [name for name in CONNECTIONS if name != 'made up'])
 def test_a_ramp_that_a_lost_drive_was_given_is_no_run_of_an_earlier_session(
     connection: str,
 ) -> None:
-    one = CONNECTIONS[connection]
-    slow = {**ramps(one.model, 0.3, 20.0), **one.parameters}
+    made = CONNECTIONS[connection]
+    slow = {**ramps(made.model, 0.3, 20.0), **made.parameters}
     with Rig(connection, setpoint_timeout=0.0, parameters=slow) as rig:
         rig.turn()
         rig.line.state = 'gone'

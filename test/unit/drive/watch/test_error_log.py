@@ -25,8 +25,8 @@ HOURS = 1234.5
 SEEN = 31.0
 G2 = [
     name
-    for name, one in CONNECTIONS.items()
-    if (one.model, one.method) == ('sinus_g2', 'mode_scmd')
+    for name, connection in CONNECTIONS.items()
+    if (connection.model, connection.method) == ('sinus_g2', 'mode_scmd')
 ]
 #: A drive that is looked at without a hurry: the tests are about minutes.
 RARELY = {'poll_rate': 2.0, 'telemetry_rate': 0.0}
@@ -65,11 +65,12 @@ def test_newest_first_with_text_and_age(connection: str) -> None:
             fill(rig, count)
             entries = rig.result(rig.drive.error_log())
             length = min(count, 32)
-            assert [one.code for one in entries] == [1 + n % 12 for n in range(length)]
-            assert [one.operating_time for one in entries] == [1234.0 - n for n in range(length)]
+            assert [entry.code for entry in entries] == [1 + n % 12 for n in range(length)]
+            times = [entry.operating_time for entry in entries]
+            assert times == [1234.0 - n for n in range(length)]
             assert entries[0].text == 'Par Fail'
             # the drive's hours begin at 1234.5
-            ages = [one.age for one in entries]
+            ages = [entry.age for entry in entries]
             assert ages == pytest.approx([0.5 + n for n in range(length)], abs=0.1)
         assert len(rig.result(rig.drive.error_log(4))) == 4
         # only the older firmware has more of them [C4]
@@ -92,7 +93,7 @@ def test_an_entry_that_comes_in_meanwhile() -> None:
 
         rig.meet = trip
         entries = rig.result(rig.drive.error_log())
-        assert [one.code for one in entries] == [12, 1, 2, 3, 4, 5]
+        assert [entry.code for entry in entries] == [12, 1, 2, 3, 4, 5]
 
         def trip_again(key: str, data: bytes | None) -> None:
             rig.far.faults.log.insert(0, LogEntry(12, 1234.4 + len(rig.asked)))
@@ -225,7 +226,7 @@ def test_an_entry_has_the_local_time_of_its_moment() -> None:
         before = datetime.now() - ago
         shown = entry.wall_time
         after = datetime.now() - ago
-        assert shown in {one.isoformat(' ', 'minutes') for one in (before, after)}
+        assert shown in {moment.isoformat(' ', 'minutes') for moment in (before, after)}
 
 
 def test_the_motor_is_stopped_first() -> None:
@@ -342,7 +343,7 @@ def test_an_operating_time_that_cannot_be_does_not_end_the_watch(
             assert rig.notes.said(f'error log: {code} {name} at 1234.5 h')
             assert not rig.notes.said('or before')
         entries = rig.result(rig.drive.error_log())
-        assert [str(one).split(' at ')[0] for one in entries] == ['1 Par Fail', '5 Overload']
+        assert [str(entry).split(' at ')[0] for entry in entries] == ['1 Par Fail', '5 Overload']
 
 
 def test_an_entry_has_its_wall_time_if_the_drive_has_had_power_ever_since() -> None:

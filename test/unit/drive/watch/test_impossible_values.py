@@ -64,7 +64,7 @@ def test_one_impossible_value_stops_nothing_and_is_not_published(connection: str
         rig.turn()
         rig.asked.clear()
         rig.pass_time(1.0)
-        usual = {shown(one) for one in rig.notes.snapshots[-15:]}
+        usual = {shown(snapshot) for snapshot in rig.notes.snapshots[-15:]}
         before = len(rig.notes.snapshots)
         polled = {key for _, key, _ in rig.asked}
         for role, data in IMPOSSIBLE.items():
@@ -76,10 +76,10 @@ def test_one_impossible_value_stops_nothing_and_is_not_published(connection: str
         found = rig.notes.snapshots[before:]
         assert rig.drive.following
         assert not rig.notes.events
-        assert {shown(one) for one in found} <= usual
-        assert all(abs(one.frequency) < 50 for one in found)
+        assert {shown(snapshot) for snapshot in found} <= usual
+        assert all(abs(snapshot.frequency) < 50 for snapshot in found)
         tells_speed = rig.drive.model.key(Role.ACTUAL_SPEED)
-        assert all(abs(one.speed) < 3000 for one in found if tells_speed)
+        assert all(abs(snapshot.speed) < 3000 for snapshot in found if tells_speed)
 
 
 @every_connection
@@ -94,10 +94,12 @@ def test_measured_values_that_stay_impossible_are_nan_and_reported_once(connecti
         found = rig.notes.snapshots[before:]
         assert rig.drive.following
         assert len(found) > 5
-        assert all(math.isnan(one.frequency) and math.isnan(one.speed) for one in found)
-        warned = [one.text for one in rig.notes.events if one.severity is Severity.WARNING]
+        assert all(
+            math.isnan(snapshot.frequency) and math.isnan(snapshot.speed) for snapshot in found
+        )
+        warned = [event.text for event in rig.notes.events if event.severity is Severity.WARNING]
         assert len(warned) == len(spoilers)
-        assert all(any(one.key in text for text in warned) for one in spoilers)
+        assert all(any(spoiler.key in text for text in warned) for spoiler in spoilers)
 
 
 def test_a_code_that_stays_unlisted_is_published_as_it_is() -> None:
@@ -135,8 +137,9 @@ def test_a_value_that_was_refused_is_measured_again_unless_the_drive_has_none() 
             before = len(rig.notes.telemetry)
             refused += codes
             rig.pass_time(2.0)
-            found = [one.values[Role.DC_LINK_VOLTAGE] for one in rig.notes.telemetry[before:]]
-            assert any(math.isnan(one) for one in found), codes
+            later = rig.notes.telemetry[before:]
+            found = [telemetry.values[Role.DC_LINK_VOLTAGE] for telemetry in later]
+            assert any(math.isnan(value) for value in found), codes
             assert found[-1] > 100, codes
         refused += [Refused.ILLEGAL_ADDRESS] * 100
         rig.pass_time(4.0)

@@ -80,7 +80,7 @@ def test_a_value_with_labels_and_one_of_another_group_is_its_number() -> None:
 def test_all_that_is_only_read_and_is_a_number_or_a_label_can_be_named(model: str) -> None:
     for method, chosen in load_profile(model).methods.items():
         family = load_family(model, method)
-        read = [one.key for one in family.values() if one.access is Access.READ]
+        read = [row.key for row in family.values() if row.access is Access.READ]
         reference = chosen.references[0]
         DriveSettings(model=model, control_method=method, reference=reference, measured=read)
 

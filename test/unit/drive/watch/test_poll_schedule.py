@@ -164,14 +164,14 @@ def test_another_status_word_never_comes_with_an_older_inverter_status() -> None
         rig.pass_time(1.0)
         rig.answer(rig.drive.stop())
         rig.pass_time(1.0)
-        statuses = [one.status for _, one in kept if one.status is not None]
+        statuses = [snapshot.status for _, snapshot in kept if snapshot.status is not None]
         changes = 0
         for before, now in itertools.pairwise(statuses):
             if now.word != before.word:
                 changes += 1
                 assert now.code_at > before.at
         assert changes > 5
-        first = next(one for _, one in kept if one.kind is Kind.FAULT)
+        first = next(status for _, status in kept if status.kind is Kind.FAULT)
         assert first.status is not None
         assert first.status.code == OVERLOAD
 

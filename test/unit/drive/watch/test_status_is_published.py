@@ -101,7 +101,8 @@ def test_a_drive_that_is_there_again_is_shown_so_and_measured(connection: str) -
         rig.wait_until(lambda: rig.drive.state.contact.connected, 20.0)
         rig.pass_time(SOON)
         assert shown(rig).connected and shown(rig).status is not None
-        assert any(one.connected and one.polled for one in rig.notes.snapshots[before:])
+        later = rig.notes.snapshots[before:]
+        assert any(snapshot.connected and snapshot.polled for snapshot in later)
 
 
 @pytest.mark.parametrize('connection', ['rtu', 'classic', 'optimal', 'canopen, ds402'])
@@ -134,13 +135,14 @@ def test_what_did_not_change_is_not_published_again() -> None:
 
 def test_between_two_polls_nothing_is_said_to_be_measured() -> None:
     with seldom('rtu') as rig:
-        (poll,) = [one for one in rig.notes.snapshots if one.polled and one.connected]
-        rest = [one for one in rig.notes.snapshots if not one.polled and one.at > poll.at]
-        assert rest and {one.frequency_at for one in rest} == {poll.frequency_at}
+        shown = rig.notes.snapshots
+        (poll,) = [snapshot for snapshot in shown if snapshot.polled and snapshot.connected]
+        rest = [snapshot for snapshot in shown if not snapshot.polled and snapshot.at > poll.at]
+        assert rest and {snapshot.frequency_at for snapshot in rest} == {poll.frequency_at}
 
 
 # what a PLC shows is as old as its last exchange with the drive, whenever it is read
-@pytest.mark.parametrize('connection', [one for one in KINDS if 'telegram1' not in one])
+@pytest.mark.parametrize('connection', [name for name in KINDS if 'telegram1' not in name])
 def test_nothing_from_before_a_pause_of_the_driver_is_published_with_what_changes_after_it(
     connection: str,
 ) -> None:
@@ -158,7 +160,8 @@ def test_nothing_from_before_a_pause_of_the_driver_is_published_with_what_change
         rig.line.stand_still(at, 2.5)
         rig.line.later(at + 2.5, resume)
         rig.pass_time(4.0)
-        read_at = [one.status.at for one in rig.notes.snapshots if one.status is not None]
+        statuses = [snapshot.status for snapshot in rig.notes.snapshots]
+        read_at = [status.at for status in statuses if status is not None]
         assert read_at and min(read_at) >= resumed[0]
 
 
@@ -174,8 +177,8 @@ def test_a_stop_after_a_pause_of_the_driver_is_shown_before_the_next_poll_is_ove
         rig.pass_time(0.1)
         assert not rig.drive.snapshot.enabled and rig.drive.snapshot.status is not None
         # what was measured before is not shown with it
-        for one in rig.notes.snapshots:
-            assert one.frequency_at >= at + 1.0 or math.isnan(one.frequency)
+        for snapshot in rig.notes.snapshots:
+            assert snapshot.frequency_at >= at + 1.0 or math.isnan(snapshot.frequency)
 
 
 @pytest.mark.parametrize('connection', ['classic', 'movitrac'])

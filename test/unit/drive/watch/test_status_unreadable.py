@@ -30,7 +30,7 @@ _READ, _WRITE_AND_READ = 3, 23
 _MEASURED = (Role.ACTUAL_FREQUENCY, Role.ACTUAL_SPEED, Role.ACTUAL_TORQUE)
 
 following = pytest.mark.parametrize(
-    'connection', [name for name, one in CONNECTIONS.items() if one.reference == 'fieldbus']
+    'connection', [name for name, kind in CONNECTIONS.items() if kind.reference == 'fieldbus']
 )
 
 
@@ -104,7 +104,7 @@ def lost_after(rig: Rig, hidden: Hidden) -> float:
     rig.pass_time(_ZERO_AT)
     rig.send(0.0)
     rig.wait_until(lambda: rig.notes.said(Cause.LOST_IN_USE), 30.0)
-    lost = next(one for one in rig.notes.events if Cause.LOST_IN_USE in one.text.causes)
+    lost = next(event for event in rig.notes.events if Cause.LOST_IN_USE in event.text.causes)
     return lost.at - hidden.begun
 
 
@@ -163,7 +163,7 @@ def test_a_status_is_read_as_often_while_a_measured_value_cannot_be(connection: 
         rig.looked = lambda: times.append(state.status.at)
         rig.pass_time(4.0)
         seen = sorted(set(times))
-        assert max(two - one for one, two in itertools.pairwise(seen)) <= 5 * timeout(rig)
+        assert max(after - before for before, after in itertools.pairwise(seen)) <= 5 * timeout(rig)
         assert rig.drive.following
 
 
@@ -177,7 +177,7 @@ def test_a_control_mode_that_cannot_be_read_is_a_loss() -> None:
         # it is read once a second
         assert took <= 1.0 + 1.0 + _POLL + 2 * timeout(rig)
         seen = sorted(set(times))
-        assert max(two - one for one, two in itertools.pairwise(seen)) <= 4 * timeout(rig)
+        assert max(after - before for before, after in itertools.pairwise(seen)) <= 4 * timeout(rig)
 
 
 def test_set_points_of_a_drive_that_is_unplugged_leave_the_line_to_others() -> None:
@@ -188,11 +188,11 @@ def test_set_points_of_a_drive_that_is_unplugged_leave_the_line_to_others() -> N
         rig.keep(lambda: rig.drive.set_setpoint(next(wanted)))
 
         def polls() -> list[int]:
-            before = [len(rig.notes_of[one].snapshots) for one in (2, 3, 4)]
+            before = [len(rig.notes_of[address].snapshots) for address in (2, 3, 4)]
             rig.pass_time(4.0)
-            after = [len(rig.notes_of[one].snapshots) for one in (2, 3, 4)]
-            return [two - one for one, two in zip(before, after, strict=True)]
+            after = [len(rig.notes_of[address].snapshots) for address in (2, 3, 4)]
+            return [new - old for old, new in zip(before, after, strict=True)]
 
         usual = polls()
         rig.line.unplug(1)
-        assert all(now > one / 2 for now, one in zip(polls(), usual, strict=True))
+        assert all(now > before / 2 for now, before in zip(polls(), usual, strict=True))

@@ -119,12 +119,12 @@ def polls_until(rig: Rig, act: Act, tells: Tells) -> int:
     before = len(rig.notes.snapshots)
     act(rig)
     rig.wait_until(lambda: any(map(tells, rig.notes.snapshots[before:])), 5.0)
-    return [tells(one) for one in rig.notes.snapshots[before:]].index(True) + 1
+    return [tells(snapshot) for snapshot in rig.notes.snapshots[before:]].index(True) + 1
 
 
 def warnings(rig: Rig) -> list[str]:
     """What the log has that an operator should look at."""
-    return [one.text for one in rig.notes.events if one.severity is not Severity.INFO]
+    return [event.text for event in rig.notes.events if event.severity is not Severity.INFO]
 
 
 @pytest.mark.parametrize('connection', CONNECTIONS)
@@ -134,8 +134,8 @@ def test_what_ends_a_run_is_shown_and_reported_once_with_a_remedy(connection: st
             continue
         with turning(connection) as rig:
 
-            def shown(one: Snapshot, tells: Tells = event.tells) -> bool:
-                return tells(one) and not one.enabled
+            def shown(snapshot: Snapshot, tells: Tells = event.tells) -> bool:
+                return tells(snapshot) and not snapshot.enabled
 
             polls = polls_until(rig, event.act, shown)
             assert polls <= POLLS, (name, polls)
@@ -180,7 +180,7 @@ def test_what_stops_nothing_is_shown_and_reported_once(connection: str) -> None:
             # the limit comes with the speed that the load takes
             assert polls <= POLLS + (name == 'current limit'), (name, polls)
             rig.pass_time(0.5)
-            texts = [one.text for one in rig.notes.events]
+            texts = [report.text for report in rig.notes.events]
             assert len(texts) == 1, (name, texts)
             assert event.cause in texts[0] and event.remedy in texts[0], texts
             assert rig.drive.following and rig.drive.snapshot.enabled
@@ -197,7 +197,8 @@ def test_set_points_that_stop_coming_are_reported_and_the_next_is_followed(conne
         rig.send(None)
         last = rig.drive.setpoint._request[1]
         rig.wait_until(lambda: rig.notes.snapshots[-1].setpoint == 0.0, 5.0)
-        late = [one for one in rig.notes.snapshots if one.at > last + TIMEOUT and one.setpoint]
+        after = [snapshot for snapshot in rig.notes.snapshots if snapshot.at > last + TIMEOUT]
+        late = [snapshot for snapshot in after if snapshot.setpoint]
         assert len(late) + 1 <= POLLS
         rig.pass_time(2.0)
         assert rig.far.motor.at_zero

@@ -19,7 +19,7 @@ from nfo_sinus_driver.catalog.profile import (
     Status,
     Steps,
     Write,
-    one,
+    one_step,
     try_steps,
 )
 from nfo_sinus_driver.catalog.status import Fact, Role, State, StatusCode, StatusWord
@@ -96,7 +96,7 @@ class DriveControl(ControlMethod):
     def stop(self, control_mode: str) -> Steps[None]:
         """Remove the run command, and write set-point 0, each by itself."""
         if (yield from self.perhaps_in_control()):
-            command = one(Write(_WORD, Word.REMOTE, retry=False))
+            command = one_step(Write(_WORD, Word.REMOTE, retry=False))
             yield from self._stop_by(command, _FREQUENCY.zero(retry=False))
 
     def release(self) -> Steps[None]:
@@ -106,7 +106,7 @@ class DriveControl(ControlMethod):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove the run command, and write set-point 0, each by itself."""
-        command = yield from try_steps(one(Write(_WORD, Word.REMOTE)))
+        command = yield from try_steps(one_step(Write(_WORD, Word.REMOTE)))
         setpoint = yield from try_steps(self.zero_setpoint(control_mode))
         if command:
             return Removal.COMMAND

@@ -26,7 +26,7 @@ from nfo_sinus_driver.catalog.profile import (
     Status,
     Steps,
     Write,
-    one,
+    one_step,
     try_steps,
 )
 from nfo_sinus_driver.catalog.status import Fact, Role, State, StatusCode, StatusWord
@@ -105,7 +105,7 @@ class FunctionBits(ControlMethod):
         """Remove the run command, and write set-point 0, each by itself."""
         if (yield from self.perhaps_in_control()):
             yield from self._stop_by(
-                one(Write(_BITS, 0, retry=False)), _FREQUENCY.zero(retry=False)
+                one_step(Write(_BITS, 0, retry=False)), _FREQUENCY.zero(retry=False)
             )
 
     def release(self) -> Steps[None]:
@@ -114,7 +114,7 @@ class FunctionBits(ControlMethod):
 
     def remove(self, control_mode: str) -> Steps[Removal]:
         """Remove the run command, and write set-point 0, each by itself."""
-        command = yield from try_steps(one(Write(_BITS, 0)))
+        command = yield from try_steps(one_step(Write(_BITS, 0)))
         setpoint = yield from try_steps(self.zero_setpoint(control_mode))
         if command:
             return Removal.COMMAND
