@@ -91,7 +91,8 @@ class Scheduler:
     longer before a request, what is less urgent than that waits, too.
 
     Units that have been silent for long are missing. Reads from them, set-points, and stops that
-    did not reach them, wait until :meth:`take` may give them out, and then go ahead of other polls.
+    did not reach them, wait until :meth:`next_entry` may give them out, and then go ahead of other
+    polls.
 
     :param is_silent: whether a unit has not answered the last request.
     :param is_missing: whether it has been silent for long.
@@ -160,7 +161,7 @@ class Scheduler:
         """Anything waits that is not for a missing unit."""
         return any(queue for rank, queue in self._queues.items() if rank != _MISSING)
 
-    def take(
+    def next_entry(
         self, *, missing: bool = True, in_noise: bool = False, only_stops: bool = False
     ) -> LatestValue | Waiting | None:
         """
@@ -188,7 +189,7 @@ class Scheduler:
             return None
         # no other unit waits
         self._unanswered = None
-        return self.take(missing=missing, only_stops=only_stops)
+        return self.next_entry(missing=missing, only_stops=only_stops)
 
     def _requests_of(self, stop: tuple[_Rank, Waiting]) -> tuple[int, bool, float]:
         """Return how many requests a stop has made; of equals the longest ago goes first."""
@@ -207,9 +208,10 @@ class Scheduler:
         """Requeue what waits for a unit that answers again: it may be a stop."""
         if not self._queues[_MISSING]:
             return
-        found = [one for one in self._queues[_MISSING] if self._rank(one) != _MISSING]
+        missing = self._queues[_MISSING]
+        found = [entry for entry in missing if self._rank(entry) != _MISSING]
         for entry in found:
-            del self._queues[_MISSING][entry]
+            del missing[entry]
             self.add(entry)
 
     def _first(self, rank: _Rank) -> LatestValue | Waiting | None:

@@ -62,6 +62,38 @@ class _Unit:
     there_since: float = -math.inf
     longest: float = 0.0
 
+    def asked(self, now: float) -> None:
+        """Note that it was sent something."""
+        self.asked_at = now
+
+    def answered(self, now: float) -> None:
+        """Note that a valid frame came; a silence in which it may have been exchanged ends."""
+        if now - self.gone_since > SWAP_TIME:
+            self.there_since = now
+        if self.frame_at > -math.inf:
+            self.longest = max(self.longest, now - self.frame_at)
+        self.frame_at = now
+        self.silent_since = self.gone_since = math.inf
+
+    def not_answered(self, failed_at: float, now: float) -> None:
+        """Note that a request was in vain, and when its answer had failed to come."""
+        if not self.is_silent:
+            self.silent_since, self.gone_since = failed_at, now
+
+    def paused(self, seconds: float) -> None:
+        """Note that nothing was sent for so long."""
+        self.silent_since += seconds
+
+    def take_longest(self) -> float:
+        """Return the longest time from one valid frame to the next since the last call."""
+        longest, self.longest = self.longest, 0.0
+        return longest
+
+    @property
+    def is_silent(self) -> bool:
+        """It has not answered the last request."""
+        return self.silent_since < math.inf
+
 
 class Silences:
     """
@@ -131,28 +163,26 @@ class Silences:
         if isinstance(error, DamagedAnswer):
             self._damaged_at = now
         if not isinstance(error, PortError):
-            its.asked_at = now
+            its.asked(now)
         if error is None or error.responded or isinstance(error, Refused):
-            self._note_swap(its, now)
+            if now - self._any_frame_at > SWAP_TIME:
+                # this end may have stood still
+                self._line_since = now
             if now - self._any_frame_at >= _MISSING_AFTER:
                 # it was the line: the others may be back with this one, and have to be stopped
                 self._back_at = now
-            if its.frame_at > -math.inf:
-                its.longest = max(its.longest, now - its.frame_at)
-            its.frame_at = self._any_frame_at = now
-            its.silent_since = its.gone_since = math.inf
+            its.answered(now)
+            self._any_frame_at = now
             self._in_vain.clear()
             self._in_vain_since = math.inf
         elif self.is_missing(unit, now):
             self._pause_ends = now + (silence + seconds) * (1 / _MISSING_SHARE - 1)
-        if is_stop and its.silent_since < math.inf:
+        if is_stop and its.is_silent:
             self._stops_from = now + (silence + seconds) * (1 / _STOPS_IN_NOISE - 1)
         if error is not None and not isinstance(error, (PortError, Refused)):
             # by then a drive has answered
             failed_at = now - max(seconds - _ANSWERED_WITHIN, 0.0)
-            if its.silent_since == math.inf:
-                its.silent_since = failed_at
-            its.gone_since = min(its.gone_since, now)
+            its.not_answered(failed_at, now)
             self._in_vain.add(unit)
             self._longest_in_vain = max(seconds, self._longest_in_vain)
             self._in_vain_since = min(self._in_vain_since, failed_at)
@@ -172,16 +202,8 @@ class Silences:
     def paused(self, seconds: float) -> None:
         """Note that nothing was sent for so long, s, for the worker did not run."""
         for its in self._units.values():
-            its.silent_since += seconds
+            its.paused(seconds)
         self._in_vain_since += seconds
-
-    def _note_swap(self, its: _Unit, now: float) -> None:
-        """Note that a silence ends in which a unit, or any, may have been exchanged."""
-        if now - its.gone_since > SWAP_TIME:
-            its.there_since = now
-        if now - self._any_frame_at > SWAP_TIME:
-            # this end may have stood still
-            self._line_since = now
 
     def there_since(self, unit: int, now: float, *, to_stop: bool = False) -> float:
         """
@@ -205,7 +227,7 @@ class Silences:
 
     def is_silent(self, unit: int) -> bool:
         """Return whether a unit has not answered the last request to it."""
-        return self._units[unit].silent_since < math.inf
+        return self._units[unit].is_silent
 
     def silent_since(self, unit: int, *, is_watched: bool) -> float:
         """
@@ -243,7 +265,7 @@ class Silences:
     @property
     def any_silent(self) -> bool:
         """A unit has not answered the last request to it."""
-        return any(its.silent_since < math.inf for its in self._units.values())
+        return any(its.is_silent for its in self._units.values())
 
     def asked_at(self, unit: int | None = None) -> float:
         """Return when a unit, or any, was last sent anything."""
@@ -257,9 +279,7 @@ class Silences:
 
     def take_longest(self, unit: int) -> float:
         """Return the longest time between two valid frames of a unit since the last call."""
-        its = self._units[unit]
-        longest, its.longest = its.longest, 0.0
-        return longest
+        return self._units[unit].take_longest()
 
     def lasts(self, unit: int, now: float) -> float:
         """Return for how long a unit has been silent; 0 if it answers."""

@@ -165,7 +165,7 @@ async def set_up(
     :param require_wanted: as for :class:`Request`.
     """
 
-    async def take(step: Operation) -> Reply | None:
+    async def ask(step: Operation) -> Reply | None:
         for left in reversed(range(tries)):
             try:
                 return await Request(unit, step, priority, require_wanted)
@@ -176,11 +176,11 @@ async def set_up(
                     raise
         raise AssertionError
 
-    return await _follow(steps, take)
+    return await _follow(steps, ask)
 
 
 async def _follow(
-    plan: Plan[_Found], take: Callable[[Operation], Coroutine[Any, Any, Reply | None]]
+    plan: Plan[_Found], ask: Callable[[Operation], Coroutine[Any, Any, Reply | None]]
 ) -> _Found:
     reply = None
     while True:
@@ -189,7 +189,7 @@ async def _follow(
         except StopIteration as end:
             found: _Found = end.value
             return found
-        reply = await take(step)
+        reply = await ask(step)
 
 
 @dataclass(eq=False, slots=True)
@@ -354,7 +354,7 @@ class LatestValue:
         self.pending = True
         return True
 
-    def take(self) -> Written | None:
+    def take_value(self) -> Written | None:
         """Return what is to be written now; ``None`` if there is nothing any more."""
         self.pending = False
         return self.make()

@@ -80,13 +80,13 @@ class Watch(NamedTuple):
     """
     What a line has to do with a drive beside its requests; called on the worker.
 
-    :ivar look: called before each request while the unit, or no unit, answers; returns when it has
-        to be called again at the latest, s, or infinity.
+    :ivar look_for_loss: called before each request while the unit, or no unit, answers; returns
+        when it has to be called again at the latest, s, or infinity.
     :ivar may_run: returns whether the driver may have run its motor.
     :ivar paused: told for how long the worker has not run, s.
     """
 
-    look: Callable[[], float]
+    look_for_loss: Callable[[], float]
     may_run: Callable[[], bool]
     paused: Callable[[float], None]
 
@@ -517,7 +517,7 @@ class Bus:
         again_at = math.inf
         for unit, watch in self._watches.items():
             if self.silences.is_silent(unit) or self.silences.is_line_silent:
-                again_at = min(again_at, watch.look())
+                again_at = min(again_at, watch.look_for_loss())
         return again_at
 
     def _tell_pause(self) -> None:
@@ -627,7 +627,7 @@ class Bus:
         scheduler, silences = self._scheduler, self.silences
         is_paced, missing = now < self._paced_until, now >= silences.missing_from
         in_noise_from = silences.stops_in_vain_from(now)
-        entry = scheduler.take(
+        entry = scheduler.next_entry(
             missing=missing,
             in_noise=now >= in_noise_from,
             only_stops=only_stops or is_paced,
@@ -655,7 +655,7 @@ class Bus:
         return True
 
     def _write_slot(self, slot: LatestValue) -> None:
-        written = slot.take()
+        written = slot.take_value()
         if written is None:
             return
         try:
@@ -835,7 +835,7 @@ class Bus:
 
     def _fail_slot(self, slot: LatestValue, error: PortError) -> None:
         try:
-            written = slot.take()
+            written = slot.take_value()
             if written is not None:
                 slot.done(written, error)
         except BaseException:

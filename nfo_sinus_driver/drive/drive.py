@@ -87,7 +87,7 @@ class Drive:
         self._controller: Controller | None = None
         self._recogniser = Recogniser(self.state)
         if settings.method != 'monitor':
-            self._controller = Controller(self.state, self.setpoint, self._recogniser.look)
+            self._controller = Controller(self.state, self.setpoint, self._recogniser.look_once)
         self._poller = Poller(
             self.state, self.setpoint, self._controller, self._recogniser, self._connect
         )
@@ -265,7 +265,7 @@ class Drive:
             await self._connect(retry)
             if parameters:
                 try:
-                    await self.parameters.read_now([one.key for one in self.model.kept])
+                    await self.parameters.read_now([kept.key for kept in self.model.kept])
                 except BaseException:
                     # no poller watches it yet
                     self._set_disconnected(_LEFT)
@@ -532,7 +532,7 @@ class Drive:
 
     def _take_parameters(self, keys: Collection[str]) -> None:
         """Note new values of parameters, whatever changed them."""
-        if self.state.timeout.take(keys, self.parameters.values):
+        if self.state.timeout.take_values(keys, self.parameters.values):
             # the drive may have to be polled more often from now on
             self._poller.wake()
         if any(self.state.model.key(role) in keys for role in _MODE_ROLES):

@@ -8,8 +8,8 @@ One account for each drive; whatever polls it, writes to it or explains what it 
 With flags in several classes, two events in an unforeseen order went wrong again and again: a loss
 that was seen here was not seen there, and a stop was kept back, or written to another drive.
 
-**Does it answer?** :class:`ContactState` and its table. It is lost by one of two rules, and whoever
-notices it first says so:
+**Does it answer?** :class:`ContactState` and its table. It is lost by one of two rules,
+whichever shows it first:
 
 - :meth:`Contact.lost_at`: it has been silent for ``lost_after``, whatever was asked;
 - :meth:`Contact.poll_failed`: it answers, but has given no status for as long; or its port is gone,

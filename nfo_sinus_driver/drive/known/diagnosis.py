@@ -182,7 +182,7 @@ class Conditions:
         #: The last status had an alarm, with a code that is no alarm's.
         self._unnamed = False
 
-    def take(self, status: InverterStatus) -> None:
+    def take_status(self, status: InverterStatus) -> None:
         """Report the conditions that have begun."""
         for severity, report in self._reports(status):
             # each alarm by its code

@@ -100,7 +100,7 @@ class DriveTimeout:
                 raise
             return None
 
-    def take(self, keys: Collection[str], values: Mapping[str, Value]) -> bool:
+    def take_values(self, keys: Collection[str], values: Mapping[str, Value]) -> bool:
         """
         Note new values of parameters; return whether SioTot is among them.
 

@@ -883,7 +883,7 @@ class _Formatter(string.Formatter):
             return sentence(value, self._calls)
         if isinstance(value, tuple):
             between = '; ' if isinstance(value[0], Report) else ', '
-            return between.join(self.format_field(one, format_spec) for one in value)
+            return between.join(self.format_field(item, format_spec) for item in value)
         return str(super().format_field(value, format_spec))
 
 

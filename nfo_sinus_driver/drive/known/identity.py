@@ -197,7 +197,7 @@ class Nameplate:
         )
         return self.identity
 
-    def take(self, product: Product) -> Identity:
+    def take_product(self, product: Product) -> Identity:
         """Take the identity that the drive gives; warn of a model that its manual does not list."""
         assert self.identity is not None
         self.identity = replace(

@@ -105,7 +105,7 @@ class Measurements:
             # standstill has no direction
             return 0.0 - value if status is not None and Fact.REVERSE in status.facts else value
         if role is self.turning.role:
-            self.direction.take(value * self.turning.hertz, self._now())
+            self.direction.take_size(value * self.turning.hertz, self._now())
         return self.direction.of(value)
 
     def shown(self, role: Role | None, value: float) -> float:
@@ -114,7 +114,7 @@ class Measurements:
         known = role not in word.sizes or Fact.REVERSE in word.valid or self.direction.known
         return value if known or value == 0 else math.nan
 
-    def note(self, role: Role, value: float) -> None:
+    def take_value(self, role: Role, value: float) -> None:
         """Note what a poll has just measured."""
         self._polled[role] = Measured(value, self._now())
 

@@ -78,7 +78,7 @@ class Standing:
     def __init__(self) -> None:
         self.since = math.inf
 
-    def note(self, at: float, stands: bool) -> float:
+    def note_standing(self, at: float, stands: bool) -> float:
         """Note whether it stood at a moment, s; return since when it does."""
         self.since = min(self.since, at) if stands else math.inf
         return self.since
@@ -103,7 +103,7 @@ class Direction:
         """Note the set-point that the drive has, in any unit; NaN: the driver commands none."""
         self._commanded = setpoint
 
-    def take(self, size: float, now: float) -> None:
+    def take_size(self, size: float, now: float) -> None:
         """Take what was measured, Hz, and when, s of the clock of the bus."""
         # set-point 0 is in no direction: the motor stops in that which it has
         wanted = math.copysign(1.0, self._commanded) if abs(self._commanded) > 0 else NAN

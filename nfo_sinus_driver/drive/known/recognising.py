@@ -103,7 +103,7 @@ class Recogniser:
             return error
         return None
 
-    async def look(self) -> None:
+    async def look_once(self) -> None:
         """
         See once that the drive is there, before one that was recognised here is stopped.
 
@@ -158,7 +158,7 @@ class Recogniser:
         return True
 
     async def _read_what_identifies(self) -> None:
-        """Read what :meth:`look` will compare, where nothing else has it."""
+        """Read what :meth:`look_once` will compare, where nothing else has it."""
         key = self._profile.identified_by
         self._identified_as = None
         if self._profile.product is not None and key and self._state.nameplate.has(key):
@@ -191,7 +191,7 @@ class Recogniser:
                 raise self._another(Report(Cause.MADE_BY, vendor=identity.vendor))
             return identity
         try:
-            return nameplate.take(await run_steps(self._state, product(), Priority.SERVICE))
+            return nameplate.take_product(await run_steps(self._state, product(), Priority.SERVICE))
         except DriveError:
             self._params.contact.another_answers()
             raise

@@ -48,7 +48,8 @@ class Scales:
         self._dialect: Mapping[str, Fraction] = {}
         model = params.model
         #: Parameters by whose value others are multiplied.
-        self._named = frozenset(one.scale for one in model.values() if one.scale in model)
+        scales = {parameter.scale for parameter in model.values()}
+        self._named = frozenset(scale for scale in scales if scale in model)
         self._of_speed = tuple(filter(None, map(model.key, _OF_SPEED)))
         self._unused = tuple(unused)
         self.found: Mapping[str, float] = {}
@@ -96,7 +97,7 @@ class Scales:
         scale, speed = model[key].scale, model.key(Role.ACTUAL_SPEED)
         by_speed = speed and scale == model[speed].scale
         scaling = {scale, *self._unused, *(self._of_speed if by_speed else ())}
-        return tuple(one for one in self.keys if one in scaling)
+        return tuple(key for key in self.keys if key in scaling)
 
     @property
     def speed(self) -> Fraction:
@@ -117,8 +118,8 @@ class Scales:
             if key and model[key].scale:
                 scales[model[key].scale] = factor
         # what the drive itself has comes first; by a scale of 0 not even a stop could be written
-        own = {one: self.found.get(one, 0.0) for one in self._named}
-        scales |= {one: Fraction(str(value)) for one, value in own.items() if value > 0}
+        own = {key: self.found.get(key, 0.0) for key in self._named}
+        scales |= {key: Fraction(str(value)) for key, value in own.items() if value > 0}
         found = {
             parameter.key: scales[parameter.scale] * self._dialect.get(parameter.key, _ONE)
             for parameter in model.values()

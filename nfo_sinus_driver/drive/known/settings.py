@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 import functools
@@ -53,7 +53,7 @@ def _references(model: str, control_method: str) -> tuple[str, ...]:
         for name, method in profile.methods.items()
         if any_will_do or name == control_method
     ]
-    return tuple(dict.fromkeys(one for method in methods for one in method.references))
+    return tuple(dict.fromkeys(name for method in methods for name in method.references))
 
 
 def _control_modes(model: str, method: str = '') -> tuple[str, ...]:
@@ -343,7 +343,7 @@ class DriveSettings:
             return
         needed = self.method_class.addressing
         if not protocol.reaches_by(needed):
-            able = ' or '.join(one.name for one in PROTOCOLS.values() if one.reaches_by(needed))
+            able = _or(line.name for line in PROTOCOLS.values() if line.reaches_by(needed))
             raise ValueError(
                 f'control_method {self.method} of {self.model} needs another line: '
                 f'set protocol to {able} (it is {protocol.name})'
@@ -351,7 +351,7 @@ class DriveSettings:
         family = load_family(self.model)
         places = family[family.key_of_status].addresses
         if not needed and protocol.addressing not in places:
-            able = ' or '.join(one.name for one in PROTOCOLS.values() if one.addressing in places)
+            able = _or(line.name for line in PROTOCOLS.values() if line.addressing in places)
             raise ValueError(
                 f'no {self.model} is on a line of {protocol.name}: set protocol to {able}, or '
                 'another model'
@@ -387,10 +387,10 @@ class DriveSettings:
         if self.expected_control_mode == SPEED.mode and not self.nominal_speed:
             self._require_no_speed_mode()
         self._check_drive_timeout()
-        for name, one in settings.items():
+        for name, declared in settings.items():
             # what a family decides was checked above
-            if one.low is not None:
-                one.check(getattr(self, name))
+            if declared.low is not None:
+                declared.check(getattr(self, name))
 
     def _require_no_speed_mode(self) -> None:
         if _has_speed_mode(self.model, self.method):
@@ -484,8 +484,12 @@ class DriveSettings:
             method = profile.methods.get(self.method)
             dialect = profile.older.name if profile.older is not None else ''
             if dialect and dialect == self.classic_dialect and method and not method.older:
-                others = ' or '.join(name for name, one in profile.methods.items() if one.older)
+                others = _or(name for name, old in profile.methods.items() if old.older)
                 raise ValueError(f'classic_dialect {dialect} has no {method.means}: use {others}')
+
+
+def _or(names: Iterable[str]) -> str:
+    return ' or '.join(names)
 
 
 def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:

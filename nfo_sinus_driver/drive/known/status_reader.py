@@ -246,7 +246,7 @@ class StatusReader:
             )
         except Refused:
             value = math.nan
-        self._measurements.note(role, value)
+        self._measurements.take_value(role, value)
         return status.with_frequency(value * hertz, before)
 
     async def _read_int(self, key: str, priority: Priority, retry: bool) -> tuple[int, float]:

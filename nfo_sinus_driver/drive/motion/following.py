@@ -160,7 +160,7 @@ class FollowingCheck:
         """
         status = self._state.status
         hidden = status is not None and status.may_run and not status.runs
-        since = self._standing.note(at, hidden and frequency == 0)
+        since = self._standing.note_standing(at, hidden and frequency == 0)
         least, most = self._setpoint.range_since(at - STANDS_FOR)
         wanted = max(least, -most) * self._state.measurements.turning.hertz
         return wanted > STANDSTILL and at - since > STANDS_FOR

@@ -261,7 +261,7 @@ class Setpoint:
         self._state.measurements.direction.command(value)
         value = 0.0 if math.isnan(value) else value
         oldest = self._bus.now() - _REMEMBERED
-        self._had = [one for one in self._had if one[1] >= oldest]
+        self._had = [(had, until) for had, until in self._had if until >= oldest]
         if (value, math.inf) not in self._had:
             self._had.append((value, math.inf))
 
@@ -271,7 +271,7 @@ class Setpoint:
         self._may_have(value)
         now = self._bus.now()
         self._had = [
-            (one, until if one == value else min(until, now)) for one, until in self._had
+            (had, until if had == value else min(until, now)) for had, until in self._had
         ]
 
     @property
@@ -309,7 +309,7 @@ class Setpoint:
     def _due(self, value: float) -> list[tuple[Address, bytes]]:
         """Return the writes for a set-point: what the drive does not have, or not recently."""
         writes = self._encode(value, self._decoded(self._in_drive))
-        return [one for one in writes if not self._is_current(*one)]
+        return [(where, data) for where, data in writes if not self._is_current(where, data)]
 
     def _is_current(self, address: Address, data: bytes) -> bool:
         """Return whether the drive has the same there, and it need not be written again."""
@@ -443,7 +443,7 @@ class Setpoint:
         self._held[address] = held
         if is_news:
             asked, has = (
-                self._decoded({**self._in_drive, address: one}) for one in (data, held)
+                self._decoded({**self._in_drive, address: value}) for value in (data, held)
             )
             self._state.notify(
                 Severity.WARNING,
@@ -510,20 +510,20 @@ class Setpoint:
         if self._slot.pending and self._counts(self._request):
             self._note_waiting(self._limited(self._request), self._due_at(self._request))
         is_held = not contact.is_recognised
-        for one in self._in_vain.values():
-            silent = contact.is_silent_since(one.since)
-            least = _TRIES if one.value else _TRIES_OF_0
-            tried = is_held or max(one.tries, self._bus.writes_in_vain) >= least
-            if not tried and one.tries <= (1 if one.value else 0):
+        for failed in self._in_vain.values():
+            silent = contact.is_silent_since(failed.since)
+            least = _TRIES if failed.value else _TRIES_OF_0
+            tried = is_held or max(failed.tries, self._bus.writes_in_vain) >= least
+            if not tried and failed.tries <= (1 if failed.value else 0):
                 # on a slow line it waits for its turn, or one try was lost in noise; so long
                 rounds = _ROUNDS * self._bus.round_time()
-                if now < one.since + seconds + max(_TURNS_WITHIN, rounds):
+                if now < failed.since + seconds + max(_TURNS_WITHIN, rounds):
                     continue
             # after that long it does not matter how often there was time to try it again
             longer = _LOST_WITHIN if silent or not tried else 0.0
-            if one.since + seconds + longer <= now:
+            if failed.since + seconds + longer <= now:
                 why = Report(
-                    Cause.SETPOINT_UNACKNOWLEDGED, value=one.value, seconds=now - one.since
+                    Cause.SETPOINT_UNACKNOWLEDGED, value=failed.value, seconds=now - failed.since
                 )
                 self._state.hooks.setpoint_refused(why)
                 return

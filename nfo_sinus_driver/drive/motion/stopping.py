@@ -554,7 +554,7 @@ class StopSequence:
             shows_at = self._force_at
         if status.stands_running:
             # it may be braked first, or magnetised for a while
-            stands_since = self._standing.note(status.at, status.stands_running)
+            stands_since = self._standing.note_standing(status.at, status.stands_running)
             shows_at = max(shows_at, stands_since + self.shown_for)
         # a status from before, kept by a PLC, does not show whether the motor ramps down
         return status.at > self._sent_at and self._bus.now() >= shows_at
@@ -642,4 +642,4 @@ class StopSequence:
         # on its ramp it shows a run, too
         braking = await self._state.read_stop_braking()
         self.shown_for = _SHOWN_FOR + braking
-        return status.at >= self._standing.note(status.at, status.stands_running) + braking
+        return status.at >= self._standing.note_standing(status.at, status.stands_running) + braking

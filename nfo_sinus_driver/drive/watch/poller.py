@@ -306,7 +306,7 @@ class Poller:
         self._contact.note_poll()
         reported = self._controller is not None and self._controller.on_status(status)
         self._report_fault(status, reported)
-        self._conditions.take(status)
+        self._conditions.take_status(status)
         return status
 
     async def _poll(self) -> None:
@@ -396,7 +396,7 @@ class Poller:
         if value is None:
             # the last one counts until the next poll
             return measurements.last(role).value
-        measurements.note(role, value)
+        measurements.take_value(role, value)
         if role in state.model.roles:
             self._plan.measured(self._running - self._requested_at)
         return value

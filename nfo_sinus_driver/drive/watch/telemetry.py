@@ -83,14 +83,14 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
         above, below = map(values.get, scale, (NAN, NAN)) if scale else (1.0, 1.0)
         # one that is impossible, or not known, is that of the factory [C114]
         scaled = above != below and min(above, below) > 0
-        measurements.note(role, NAN if scaled else values[key_of(role)])
+        measurements.take_value(role, NAN if scaled else values[key_of(role)])
 
     while True:
         started = state.bus.now()
         rate = state.settings.telemetry_rate
         if not rate:
             for role in unpolled:
-                measurements.note(role, NAN)
+                measurements.take_value(role, NAN)
         if rate and state.contact.connected and state.contact.responsive and not yields():
             try:
                 keys = map(key_of, (*fast, *unpolled))
@@ -112,6 +112,6 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
                 state.missed()
                 values.update(dict.fromkeys((*map(key_of, FAST), *state.measured_keys), NAN))
                 for role in unpolled:
-                    measurements.note(role, NAN)
+                    measurements.take_value(role, NAN)
         period = 1 / rate if rate else _OFF_PERIOD
         await state.bus.sleep(period - (state.bus.now() - started))

@@ -56,7 +56,7 @@ def without_end(kinds: Iterable[object], took: dict[object, float]) -> list[obje
         scheduler.add(entry(kind))
     went = []
     for _ in range(_TURNS):
-        kind = kind_of(scheduler.take())
+        kind = kind_of(scheduler.next_entry())
         scheduler.took(took.get(kind, _READ))
         went.append(kind)
         scheduler.add(entry(kind))
@@ -76,7 +76,7 @@ def test_most_urgent_goes_first() -> None:
     for kind in (*sorted(Priority, reverse=True), _SLOT):
         scheduler.add(entry(kind))
     went = []
-    while (taken := scheduler.take()) is not None:
+    while (taken := scheduler.next_entry()) is not None:
         went.append(kind_of(taken))
         scheduler.took(0.0)
     assert went[:7] == [
@@ -97,7 +97,7 @@ def test_equals_go_in_the_order_they_came(kind: object) -> None:
     entries = [entry(kind, str(number)) for number in range(5)]
     for waiting in entries:
         scheduler.add(waiting)
-    assert [scheduler.take() for _ in range(6)] == [*entries, None]
+    assert [scheduler.next_entry() for _ in range(6)] == [*entries, None]
 
 
 def test_a_stop_goes_before_a_look_whether_a_motor_stops() -> None:
@@ -110,7 +110,7 @@ def test_a_stop_goes_before_a_look_whether_a_motor_stops() -> None:
     ]
     for waiting in (look, *stops):
         scheduler.add(waiting)
-    assert [scheduler.take() for _ in range(3)] == [*stops, look]
+    assert [scheduler.next_entry() for _ in range(3)] == [*stops, look]
 
 
 # --- the background -------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ def test_polls_of_units_that_do_not_answer_have_half_the_time() -> None:
     took: Counter[int] = Counter()
     gaps, gap = [], 0.0
     while sum(took.values()) < 60.0:
-        taken = scheduler.take()
+        taken = scheduler.next_entry()
         assert isinstance(taken, Waiting)
         unit = taken.request.unit
         seconds = timeout if unit in silent else _READ
@@ -173,19 +173,19 @@ def test_the_request_with_which_a_unit_falls_silent_is_of_that_half_too() -> Non
     for unit in (7, 8, 1):
         scheduler.add(poll_of(unit))
     for unit in (7, 8):
-        taken = scheduler.take()
+        taken = scheduler.next_entry()
         assert isinstance(taken, Waiting) and taken.request.unit == unit
         silent.add(unit)
         scheduler.took(0.2)
         scheduler.add(taken)
-    assert cast(Waiting, scheduler.take()).request.unit == 1
+    assert cast(Waiting, scheduler.next_entry()).request.unit == 1
 
 
 def test_units_that_do_not_answer_do_not_wait_when_no_other_waits() -> None:
     scheduler = Scheduler(lambda unit: True)
     for _ in range(10):
         scheduler.add(entry(Priority.POLL))
-        assert kind_of(scheduler.take()) == Priority.POLL
+        assert kind_of(scheduler.next_entry()) == Priority.POLL
         scheduler.took(0.2)
 
 
@@ -198,13 +198,13 @@ def test_an_idle_background_is_owed_little() -> None:
     scheduler = Scheduler()
     for _ in range(1000):
         scheduler.add(entry(Priority.POLL))
-        scheduler.take()
+        scheduler.next_entry()
         scheduler.took(0.2)
     for kind in (Priority.POLL, *_BACKGROUND):
         scheduler.add(entry(kind))
     went = []
     for _ in range(3):
-        went.append(kind_of(scheduler.take()))
+        went.append(kind_of(scheduler.next_entry()))
         scheduler.took(_READ)
     # one request of each
     assert set(went[:2]) == set(_BACKGROUND)
@@ -216,10 +216,10 @@ def test_background_that_waited_long_does_not_keep_the_line_for_long() -> None:
     for kind in (*[Priority.STOP] * 1000, *[Priority.TELEMETRY] * 1000, Priority.POLL):
         scheduler.add(entry(kind))
     for _ in range(1000):
-        scheduler.take()
+        scheduler.next_entry()
         scheduler.took(_READ)
     passed = 0.0
-    while kind_of(scheduler.take()) != Priority.POLL:
+    while kind_of(scheduler.next_entry()) != Priority.POLL:
         scheduler.took(_READ)
         passed += _READ
     # what it earns in half a second
@@ -230,13 +230,13 @@ def test_background_on_an_idle_line_makes_no_debt() -> None:
     scheduler = Scheduler()
     for _ in range(1000):
         scheduler.add(entry(Priority.TELEMETRY))
-        scheduler.take()
+        scheduler.next_entry()
         scheduler.took(_READ)
     scheduler.add(entry(Priority.TELEMETRY))
     went = []
     for _ in range(10):
         scheduler.add(entry(Priority.POLL))
-        went.append(kind_of(scheduler.take()))
+        went.append(kind_of(scheduler.next_entry()))
         scheduler.took(_READ)
     assert went.index(Priority.TELEMETRY) <= 7
 
@@ -248,17 +248,17 @@ def test_set_point_goes_before_all_that_the_background_is_owed() -> None:
     scheduler = Scheduler()
     for kind in (Priority.POLL, *[Priority.TELEMETRY] * 10):
         scheduler.add(entry(kind))
-    scheduler.take()
+    scheduler.next_entry()
     scheduler.took(10.0)
-    scheduler.take()
+    scheduler.next_entry()
     scheduler.took(_READ)
     scheduler.add(entry(_SLOT))
-    assert kind_of(scheduler.take()) == _SLOT
+    assert kind_of(scheduler.next_entry()) == _SLOT
     scheduler.took(_READ)
     # and then it goes on with what it is owed
     scheduler.add(entry(_SLOT))
     scheduler.add(entry(Priority.POLL))
-    assert kind_of(scheduler.take()) == Priority.TELEMETRY
+    assert kind_of(scheduler.next_entry()) == Priority.TELEMETRY
 
 
 @pytest.mark.parametrize('kind', [Priority.SERVICE, Priority.POLL])
@@ -269,7 +269,7 @@ def test_set_points_without_end_leave_every_other_turn_to_the_others(kind: Prior
         scheduler.add(entry(kind))
     went = []
     for _ in range(10):
-        went.append(kind_of(scheduler.take()))
+        went.append(kind_of(scheduler.next_entry()))
         scheduler.took(_READ)
     assert went == [_SLOT, kind] * 5
 
@@ -278,7 +278,7 @@ def test_stop_goes_before_a_set_point() -> None:
     scheduler = Scheduler()
     scheduler.add(entry(_SLOT))
     scheduler.add(entry(Priority.STOP))
-    assert kind_of(scheduler.take()) == Priority.STOP
+    assert kind_of(scheduler.next_entry()) == Priority.STOP
 
 
 def test_set_point_that_was_not_sent_had_no_turn() -> None:
@@ -286,8 +286,8 @@ def test_set_point_that_was_not_sent_had_no_turn() -> None:
     for kind in (_SLOT, _SLOT, Priority.POLL):
         scheduler.add(entry(kind))
     # the first has nothing to say any more
-    scheduler.take()
-    assert kind_of(scheduler.take()) == _SLOT
+    scheduler.next_entry()
+    assert kind_of(scheduler.next_entry()) == _SLOT
 
 
 def stop_of(unit: int) -> Waiting:
@@ -300,22 +300,22 @@ def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
     silent, poll, other = stop_of(2), entry(Priority.POLL), stop_of(3)
     scheduler = Scheduler(lambda unit: unit == 2)
     scheduler.add(silent)
-    assert scheduler.take() is silent
+    assert scheduler.next_entry() is silent
     scheduler.took(0.2)
     for waiting in (silent, poll):
         scheduler.add(waiting)
-    assert scheduler.take() is poll
+    assert scheduler.next_entry() is poll
     scheduler.took(_READ)
-    assert scheduler.take() is silent
+    assert scheduler.next_entry() is silent
     scheduler.took(0.2)
     # nothing else waits
     scheduler.add(silent)
-    assert scheduler.take() is silent
+    assert scheduler.next_entry() is silent
     scheduler.took(0.2)
     # a stop of another unit goes first of all
     for waiting in (silent, poll, other):
         scheduler.add(waiting)
-    assert scheduler.take() is other
+    assert scheduler.next_entry() is other
 
 
 @pytest.mark.parametrize('kind', [Priority.POLL, Priority.SERVICE, Priority.SETPOINT])
@@ -330,10 +330,10 @@ def test_between_two_stops_without_an_answer_the_most_urgent_has_its_turn(
     # it costs so much that every other request has a claim on the line
     for _ in range(5):
         scheduler.add(silent)
-        assert scheduler.take() is silent
+        assert scheduler.next_entry() is silent
         scheduler.took(0.2)
         scheduler.add(urgent)
-        assert scheduler.take() is urgent
+        assert scheduler.next_entry() is urgent
         scheduler.took(_READ)
 
 
@@ -346,7 +346,7 @@ def test_set_points_without_end_leave_turns_between_stops_without_an_answer(
         scheduler.add(waiting)
     went = []
     for _ in range(9):
-        taken = scheduler.take()
+        taken = scheduler.next_entry()
         assert taken is not None
         went.append(kind_of(taken))
         scheduler.took(0.2 if went[-1] == Priority.STOP else _READ)
@@ -363,7 +363,7 @@ def test_stops_of_several_units_that_do_not_answer_leave_every_other_turn_to_the
     # the first of each goes at once
     went = []
     for _ in range(13):
-        taken = scheduler.take()
+        taken = scheduler.next_entry()
         assert isinstance(taken, Waiting)
         went.append(taken)
         scheduler.took(_READ if taken is poll else 0.2)
@@ -380,7 +380,7 @@ def test_what_waits_for_a_unit_that_falls_silent_is_ranked_again(kind: Priority)
     for waiting in (falls_silent, other):
         scheduler.add(waiting)
     silent.add(7)
-    assert [scheduler.take() for _ in range(3)] == [other, falls_silent, None]
+    assert [scheduler.next_entry() for _ in range(3)] == [other, falls_silent, None]
 
 
 def test_the_first_stop_of_a_unit_is_not_held_back_by_its_service_that_was_in_vain() -> None:
@@ -390,11 +390,11 @@ def test_the_first_stop_of_a_unit_is_not_held_back_by_its_service_that_was_in_va
     service = Waiting(cast(Task, named('service')), asked)
     for waiting in (service, poll):
         scheduler.add(waiting)
-    assert scheduler.take() is service
+    assert scheduler.next_entry() is service
     scheduler.took(0.2)
     for waiting in (service, stop):
         scheduler.add(waiting)
-    assert [scheduler.take() for _ in range(2)] == [stop, poll]
+    assert [scheduler.next_entry() for _ in range(2)] == [stop, poll]
 
 
 def test_a_stop_that_is_answered_gives_way_to_none() -> None:
@@ -403,7 +403,7 @@ def test_a_stop_that_is_answered_gives_way_to_none() -> None:
     for waiting in (*stops, entry(Priority.POLL)):
         scheduler.add(waiting)
     for stop in stops:
-        assert scheduler.take() is stop
+        assert scheduler.next_entry() is stop
         scheduler.took(_READ)
 
 
@@ -422,10 +422,10 @@ def test_what_is_for_a_missing_unit_waits_until_it_may_go_and_goes_first_then() 
     scheduler.add(missing)
     scheduler.add(other)
     assert scheduler.missing_wait
-    assert scheduler.take(missing=False) is other
-    assert scheduler.take(missing=False) is None
+    assert scheduler.next_entry(missing=False) is other
+    assert scheduler.next_entry(missing=False) is None
     scheduler.add(other)
-    assert scheduler.take() is missing
+    assert scheduler.next_entry() is missing
     assert not scheduler.missing_wait
 
 
@@ -438,13 +438,13 @@ def test_what_waits_for_a_unit_that_goes_missing_waits_with_the_others_then(
     waiting = Waiting(cast(Task, named('asks')), Request(7, Read(register(1)), kind))
     scheduler.add(waiting)
     missing.add(7)
-    assert scheduler.take(missing=False) is None
+    assert scheduler.next_entry(missing=False) is None
     assert scheduler.missing_wait
-    assert scheduler.take() is waiting
+    assert scheduler.next_entry() is waiting
     scheduler.add(waiting)
     missing.clear()
     # it answers again, and is nothing special any more
-    assert scheduler.take() is waiting
+    assert scheduler.next_entry() is waiting
 
 
 def test_the_first_stop_of_a_missing_unit_goes_ahead_and_its_repetitions_wait() -> None:
@@ -452,23 +452,23 @@ def test_the_first_stop_of_a_missing_unit_goes_ahead_and_its_repetitions_wait() 
     scheduler = Scheduler(silent.__contains__, silent.__contains__)
     first, again, other = stop_of(7), stop_of(7), stop_of(2)
     scheduler.add(first)
-    assert scheduler.take(missing=False) is first
+    assert scheduler.next_entry(missing=False) is first
     scheduler.took(0.2)
     scheduler.add(again)
     scheduler.add(other)
-    assert scheduler.take(missing=False) is other
+    assert scheduler.next_entry(missing=False) is other
     scheduler.took(_READ)
-    assert scheduler.take(missing=False) is None
-    assert scheduler.take() is again
+    assert scheduler.next_entry(missing=False) is None
+    assert scheduler.next_entry() is again
     scheduler.took(0.2)
     # it has been back meanwhile: this stop is a first one again
     silent.clear()
     scheduler.add(poll_of(7))
-    assert scheduler.take(missing=False) is not None
+    assert scheduler.next_entry(missing=False) is not None
     scheduler.took(_READ)
     silent.add(7)
     scheduler.add(again)
-    assert scheduler.take(missing=False) is again
+    assert scheduler.next_entry(missing=False) is again
 
 
 @pytest.mark.parametrize(('answers', 'silent', 'first'), [(1, 9, 1), (9, 1, 2), (9, 8, 2)])
@@ -484,7 +484,7 @@ def test_in_noise_the_stop_with_the_fewest_requests_goes_first(
         task = Task(stop(unit), stops=True)
         awaited = [task.step(None, None) for _ in range(requests)]
         scheduler.add(Waiting(task, cast(Request, awaited[-1])))
-    taken = scheduler.take(in_noise=True)
+    taken = scheduler.next_entry(in_noise=True)
     assert isinstance(taken, Waiting) and taken.request.unit == first
 
 
@@ -500,10 +500,10 @@ def test_what_a_task_waits_for_can_be_withdrawn() -> None:
     ):
         scheduler.add(waiting)
     scheduler.withdraw(cast(Task, named('mine')))
-    assert scheduler.take() is slot
-    left = scheduler.take()
+    assert scheduler.next_entry() is slot
+    left = scheduler.next_entry()
     assert isinstance(left, Waiting) and left.task == cast(Task, named('other'))
-    assert scheduler.take() is None
+    assert scheduler.next_entry() is None
 
 
 def test_everything_can_be_taken_out_at_once() -> None:
@@ -513,25 +513,25 @@ def test_everything_can_be_taken_out_at_once() -> None:
         scheduler.add(waiting)
     cleared = scheduler.clear()
     assert sorted(map(id, cleared)) == sorted(map(id, entries))
-    assert scheduler.take() is None
+    assert scheduler.next_entry() is None
 
 
 def test_a_stop_in_vain_goes_ahead_again_once_the_unit_answers() -> None:
     missing = {7}
     scheduler = Scheduler(missing.__contains__, missing.__contains__)
     scheduler.add(stop_of(7))
-    scheduler.take()
+    scheduler.next_entry()
     scheduler.took(0.1)
     repeated, before, other = stop_of(7), poll_of(1), poll_of(1)
     scheduler.add(repeated)
     scheduler.add(before)
-    assert scheduler.take(missing=False) is before
+    assert scheduler.next_entry(missing=False) is before
     scheduler.took(_READ)
     scheduler.add(other)
     # it has been asked by another request meanwhile
     missing.clear()
-    assert scheduler.take(missing=False) is repeated
-    assert scheduler.take(missing=False) is other
+    assert scheduler.next_entry(missing=False) is repeated
+    assert scheduler.next_entry(missing=False) is other
 
 
 def test_of_stops_in_vain_the_one_that_was_tried_least_goes_first() -> None:
@@ -539,7 +539,7 @@ def test_of_stops_in_vain_the_one_that_was_tried_least_goes_first() -> None:
 
     def tried() -> int:
         """Have the next one tried in vain, and wait again behind all; return its unit."""
-        taken = scheduler.take()
+        taken = scheduler.next_entry()
         assert isinstance(taken, Waiting)
         scheduler.took(0.01)
         scheduler.add(taken)
