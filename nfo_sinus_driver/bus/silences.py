@@ -77,7 +77,7 @@ class _Unit:
 
     def not_answered(self, failed_at: float, now: float) -> None:
         """Note that a request was in vain, and when its answer had failed to come."""
-        if not self.is_silent:
+        if self.silent_since == math.inf:
             self.silent_since, self.gone_since = failed_at, now
 
     def paused(self, seconds: float) -> None:
@@ -88,11 +88,6 @@ class _Unit:
         """Return the longest time from one valid frame to the next since the last call."""
         longest, self.longest = self.longest, 0.0
         return longest
-
-    @property
-    def is_silent(self) -> bool:
-        """It has not answered the last request."""
-        return self.silent_since < math.inf
 
 
 class Silences:
@@ -177,7 +172,7 @@ class Silences:
             self._in_vain_since = math.inf
         elif self.is_missing(unit, now):
             self._pause_ends = now + (silence + seconds) * (1 / _MISSING_SHARE - 1)
-        if is_stop and its.is_silent:
+        if is_stop and its.silent_since < math.inf:
             self._stops_from = now + (silence + seconds) * (1 / _STOPS_IN_NOISE - 1)
         if error is not None and not isinstance(error, (PortError, Refused)):
             # by then a drive has answered
@@ -227,7 +222,7 @@ class Silences:
 
     def is_silent(self, unit: int) -> bool:
         """Return whether a unit has not answered the last request to it."""
-        return self._units[unit].is_silent
+        return self._units[unit].silent_since < math.inf
 
     def silent_since(self, unit: int, *, is_watched: bool) -> float:
         """
@@ -265,7 +260,7 @@ class Silences:
     @property
     def any_silent(self) -> bool:
         """A unit has not answered the last request to it."""
-        return any(its.is_silent for its in self._units.values())
+        return any(its.silent_since < math.inf for its in self._units.values())
 
     def asked_at(self, unit: int | None = None) -> float:
         """Return when a unit, or any, was last sent anything."""
