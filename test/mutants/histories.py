@@ -46,11 +46,11 @@ HISTORIES = (
     ),
     Mutant(
         2,
-        'in any order: a lost line does not end the enable',
+        'control is not told of a loss',
         'Poller._mark_lost',
         'self._controller is not None and self._controller.lost(why)\n',
         'False\n',
-        G2_SCMD,
+        ('test_no_stop_is_forgotten.py',),
     ),
     Mutant(
         2,

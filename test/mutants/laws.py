@@ -1342,7 +1342,7 @@ LAWS = (
         'Silences.stops_in_vain_from',
         'return self._stops_from if self.is_in_noise(now) else math.inf',
         'return math.inf',
-        ('test_noise.py', '-k', 'no_stop_waits'),
+        ('test_noise.py', '-k', 'long_line'),
     ),
     Mutant(
         3,
@@ -1593,8 +1593,8 @@ LAWS = (
         7,
         'between two polls what was read is not published',
         'Poller._poll_repeatedly',
-        '                    self._publish_changed()\n                if',
-        '                if',
+        '                        self._publish_changed()\n',
+        '',
         ('test_status_is_published.py', '-k', 'turns_is_shown'),
     ),
     Mutant(

@@ -248,6 +248,8 @@ def test_nothing_is_written_to_another_drive_and_every_state_is_reached() -> Non
         story = f'{before.key()} -> {name}'
         if world.drive == _OTHER:
             assert recognition not in (Recognition.HOLDS, Recognition.FOR_STOP), story
+        if before.drive == _OTHER and before.is_reached and name in ('recognise', 'look'):
+            assert recognition is Recognition.NONE, story
         if recognition is Recognition.HOLDS:
             assert contact.may_stop and contact.was_here, story
         # blind, a stop is written twice, and soon
