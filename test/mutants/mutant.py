@@ -13,7 +13,7 @@ import itertools
 from pathlib import Path
 import re
 
-WAYS_OUT = 'test_ways_out.py'
+WAYS_OUT = 'test_every_end_stops_the_motor.py'
 NO_RESTART = 'test_no_restart.py'
 INTERFACE = 'test_interface.py'
 TRACE = 'test_trace.py'
