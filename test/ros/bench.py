@@ -515,7 +515,7 @@ class Client(contextlib.ExitStack):
         """
         response = self.enable()
         not_yet = ('a stop is on its way', 'did not answer')
-        return None if any(one in response.message for one in not_yet) else response
+        return None if any(reason in response.message for reason in not_yet) else response
 
     def change_state(self, transition: int) -> bool:
         """Ask for a lifecycle transition."""

@@ -236,7 +236,11 @@ CONNECTIONS = {
     )
 }
 #: Through a PLC, which tells less than any line of the drives themselves, by their models.
-TELEGRAM1 = {one.model: one for one in CONNECTIONS.values() if one.method == 'telegram1'}
+TELEGRAM1 = {
+    connection.model: connection
+    for connection in CONNECTIONS.values()
+    if connection.method == 'telegram1'
+}
 #: Those of a normal run: the others behind a PLC have their share in test_telegram1_ros.py.
 USUAL = tuple(name for name in CONNECTIONS if name not in ('telegram1_optimal', 'telegram1_g2'))
 DEFAULT = 'modbus_rtu'

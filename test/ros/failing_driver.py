@@ -33,7 +33,7 @@ def _failing(what: str) -> Any:
 
 def _failing_for_one(check: Any) -> Any:
     def fail(node: DriveNode, parameters: list[Parameter]) -> Any:
-        if any(one.name == PARAMETER for one in parameters):
+        if any(parameter.name == PARAMETER for parameter in parameters):
             raise LookupError('a parameter')
         return check(node, parameters)
 

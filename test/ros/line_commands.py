@@ -30,7 +30,11 @@ def run_commands(connection: Connection, requests: Sequence[Request]) -> int:
     """Return how often that drive was commanded to run; function bits are refreshed meanwhile."""
     if connection.bus != 'movitrac':
         return requests.count(run_command(connection))
-    written = [one.words[1] for one in requests if one.place == _BITS and one.words is not None]
+    written = [
+        request.words[1]
+        for request in requests
+        if request.place == _BITS and request.words is not None
+    ]
     runs = [bool(bits & _DIRECTIONS) for bits in written]
     return sum(now and not before for before, now in itertools.pairwise([False, *runs]))
 

@@ -97,15 +97,15 @@ def test_both_say_the_same_of_it(modules: dict[str, ModuleType], tmp_path: Path)
         assert dict(described['custom_data']) == {'drive': 'simulated'}
         found.append(
             {
-                (one['topic_metadata']['name'], one['topic_metadata']['type'],
-                 one['topic_metadata']['type_description_hash'],
-                 one['topic_metadata']['offered_qos_profiles'][0]['durability'],
-                 one['topic_metadata']['offered_qos_profiles'][0]['reliability'],
-                 one['message_count'])
-                for one in described['topics_with_message_count']
+                (topic['topic_metadata']['name'], topic['topic_metadata']['type'],
+                 topic['topic_metadata']['type_description_hash'],
+                 topic['topic_metadata']['offered_qos_profiles'][0]['durability'],
+                 topic['topic_metadata']['offered_qos_profiles'][0]['reliability'],
+                 topic['message_count'])
+                for topic in described['topics_with_message_count']
             }
         )
-    assert all(one == found[0] for one in found) and len(found[0]) == len(MESSAGES)
+    assert all(messages == found[0] for messages in found) and len(found[0]) == len(MESSAGES)
 
 
 def test_what_cannot_be_written_is_an_error_of_the_system(

@@ -27,12 +27,13 @@ def test_a_belt_is_commanded_and_reported_in_its_own_unit(bench: Bench, sign: in
         # 0.02 m/s a hertz
         wait_until(lambda: abs(simulator.state()['frequency'] + sign * 20.0) < 0.2, '20 Hz')
         status = wait_until(
-            lambda: abs((one := client.messages['status'][-1]).actual + 0.4) < 0.005 and one,
+            lambda: abs((status := client.messages['status'][-1]).actual + 0.4) < 0.005 and status,
             'it is reported',
         )
         # another topic may arrive later, although it was published with this status
         client.wait_for(
-            'actual_frequency', lambda one: abs(abs(one.data) - 20.0) < 0.5, 'in Hz all the same'
+            'actual_frequency', lambda message: abs(abs(message.data) - 20.0) < 0.5,
+            'in Hz all the same',
         )
     assert status.unit == 'm/s'
     assert status.setpoint == pytest.approx(-0.4, abs=0.001)
@@ -49,7 +50,8 @@ def test_the_limit_is_in_the_unit_of_the_drive(bench: Bench) -> None:
     with client.setpoints(1.0):
         wait_until(lambda: simulator.state()['frequency'] > 14.8, 'it is at the limit')
         status = wait_until(
-            lambda: (one := client.messages['status'][-1]).setpoint_clamped and one, 'it says so'
+            lambda: (status := client.messages['status'][-1]).setpoint_clamped and status,
+            'it says so',
         )
         assert status.setpoint == pytest.approx(0.3, abs=0.001)
     assert simulator.state()['frequency'] < 15.2
@@ -107,11 +109,11 @@ right: {ros__parameters: {address: 2, scale: 0.04, unit: m/s}}
     assert every_drive.call('enable_all').success
     publishing(
         lambda: all(
-            abs(simulator.state(one)['frequency'] - hertz) < 0.2
-            for one, hertz in ((1, 20.0), (2, 10.0))
+            abs(simulator.state(unit)['frequency'] - hertz) < 0.2
+            for unit, hertz in ((1, 20.0), (2, 10.0))
         ),
         'each has 0.4 m/s',
     )
-    assert [one.messages['status'][-1].unit for one in (left, right)] == ['m/s', 'm/s']
+    assert [client.messages['status'][-1].unit for client in (left, right)] == ['m/s', 'm/s']
     assert every_drive.call('stop_all').success
-    wait_until(lambda: not any(simulator.state(one)['turning'] for one in (1, 2)), 'both stand')
+    wait_until(lambda: not any(simulator.state(unit)['turning'] for unit in (1, 2)), 'both stand')

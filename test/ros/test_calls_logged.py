@@ -41,7 +41,7 @@ def test_each_command_is_logged_once_with_the_name_of_its_client(bench: Bench) -
         f'/nfo_sinus/enable (true) called by {name}',
         f'/nfo_sinus/enable (false) called by {name}',
         *(f'/nfo_sinus/{service} called by {name}' for service in (*_TRIGGERS, 'tune_basic')),
-        *(f'/nfo_sinus_bus/{one} called by {other}' for one in ('stop_all', 'disable_all')),
+        *(f'/nfo_sinus_bus/{service} called by {other}' for service in ('stop_all', 'disable_all')),
         f'/nfo_sinus_bus/enable_all called by {other}',
         f'/nfo_sinus/enable (true) called by {name}: fault 5 ',
         f'/nfo_sinus/tune_full called by {name}: fault 5 ',

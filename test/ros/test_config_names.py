@@ -117,7 +117,9 @@ def test_foxglove_shows_fields_that_exist(topics: Names) -> None:
 
 def test_foxglove_names_the_states_as_the_message_does() -> None:
     (panel,) = _panels('StateTransitions').values()
-    (states,) = [one['customStates']['states'] for one in panel['paths'] if 'customStates' in one]
+    (states,) = [
+        path['customStates']['states'] for path in panel['paths'] if 'customStates' in path
+    ]
     shown = {state['label'].upper().replace(' ', '_'): int(state['value']) for state in states}
     assert shown == {name: getattr(DriveStatus, name) for name in shown}
     text = (MSG_DEFS / 'msg' / 'DriveStatus.msg').read_text()
@@ -148,7 +150,7 @@ def test_plotjuggler_draws_fields_that_exist(topics: Names) -> None:
 
 def _statuses(client: Client) -> set[str]:
     """The names of what the driver says in its diagnostics."""
-    return {one.name for message in client.messages['diagnostics'] for one in message.status}
+    return {status.name for message in client.messages['diagnostics'] for status in message.status}
 
 
 def test_diagnostics_are_grouped_by_bus_and_by_drive(client: Client) -> None:
@@ -161,8 +163,8 @@ def test_diagnostics_are_grouped_by_bus_and_by_drive(client: Client) -> None:
     conveyor = yaml.safe_load((CONFIG / 'conveyor.yaml').read_text())
     drives = conveyor['/**/nfo_sinus_bus']['ros__parameters']['drives']
     (bus,) = (name for name in _statuses(client) if name.startswith('nfo_sinus_bus'))
-    (one,) = _statuses(client) - {bus}
-    named = {drive: one.replace('nfo_sinus', drive) for drive in drives}
+    (status,) = _statuses(client) - {bus}
+    named = {drive: status.replace('nfo_sinus', drive) for drive in drives}
     assert aggregator.expected() == {bus, *named.values()}
     assert aggregator.groups(bus) == {'Lines', 'Conveyor/line'}
     for drive, status in named.items():

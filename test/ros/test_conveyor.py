@@ -72,9 +72,9 @@ class Conveyor:
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            for one in status.values:
-                if one.key == 'lifecycle state':
-                    self.states[status.name] = one.value
+            for pair in status.values:
+                if pair.key == 'lifecycle state':
+                    self.states[status.name] = pair.value
 
     def who_do_not(self, *others: int) -> dict[int, DriveStatus]:
         """Return the drives, but some, that do not follow their set-point of 20 Hz."""
@@ -91,7 +91,7 @@ class Conveyor:
         assert answer.success, answer.message
         assert answer.message.count(': enabled') == len(NAMES)
         wait_until(
-            lambda: all(one.get_subscription_count() for one in self._setpoints),
+            lambda: all(publisher.get_subscription_count() for publisher in self._setpoints),
             'each has a subscriber', period=0.1,
         )
         for publisher in self._setpoints:
@@ -175,4 +175,5 @@ def test_a_conveyor_from_its_start_to_its_end(bench: Bench) -> None:
     requests = bench.requests()[before:]
     stops = {address: requests.index(f'{address:02x}{_STOP}') for address in NAMES}
     meanwhile = requests[min(stops.values()) : max(stops.values())]
-    assert not [one for one in meanwhile if one[2:4] == _READ], 'one was asked before all'
+    asked = [request for request in meanwhile if request[2:4] == _READ]
+    assert not asked, 'a drive was asked before all have a stop'

@@ -148,7 +148,7 @@ def _read(folder: Path) -> Bag:
     bag = Bag({}, {})
     # the definitions in the bag are all it has, and it compares them with the types' hashes
     with AnyReader([folder]) as reader:
-        assert {one.topic: one.msgtype for one in reader.connections} == _TYPES
+        assert {connection.topic: connection.msgtype for connection in reader.connections} == _TYPES
         for connection, stamp, data in reader.messages():
             message = reader.deserialize(data, connection.msgtype)
             bag.times.setdefault(connection.topic, []).append(stamp / 1e9)
@@ -161,7 +161,7 @@ def _check_counts(bag: Bag) -> None:
     length = _seconds(connected[-1].header.stamp) - _seconds(connected[0].header.stamp)
     assert length > _LEAST_LENGTH
     counts = {topic: len(messages) for topic, messages in bag.messages.items()}
-    cycles = [one.cycle_time for one in bag.messages['/nfo_sinus_bus/statistics']]
+    cycles = [statistics.cycle_time for statistics in bag.messages['/nfo_sinus_bus/statistics']]
     cycle = statistics.median(time for time in cycles if not math.isnan(time))
     asked = bag.times['/nfo_sinus/setpoint']
     least = {
@@ -224,7 +224,8 @@ def _check_values(bag: Bag) -> None:
     assert statuses[0].OPERATION_ENABLED in states[:faulted]
     assert statuses[0].OPERATION_ENABLED in states[faulted:], 'it ran again'
 
-    wanted = [value for value, _ in itertools.groupby(one.data for one in bag.drive('setpoint'))]
+    setpoints = (message.data for message in bag.drive('setpoint'))
+    wanted = [value for value, _ in itertools.groupby(setpoints)]
     assert wanted == [30.0, -20.0, 0.0, 15.0]
     # 1480 rpm at 50 Hz
     speeds = [message.data for message in bag.drive('actual_speed')]
@@ -237,7 +238,8 @@ def _check_values(bag: Bag) -> None:
     assert 0 in currents
 
     faults = [message for message in bag.drive('inv_st') if message.kind == message.FAULT]
-    assert {(one.code, one.text, one.requires_ack) for one in faults} == {(5, 'Overload', True)}
+    told = {(fault.code, fault.text, fault.requires_ack) for fault in faults}
+    assert told == {(5, 'Overload', True)}
     assert bag.drive('inv_st')[-1].text == 'Bus Stby'
     assert any('fault 5 Overload' in message.msg for message in bag.messages['/rosout'])
 
@@ -248,8 +250,8 @@ def _check_calls(bag: Bag) -> None:
     }
     for service, beginnings in answers.items():
         events = bag.drive(f'{service}/_service_event')
-        asked = [one.request[0] for one in events if one.request]
-        answered = [one.response[0] for one in events if one.response]
+        asked = [event.request[0] for event in events if event.request]
+        answered = [event.response[0] for event in events if event.response]
         assert len(asked) == len(answered) == len(beginnings), service
         for response, beginning in zip(answered, beginnings, strict=True):
             assert response.success

@@ -66,7 +66,7 @@ def test_a_run(bench: Bench, file: Path, family: str) -> None:
         client.wait_for('status', lambda status: abs(status.actual + 15) < 0.5, 'reverse')
         assert client.newest('status').reverse
         drive.inject('fault', 1)
-        fault = client.wait_for('inv_st', lambda one: one.code == 1, 'the fault')
+        fault = client.wait_for('inv_st', lambda status: status.code == 1, 'the fault')
         assert (fault.text, fault.remedy[:11]) == ('oc', 'Check motor')
         client.wait_for('status', lambda status: not status.enabled, 'it is not enabled any more')
         assert client.call('fault_ack').success
@@ -115,5 +115,5 @@ def test_the_command_families_lists_it(bench: Bench, file: Path) -> None:
         [_executable('families')], env=bench._environment, capture_output=True, text=True,
         check=True,
     )
-    (line,) = [one for one in done.stdout.splitlines() if one.startswith(NAME)]
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith(NAME)]
     assert 'Delta VFD-EL' in line and f'package {PACKAGE}' in line and str(file) in line

@@ -75,7 +75,7 @@ def test_all_drives_of_one_machine_stop_with_each_of_them(name: str) -> None:
         drive: {**nodes['/**'], **nodes[drive]} for drive in nodes['nfo_sinus_bus']['drives']
     }
     # one that is only monitored neither stops nor is stopped
-    commanded = {one for one, given in drives.items() if given.get('control_method') != 'monitor'}
+    commanded = {name for name, given in drives.items() if given.get('control_method') != 'monitor'}
     for drive in commanded:
         assert {drive, *drives[drive].get('stop_with', ())} == commanded, drive
 
@@ -248,14 +248,14 @@ def test_a_wheel_that_stops_stops_the_other_whatever_the_controller_sends(
         happens(simulator, left)
         right.wait_for(
             'status',
-            lambda one: one.stop_reason == DriveStatus.REASON_STOP_WITH and not one.enabled
-            and one.stop_text.startswith('it stops with /left_wheel: '),
+            lambda status: status.stop_reason == DriveStatus.REASON_STOP_WITH and not status.enabled
+            and status.stop_text.startswith('it stops with /left_wheel: '),
             'the other one stops with it',
         )
         for address in (1, 2):
             wait_until(lambda a=address: not simulator.state(a)['turning'], 'it stands')
         holds_for(
-            A_WHILE, lambda: not any(simulator.state(one)['turning'] for one in (1, 2)),
+            A_WHILE, lambda: not any(simulator.state(unit)['turning'] for unit in (1, 2)),
             'no command moves either',
         )
 

@@ -35,7 +35,7 @@ _OF_OTHERS = (
     'nav2_lifecycle_manager', '/lifecycle_manager', 'nfo_sinus_cpp_client', 'ros2 security',
     'ros2 daemon', 'nav2_msgs',
 )
-_OURS = [one for one in _ALL if not any(other in one.text for other in _OF_OTHERS)]
+_OURS = [command for command in _ALL if not any(other in command.text for other in _OF_OTHERS)]
 #: What commands and shows a running drive by the names of its node.
 _NODE = re.compile(r'ros2 (topic|service|param|action) .*?(/nfo_sinus(?:_bus)?)(?=[/ ]|$)')
 #: Needs another drive or another bus, or a file that the page has made before.
@@ -61,7 +61,7 @@ def _fill(message: Any, values: dict[str, Any]) -> None:
 
 
 def test_there_are_such_commands() -> None:
-    verbs = {_words(one)[1] for one in _OURS}
+    verbs = {_words(command)[1] for command in _OURS}
     assert {'topic', 'service', 'param', 'action', 'run', 'launch'} <= verbs
     assert len(_OURS) > 25
     with pytest.raises(AssertionError, match='has no datum'):
@@ -97,7 +97,7 @@ def test_commands_for_a_running_drive_run_as_they_are_typed(bench: Bench) -> Non
     client = bench.client().connected()
     done = []
     for command in _OURS:
-        if not _NODE.match(command.text) or any(one in command.text for one in _ELSEWHERE):
+        if not _NODE.match(command.text) or any(word in command.text for word in _ELSEWHERE):
             continue
         wait_until(functools.partial(_runs, command, bench), f'{command} finds its node')
         done.append(command)

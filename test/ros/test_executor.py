@@ -125,4 +125,4 @@ def test_the_threads_of_a_node_that_is_ended_are_gone(served: Served) -> None:
     served.executor.end()
     served.executor.join(10.0)
     assert not served.executor.alive
-    assert not [one for one in threading.enumerate() if one.name == 'executor of served']
+    assert not [thread for thread in threading.enumerate() if thread.name == 'executor of served']

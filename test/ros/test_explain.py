@@ -69,7 +69,7 @@ def statuses() -> Iterator[tuple[float, DriveStatus]]:
 def write(bag: Path, messages: list[tuple[str, float, Any]]) -> None:
     """Write messages: topic, when (s) and what."""
     writer = bags.create(bag, {})
-    messages.sort(key=lambda one: one[1])
+    messages.sort(key=lambda message: message[1])
     for topic, type_ in {topic: type(message) for topic, _, message in messages}.items():
         writer.add_topic(topic, type_, RELIABLE)
     for topic, at, message in messages:
@@ -87,7 +87,7 @@ def bag(tmp_path: Path) -> Path:
     answer.info.stamp, answer.info.event_type = stamp(1.0), answer.info.RESPONSE_SENT
     call = f'{_DRIVE}/enable/_service_event'
     write(folder, [
-        *((f'{_DRIVE}/status', at, one) for at, one in statuses()),
+        *((f'{_DRIVE}/status', at, status) for at, status in statuses()),
         (call, 0.9, event), (call, 1.0, answer), ('/line2/outfeed/status', 0.5, status(0.5)),
     ])
     return folder

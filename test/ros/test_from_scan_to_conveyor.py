@@ -125,7 +125,7 @@ def test_the_file_for_32_drives_starts_as_many(bench: Bench) -> None:
     def all_there() -> bool:
         for message in client.messages['diagnostics']:
             for status in message.status:
-                seen[status.name] = {one.key: one.value for one in status.values}
+                seen[status.name] = {pair.key: pair.value for pair in status.values}
         return names <= seen.keys()
 
     wait_until(all_there, 'every drive has a node', timeout=3 * PATIENCE)

@@ -243,9 +243,9 @@ def test_diagnostics_of_a_run_name_its_fault_and_cry_over_no_stop_that_goes_well
         drive.inject('fault', fault.code)
         # at once, and with the second that follows
         wait_until(
-            lambda: sum(one.startswith(f'{fault.text}: ') for one in said()) > 1, 'the fault'
+            lambda: sum(line.startswith(f'{fault.text}: ') for line in said()) > 1, 'the fault'
         )
-    assert not [one for one in said() if 'NOT confirmed' in one]
+    assert not [line for line in said() if 'NOT confirmed' in line]
 
 
 @needs('direct')
@@ -274,7 +274,7 @@ def test_quality_of_service(idle: Client) -> None:
 def test_the_settings_have_their_defaults_and_descriptions(bench: Bench) -> None:
     bench.simulator(paced=True)
     given = {'port': bench.port, **bench.connection.driver}
-    bench.bare_driver(*(word for one in given.items() for word in ('-p', '{}:={}'.format(*one))))
+    bench.bare_driver(*(word for item in given.items() for word in ('-p', '{}:={}'.format(*item))))
     client = bench.client().connected()
     names = client.parameter_names()
     for name, default in {**_SETTINGS, 'model': bench.connection.model}.items():
@@ -499,11 +499,11 @@ def test_each_drive_publishes_its_own_statistics(bench: Bench) -> None:
     assert line.timeouts > 2 and line.round_trip_median > 0
     drive.inject('silence', 0.0, address=2)
     right.wait_for('own statistics', lambda m: m.reconnects == 1 and not m.silent_drives, 'back')
-    values = {one.key: one.value for one in _diagnosis(right, 'right: drive').values}
+    values = {pair.key: pair.value for pair in _diagnosis(right, 'right: drive').values}
     assert int(values['timeouts']) > 2
     wait_until(lambda: _median(right) > 0, 'its round trips are in its diagnostics')
 
 
 def _median(client: Client) -> float:
-    values = {one.key: one.value for one in _diagnosis(client, 'right: drive').values}
+    values = {pair.key: pair.value for pair in _diagnosis(client, 'right: drive').values}
     return float(values['round trip median'].partition(' ')[0] or 0)

@@ -289,7 +289,7 @@ def test_a_set_point_of_a_clock_that_is_ahead_is_ignored_and_that_is_reported_on
     # a little is no reason: no two clocks are the same
     with Publisher(client, path, message(1.0)):
         wait_until(lambda: turns(simulator), 'it is followed')
-    client.wait_for('status', lambda one: not one.setpoint, 'no set-point arrives')
+    client.wait_for('status', lambda status: not status.setpoint, 'no set-point arrives')
     wait_until(lambda: not turns(simulator), 'it stands')
     with Publisher(client, path, message(_HOUR)):
         wait_until(lambda: bench.log.count(_AHEAD) == 2, 'it was right, and is wrong again')

@@ -39,7 +39,7 @@ def test_many_calls_at_once_are_all_answered(
     drive = bench.simulator(*bench.drives.ramps(1))
     bench.driver()
     client = bench.client().connected()
-    type_ = next(one for one in _TYPES if isinstance(request_, one.Request))
+    type_ = next(type_ for type_ in _TYPES if isinstance(request_, type_.Request))
     many = client.node.create_client(type_, service, qos_profile=_QUALITY)
     wait_until(many.service_is_ready, 'there is a service')
     with client.run_at(20.0):

@@ -32,14 +32,14 @@ def test_measured_values_and_what_is_only_read(bench: Bench) -> None:
     client: Client = bench.client().connected()
     client.listen('measured', Measured, '/nfo_sinus/measured', RELIABLE)
     heat = 'status.heat_sink_temperature'
-    message = client.wait_for('measured', lambda one: one.value[0] > 0, 'a warm heat sink')
+    message = client.wait_for('measured', lambda message: message.value[0] > 0, 'a warm heat sink')
     usual = list(load_family('movitrac31').profile.measured)
     assert (message.name, len(message.value)) == (usual, len(usual))
     assert message.unit[:3] == ['°C', '%', '%']
 
     # named while it runs, and named wrongly
     assert client.set_parameters(measured=['status.frequency']).successful
-    client.wait_for('measured', lambda one: one.name == ['status.frequency'], 'the other')
+    client.wait_for('measured', lambda message: message.name == ['status.frequency'], 'the other')
     refused(client.set_parameters(measured=['status.no_such']), 'status.no_such', heat)
 
     # between the ends of its range it takes some numbers alone
@@ -56,23 +56,23 @@ def test_measured_values_and_what_is_only_read(bench: Bench) -> None:
 
 
 def test_a_list_that_was_dumped_empty_is_taken_as_empty(bench: Bench, tmp_path: Path) -> None:
-    names = [name for name, one in DRIVE_SETTINGS.items() if isinstance(one.default, list)]
+    names = [name for name, setting in DRIVE_SETTINGS.items() if isinstance(setting.default, list)]
     assert len(names) > 1
     bench.simulator()
     dumped = tmp_path / 'dumped.yaml'
     # as `ros2 param dump` writes it
     dumped.write_text(
-        '\n'.join(['/nfo_sinus:', '  ros__parameters:', *(f'    {one}: []' for one in names)]),
+        '\n'.join(['/nfo_sinus:', '  ros__parameters:', *(f'    {name}: []' for name in names)]),
         encoding='utf-8',
     )
     bench.driver('--params-file', str(dumped))
     client: Client = bench.client().connected()
     client.listen('measured', Measured, '/nfo_sinus/measured', RELIABLE)
     usual = list(load_family('movitrac31').profile.measured)
-    client.wait_for('measured', lambda one: one.name == usual, 'the usual ones')
+    client.wait_for('measured', lambda message: message.name == usual, 'the usual ones')
     # and while it runs
     assert client.set_parameters(measured=['status.frequency']).successful
-    client.wait_for('measured', lambda one: one.name == ['status.frequency'], 'the one')
+    client.wait_for('measured', lambda message: message.name == ['status.frequency'], 'the one')
     result = client.set_parameters(measured=[])
     assert result.successful, result.reason
-    client.wait_for('measured', lambda one: one.name == usual, 'the usual ones again')
+    client.wait_for('measured', lambda message: message.name == usual, 'the usual ones again')

@@ -25,7 +25,7 @@ def test_no_parameter_name_is_the_prefix_of_another(
 ) -> None:
     # `ros2 param dump` makes a tree of them, in which a name is a value or a branch
     names = {*_OF_ROS, *settings, *load_family(family)}
-    assert not [(one, other) for one in names for other in names if other.startswith(f'{one}.')]
+    assert not [(name, other) for name in names for other in names if other.startswith(f'{name}.')]
 
 
 def test_an_old_name_is_answered_with_what_it_is_called_now() -> None:

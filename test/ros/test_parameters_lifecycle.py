@@ -254,8 +254,8 @@ def test_what_clients_set_and_list_meanwhile_hinders_no_transition(
     bench.driver(*QUIET, '-p', 'autostart:=false')
     client = bench.client()
     value = itertools.cycle((6.0, 7.0))
-    calling(lambda one: one.set_parameters_async(**{'control.accel': next(value)}))
-    calling(lambda one: one.call_async('list_parameters', ListParameters))
+    calling(lambda client: client.set_parameters_async(**{'control.accel': next(value)}))
+    calling(lambda client: client.call_async('list_parameters', ListParameters))
     for _ in range(4):
         # a simulated drive that gets no time to answer hinders it, too
         wait_until(lambda: client.change_state(Transition.TRANSITION_CONFIGURE), 'it is configured')
@@ -361,8 +361,8 @@ def test_a_drive_that_is_let_go_is_left_alone(bench: Bench, ways: tuple[int, ...
     # and it is not missed
     heard = len(client.messages['diagnostics'])
     wait_until(lambda: len(client.messages['diagnostics']) > heard + 1, 'what is known now')
-    found = {one.name: one for one in client.messages['diagnostics'][-1].status}
-    assert {one.level for one in found.values()} == {DiagnosticStatus.OK}, found
+    found = {status.name: status for status in client.messages['diagnostics'][-1].status}
+    assert {status.level for status in found.values()} == {DiagnosticStatus.OK}, found
     assert 'not connected' in found['nfo_sinus: drive'].message
     assert list(client.newest('statistics').silent_drives) == []
 
@@ -384,7 +384,7 @@ def test_a_later_difference_from_the_parameter_file_is_reported_after_a_new_star
     assert client.change_state(Transition.TRANSITION_CONFIGURE)
     client.wait_for(
         'diagnostics',
-        lambda message: any('1 parameters differ' in one.message for one in message.status),
+        lambda message: any('1 parameters differ' in status.message for status in message.status),
         'it is reported',
         timeout=20.0,
     )

@@ -56,8 +56,8 @@ def cut(texts: list[Text]) -> list[tuple[str, str]]:
     """The pairs that lie one on the other."""
     boxes = [(text.get_text(), text.get_window_extent()) for text in texts]
     return [
-        (one, other)
-        for (one, box), (other, another) in itertools.combinations(boxes, 2)
+        (text, other)
+        for (text, box), (other, another) in itertools.combinations(boxes, 2)
         if box.overlaps(another)
     ]
 
@@ -101,7 +101,7 @@ def test_names_of_faults_and_states_do_not_cut_each_other(seed: int) -> None:
         Span(begin, end, random.choice(('Bus Run', 'Overload', 'Bus Stby', 'DC Over Voltage')))
         for begin, end in itertools.pairwise((0.0, *moments, 60.0))
     ]
-    faults = [Span(one.begin, one.end, one.what, 7) for one in states if 'Over' in one.what]
+    faults = [Span(span.begin, span.end, span.what, 7) for span in states if 'Over' in span.what]
     run = run_of(60.0, lambda time: 20.0, texts=states, faults=faults)
     bars, frequency = panels(run)[:2]
     assert not cut([text for text in bars.texts if text.get_position()[1] < 1])

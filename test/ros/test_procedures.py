@@ -88,13 +88,13 @@ def test_a_new_entry_is_published_with_the_fault(bench: Bench) -> None:
     wait_until(lambda: _last_error(client).startswith('5 Overload at'), 'reported there')
     # both are of the tick of the first reading, and may be from before it was switched on
     log = client.call('get_error_log', GetErrorLog)
-    assert [one.code for one in log.entries] == [5, 3]
-    assert [seconds(one.stamp) for one in log.entries] == [0, 0]
+    assert [entry.code for entry in log.entries] == [5, 3]
+    assert [seconds(entry.stamp) for entry in log.entries] == [0, 0]
     assert '2 of them without the wall time' in log.message
     # who comes late gets it too
     late = bench.client()
     late.listen('entry', ErrorLogEntry, '/nfo_sinus/error_log_entry', kept)
-    late.wait_for('entry', lambda one: one == entry, 'the entry')
+    late.wait_for('entry', lambda message: message == entry, 'the entry')
 
 
 def test_the_energy_is_reset(bench: Bench) -> None:
@@ -158,7 +158,7 @@ def test_the_action_reports_its_progress_and_what_changed(bench: Bench) -> None:
     assert result.success and 'TuningOK' in result.message
     assert {text.split(':')[0] for text in result.changed} >= {'motor.r_stat', 'motor.sigma'}
     assert all(' -> ' in text for text in result.changed)
-    during = [one for one in tuner.feedback if one.status.code == _TUNING]
+    during = [feedback for feedback in tuner.feedback if feedback.status.code == _TUNING]
     assert during and during[-1].elapsed > during[0].elapsed >= 0
     assert during[0].status.text == 'Tuning'
 

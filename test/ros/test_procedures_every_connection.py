@@ -106,9 +106,9 @@ def test_the_action_reports_every_stage(rig: Rig) -> None:
     assert any(text.startswith('motor.r_stat: ') for text in result.changed)
     # feedback is on its way beside the result
     wait_until(lambda: tuner.feedback[-1].status.text == 'RsMeasOK', 'the last stage')
-    codes = [one.status.code for one in tuner.feedback]
+    codes = [feedback.status.code for feedback in tuner.feedback]
     assert _TUNING in codes
-    times = [one.elapsed for one in tuner.feedback]
+    times = [feedback.elapsed for feedback in tuner.feedback]
     assert times == sorted(times) and times[0] < times[-1]
 
 

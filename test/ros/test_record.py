@@ -158,9 +158,11 @@ def test_all_drives_are_recorded_and_it_is_explained_why_they_stopped(bench: Ben
     infeed.enable()
     outfeed.enable()
     simulator.inject('fault', 5, address=1)
-    infeed.wait_for('status', lambda one: one.stop_reason == one.REASON_FAULT, 'the fault')
+    infeed.wait_for('status', lambda status: status.stop_reason == status.REASON_FAULT, 'the fault')
     bus.call('stop_all')
-    outfeed.wait_for('status', lambda one: one.stop_reason == one.REASON_STOP_ALL, 'the stop')
+    outfeed.wait_for(
+        'status', lambda status: status.stop_reason == status.REASON_STOP_ALL, 'the stop'
+    )
     known = len(outfeed.messages['status'])
     # the name of who called is there within a second
     wait_until(lambda: len(outfeed.messages['status']) > known + 80, 'it says who stopped it')
@@ -187,7 +189,7 @@ def test_of_a_recorder_that_was_killed_all_but_the_last_two_seconds_is_there(ben
     recorder = _recorder(bench, '--output', str(output))
     wait_until(lambda: '/nfo_sinus is heard' in recorder.text, 'it records')
     with client.run_at(20.0):
-        client.wait_for('status', lambda one: one.enabled, 'it runs')
+        client.wait_for('status', lambda status: status.enabled, 'it runs')
     client.call('stop')
     # what a healthy machine has done in two seconds, a busy one may do later
     wait_until(lambda: read(output / 'ride', ['/nfo_sinus'])[0].stops, 'it is on disk')

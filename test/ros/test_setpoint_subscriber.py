@@ -140,7 +140,9 @@ def test_two_sources_at_once_are_warned_of_by_name(bench: Bench, node: Node, oth
     words = 'different set-points come from two sources at once'
     assert client.enable().success
     with client.setpoints(20.0):
-        client.wait_for('status', lambda one: one.enabled and one.setpoint == 20.0, 'it follows')
+        client.wait_for(
+            'status', lambda status: status.enabled and status.setpoint == 20.0, 'it follows'
+        )
         # that two agree is no harm, nor one that is heard now and then
         for value in (20.0, 20.0, 20.0, 10.0):
             publisher.publish(Float32(data=value))
@@ -152,7 +154,7 @@ def test_two_sources_at_once_are_warned_of_by_name(bench: Bench, node: Node, oth
             return words in driver.text
 
         wait_until(warned, 'they are warned of', period=0.05)
-    (line,) = [one for one in driver.text.splitlines() if words in one]
+    (line,) = [line for line in driver.text.splitlines() if words in line]
     mine, theirs = client.node.get_fully_qualified_name(), '/test_subscriber'
     if other == '/nfo_sinus/setpoint':
         both = ' and '.join(sorted((mine, theirs)))

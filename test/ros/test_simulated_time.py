@@ -54,7 +54,7 @@ def test_the_clock_goes_on_while_a_setting_waits_for_the_drive(bench: Bench) -> 
     thread.start()
     try:
         client.wait_for(
-            'status', lambda one: abs(_now() - seconds(one.header.stamp)) < _NEAR, 'its time'
+            'status', lambda status: abs(_now() - seconds(status.header.stamp)) < _NEAR, 'its time'
         )
         known.set()
         assert client.enable().success
@@ -65,7 +65,9 @@ def test_the_clock_goes_on_while_a_setting_waits_for_the_drive(bench: Bench) -> 
         assert time.monotonic() - begun > _TIMEOUT
         stamp = seconds(client.newest('status').header.stamp)
         client.wait_for(
-            'status', lambda one: seconds(one.header.stamp) > stamp + 2 * _TIMEOUT, 'time goes on'
+            'status',
+            lambda status: seconds(status.header.stamp) > stamp + 2 * _TIMEOUT,
+            'time goes on',
         )
         assert drive.state()['frequency'] == 20.0
         assert client.newest('status').enabled

@@ -154,11 +154,16 @@ def test_what_the_driver_acts_on_is_published_however_seldom_it_polls(bench: Ben
     before = [len(client.messages[topic]) for topic in measured]
     assert client.enable().success
     with client.setpoints(20.0):
-        client.wait_for('status', lambda one: one.enabled and one.setpoint == 20.0, 'it follows')
+        client.wait_for(
+            'status', lambda status: status.enabled and status.setpoint == 20.0, 'it follows'
+        )
         drive.inject('fault', bench.drives.overload.code)
         client.wait_for(
-            'status', lambda one: one.fault and not one.enabled and one.stop_text, 'a fault'
+            'status',
+            lambda status: status.fault and not status.enabled and status.stop_text,
+            'a fault',
         )
-        client.wait_for('inv_st', lambda one: one.code == bench.drives.overload.code, 'which one')
+        overload = bench.drives.overload.code
+        client.wait_for('inv_st', lambda message: message.code == overload, 'which one')
     # no message repeats what was measured before
     assert [len(client.messages[topic]) for topic in measured] == before

@@ -56,8 +56,8 @@ def test_a_drive_stops_those_that_it_names_and_says_why(bench: Bench) -> None:
     simulator.inject('fault', 5, address=1)
     outfeed.wait_for(
         'status',
-        lambda one: one.stop_reason == DriveStatus.REASON_STOP_WITH and not one.enabled
-        and one.stop_text.startswith('it stops with /line1/infeed: fault 5 Overload'),
+        lambda status: status.stop_reason == DriveStatus.REASON_STOP_WITH and not status.enabled
+        and status.stop_text.startswith('it stops with /line1/infeed: fault 5 Overload'),
         'it stops with the other',
     )
     # a name that no drive has is refused, with those that there are
@@ -84,10 +84,12 @@ def test_full_names_of_its_own_line_are_those_of_the_line_and_its_own_is_none(
         infeed.enable()
         assert infeed.call('stop').success
     infeed.enable()
-    infeed.wait_for('status', lambda one: one.enabled, 'it is enabled')
+    infeed.wait_for('status', lambda status: status.enabled, 'it is enabled')
     holds_for(A_WHILE, lambda: infeed.newest('status').enabled, 'its own stop does not stop it')
     outfeed.wait_for(
-        'status', lambda one: one.stop_reason == DriveStatus.REASON_STOP_WITH, 'the other stops'
+        'status',
+        lambda status: status.stop_reason == DriveStatus.REASON_STOP_WITH,
+        'the other stops',
     )
     assert 'stop called by /line1/infeed' not in driver.text
 
@@ -189,7 +191,7 @@ def test_whatever_stops_a_drive_stops_the_one_of_another_line(
         own = wait_until(lambda: first.stops_since(begun), 'the first gets its stop')
     assert other[0] - own[0] < _SOON
     second.client.wait_for(
-        'status', lambda one: one.stop_reason == DriveStatus.REASON_STOP, 'it says why'
+        'status', lambda status: status.stop_reason == DriveStatus.REASON_STOP, 'it says why'
     )
     assert '/line2/drive/stop called by ' in second.client.newest('status').stop_text
     wait_until(lambda: second.simulator.state()['frequency'] == 0, 'it stands')
@@ -203,7 +205,7 @@ def test_two_that_name_each_other_stop_once_and_can_be_enabled_again(
     for line in lines:
         line.turn()
     first.simulator.inject('fault', 5)
-    second.client.wait_for('status', lambda one: not one.enabled, 'the other stops')
+    second.client.wait_for('status', lambda status: not status.enabled, 'the other stops')
     assert second.client.newest('status').stop_text.endswith('/line2/drive/stop called by /drive')
     wait_until(lambda: '/drive stops with it: ' in second.driver.text, 'and has it stopped')
     assert first.client.call('fault_ack').success

@@ -15,7 +15,9 @@ from std_srvs.srv import SetBool, Trigger
 def shown(client: Client, reason: int, text: str) -> None:
     """Wait until the topic has a reason, and in words."""
     client.wait_for(
-        'status', lambda one: one.stop_reason == reason and text in one.stop_text, text or 'nothing'
+        'status',
+        lambda status: status.stop_reason == reason and text in status.stop_text,
+        text or 'nothing',
     )
 
 

@@ -158,7 +158,7 @@ def test_the_branch_of_a_release_has_the_packages_side_by_side(
     assert {package.name for package in found} == BOTH
     address = 'https://forge.example/team/nfo_sinus'
     for package in found:
-        urls = {one.type: one.url for one in package.urls}
+        urls = {url.type: url.url for url in package.urls}
         assert urls == {
             'website': address, 'repository': address, 'bugtracker': f'{address}/issues'
         }
@@ -190,9 +190,9 @@ def test_the_changelog_has_the_form_that_the_tools_of_a_release_read(folder: Pat
     versions = {version: content for version, _, content in log.foreach_version()}
     assert VERSION in versions
     # one list for each
-    lists = [one for content in versions.values() for one in content]
+    lists = [entry for content in versions.values() for entry in content]
     assert len(lists) == len([content for content in versions.values() if content])
-    bullets = sum(len(one.bullets) for one in lists)
+    bullets = sum(len(entry.bullets) for entry in lists)
     # what is forthcoming has no version yet
     released = text[text.index(f'\n{VERSION} (') :]
     assert bullets == len(re.findall(r'^\* ', released, re.MULTILINE))

@@ -66,7 +66,7 @@ def _component(tag: ElementTree.Element) -> Component:
     return Component(
         tag.attrib['name'],
         hardware.findtext('plugin', ''),
-        {one.attrib['name']: one.text or '' for one in hardware.findall('param')},
+        {parameter.attrib['name']: parameter.text or '' for parameter in hardware.findall('param')},
         {name: _interfaces(joint, 'command') for name, joint in joints.items()},
         {name: _interfaces(joint, 'state') for name, joint in joints.items()},
         dict(still),
@@ -76,7 +76,7 @@ def _component(tag: ElementTree.Element) -> Component:
 
 
 def _interfaces(joint: ElementTree.Element, kind: str) -> list[str]:
-    return [one.attrib['name'] for one in joint.findall(f'{kind}_interface')]
+    return [interface.attrib['name'] for interface in joint.findall(f'{kind}_interface')]
 
 
 class Hardware:

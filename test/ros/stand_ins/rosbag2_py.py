@@ -60,17 +60,17 @@ def to_rclcpp_qos_vector(serialized: str, version: int) -> list[Qos]:
 
     return [
         Qos(
-            history=QosHistory[one['history'].upper()],
-            depth=one['depth'],
-            reliability=QosReliability[one['reliability'].upper()],
-            durability=QosDurability[one['durability'].upper()],
-            deadline=time(one['deadline']),
-            lifespan=time(one['lifespan']),
-            liveliness=QosLiveliness[one['liveliness'].upper()],
-            liveliness_lease_duration=time(one['liveliness_lease_duration']),
-            avoid_ros_namespace_conventions=one['avoid_ros_namespace_conventions'],
+            history=QosHistory[profile['history'].upper()],
+            depth=profile['depth'],
+            reliability=QosReliability[profile['reliability'].upper()],
+            durability=QosDurability[profile['durability'].upper()],
+            deadline=time(profile['deadline']),
+            lifespan=time(profile['lifespan']),
+            liveliness=QosLiveliness[profile['liveliness'].upper()],
+            liveliness_lease_duration=time(profile['liveliness_lease_duration']),
+            avoid_ros_namespace_conventions=profile['avoid_ros_namespace_conventions'],
         )
-        for one in yaml.safe_load(serialized)
+        for profile in yaml.safe_load(serialized)
     ]
 
 
@@ -118,8 +118,8 @@ class SequentialReader:
 
     def get_all_topics_and_types(self) -> list[TopicMetadata]:
         return [
-            TopicMetadata(one.id, one.topic, one.msgtype, 'cdr')
-            for one in self._reader.connections
+            TopicMetadata(connection.id, connection.topic, connection.msgtype, 'cdr')
+            for connection in self._reader.connections
         ]
 
     def has_next(self) -> bool:
