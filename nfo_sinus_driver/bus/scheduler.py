@@ -100,6 +100,7 @@ class Scheduler:
     :param asked_at: when a unit was last sent anything, s.
     :param rests: whether a unit is to be asked nothing yet.
     :param needs_silence: whether the line has to be silent for longer before a request to it.
+    :param answers_twice: whether an answer of it is certain only after a silence.
     """
 
     def __init__(
@@ -110,6 +111,7 @@ class Scheduler:
         asked_at: Callable[[int], float] = lambda unit: -math.inf,
         rests: Callable[[int], bool] = lambda unit: False,
         needs_silence: Callable[[int], bool] = lambda unit: False,
+        answers_twice: Callable[[int], bool] = lambda unit: False,
     ) -> None:
         self._is_silent = is_silent
         self._is_missing = is_missing
@@ -117,6 +119,7 @@ class Scheduler:
         self._asked_at = asked_at
         self._rests = rests
         self._needs_silence = needs_silence
+        self._answers_twice = answers_twice
         #: In order; the values are not used.
         self._queues: dict[_Rank, dict[LatestValue | Waiting, None]] = {
             rank: {} for rank in (*Priority, _SLOT, _RETRY, _MISSING)
@@ -253,10 +256,13 @@ class Scheduler:
 
         That is so of a stop, where others wait for it or may be in vain as well, of a look at one
         that answers no stop, both but for the second and then each eighth one, of what is read
-        before a stop is written, for that goes without it, and of what is sent to be heard.
+        before a stop is written, for that goes without it, and of what is sent to be heard. Of a
+        unit that answers twice nothing would ever be read so.
         """
-        if request.is_brief or (request.priority is Priority.STOP and not request.writes):
+        if request.is_brief:
             return True
+        if request.priority is Priority.STOP and not request.writes:
+            return not self._answers_twice(request.unit)
         tries = self._unanswered_stops
         is_look = request.priority is Priority.LOOK and (request.unit, True) in tries
         if request.priority is not Priority.STOP and not is_look:

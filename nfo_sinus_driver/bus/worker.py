@@ -129,6 +129,7 @@ class Bus:
             self.silences.asked_at,
             lambda unit: self._is_held_until(self._rests_until(unit)),
             lambda unit: self._is_held_until(link.pauses.silent_until(unit)),
+            link.answers_twice,
         )
         #: When the first of those that wait for a pause may go, s.
         self._held_until = math.inf
@@ -336,6 +337,10 @@ class Bus:
         :param until: until when this one is, s of the steady clock.
         """
         self._quiet_until[unit] = until
+
+    def answers_twice(self, unit: int) -> bool:
+        """Return whether a unit does: what is read of it takes longer than a stop may wait."""
+        return self._link.answers_twice(unit)
 
     @property
     def is_any_reached(self) -> bool:

@@ -329,6 +329,9 @@ class Link(Protocol):
         :param stop_waits: returns whether one does.
         """
 
+    def answers_twice(self, unit: int) -> bool:
+        """Return whether a unit does: an answer is certain only once the line was silent for it."""
+
     @property
     def supervision(self) -> Supervision | None:
         """Its messages beside requests and answers; ``None``: it has none."""

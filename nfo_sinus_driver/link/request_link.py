@@ -192,6 +192,10 @@ class RequestLink(ABC, Generic[_Request]):
         self._port.open()
         self._line_end = self._now()
 
+    def answers_twice(self, unit: int) -> bool:
+        """Return whether a unit does; see :class:`.SecondAnswers`."""
+        return self._seconds.silence(unit, self._now()) > 0.0
+
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""
         self._port.close()

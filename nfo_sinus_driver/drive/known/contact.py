@@ -286,6 +286,11 @@ class Contact:
         return silences.is_silent(self._unit) or silences.was_asked_since_silent(self._unit)
 
     @property
+    def answers_twice(self) -> bool:
+        """It does, and what is read of it takes longer than a stop may wait."""
+        return self._bus.answers_twice(self._unit)
+
+    @property
     def is_gone(self) -> bool:
         """It is lost, or the whole line is silent for more than noise."""
         return not self.connected or self._bus.silences.is_dead(self._bus.now())

@@ -530,9 +530,9 @@ class StopSequence:
 
     @property
     def _is_blind(self) -> bool:
-        """Nothing answers, and the bus had control of the drive when something did."""
+        """Nothing answers in time, and the bus had control of the drive when something did."""
         status = self._state.status
-        silent = self._contact.is_gone
+        silent = self._contact.is_gone or self._contact.answers_twice
         # what is read before a stop was read in vain
         silent |= self._unanswered >= _READ_IN_VAIN and not self._wrote
         return silent and status is not None and status.from_bus

@@ -224,6 +224,10 @@ class CanopenLink:
         """Wait for no more than the answer to the request that was sent, where a stop waits."""
         self.stop_waits = stop_waits
 
+    def answers_twice(self, unit: int) -> bool:
+        """Return false: each SDO answer names what it answers."""
+        return False
+
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> CanopenLink:
         """

@@ -180,6 +180,10 @@ class TcpLink(ModbusLink):
         """Wait for no more than the answer to the request that was sent, where a stop waits."""
         self.stop_waits = stop_waits
 
+    def answers_twice(self, unit: int) -> bool:
+        """Return false: each answer has the number of its request."""
+        return False
+
     @classmethod
     def on_port(cls, port: str, settings: LineSettings) -> TcpLink:
         """Return the link to a gateway; of the settings only those of time count."""

@@ -79,6 +79,9 @@ class FakeLink:
     def end_listening_if(self, stop_waits: Any) -> None:
         pass
 
+    def answers_twice(self, unit: int) -> bool:
+        return False
+
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
         """Keep the next transaction on the line; inside, it has begun as soon as asked for."""

@@ -58,6 +58,9 @@ class FarEnd:
     def end_listening_if(self, stop_waits: Any) -> None:
         pass
 
+    def answers_twice(self, unit: int) -> bool:
+        return False
+
     def was_read(self, number: int) -> None:
         """Do what time has brought; a drive may have more to do."""
 

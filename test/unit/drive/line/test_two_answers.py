@@ -117,7 +117,14 @@ def assert_stopped(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize('seconds', [0.004, 0.03, 0.09])
-@pytest.mark.parametrize('connection', ['rtu', 'classic', 'described', 'optimal'])
+@pytest.mark.parametrize(
+    'connection',
+    [
+        'rtu', 'classic', 'described', 'optimal',
+        # what they stop by is read before
+        'optimal, control word', 'classic, control word',
+    ],
+)
 def test_on_a_line_of_eight_no_stop_waits_for_a_second_answer(
     connection: str, seconds: float
 ) -> None:
