@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 import heapq
 import itertools
+import math
 from random import Random
 from typing import Any
 
@@ -83,7 +84,7 @@ class Line:
         it; :ivar banner: what it says then at once.
     :ivar place: where it is; a test may plug it in somewhere else.
     :ivar losses: how many answers are still lost; :ivar unheard: how many requests are;
-        :ivar doubled: how many answers come twice.
+        :ivar doubled: how many answers come twice; ``doubled_at``: when the last one did.
     :ivar plan: called with each request; what it returns goes wrong with it: one of
         :data:`~nfo_sinus_driver.simulator.line_faults.ANSWER_FAULTS` or ``unheard``.
     :ivar passed: called whenever the clock went on.
@@ -183,6 +184,7 @@ class Line:
         """End all that is wrong with the line."""
         self.state = 'whole'
         self.losses = self.unheard = self.doubled = 0
+        self.doubled_at = -math.inf
         self.noise = self.byte_noise = self.boots_for = 0.0
         self._random = Random(0)
         self._next.clear()
@@ -263,6 +265,7 @@ class Line:
             return 'drop'
         if self.doubled:
             self.doubled -= 1
+            self.doubled_at = self.clock.now
             return 'double'
         # a frame with a damaged byte is none
         if self.byte_noise and self._random.random() > (1 - self.byte_noise) ** len(frame):

@@ -28,6 +28,9 @@ SHUTDOWN_TIMEOUT = 1.0
 NOISY = 2.0
 #: A stop that a fault keeps a drive from taking is not repeated within this, s.
 REFUSED = 0.3
+#: For how long a line is known as one where answers come twice, s, and how much longer eight
+#: requests take there.
+_TWICE_FOR, _LATER_BY = 60.0, 0.15
 
 #: Reads that acknowledge a fault.
 ACKNOWLEDGING_READS = ('fieldbus.inv_st_with_ack', 'fieldbus.sio_err')
@@ -222,7 +225,10 @@ class History:
     @property
     def noticed(self) -> float:
         """Within which time something is noticed, s."""
-        return self.times.noticed if self.active else self.times.noticed_idle
+        noticed = self.times.noticed if self.active else self.times.noticed_idle
+        # after an answer that came twice each of two polls waits for more
+        twice = self.now - self._rig.line.doubled_at < _TWICE_FOR
+        return noticed + _LATER_BY if twice else noticed
 
     @property
     def settled_since(self) -> float:
