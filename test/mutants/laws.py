@@ -1457,6 +1457,22 @@ LAWS = (
         (RECOGNITION, '-k', 'in_the_place_of'),
     ),
     Mutant(
+        3,
+        'where answers come twice a stop is read before',
+        'StopSequence._send',
+        'self._contact.answers_twice and self._unanswered % 2 == 0',
+        'False',
+        ('test_two_answers.py', '-k', 'line_of_eight'),
+    ),
+    Mutant(
+        3,
+        'where answers come twice no stop is read before, not one that has to be',
+        'StopSequence._send',
+        'self._contact.answers_twice and self._unanswered % 2 == 0',
+        'self._contact.answers_twice',
+        ('test_two_answers.py', '-k', 'has_to_be_read'),
+    ),
+    Mutant(
         11,
         'what was recognised stays so where another drive answers',
         'Contact.another_answers',

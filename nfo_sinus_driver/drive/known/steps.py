@@ -35,6 +35,7 @@ async def run_steps(
     onward: bool = False,
     permit: Callable[[], None] | None = None,
     is_blind: bool = False,
+    reads: bool = True,
 ) -> _T:
     """
     Carry out a sequence of a profile on the bus.
@@ -45,8 +46,8 @@ async def run_steps(
         a write that reading shows to have been carried out.
     :param permit: as for :meth:`ParameterAccess.write`.
     :param is_blind: nothing answers, but the drive may hear. A read is tried once, and where it has
-        no answer the sequence goes on as if it had been refused; so it does at once where the drive
-        answers twice.
+        no answer the sequence goes on as if it had been refused.
+    :param reads: false: it is not even tried.
     :raises DriveError: it cannot be carried out.
     :raises LinkError: the drive does not answer, so that the outcome is unknown; or it refuses,
         and the sequence ends by that.
@@ -77,8 +78,8 @@ async def run_steps(
             match step:
                 case profile.Read(key, retry):
                     params.require_fitted(key)
-                    if is_blind and state.contact.answers_twice:
-                        raise DamagedAnswer(f'{key} is not read: the drive answers twice')
+                    if not reads:
+                        raise DamagedAnswer(f'{key} is not read: that would take too long')
                     # what is read behind a stop keeps back no stop of another drive
                     behind = priority is Priority.STOP and written_at > -math.inf
                     urgency = Priority.LOOK if behind else priority

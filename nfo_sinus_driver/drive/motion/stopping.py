@@ -470,7 +470,10 @@ class StopSequence:
         :raises LinkError: what it did is not to be seen: the line, or the drive, is gone.
         """
         await self.find()
-        is_blind, self._wrote, self._removed_blind = self._is_blind, False, False
+        # every second try without: what is read of a drive that answers twice takes long, and not
+        # every stop can be written without it
+        reads = not (self._contact.answers_twice and self._unanswered % 2 == 0)
+        is_blind, self._wrote, self._removed_blind = self._is_blind(reads), False, False
         try:
             await run_steps(
                 self._state,
@@ -478,6 +481,7 @@ class StopSequence:
                 Priority.STOP,
                 permit=self.require_same,
                 is_blind=is_blind,
+                reads=reads or not is_blind,
             )
         except Refused as error:
             self._unanswered = self._ignored = 0
@@ -528,11 +532,10 @@ class StopSequence:
             status = await self._newer(status, reasons, removed_at)
         return removed, status
 
-    @property
-    def _is_blind(self) -> bool:
-        """Nothing answers in time, and the bus had control of the drive when something did."""
+    def _is_blind(self, reads: bool) -> bool:
+        """Return whether nothing answers in time, and the bus had control when something did."""
         status = self._state.status
-        silent = self._contact.is_gone or self._contact.answers_twice
+        silent = self._contact.is_gone or not reads
         # what is read before a stop was read in vain
         silent |= self._unanswered >= _READ_IN_VAIN and not self._wrote
         return silent and status is not None and status.from_bus

@@ -6,11 +6,14 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from random import Random
 from typing import Any
 
 import pytest
 from support.belief import Judge
+from support.described import DescribedRig
+from support.oddities import described
 from support.rig import Rig
 from support.stops import takes_run_away
 
@@ -140,6 +143,35 @@ def test_on_a_line_of_eight_no_stop_waits_for_a_second_answer(
 
     # the rest of the request under way, and eight requests with their silence
     rig.wait_until(lambda: stopped() == set(rig.drives), 0.5)
+    for stop in stops:
+        rig.answer(stop)
+    rig.kill()
+
+
+def words(rig: Rig) -> set[tuple[int, int]]:
+    """Return which words were written to register 10 of which unit."""
+    return {(unit, rig.number(data)) for unit, key, data in rig.asked if data and 'r000a' in key}
+
+
+@pytest.mark.parametrize('drives', [1, 4])
+@pytest.mark.parametrize('seconds', [0.004, 0.03, 0.09])
+def test_a_stop_that_has_to_be_read_before_is_written_all_the_same(
+    tmp_path: Path, seconds: float, drives: int
+) -> None:
+    register = {'register': 10}
+    control = {
+        'run': [{**register, 'set': 1, 'clear': 2}],
+        # what else is in the register has to stay: it cannot be written without being read
+        'stop': [{**register, 'set': 2, 'clear': 1}],
+    }
+    rig = DescribedRig(described(tmp_path, control=control), drives=drives, poll_rate=20.0)
+    rig.turn()
+    repeat(rig, seconds)
+    rig.pass_time(6.0)
+    rig.asked.clear()
+    stops = [drive.stop() for drive in rig.drives.values()]
+    removed = {(unit, 2) for unit in rig.drives}
+    rig.wait_until(lambda: removed <= words(rig), 2.0)
     for stop in stops:
         rig.answer(stop)
     rig.kill()
