@@ -11,7 +11,7 @@ from typing import Any
 
 from nfo_sinus_driver.catalog import Kind, Role, to_words
 from nfo_sinus_driver.catalog.declared import FAULT_KEY, STATUS_KEY, Description, drive_number
-from nfo_sinus_driver.simulator._declared.orders import Place, orders_of
+from nfo_sinus_driver.simulator._declared.orders import Orders, Place
 from nfo_sinus_driver.simulator._declared.status import Wish, compose
 from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused
@@ -56,8 +56,10 @@ class DeclaredControlUnit(ControlUnit):
     ) -> None:
         self._drive = drive
         super().__init__(memory, address, variant)
-        self._orders = orders_of(drive)
+        self._orders = Orders(drive)
         self._words: dict[Place, int] = {}
+        #: Where nothing else was commanded since the last word.
+        self._newest: set[Place] = set()
         self._run = self._reverse = self._coasts = self._quick = False
         self._silent_for = self._braked_for = 0.0
         self.local = False
@@ -67,18 +69,7 @@ class DeclaredControlUnit(ControlUnit):
     @property
     def command_places(self) -> set[Place]:
         """Where commands are written."""
-        places = {place for order in self._orders.values() for place in order.places}
-        if self._direction is not None:
-            places.add(self._direction)
-        return places
-
-    @property
-    def _direction(self) -> Place | None:
-        direction = self._drive.setpoint.direction
-        if direction is None:
-            return None
-        address = self._drive.parameters[direction.key].at('modbus')
-        return address.index, address.space == 'coil'
+        return self._orders.places
 
     def take_word(self, place: Place, word: int) -> None:
         """Take a word, or a coil, that is a command."""
@@ -86,23 +77,23 @@ class DeclaredControlUnit(ControlUnit):
             if self.variant.in_local == 'refuses':
                 raise Refused(Reason.STATE, 'the line has no control')
             return
+        if place in self._newest and self._words.get(place) == word:
+            # a PLC writes cyclically
+            return
         self._words[place] = word
-        done = {name for name, order in self._orders.items() if order.take_word(place, word)}
-        self._turn(place, word)
+        orders = self._orders
+        done, way = {*orders.made_by(place, word)}, orders.direction_of(place, word)
+        if way:
+            self._reverse = way < 0
+            # the word of the direction may be the run command, too
+            done |= {'run'} if orders.has_run(place) else set()
+        removes = orders.removes_run(place, word)
+        self._newest = {place} if done or removes else self._newest | {place}
+        if removes:
+            self._run = False
         for name in ('run', 'stop', 'quick_stop', 'coast', 'release', 'reset'):
             if name in done:
                 self._act(name)
-
-    def _turn(self, place: Place, word: int) -> None:
-        direction = self._drive.setpoint.direction
-        if direction is None or place != self._direction:
-            return
-        if word in (direction.forward, direction.reverse):
-            self._reverse = word == direction.reverse
-            run = self._orders['run'].last
-            if run is not None and run[0] == place:
-                # the word of the direction is a run command, too
-                self._act('run')
 
     def _act(self, name: str) -> None:
         if name == 'run':
@@ -183,9 +174,7 @@ class DeclaredControlUnit(ControlUnit):
         wishes += [
             (condition, is_fault and flag.code == fault, 10) for condition, flag in drive.flags
         ]
-        for order in self._orders.values():
-            if order.shows is not None:
-                wishes.append((order.shows, True, _AWAITED))
+        wishes += [(condition, True, _AWAITED) for condition in self._orders.shown]
         mask = fixed = 0
         for shift, word in self._measured_words():
             mask, fixed = mask | 0xFFFF << shift, fixed | word << shift
@@ -260,7 +249,8 @@ class DeclaredControlUnit(ControlUnit):
         """Run the motor, ramp it to a stop, or let it go."""
         motor = self.motor
         if self.faults:
-            self._run = self._run and self.variant.run_command_in_fault == 'keeps'
+            if self.variant.run_command_in_fault != 'keeps':
+                self._drop_run()
             motor.release()
             return
         self._set_ramps()
@@ -272,6 +262,11 @@ class DeclaredControlUnit(ControlUnit):
             stopped = motor.at_zero and self._braked_for >= self._braking
             if self._coasts or not self.run_input or stopped:
                 motor.release()
+
+    def _drop_run(self) -> None:
+        """Take the run command away; one that is repeated is a new one then."""
+        self._run = False
+        self._newest.clear()
 
     @property
     def _braking(self) -> float:
@@ -306,7 +301,8 @@ class DeclaredControlUnit(ControlUnit):
         if self._drive.keeps_run:
             return
         self._words.clear()
-        self._orders = orders_of(self._drive)
+        self._newest.clear()
+        self._orders = Orders(self._drive)
         self._run = self._reverse = self._coasts = self._quick = False
         self.memory.put(self._drive.setpoint.key, 0)
 
@@ -328,7 +324,7 @@ class DeclaredControlUnit(ControlUnit):
         self._silent_for += dt
         if self._time_out and self._silent_for > self._time_out and (self._run or self.faults):
             self._silent_for = 0.0
-            self._run = False
+            self._drop_run()
             lost = [fault.code for fault in self._drive.faults.values() if fault.line]
             if lost and not self.faults:
                 self.trip(lost[0])

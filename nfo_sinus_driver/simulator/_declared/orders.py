@@ -1,11 +1,26 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Notices which commands of a described drive the written words make."""
+"""
+Notices which commands of a described drive the written words make.
+
+A file names whole words, and a real drive looks at bits: masters that have driven these drives for
+years write others. So of a register with the run command those bits count in which a run word,
+forward or reverse, differs from any other command there:
+
+- a word that is a run word in them runs;
+- one that is another command, in the bits in which that differs from a run word, is that, and where
+  it is one by more bits, not the one by fewer;
+- any other takes the run command away, and so do these.
+
+A word that is repeated changes nothing: a PLC writes cyclically. A reset counts from its first
+word.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 from nfo_sinus_driver.catalog import to_words
 from nfo_sinus_driver.catalog.declared import Await, Condition, Description, SetBits, Step, Write
@@ -13,74 +28,187 @@ from nfo_sinus_driver.catalog.declared import Await, Condition, Description, Set
 #: The first register or coil of a key, and whether it is a coil.
 Place = tuple[int, bool]
 
-
-def words_of(drive: Description, step: Write) -> Iterator[tuple[Place, int]]:
-    """Yield where each word of a step goes; a setting is kept as any other, and is no command."""
-    parameter = drive.parameters[step.key]
-    address = parameter.at('modbus')
-    if parameter.is_setting:
-        return
-    if address.space == 'coil':
-        yield (address.index, True), int(step.value)
-        return
-    for index, word in enumerate(to_words(parameter.encode(step.value)), address.index):
-        yield (index, False), word
+_RUN, _RESET = 'run', 'reset'
+_WHOLE = 0xFFFF
 
 
-class Order:
+@dataclass(frozen=True)
+class _Word:
     """
-    One command: a row of words, each of which has to come after the one before.
+    A word of a command: where it goes, what it is, and the bits of it that count.
 
-    :ivar places: where its words go.
+    :ivar given: the file names these bits.
     """
 
-    def __init__(self, drive: Description, steps: tuple[Step, ...]) -> None:
-        #: Of each word where it goes, the bits that count, and what they are.
-        self._row: list[tuple[Place, int, int]] = []
-        self._shown: dict[int, Condition] = {}
+    place: Place
+    value: int
+    mask: int = _WHOLE
+    given: bool = False
+
+    def fits(self, place: Place, word: int) -> bool:
+        """Return whether a word that is written is this one."""
+        return place == self.place and (word ^ self.value) & self.mask == 0
+
+    def differs(self, others: Iterable[_Word]) -> int:
+        """Return the bits in which it differs from any of these, at the same place."""
+        bits = 0
+        for other in others:
+            if other.place == self.place:
+                bits |= (self.value ^ other.value) & self.mask & other.mask
+        return bits
+
+    def by(self, mask: int) -> _Word:
+        """Return the same by other bits; where there are none, or the file names them, as it is."""
+        return self if self.given or not mask else replace(self, mask=mask)
+
+
+class _Order:
+    """One command: a row of words, each of which has to come after the one before."""
+
+    def __init__(self, row: tuple[_Word, ...], shown: Mapping[int, Condition]) -> None:
+        self.row = row
+        self._shown = shown
         self._passed = 0
-        setpoint = drive.parameters[drive.setpoint.key].at('modbus').index
-        for step in steps:
-            if isinstance(step, Write):
-                for place, word in words_of(drive, step):
-                    if place != (setpoint, False):
-                        self._row.append((place, 0xFFFF, word))
-            elif isinstance(step, SetBits):
-                index = drive.parameters[step.key].at('modbus').index
-                self._row.append(((index, False), step.set | step.clear, step.set))
-            elif isinstance(step, Await):
-                self._shown[len(self._row)] = step.condition
-        self.places = {place for place, _, _ in self._row}
-
-    @property
-    def last(self) -> tuple[Place, int] | None:
-        """Where its last word goes, and what it is."""
-        return (self._row[-1][0], self._row[-1][2]) if self._row else None
 
     @property
     def shows(self) -> Condition | None:
         """What the drive shows by now, for a step that waits for it."""
         return self._shown.get(self._passed)
 
-    def take_word(self, place: Place, word: int) -> bool:
+    def is_complete_by(self, place: Place, word: int) -> bool:
         """Take a word that was written; return whether the command is complete by it."""
-        if place not in self.places:
+        if all(place != known.place for known in self.row):
             return False
-        if not self._fits(self._passed % len(self._row), place, word):
-            self._passed = 0
-        if self._fits(self._passed % len(self._row), place, word):
-            self._passed = self._passed % len(self._row) + 1
-        return self._passed == len(self._row)
-
-    def _fits(self, number: int, place: Place, word: int) -> bool:
-        where, mask, wanted = self._row[number]
-        return where == place and word & mask == wanted
+        if self._passed < len(self.row) and self.row[self._passed].fits(place, word):
+            self._passed += 1
+        elif not (self._passed and self.row[self._passed - 1].fits(place, word)):
+            self._passed = int(self.row[0].fits(place, word))
+        return self._passed == len(self.row)
 
 
-def orders_of(drive: Description) -> Mapping[str, Order]:
-    """Return the commands of a drive, by name."""
-    lists = {
-        'prepare': drive.prepare, 'run': drive.run, 'stop': drive.stop, 'coast': drive.coast,
-        'quick_stop': drive.quick_stop, 'reset': drive.reset, 'release': drive.release,
-    }
-    return {name: Order(drive, tuple(steps)) for name, steps in lists.items() if steps}
+class Orders:
+    """
+    The commands of one drive.
+
+    :ivar places: where their words go.
+    """
+
+    def __init__(self, drive: Description) -> None:
+        lists = {
+            'prepare': drive.prepare, _RUN: drive.run, 'stop': drive.stop, 'coast': drive.coast,
+            'quick_stop': drive.quick_stop, _RESET: drive.reset, 'release': drive.release,
+        }
+        rows = {name: _row(drive, tuple(steps)) for name, steps in lists.items() if steps}
+        if _RESET in rows:
+            words, shown = rows[_RESET]
+            rows[_RESET] = words[:1], shown
+        self._directions = _directions(drive)
+        run, _ = rows.get(_RUN, ((), {}))
+        #: What runs the motor by itself, once what comes before it was written.
+        self._runs = [*run[-1:], *(way for way in self._directions if way.place == run[-1].place)]
+        others = [word for name, (words, _) in rows.items() if name != _RUN for word in words]
+        others += run[:-1]
+        counts = _union(word.differs(others) for word in self._runs)
+        counts |= _union(word.differs(self._runs) for word in self._runs)
+        place = run[-1].place if run else None
+        self._runs = [word.by(counts) for word in self._runs]
+        self._directions = tuple(
+            way.by(counts if way.place == place else way.differs(self._directions))
+            for way in self._directions
+        )
+        self._orders = {
+            name: _Order(
+                tuple(
+                    word if word.place != place
+                    else word.by(counts if name == _RUN else word.differs(self._runs))
+                    for word in words
+                ),
+                shown,
+            )
+            for name, (words, shown) in rows.items()
+        }
+        self.places = {word.place for words, _ in rows.values() for word in words}
+        self.places |= {way.place for way in self._directions}
+
+    def made_by(self, place: Place, word: int) -> Collection[str]:
+        """Take a word that was written; return the commands that are complete by it."""
+        done = {
+            name: order.row[-1].mask
+            for name, order in self._orders.items()
+            if order.is_complete_by(place, word)
+        }
+        return [
+            name
+            for name, mask in done.items()
+            if not any(mask != more and mask & more == mask for more in done.values())
+        ]
+
+    def removes_run(self, place: Place, word: int) -> bool:
+        """Return whether a word takes the run command away, whatever it is besides."""
+        return self.has_run(place) and not any(run.fits(place, word) for run in self._runs)
+
+    def direction_of(self, place: Place, word: int) -> int:
+        """Return which way a word commands: 1 forward, -1 reverse, 0 neither."""
+        for way, direction in zip((1, -1), self._directions, strict=False):
+            if direction.fits(place, word):
+                return way
+        return 0
+
+    def has_run(self, place: Place) -> bool:
+        """Return whether the run command is in the words that go to a place."""
+        return any(run.place == place for run in self._runs)
+
+    @property
+    def shown(self) -> Iterator[Condition]:
+        """What the drive shows for the steps that wait for it by now."""
+        for order in self._orders.values():
+            if order.shows is not None:
+                yield order.shows
+
+
+def _row(
+    drive: Description, steps: tuple[Step, ...]
+) -> tuple[tuple[_Word, ...], dict[int, Condition]]:
+    """Return the words of a command, and what is waited for before which of them."""
+    row: list[_Word] = []
+    shown: dict[int, Condition] = {}
+    setpoint = drive.parameters[drive.setpoint.key].at('modbus').index
+    for step in steps:
+        if isinstance(step, Write):
+            row += (word for word in _words(drive, step) if word.place != (setpoint, False))
+        elif isinstance(step, SetBits):
+            index = drive.parameters[step.key].at('modbus').index
+            row.append(_Word((index, False), step.set, step.set | step.clear, given=True))
+        elif isinstance(step, Await):
+            shown[len(row)] = step.condition
+    return tuple(row), shown
+
+
+def _words(drive: Description, step: Write) -> Iterator[_Word]:
+    """Yield each word of a step; a setting is kept as any other, and is no command."""
+    parameter = drive.parameters[step.key]
+    address = parameter.at('modbus')
+    if parameter.is_setting:
+        return
+    if address.space == 'coil':
+        yield _Word((address.index, True), int(step.value))
+        return
+    for index, word in enumerate(to_words(parameter.encode(step.value)), address.index):
+        yield _Word((index, False), word)
+
+
+def _directions(drive: Description) -> tuple[_Word, ...]:
+    """Return the words for forward and reverse, where there are such."""
+    direction = drive.setpoint.direction
+    if direction is None:
+        return ()
+    address = drive.parameters[direction.key].at('modbus')
+    place = address.index, address.space == 'coil'
+    return _Word(place, direction.forward), _Word(place, direction.reverse)
+
+
+def _union(masks: Iterable[int]) -> int:
+    bits = 0
+    for mask in masks:
+        bits |= mask
+    return bits
