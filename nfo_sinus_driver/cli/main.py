@@ -191,6 +191,7 @@ def _add_line(parser: argparse.ArgumentParser, **more: str) -> None:
     group = parser.add_argument_group('line and drive, as the parameters of the driver')
     for name in LINE_AND_DRIVE:
         add_setting(group, name, f'--{name.replace("_", "-")}', **more)
+    add_setting(group, 'trace', '--trace', **({'metavar': 'FILE'} | more))
     add_flag(group, '--yes', more.get('help', 'do it without asking'))
 
 

@@ -138,6 +138,7 @@ class Session:
                 options.baud_rate,
                 options.char_format,
                 options.response_timeout,
+                trace=options.trace,
             ).open()
             self._bus = Bus(link, link.protocol.most_requests)
             self._memory = StateFolder(options.port)

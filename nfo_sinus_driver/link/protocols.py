@@ -131,7 +131,7 @@ ADDRESSES = '; '.join(
 class _LinkClass(Protocol):
     """The class of a link."""
 
-    def on_port(self, port: str, settings: LineSettings) -> Link:
+    def on_port(self, port: str, settings: LineSettings, trace: str = '') -> Link:
         """Return the link on a port; it is not open yet."""
 
 
@@ -210,6 +210,12 @@ class BusSettings:
         'let the port itself switch the RS-485 transmitter; most adapters do it by themselves',
         change=FIXED,
     )
+    trace: str = setting(
+        '',
+        'a file to which each frame of the line is written, with its time, as the simulator does',
+        zero='none',
+        change=FIXED,
+    )
 
     @property
     def line(self) -> LineSettings:
@@ -234,20 +240,21 @@ class BusSettings:
 
         :raises ValueError: settings with which it can never work, see :func:`open_link`.
         """
-        return open_link(self.protocol, self.port, self.line)
+        return open_link(self.protocol, self.port, self.line, self.trace)
 
 
-def open_link(protocol: str, port: str, settings: LineSettings) -> Link:
+def open_link(protocol: str, port: str, settings: LineSettings, trace: str = '') -> Link:
     """
     Return the link for a protocol on a port; it is not open yet.
 
     :param port: a device path, or a URL of pyserial (``socket://host:port``); ``host:port`` of
         the gateway for ``modbus_tcp``, where only the ``response_timeout`` of the settings counts;
         for ``canopen`` the name of a CAN interface, such as ``can0``, too.
+    :param trace: a file to which each frame is written; ``''``: none.
     :raises ValueError: no such protocol or kind of URL, or a setting with which the protocol can
         never work; the message says what can.
     """
     found = protocol_of(protocol)
     found.require_baud_rate(settings.baud_rate)
     found.require_char_format(settings.char_format)
-    return link_class(found).on_port(port, settings)
+    return link_class(found).on_port(port, settings, trace)

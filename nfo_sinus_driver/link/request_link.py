@@ -178,9 +178,11 @@ class RequestLink(ABC, Generic[_Request]):
         self.stop_waits = stop_waits
 
     @classmethod
-    def on_port(cls: type[_Self], port: str, settings: LineSettings) -> _Self:
+    def on_port(
+        cls: type[_Self], port: str, settings: LineSettings, trace: str = ''
+    ) -> _Self:
         """Return the link on a port; a ValueError says what is no port."""
-        return cls(port_of(port, settings), settings)
+        return cls(port_of(port, settings, trace), settings)
 
     @property
     def place(self) -> str:

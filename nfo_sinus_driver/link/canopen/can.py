@@ -18,6 +18,7 @@ from typing import NamedTuple, Protocol
 from nfo_sinus_driver.link.canopen.netlink import restart_ms
 from nfo_sinus_driver.link.interface import PortError
 from nfo_sinus_driver.link.ports.place import place_of_interface
+from nfo_sinus_driver.link.ports.trace import Trace
 
 #: The most bytes that a frame carries.
 MOST_DATA = 8
@@ -83,6 +84,55 @@ class CanPort(Protocol):
         :returns: none when the time is over, or when what came was no whole frame.
         :raises PortError: it is gone.
         """
+
+
+class TracedCan:
+    """A port whose frames are traced, each as its identifier in two bytes, then its data."""
+
+    def __init__(self, port: CanPort, trace: Trace) -> None:
+        self._port = port
+        self._trace = trace
+
+    @property
+    def place(self) -> str:
+        """Where it is."""
+        return self._port.place
+
+    @property
+    def trouble(self) -> str:
+        """What keeps frames off the bus."""
+        return self._port.trouble
+
+    @property
+    def remark(self) -> str:
+        """What is to be set otherwise."""
+        return self._port.remark
+
+    def open(self) -> None:
+        """Open it."""
+        self._port.open()
+
+    def close(self) -> None:
+        """Close it."""
+        self._trace.flush()
+        self._port.close()
+
+    def send(self, frame: Frame) -> None:
+        """Hand a frame over."""
+        self._trace.sent(_traced(frame))
+        self._port.send(frame)
+
+    def receive(self, until: float) -> Sequence[Frame]:
+        """Return what has come; each frame is an answer of its own."""
+        frames = self._port.receive(until)
+        for frame in frames:
+            self._trace.came(_traced(frame))
+            self._trace.flush()
+        return frames
+
+
+def _traced(frame: Frame) -> bytes:
+    return frame.identifier.to_bytes(2, 'big') + frame.data
 
 
 #: struct can_frame and struct can_filter (linux/can.h).

@@ -13,7 +13,7 @@ import re
 import time
 
 from nfo_sinus_driver.link.canopen import sdo
-from nfo_sinus_driver.link.canopen.can import FUNCTION_CODE, CanPort, Frame, SocketCan
+from nfo_sinus_driver.link.canopen.can import FUNCTION_CODE, CanPort, Frame, SocketCan, TracedCan
 from nfo_sinus_driver.link.canopen.lawicel import LawicelPort
 from nfo_sinus_driver.link.canopen.sdo import SECOND, Download, Kind, ObjectShapes, Transfer, Upload
 from nfo_sinus_driver.link.canopen.supervision import (
@@ -43,6 +43,7 @@ from nfo_sinus_driver.link.interface import (
 from nfo_sinus_driver.link.late_replies import LISTENING_STEP, STOP_WAITS, LateReplies
 from nfo_sinus_driver.link.pauses import Pauses
 from nfo_sinus_driver.link.ports.port import port_of
+from nfo_sinus_driver.link.ports.trace import Trace
 from nfo_sinus_driver.link.protocols import CANOPEN
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 
@@ -229,7 +230,7 @@ class CanopenLink:
         return False
 
     @classmethod
-    def on_port(cls, port: str, settings: LineSettings) -> CanopenLink:
+    def on_port(cls, port: str, settings: LineSettings, trace: str = '') -> CanopenLink:
         """
         Return the link on a port.
 
@@ -240,8 +241,10 @@ class CanopenLink:
         if _INTERFACE.fullmatch(port):
             identifiers = sdo.ANSWERS, sdo.REQUESTS, HEARTBEATS
             wanted = tuple((identifier, FUNCTION_CODE) for identifier in identifiers)
-            return cls(SocketCan(port, wanted), settings)
-        serial = port_of(port, replace(settings, baud_rate=_ADAPTER_RATE, char_format='8N1'))
+            can: CanPort = SocketCan(port, wanted)
+            return cls(TracedCan(can, Trace(trace)) if trace else can, settings)
+        of_adapter = replace(settings, baud_rate=_ADAPTER_RATE, char_format='8N1')
+        serial = port_of(port, of_adapter, trace)
         return cls(LawicelPort(serial, settings.baud_rate), settings)
 
     @property

@@ -47,7 +47,13 @@ from nfo_sinus_driver.link.modbus.other_values import OtherValues
 from nfo_sinus_driver.link.modbus.pdu import Request, Write, WriteAndRead, read_of, understand
 from nfo_sinus_driver.link.pauses import Pauses
 from nfo_sinus_driver.link.plc import telegram
-from nfo_sinus_driver.link.ports.tcp_connection import CLOSED_HINT, Connection, TcpConnection
+from nfo_sinus_driver.link.ports.tcp_connection import (
+    CLOSED_HINT,
+    Connection,
+    TcpConnection,
+    TracedConnection,
+)
+from nfo_sinus_driver.link.ports.trace import Trace
 from nfo_sinus_driver.link.protocols import MODBUS_TCP
 from nfo_sinus_driver.link.thread_clock import ThreadClock
 
@@ -185,11 +191,20 @@ class TcpLink(ModbusLink):
         return False
 
     @classmethod
-    def on_port(cls, port: str, settings: LineSettings) -> TcpLink:
+    def on_port(cls, port: str, settings: LineSettings, trace: str = '') -> TcpLink:
         """Return the link to a gateway; of the settings only those of time count."""
+
+        host_and_port = _host_and_port(port)
+        kept = Trace(trace) if trace else None
+
+        def connection(host: str, number: int) -> Connection:
+            made = TcpConnection(host, number)
+            return made if kept is None else TracedConnection(made, kept)
+
         return cls(
-            *_host_and_port(port),
+            *host_and_port,
             settings.response_timeout,
+            connection,
             request_gap=settings.request_gap,
         )
 

@@ -10,6 +10,7 @@ from typing import Protocol
 
 from nfo_sinus_driver.link.interface import LineSettings
 from nfo_sinus_driver.link.ports.serial_port import SerialPort
+from nfo_sinus_driver.link.ports.trace import Trace
 from nfo_sinus_driver.link.ports.url_port import UrlPort
 
 #: A network address without the scheme of a URL.
@@ -44,8 +45,46 @@ class Port(Protocol):
         """
 
 
-def port_of(name: str, settings: LineSettings) -> Port:
+class TracedPort:
+    """A port whose bytes are traced; all else is as without."""
+
+    def __init__(self, port: Port, trace: Trace) -> None:
+        self._port = port
+        self._trace = trace
+
+    @property
+    def place(self) -> str:
+        """Where it is."""
+        return self._port.place
+
+    def open(self) -> None:
+        """Open it."""
+        self._port.open()
+
+    def close(self) -> None:
+        """Close it."""
+        self._trace.flush()
+        self._port.close()
+
+    def write(self, data: bytes) -> None:
+        """Hand all bytes over."""
+        self._trace.sent(data)
+        self._port.write(data)
+
+    def read(self, until: float) -> bytes:
+        """Return what has come."""
+        data = self._port.read(until)
+        self._trace.came(data)
+        return data
+
+
+def port_of(name: str, settings: LineSettings, trace: str = '') -> Port:
     """Return the port of a device path or of a URL of pyserial; it is not open yet."""
+    port = _port_of(name, settings)
+    return TracedPort(port, Trace(trace)) if trace else port
+
+
+def _port_of(name: str, settings: LineSettings) -> Port:
     if not name:
         raise ValueError('port is empty: name a device, such as /dev/ttyUSB0')
     if '://' in name:

@@ -12,6 +12,8 @@ import struct
 import time
 from typing import Protocol
 
+from nfo_sinus_driver.link.ports.trace import Trace
+
 #: How long bytes may stay unacknowledged before the connection counts as lost, s.
 _ACKNOWLEDGE_TIMEOUT = 5
 #: After how long an idle connection is probed, how often, s, and how many times: a gateway that
@@ -114,6 +116,38 @@ class TcpConnection:
         if self._socket is None:
             raise ConnectionError('it is not open')
         return self._socket
+
+
+class TracedConnection:
+    """A connection whose bytes are traced; all else is as without."""
+
+    def __init__(self, connection: Connection, trace: Trace) -> None:
+        self._connection = connection
+        self._trace = trace
+
+    def open(self) -> None:
+        """Begin to connect."""
+        self._connection.open()
+
+    def connected(self, until: float) -> bool:
+        """Wait for the connection until a moment; return whether it is there."""
+        return self._connection.connected(until)
+
+    def write(self, data: bytes) -> None:
+        """Hand all bytes over."""
+        self._trace.sent(data)
+        self._connection.write(data)
+
+    def read(self, until: float) -> bytes:
+        """Return what has come, or nothing."""
+        data = self._connection.read(until)
+        self._trace.came(data)
+        return data
+
+    def close(self, *, discard: bool = False) -> None:
+        """Close it."""
+        self._trace.flush()
+        self._connection.close(discard=discard)
 
 
 def discard_unsent(connection: socket.socket) -> None:
