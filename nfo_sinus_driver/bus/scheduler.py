@@ -256,8 +256,8 @@ class Scheduler:
 
         That is so of a stop, where others wait for it or may be in vain as well, of a look at one
         that answers no stop, both but for the second and then each eighth one, of what is read
-        before a stop is written, for that goes without it, and of what is sent to be heard. Of a
-        unit that answers twice nothing would ever be read so.
+        before a stop is written, for that goes without it, and of what is sent to be heard. Where
+        an answer counts only after a silence nothing would ever be read so.
         """
         if request.is_brief:
             return True

@@ -10,7 +10,6 @@ request, and asks.
 
 from __future__ import annotations
 
-from collections import defaultdict
 import dataclasses
 import math
 
@@ -62,7 +61,7 @@ class _Unit:
     there_since: float = -math.inf
     longest: float = 0.0
 
-    def asked(self, now: float) -> None:
+    def note_asked(self, now: float) -> None:
         """Note that it was sent something."""
         self.asked_at = now
 
@@ -90,6 +89,10 @@ class _Unit:
         return longest
 
 
+#: What is known of a unit that was never asked.
+_NEVER_ASKED = _Unit()
+
+
 class Silences:
     """
     How long each unit has not answered its requests; all times are of one clock, s.
@@ -111,7 +114,8 @@ class Silences:
     """
 
     def __init__(self) -> None:
-        self._units: defaultdict[int, _Unit] = defaultdict(_Unit)
+        #: Of each that was ever asked; other threads look here, too, and add none.
+        self._units: dict[int, _Unit] = {}
         #: After which silence the drive at a unit is lost, s: all units that have a drive.
         self._lost_after: dict[int, float] = {}
         #: The units asked in vain since the last valid frame, and since when one of them was.
@@ -154,11 +158,11 @@ class Silences:
         """
         if isinstance(error, NotSent):
             return
-        its = self._units[unit]
+        its = self._units.setdefault(unit, _Unit())
         if isinstance(error, DamagedAnswer):
             self._damaged_at = now
         if not isinstance(error, PortError):
-            its.asked(now)
+            its.note_asked(now)
         if error is None or error.responded or isinstance(error, Refused):
             if now - self._any_frame_at > SWAP_TIME:
                 # this end may have stood still
@@ -200,6 +204,9 @@ class Silences:
             its.paused(seconds)
         self._in_vain_since += seconds
 
+    def _of(self, unit: int) -> _Unit:
+        return self._units.get(unit, _NEVER_ASKED)
+
     def there_since(self, unit: int, now: float, *, to_stop: bool = False) -> float:
         """
         Return since when a unit cannot have been exchanged; infinity if it may be by now.
@@ -210,7 +217,7 @@ class Silences:
         longest = SWAP_TIME
         if to_stop:
             longest = max(SWAP_TIME, self._lost_after.get(unit, 0.0) + _NOTICED_WITHIN)
-        its = self._units[unit]
+        its = self._of(unit)
         if now - min(its.gone_since, self._any_frame_at) > longest:
             return math.inf
         return max(self._line_since, its.there_since)
@@ -222,7 +229,7 @@ class Silences:
 
     def is_silent(self, unit: int) -> bool:
         """Return whether a unit has not answered the last request to it."""
-        return self._units[unit].silent_since < math.inf
+        return self._of(unit).silent_since < math.inf
 
     def silent_since(self, unit: int, *, is_watched: bool) -> float:
         """
@@ -230,7 +237,7 @@ class Silences:
 
         :param is_watched: it would have been asked all the time, were there time for it.
         """
-        since = self._units[unit].silent_since
+        since = self._of(unit).silent_since
         return min(since, self._in_vain_since) if is_watched and self.is_line_silent else since
 
     @property
@@ -250,7 +257,7 @@ class Silences:
 
     def was_asked_since_silent(self, unit: int) -> bool:
         """Return whether a unit was sent anything since the line is silent."""
-        return self._units[unit].asked_at >= self._in_vain_since
+        return self._of(unit).asked_at >= self._in_vain_since
 
     def is_dead(self, now: float) -> bool:
         """Return whether the line is silent for more than noise: for several units, or for long."""
@@ -266,19 +273,19 @@ class Silences:
         """Return when a unit, or any, was last sent anything."""
         if unit is None:
             return max((its.asked_at for its in self._units.values()), default=-math.inf)
-        return self._units[unit].asked_at
+        return self._of(unit).asked_at
 
     def last_frame_at(self, unit: int) -> float:
         """Return when the last valid frame of a unit came."""
-        return self._units[unit].frame_at
+        return self._of(unit).frame_at
 
     def take_longest(self, unit: int) -> float:
         """Return the longest time between two valid frames of a unit since the last call."""
-        return self._units[unit].take_longest()
+        return self._of(unit).take_longest()
 
     def lasts(self, unit: int, now: float) -> float:
         """Return for how long a unit has been silent; 0 if it answers."""
-        since = self._units[unit].silent_since
+        since = self._of(unit).silent_since
         return now - since if since < math.inf else 0.0
 
     def is_missing(self, unit: int, now: float) -> bool:

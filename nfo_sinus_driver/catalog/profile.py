@@ -36,6 +36,14 @@ class Refusal(Exception):
     """
 
 
+class NotTried(Refusal):
+    """
+    What a step reads was not even tried, for it takes longer than a stop may wait.
+
+    What cannot be written rightly without it raises this again: the next try reads.
+    """
+
+
 class NotPossible(Exception):
     """A sequence cannot be carried out; the message says why and what to do."""
 

@@ -195,8 +195,8 @@ class RequestLink(ABC, Generic[_Request]):
         self._line_end = self._now()
 
     def answers_twice(self, unit: int) -> bool:
-        """Return whether a unit does; see :class:`.SecondAnswers`."""
-        return self._seconds.silence(unit, self._now()) > 0.0
+        """Return false: an answer counts at once, and the silence behind it is waited for after."""
+        return False
 
     def close(self) -> None:
         """Close the port; harmless when it is closed already."""

@@ -14,7 +14,14 @@ import math
 from typing import Any, TypeVar
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Access, InverterStatus, NotPossible, Refusal, profile
+from nfo_sinus_driver.catalog import (
+    Access,
+    InverterStatus,
+    NotPossible,
+    NotTried,
+    Refusal,
+    profile,
+)
 from nfo_sinus_driver.drive.known.drive_state import DriveState
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Severity
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
@@ -24,6 +31,10 @@ _T = TypeVar('_T')
 _Condition = Callable[[InverterStatus], bool]
 #: Waits until the drive's status fulfils a condition; raises DriveError if it does not.
 Reached = Callable[[_Condition], Awaitable[None]]
+
+
+class NotRead(DamagedAnswer):
+    """A stop cannot be written without what was not read this time: the next try has to."""
 
 
 async def run_steps(
@@ -47,7 +58,7 @@ async def run_steps(
     :param permit: as for :meth:`ParameterAccess.write`.
     :param is_blind: nothing answers, but the drive may hear. A read is tried once, and where it has
         no answer the sequence goes on as if it had been refused.
-    :param reads: false: it is not even tried.
+    :param reads: false: it is not even tried (:class:`NotRead`).
     :raises DriveError: it cannot be carried out.
     :raises LinkError: the drive does not answer, so that the outcome is unknown; or it refuses,
         and the sequence ends by that.
@@ -79,7 +90,7 @@ async def run_steps(
                 case profile.Read(key, retry):
                     params.require_fitted(key)
                     if not reads:
-                        raise DamagedAnswer(f'{key} is not read: that would take too long')
+                        raise NotRead(f'{key} is not read: that would take too long')
                     # what is read behind a stop keeps back no stop of another drive
                     behind = priority is Priority.STOP and written_at > -math.inf
                     urgency = Priority.LOOK if behind else priority
@@ -104,7 +115,8 @@ async def run_steps(
                 raise
             if not await _was_written(step, state, priority, error):
                 named = error.naming() if isinstance(error, Refused) else error
-                refusal = Refusal(str(named))
+                kind = NotTried if isinstance(error, NotRead) else Refusal
+                refusal = kind(str(named))
                 refusal.__cause__ = named
         if isinstance(step, profile.Write):
             written_at = params.now()

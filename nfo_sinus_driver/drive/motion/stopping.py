@@ -19,7 +19,7 @@ from nfo_sinus_driver.drive.known.diagnosis import report_of
 from nfo_sinus_driver.drive.known.drive_state import DriveState
 from nfo_sinus_driver.drive.known.events import Cause, DriveError, Report, Severity
 from nfo_sinus_driver.drive.known.movement import RAMP_SHOWS_BY, STANDSTILL, Standing
-from nfo_sinus_driver.drive.known.steps import run_steps
+from nfo_sinus_driver.drive.known.steps import NotRead, run_steps
 from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, NoData, PortError, Refused
 
 #: How often a stop that was answered and is not confirmed is written again, s.
@@ -113,6 +113,9 @@ class StopSequence:
         self._tried_at = -math.inf
         #: How often there was a new reason; an earlier attempt does not confirm it.
         self._reasons = 0
+        #: What is written cannot be made without what is in the drive: the next attempt reads that,
+        #: although it takes long.
+        self._has_to_read = False
         #: The present attempt has written something; and that was acknowledged, a word made without
         #: what is in the drive: what cannot be read before a stop cannot be read after it either.
         self._wrote = self._removed_blind = False
@@ -406,6 +409,8 @@ class StopSequence:
         reasons, self._acknowledged = self._reasons, False
         try:
             outcome = await self._try_once(before)
+        except NotRead as error:
+            outcome, self._failure = _Outcome.UNANSWERED, error
         except (NoAnswer, DamagedAnswer) as error:
             # a PLC that has no data of the drive has answered
             heard = isinstance(error, NoData)
@@ -470,9 +475,8 @@ class StopSequence:
         :raises LinkError: what it did is not to be seen: the line, or the drive, is gone.
         """
         await self.find()
-        # every second try without: what is read of a drive that answers twice takes long, and not
-        # every stop can be written without it
-        reads = not (self._contact.answers_twice and self._unanswered % 2 == 0)
+        # what is read of a drive that answers twice takes long
+        reads, self._has_to_read = self._has_to_read or not self._contact.answers_twice, False
         is_blind, self._wrote, self._removed_blind = self._is_blind(reads), False, False
         try:
             await run_steps(
@@ -488,6 +492,10 @@ class StopSequence:
             is_busy = error.is_busy and self._bus.now() < self._due
             self._refusals += not is_busy
             return _Sent(error, is_busy)
+        except NotRead:
+            # nothing was in vain
+            self._has_to_read = True
+            raise
         except PortError:
             raise
         except LinkError as error:

@@ -27,6 +27,7 @@ from nfo_sinus_driver.catalog.profile import (
     Hold,
     Holder,
     NotPossible,
+    NotTried,
     Profile,
     Read,
     Refusal,
@@ -209,6 +210,8 @@ def _changed(step: SetBits, retry: bool) -> Steps[int]:
     """Return a register with bits changed; what is only cleared is 0 where it cannot be read."""
     try:
         before = int((yield Read(step.key, retry=retry)))
+    except NotTried:
+        raise
     except Refusal:
         if step.set:
             raise

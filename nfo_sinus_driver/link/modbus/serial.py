@@ -170,6 +170,10 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
 
     # --- belief -----------------------------------------------------------------------------------
 
+    def answers_twice(self, unit: int) -> bool:
+        """Return whether a unit does: an answer counts once the line was silent behind it."""
+        return self._seconds.silence(unit, self._now()) > 0.0
+
     def _believed(self, request: Request[_T]) -> tuple[_T, float]:
         """Return the answer to a request: not one sent twice, nor one to another master."""
         names_it = isinstance(request, Write)
@@ -350,9 +354,13 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             self._late.expect(request, self._now())
         elif isinstance(came.error, (AnotherValue, Refused)):
             self._take_refusal(request, came)
-        if came.error is not None:
+        if came.error is None:
+            return came.answer, came.arrived
+        try:
             raise came.error
-        return came.answer, came.arrived
+        finally:
+            # as above
+            del came
 
     def _await_answer(self, request: Request[Any], frame: bytes) -> _Came:
         """Wait for the answer to a request that was sent; return what came of it."""
@@ -368,7 +376,13 @@ class SerialLink(RequestLink[Request[Any]], ModbusLink):
             self._note_answer(request, refusal_head(request), reader.frame)
         late = request.answer_head in self._late.quarantined(request.unit, self._now())
         asked_too = self._take_others(request, reader, frame)
-        return _Came(answer, arrived, error, reader.frame, bool(reader.received), late, asked_too)
+        try:
+            return _Came(
+                answer, arrived, error, reader.frame, bool(reader.received), late, asked_too
+            )
+        finally:
+            # else its traceback and this frame keep each other
+            error = None
 
     def _take_answer(self, request: Request[Any], came: _Came) -> None:
         """Note that a request was answered, and what else may come by that."""

@@ -249,7 +249,7 @@ class DeclaredControlUnit(ControlUnit):
         """Run the motor, ramp it to a stop, or let it go."""
         motor = self.motor
         if self.faults:
-            if self.variant.run_command_in_fault != 'keeps':
+            if self._run and self.variant.run_command_in_fault != 'keeps':
                 self._drop_run()
             motor.release()
             return

@@ -104,13 +104,13 @@ class Orders:
             rows[_RESET] = words[:1], shown
         self._directions = _directions(drive)
         run, _ = rows.get(_RUN, ((), {}))
+        place = run[-1].place if run else None
         #: What runs the motor by itself, once what comes before it was written.
-        self._runs = [*run[-1:], *(way for way in self._directions if way.place == run[-1].place)]
+        self._runs = [*run[-1:], *(way for way in self._directions if way.place == place)]
         others = [word for name, (words, _) in rows.items() if name != _RUN for word in words]
         others += run[:-1]
         counts = _union(word.differs(others) for word in self._runs)
         counts |= _union(word.differs(self._runs) for word in self._runs)
-        place = run[-1].place if run else None
         self._runs = [word.by(counts) for word in self._runs]
         self._directions = tuple(
             way.by(counts if way.place == place else way.differs(self._directions))
