@@ -176,11 +176,6 @@ class Drive:
         return self.state.control.stopping
 
     @property
-    def recognised(self) -> bool:
-        """It is known what is at its address; before, nothing is written there."""
-        return self.state.contact.is_recognised
-
-    @property
     def stop_owed(self) -> bool:
         """This driver may have run the motor, and has no confirmation that it stops."""
         return self.state.control.stop_owed

@@ -310,6 +310,7 @@ def untouched(
         (['-p', 'poll_rate:=.nan'], ['poll_rate nan', '0 to 1000 Hz']),
         (['-p', 'response_timeout:=11.0'], ['response_timeout 11', '0.01 to 10 s']),
         (['-p', 'retries:=11'], ['retries 11', '0 to 10']),
+        (['-p', 'trace:=/nowhere/line'], ['trace /nowhere/line: No such file', 'name a file in']),
         pytest.param(
             ['-p', 'port:=foo://x'],
             ['port', 'there is no foo://', 'socket://host:port', 'rfc2217'],
