@@ -90,7 +90,7 @@ async def run_steps(
                 case profile.Read(key, retry):
                     params.require_fitted(key)
                     if not reads:
-                        raise NotRead(f'{key} is not read: that would take too long')
+                        raise NotRead(key)
                     # what is read behind a stop keeps back no stop of another drive
                     behind = priority is Priority.STOP and written_at > -math.inf
                     urgency = Priority.LOOK if behind else priority

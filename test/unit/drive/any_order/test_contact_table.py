@@ -69,7 +69,7 @@ class World:
     def key(self) -> tuple[object, ...]:
         """All that can make a difference from now on: ages, and which of two came first."""
         contact, line = vars(self.contact), vars(self.silences)
-        its = self.silences._units[_UNIT]
+        its = self.silences._of(_UNIT)
         ages = (
             self.away_since, self.due_at, contact['_stop_due_at'], line['_any_frame_at'],
             its.silent_since, its.gone_since, its.asked_at,
