@@ -30,7 +30,7 @@ LINE_AND_DRIVE = (
 LINE = ('protocol', 'baud_rate', 'char_format', 'address')
 DEFAULTS = {name: SETTINGS[name].default for name in LINE_AND_DRIVE}
 #: What every verb has besides, where nothing else was typed or filled in.
-USUAL = {'yes': False, 'may_take_control': False}
+USUAL = {'yes': False, 'may_take_control': False, 'trace': ''}
 #: Defaults of a scan: a short time-out, no retries.
 OF_SCAN = {'response_timeout': 0.1, 'retries': 0}
 

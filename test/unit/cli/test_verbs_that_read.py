@@ -41,6 +41,15 @@ def test_info(nfo: Nfo, bench: Bench) -> None:
     assert bench.writes() == []
 
 
+def test_what_goes_over_the_line_is_traced_where_that_is_wanted(nfo: Nfo, tmp_path: Path) -> None:
+    trace = tmp_path / 'line.jsonl'
+    assert nfo('info', '--trace', trace).status == 0
+    frames = [json.loads(line) for line in trace.read_text().splitlines()]
+    assert [frame['direction'] for frame in frames[:4]] == ['request', 'answer'] * 2
+    done = nfo('info', '--trace', tmp_path / 'no' / 'line')
+    assert done.status == 2 and 'No such file' in done.err
+
+
 def test_list_shows_every_setting(nfo: Nfo, bench: Bench) -> None:
     done = nfo('list')
     assert done.status == 0 and done.err == ''
