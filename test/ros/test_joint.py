@@ -159,7 +159,8 @@ def test_a_command_that_is_ignored_while_the_drive_is_lost_says_so(bench: Bench)
 
 def test_a_command_before_the_drive_was_read_says_so() -> None:
     drive = SimpleNamespace(
-        snapshot=SimpleNamespace(control_mode=''), state=SimpleNamespace(connected=True)
+        snapshot=SimpleNamespace(control_mode=''),
+        state=SimpleNamespace(contact=SimpleNamespace(connected=True)),
     )
     for identity in (None, Identity()):
         drive.identity = identity
