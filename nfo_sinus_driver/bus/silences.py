@@ -158,7 +158,9 @@ class Silences:
         """
         if isinstance(error, NotSent):
             return
-        its = self._units.setdefault(unit, _Unit())
+        its = self._units.get(unit)
+        if its is None:
+            its = self._units[unit] = _Unit()
         if isinstance(error, DamagedAnswer):
             self._damaged_at = now
         if not isinstance(error, PortError):

@@ -549,6 +549,11 @@ class Bus:
         return self._clock.paused
 
     @property
+    def running(self) -> float:
+        """The time, but for the time in which the worker did not run, s."""
+        return self.now() - self._clock.paused
+
+    @property
     def resumed_at(self) -> float:
         """When the worker last ran again after it had not, s; for coroutines on it."""
         return self._clock.resumed_at

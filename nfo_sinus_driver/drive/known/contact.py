@@ -199,7 +199,7 @@ class Contact:
 
     def read_failed(self, what: str, error: LinkError) -> bool:
         """Note that one was not; return whether the poll fails by that."""
-        self._failures.add(what, self._running, error)
+        self._failures.add(what, self._bus.running, error)
         return self.is_silent_for_long or self.fails_for_long(what)
 
     def poll_passed(self) -> None:
@@ -213,7 +213,7 @@ class Contact:
         self.behind_plc = isinstance(error, NoData) or is_old
         if not self.connected:
             return False
-        self._failures.add(_POLL, self._running, error)
+        self._failures.add(_POLL, self._bus.running, error)
         # these have been waited out, or cannot be
         at_once = self.behind_plc or isinstance(error, (PortError, Interrupted))
         another = isinstance(error, DriveError) and not self.is_recognised
@@ -228,16 +228,11 @@ class Contact:
 
     def is_failing(self, what: str) -> bool:
         """Return whether a read was not answered when it was tried last."""
-        return bool(self._failures.last(what, self._running))
+        return bool(self._failures.last(what, self._bus.running))
 
     def fails_for_long(self, what: str) -> bool:
         """Return whether a read has failed for ``lost_after``, whatever else was answered."""
-        return self._failures.last(what, self._running) >= self._lost_after()
-
-    @property
-    def _running(self) -> float:
-        """The time, but for pauses of the worker, s."""
-        return self._bus.now() - self._bus.paused
+        return self._failures.last(what, self._bus.running) >= self._lost_after()
 
     # --- for how long not? --------------------------------------------------------------------
 

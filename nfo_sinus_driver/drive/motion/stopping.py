@@ -475,7 +475,7 @@ class StopSequence:
         :raises LinkError: what it did is not to be seen: the line, or the drive, is gone.
         """
         await self.find()
-        # what is read of a drive that answers twice takes long
+        # what is read of a drive that answers twice takes long: first without, where that can be
         reads, self._has_to_read = self._has_to_read or not self._contact.answers_twice, False
         is_blind, self._wrote, self._removed_blind = self._is_blind(reads), False, False
         try:

@@ -265,11 +265,6 @@ class Poller:
                 await self._be_heard()
             await self._bus.sleep(left if left > 0 else latest / 2)
 
-    @property
-    def _running(self) -> float:
-        """The time, but for pauses of the worker, s."""
-        return self._bus.now() - self._bus.paused
-
     def _alarming(self, status: InverterStatus) -> bool:
         """Return whether a status may have to stop the motor."""
         return self._controller is not None and self._controller.alarmed_by(status)
@@ -398,7 +393,7 @@ class Poller:
             return measurements.last(role).value
         measurements.take_value(role, value)
         if role in state.model.roles:
-            self._plan.measured(self._running - self._requested_at)
+            self._plan.measured(self._bus.running - self._requested_at)
         return value
 
     async def _read_mode(self, status: InverterStatus) -> bool:
@@ -435,7 +430,7 @@ class Poller:
         :raises LinkError: the drive has been silent for too long, or has answered everything but
             this; it refuses; the port is gone; or the PLC has no valid data of it.
         """
-        asked_at, self._requested_at = self._bus.now(), self._running
+        asked_at, self._requested_at = self._bus.now(), self._bus.running
         try:
             answer = await read()
         except (PortError, Refused, Interrupted, NoData):

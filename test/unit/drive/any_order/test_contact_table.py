@@ -66,6 +66,10 @@ class World:
     def now(self) -> float:
         return self.time
 
+    @property
+    def running(self) -> float:
+        return self.time - self.paused
+
     def key(self) -> tuple[object, ...]:
         """All that can make a difference from now on: ages, and which of two came first."""
         contact, line = vars(self.contact), vars(self.silences)

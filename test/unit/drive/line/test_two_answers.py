@@ -179,6 +179,32 @@ def test_a_stop_that_has_to_be_read_before_is_written_all_the_same(
     rig.kill()
 
 
+def test_a_stop_leaves_what_else_is_in_a_register(tmp_path: Path) -> None:
+    register = {'register': 10}
+    control = {'run': [{**register, 'set': 0x81}], 'stop': [{**register, 'clear': 0x01}]}
+    rig = DescribedRig(described(tmp_path, control=control), poll_rate=20.0)
+    rig.turn()
+    repeat(rig, 0.03)
+    rig.pass_time(6.0)
+    rig.asked.clear()
+    rig.answer(rig.drive.stop())
+    assert words(rig) == {(1, 0x80)}
+    rig.kill()
+
+
+def test_an_ordinary_stop_of_a_movitrac_stays_one() -> None:
+    rig = Rig('movitrac', poll_rate=20.0)
+    rig.turn()
+    repeat(rig, 0.03)
+    rig.pass_time(6.0)
+    rig.asked.clear()
+    rig.answer(rig.drive.stop())
+    bits = [rig.number(data) for _, key, data in rig.asked if data and 'function_bits' in key]
+    # without Enable it would be a rapid one
+    assert bits and all(number & 0x04 for number in bits)
+    rig.kill()
+
+
 @pytest.mark.parametrize('seconds', [0.0, 0.004, 0.03, 0.09])
 @pytest.mark.parametrize('connection', LINES)
 def test_a_drive_is_connected_read_and_enabled(connection: str, seconds: float) -> None:
