@@ -267,18 +267,23 @@ class Scheduler:
         is_look = request.priority is Priority.LOOK and (request.unit, True) in tries
         if request.priority is not Priority.STOP and not is_look:
             return False
-        if tries.get((request.unit, request.writes), 0) % _PATIENT == 1:
-            return False
-        return self._is_silent(request.unit) or any(
-            isinstance(entry, Waiting) and entry.request.unit != request.unit
+        others = [
+            entry.task
             for entry in self._queues[Priority.STOP]
-        )
+            if isinstance(entry, Waiting) and entry.request.unit != request.unit
+        ]
+        is_patient = tries.get((request.unit, request.writes), 0) % _PATIENT == 1
+        if is_patient and all(task.requests > 1 for task in others):
+            return False
+        return self._is_silent(request.unit) or bool(others)
 
     def _in_vain(self, entry: LatestValue | Waiting) -> tuple[int, int]:
         """Return how often the like of it was in vain, and how many requests its stop has made."""
         assert isinstance(entry, Waiting)
         task, request = entry
-        return self._unanswered_stops.get((request.unit, request.writes), 0), task.requests
+        in_vain = self._unanswered_stops.get((request.unit, request.writes), 0)
+        # what another stop of the unit has tried keeps no first request back
+        return min(in_vain, task.requests - 1), task.requests
 
     def _gives_way(self, entry: LatestValue | Waiting) -> bool:
         """Return whether it is for the unit that has just not answered, or for one like it."""

@@ -290,10 +290,12 @@ def test_set_point_that_was_not_sent_had_no_turn() -> None:
     assert kind_of(scheduler.next_entry()) == _SLOT
 
 
-def stop_of(unit: int) -> Waiting:
-    """A stop that waits."""
+def stop_of(unit: int, requests: int = 1) -> Waiting:
+    """A stop that waits, of a task that has made so many requests."""
     request = Request(unit, Write(register(1), packed(0)), Priority.STOP)
-    return Waiting(cast(Task, named(f'stop {unit}')), request)
+    task = _Named(f'stop {unit}')
+    task.requests = requests
+    return Waiting(cast(Task, task), request)
 
 
 def test_a_stop_that_is_not_answered_gives_way_to_others_once() -> None:
@@ -542,6 +544,7 @@ def test_of_stops_in_vain_the_one_that_was_tried_least_goes_first() -> None:
         taken = scheduler.next_entry()
         assert isinstance(taken, Waiting)
         scheduler.took(0.01)
+        taken.task.requests += 1
         scheduler.add(taken)
         return taken.request.unit
 
@@ -550,3 +553,35 @@ def test_of_stops_in_vain_the_one_that_was_tried_least_goes_first() -> None:
     assert [tried() for _ in range(4)] == [1, 2, 1, 2]
     scheduler.add(stop_of(3))
     assert [tried() for _ in range(4)] == [3, 3, 1, 2]
+
+
+def test_what_was_in_vain_before_keeps_no_new_stop_back() -> None:
+    scheduler = Scheduler(lambda unit: True)
+    before, other = stop_of(1), stop_of(2)
+    for _ in range(3):
+        # as set-point 0, which is written until it arrives
+        scheduler.add(before)
+        assert scheduler.next_entry() is before
+        scheduler.took(0.01)
+    scheduler.add(other)
+    assert scheduler.next_entry() is other
+    scheduler.took(0.01)
+    new, again = stop_of(1), stop_of(2, requests=2)
+    scheduler.add(again)
+    scheduler.add(new)
+    assert scheduler.next_entry() is new
+
+
+def test_no_stop_is_waited_for_while_that_of_another_unit_was_not_sent() -> None:
+    scheduler = Scheduler(lambda unit: True)
+    first, second = stop_of(1), stop_of(1, requests=2)
+    scheduler.add(first)
+    assert scheduler.next_entry() is first
+    assert scheduler.is_brief(first.request)
+    scheduler.took(0.01)
+    scheduler.add(stop_of(2))
+    assert scheduler.is_brief(second.request), 'the other one has to go'
+    scheduler.next_entry()
+    scheduler.took(0.01)
+    scheduler.add(stop_of(2, requests=2))
+    assert not scheduler.is_brief(second.request), 'an answer may take longer than ever'

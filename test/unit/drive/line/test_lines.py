@@ -29,6 +29,11 @@ def test_all_answers_are_lost_from_one_request_on(kind: str, calls: str, at: int
     run(kind, 'all answers lost', calls, at)
 
 
+def test_of_a_line_that_hears_no_write_no_stop_waits_for_vain_ones_of_others() -> None:
+    # the set-points 0 that were in vain before are no tries of the stops
+    run('rtu 8', 'writes unheard', 'no set-points', at=1)
+
+
 @pytest.mark.parametrize('happens', HAPPENS)
 @pytest.mark.parametrize('kind', KINDS)
 def test_whatever_happens_to_a_line(kind: str, happens: str) -> None:
