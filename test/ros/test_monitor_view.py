@@ -21,7 +21,7 @@ _TWO = """
 /**/drive_10: {ros__parameters: {address: 2}}
 """
 #: What the key for the row above sends.
-_UP = '\x1bOA'
+_UP = '\x1b[A'
 
 
 def start(bench: Bench) -> object:

@@ -50,8 +50,8 @@ class Terminal(contextlib.ExitStack):
             preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
             env={
                 **(os.environ if environment is None else environment),
-                # of that of xterm pyte does not know all
-                'TERM': 'screen-256color',
+                # pyte knows all of it; of others not how they scroll by several lines
+                'TERM': 'linux',
                 'LC_ALL': 'C.UTF-8',
                 'PYTHONUTF8': '1',
             },
