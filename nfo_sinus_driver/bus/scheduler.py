@@ -63,6 +63,24 @@ class Waiting(NamedTuple):
     request: Request
 
 
+class _Tried(NamedTuple):
+    """What was in vain: of which unit, a write or a read, of a stop or of a set-point 0."""
+
+    unit: int
+    writes: bool
+    stops: bool
+
+
+def _tried(entry: Waiting) -> _Tried:
+    task, request = entry
+    return _Tried(request.unit, request.writes, task.stops)
+
+
+def _any_of(request: Request) -> list[_Tried]:
+    """Return what a request may be, by the task that makes it."""
+    return [_Tried(request.unit, request.writes, stops) for stops in (True, False)]
+
+
 def _unit_of(entry: LatestValue | Waiting) -> int:
     return entry.unit if isinstance(entry, LatestValue) else entry.request.unit
 
@@ -128,13 +146,12 @@ class Scheduler:
         self._owed = dict.fromkeys(_SHARES, 0.0)
         #: What was given out just now, and of which rank.
         self._given: _Rank = _SLOT
-        self._wanted: LatestValue | Request | None = None
+        self._wanted: LatestValue | Waiting | None = None
         self._slot_went = False
         #: The stop, its read, or the service that has just not been answered.
         self._unanswered: Request | None = None
-        #: What units have not answered since they last answered anything: a stop (true), its read;
-        #: and how often.
-        self._unanswered_stops: dict[tuple[int, bool], int] = {}
+        #: What units have not answered since they last answered anything, and how often.
+        self._unanswered_stops: dict[_Tried, int] = {}
 
     def add(self, entry: LatestValue | Waiting) -> None:
         """Queue a slot or a transaction, behind its equals."""
@@ -204,7 +221,7 @@ class Scheduler:
     def _take_out(self, rank: _Rank, entry: LatestValue | Waiting) -> LatestValue | Waiting:
         del self._queues[rank][entry]
         self._given = rank
-        self._wanted = entry if isinstance(entry, LatestValue) else entry.request
+        self._wanted = entry
         return entry
 
     def _release_found(self) -> None:
@@ -264,26 +281,22 @@ class Scheduler:
         if request.priority is Priority.STOP and not request.writes:
             return not self._answers_twice(request.unit)
         tries = self._unanswered_stops
-        is_look = request.priority is Priority.LOOK and (request.unit, True) in tries
+        is_look = request.priority is Priority.LOOK and any(
+            tried._replace(writes=True) in tries for tried in _any_of(request)
+        )
         if request.priority is not Priority.STOP and not is_look:
             return False
-        others = [
-            entry.task
-            for entry in self._queues[Priority.STOP]
-            if isinstance(entry, Waiting) and entry.request.unit != request.unit
-        ]
-        is_patient = tries.get((request.unit, request.writes), 0) % _PATIENT == 1
-        if is_patient and all(task.requests > 1 for task in others):
+        if sum(tries.get(tried, 0) for tried in _any_of(request)) % _PATIENT == 1:
             return False
-        return self._is_silent(request.unit) or bool(others)
+        return self._is_silent(request.unit) or any(
+            isinstance(entry, Waiting) and entry.request.unit != request.unit
+            for entry in self._queues[Priority.STOP]
+        )
 
     def _in_vain(self, entry: LatestValue | Waiting) -> tuple[int, int]:
         """Return how often the like of it was in vain, and how many requests its stop has made."""
         assert isinstance(entry, Waiting)
-        task, request = entry
-        in_vain = self._unanswered_stops.get((request.unit, request.writes), 0)
-        # what another stop of the unit has tried keeps no first request back
-        return min(in_vain, task.requests - 1), task.requests
+        return self._unanswered_stops.get(_tried(entry), 0), entry.task.requests
 
     def _gives_way(self, entry: LatestValue | Waiting) -> bool:
         """Return whether it is for the unit that has just not answered, or for one like it."""
@@ -293,7 +306,7 @@ class Scheduler:
         if request.priority not in _STOPS and self._waits_for_stops(request.unit):
             return True
         before = self._unanswered
-        is_repeated = self._is_repeated(request)
+        is_repeated = self._is_repeated(entry)
         if before is not None and request.unit == before.unit:
             # the first stop that is requested is not held back by a service in vain
             return is_repeated or request.priority not in _STOPS or before.priority in _STOPS
@@ -308,24 +321,26 @@ class Scheduler:
         rounds = _ROUNDS if self._is_silent(unit) else 1
         return any(
             isinstance(entry, Waiting)
-            and self._unanswered_stops.get((entry.request.unit, entry.request.writes), 0) < rounds
+            and self._unanswered_stops.get(_tried(entry), 0) < rounds
             for entry in self._queues[Priority.STOP]
         )
 
     def took(self, seconds: float) -> None:
         """Account for the time, s, for which what was taken out last has kept the line."""
         wanted = self._wanted
-        in_vain = wanted is not None and self._is_silent(wanted.unit)
+        in_vain = wanted is not None and self._is_silent(_unit_of(wanted))
         is_stop = self._given in _STOPS
         is_unanswered = in_vain and self._given in _REPEATED
-        self._unanswered = wanted if isinstance(wanted, Request) and is_unanswered else None
+        waited = wanted if isinstance(wanted, Waiting) and is_unanswered else None
+        self._unanswered = waited.request if waited is not None else None
         # what was in vain takes no turn: else the next one were that of a set-point again
         self._slot_went = self._given == _SLOT or (
             self._slot_went and self._unanswered is not None
         )
-        if self._unanswered is not None and is_stop and not self._unanswered.is_brief:
-            # each by itself: the stop behind a read that was not answered goes out at once
-            stop = self._unanswered.unit, self._unanswered.writes
+        if waited is not None and is_stop and not waited.request.is_brief:
+            # each by itself: the stop behind a read that was not answered goes out at once, and so
+            # does the stop behind a set-point 0
+            stop = _tried(waited)
             self._unanswered_stops[stop] = 1 + self._unanswered_stops.get(stop, 0)
         for rank, share in _SHARES.items():
             if self._slot_went and rank in _BACKGROUND:
@@ -389,15 +404,15 @@ class Scheduler:
         request = entry.request
         if not self._is_silent(request.unit):
             if self._unanswered_stops:
-                self._unanswered_stops.pop((request.unit, False), None)
-                self._unanswered_stops.pop((request.unit, True), None)
+                for tried in _any_of(request):
+                    self._unanswered_stops.pop(tried._replace(writes=False), None)
+                    self._unanswered_stops.pop(tried._replace(writes=True), None)
         elif request.priority in _READS:
             return _MISSING if self._is_missing(request.unit) else _RETRY
-        elif self._is_repeated(request) and self._is_missing(request.unit):
+        elif self._is_repeated(entry) and self._is_missing(request.unit):
             # of others that answer it takes no more than their share
             return request.priority if self._is_line_silent() else _MISSING
         return request.priority
 
-    def _is_repeated(self, request: Request) -> bool:
-        before = (request.unit, request.writes)
-        return request.priority <= Priority.LOOK and before in self._unanswered_stops
+    def _is_repeated(self, entry: Waiting) -> bool:
+        return entry.request.priority <= Priority.LOOK and _tried(entry) in self._unanswered_stops

@@ -1338,6 +1338,22 @@ LAWS = (
     ),
     Mutant(
         3,
+        'a stop waits for the second tries of others where its set-points 0 were in vain',
+        '_tried',
+        'return _Tried(request.unit, request.writes, task.stops)',
+        'return _Tried(request.unit, request.writes, False)',
+        (LINES, '-k', 'hears_no_write'),
+    ),
+    Mutant(
+        3,
+        'each call of a quick stop makes one, and all of them fill the line',
+        'Controller._one_at_once',
+        '        if task is None or task.future.done():',
+        '        if True:',
+        (LINES, '-k', 'again_and_again'),
+    ),
+    Mutant(
+        3,
         'in noise the stops of those that answer keep back those of the others',
         'Silences.stops_in_vain_from',
         'return self._stops_from if self.is_in_noise(now) else math.inf',

@@ -45,6 +45,9 @@ NEEDED = {
         'a pause of the driver is the time that an answer takes',
     'test_lines.py::test_whatever_happens_to_a_line[movitrac 4-all answers lost]':
         'what is read before a stop keeps it back from a drive that hears and is not heard',
+    'test_lines.py::test_a_stop_that_is_called_for_again_and_again_keeps_no_other_back'
+    '[rtu-quick_stop]':
+        'each call of a quick stop makes one, and all of them fill the line',
     'test_two_answers.py::'
     'test_on_a_line_of_eight_no_stop_waits_for_a_second_answer[optimal, control word-0.03]':
         'where answers come twice a stop is read before',

@@ -11,9 +11,10 @@ Every command, every status that matters and every loss is an event of
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 import contextlib
 import math
+from typing import Any
 
 from nfo_sinus_driver.bus import Cancelled, Priority, Task
 from nfo_sinus_driver.catalog import InverterStatus, Kind, Limits, Meaning, State
@@ -40,6 +41,9 @@ from nfo_sinus_driver.link import DamagedAnswer, LinkError, NoAnswer, Refused
 _LEAST_PATIENCE = 1.0
 #: How long a motor that was released may be shown as driven still, by its voltage, s.
 _RELEASED_WITHIN = 0.1
+
+#: A stop of the drive's own kind, and why it is made.
+_OwnStop = Callable[[Report], Coroutine[Any, Any, Report]]
 
 
 class Controller:
@@ -68,6 +72,8 @@ class Controller:
         self._control.listen(self._changed, self._notify_stop)
         #: The task of the newest enable.
         self._enabling: Task | None = None
+        #: The quick stop and the rapid stop that go on, by what makes them.
+        self._own_stops: dict[_OwnStop, Task] = {}
         self._starting = StartSequence(state, method)
         self._sequence = StopSequence(state, method, look)
         self._following = FollowingCheck(state, setpoint)
@@ -347,6 +353,26 @@ class Controller:
         if not self.method.coasts:
             return Report(Cause.NO_QUICK_STOP, stop=await self.stop(why))
         await self._require_recognised()
+        return await self._one_at_once(self._quick_stop, why)
+
+    async def _one_at_once(self, stop: _OwnStop, why: Report) -> Report:
+        """
+        Stop in a way of the drive's own; a call while that goes on waits for the same.
+
+        A client may call until one call succeeds: as many stops would keep the line from those of
+        other drives.
+        """
+        task = self._own_stops.get(stop)
+        if task is None or task.future.done():
+            task = self._own_stops[stop] = self._bus.spawn(_outcome(stop(why)), stops=True)
+        while not await self._bus.join(task, LOOK_PERIOD):
+            pass
+        came: Report | Exception = task.future.result()
+        if isinstance(came, Exception):
+            raise came
+        return came
+
+    async def _quick_stop(self, why: Report) -> Report:
         may_run = self.may_run
         with self._sequence.external_stop(why):
             try:
@@ -385,6 +411,9 @@ class Controller:
         if not self.method.stop_ramp:
             return Report(Cause.NO_RAPID_STOP, stop=await self.stop(why))
         await self._require_recognised()
+        return await self._one_at_once(self._rapid_stop, why)
+
+    async def _rapid_stop(self, why: Report) -> Report:
         with self._sequence.external_stop(why):
             with contextlib.suppress(LinkError, DriveError):
                 await self._sequence.find()
@@ -728,6 +757,14 @@ class Controller:
         if status is not None and status.driven:
             raise DriveError(self._state.report(Cause.RUN_BY_OTHERS))
         return self._state.report(Cause.NO_CONTROL)
+
+
+async def _outcome(stop: Awaitable[Report]) -> Report | Exception:
+    """Return what a stop comes to, or why it failed: it is the same to all that wait for it."""
+    try:
+        return await stop
+    except Exception as error:
+        return error
 
 
 def required(controller: Controller | None) -> Controller:

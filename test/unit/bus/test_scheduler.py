@@ -28,6 +28,7 @@ class _Named(str):
     """A task in name alone."""
 
     requests = 0
+    stops = False
 
 
 #: The same each time.
@@ -290,11 +291,11 @@ def test_set_point_that_was_not_sent_had_no_turn() -> None:
     assert kind_of(scheduler.next_entry()) == _SLOT
 
 
-def stop_of(unit: int, requests: int = 1) -> Waiting:
-    """A stop that waits, of a task that has made so many requests."""
+def stop_of(unit: int, *, stops: bool = True) -> Waiting:
+    """A stop that waits, or a set-point 0."""
     request = Request(unit, Write(register(1), packed(0)), Priority.STOP)
     task = _Named(f'stop {unit}')
-    task.requests = requests
+    task.stops = stops
     return Waiting(cast(Task, task), request)
 
 
@@ -555,33 +556,32 @@ def test_of_stops_in_vain_the_one_that_was_tried_least_goes_first() -> None:
     assert [tried() for _ in range(4)] == [3, 3, 1, 2]
 
 
-def test_what_was_in_vain_before_keeps_no_new_stop_back() -> None:
+def test_the_set_point_0_that_was_in_vain_keeps_no_stop_of_its_unit_back() -> None:
     scheduler = Scheduler(lambda unit: True)
-    before, other = stop_of(1), stop_of(2)
+    zero, other = stop_of(1, stops=False), stop_of(2)
     for _ in range(3):
-        # as set-point 0, which is written until it arrives
-        scheduler.add(before)
-        assert scheduler.next_entry() is before
+        scheduler.add(zero)
+        assert scheduler.next_entry() is zero
         scheduler.took(0.01)
     scheduler.add(other)
     assert scheduler.next_entry() is other
     scheduler.took(0.01)
-    new, again = stop_of(1), stop_of(2, requests=2)
-    scheduler.add(again)
-    scheduler.add(new)
-    assert scheduler.next_entry() is new
+    stop = stop_of(1)
+    scheduler.add(other)
+    scheduler.add(stop)
+    assert scheduler.next_entry() is stop
 
 
-def test_no_stop_is_waited_for_while_that_of_another_unit_was_not_sent() -> None:
+def test_a_new_stop_of_a_unit_keeps_no_other_back() -> None:
     scheduler = Scheduler(lambda unit: True)
-    first, second = stop_of(1), stop_of(1, requests=2)
-    scheduler.add(first)
-    assert scheduler.next_entry() is first
-    assert scheduler.is_brief(first.request)
-    scheduler.took(0.01)
-    scheduler.add(stop_of(2))
-    assert scheduler.is_brief(second.request), 'the other one has to go'
-    scheduler.next_entry()
-    scheduler.took(0.01)
-    scheduler.add(stop_of(2, requests=2))
-    assert not scheduler.is_brief(second.request), 'an answer may take longer than ever'
+    for unit in (1, 2):
+        scheduler.add(stop_of(unit))
+    went = []
+    for _ in range(8):
+        taken = scheduler.next_entry()
+        assert isinstance(taken, Waiting)
+        went.append(taken.request.unit)
+        scheduler.took(0.01)
+        # each of them made by another call
+        scheduler.add(stop_of(taken.request.unit))
+    assert went == [1, 2] * 4

@@ -20,6 +20,7 @@ from support.line_runs import CALLS, HAPPENS, KINDS, LineRun
 from support.rig import Rig
 
 from nfo_sinus_driver.drive import Cause
+from nfo_sinus_driver.drive.broadcast import broadcast_stop
 
 
 @pytest.mark.parametrize('calls', ['no stop', 'stop all soon', 'end soon'])
@@ -140,3 +141,29 @@ def test_one_that_does_not_tell_its_firmware_any_more_is_stopped_by_its_status()
         rig.meet = lambda key, data: 'refused' if key == 'fieldbus.sw_ver' else None
         rig.line.mend()
         rig.wait_until(lambda: not rig.turns, 4.0)
+
+
+@pytest.mark.parametrize(('connection', 'call'), [
+    # SEW MOVITRAC and telegram 1 have the rapid stop
+    ('rtu', 'quick_stop'), ('movitrac', 'rapid_stop'), ('rtu', 'rapid_stop'),
+    ('classic', 'broadcast_stop'), ('rtu', 'stop'),
+])
+def test_a_stop_that_is_called_for_again_and_again_keeps_no_other_back(
+    connection: str, call: str
+) -> None:
+    # a node that calls until one succeeds
+    with Rig(connection, drives=3) as rig:
+        rig.turn()
+        rig.line.state = 'silent'
+        for drive in rig.drives.values():
+            drive.stop()
+        for _ in range(60):
+            if call == 'broadcast_stop':
+                broadcast_stop(rig.bus, rig.drives.values())
+            else:
+                getattr(rig.drives[1], call)()
+            rig.pass_time(0.02)
+        rig.pass_time(1.5)
+        rig.line.mend()
+        # longer than the longest pause between two looks at a lost one
+        rig.wait_until(lambda: not rig.turns, 2.0)

@@ -113,25 +113,25 @@ def test_where_a_fault_forbids_what_was_requested_before_a_stop_the_fault_is_tol
             assert 'fault 5 Overload is active' in rig.answer(command)
 
 
-def test_an_enable_is_refused_until_every_quick_stop_has_ended() -> None:
+def test_two_calls_of_a_quick_stop_are_one_and_no_enable_comes_between() -> None:
     with Rig() as rig:
         rig.turn()
         stops: list[Future[Any]] = [rig.drive.quick_stop()]
         releases = itertools.count()
 
-        def be_busy_with_the_second(key: str, data: bytes | None) -> str | None:
+        def be_busy(key: str, data: bytes | None) -> str | None:
             if (key, data) != (MODE, int(Mode.STOP).to_bytes(2, 'big')):
                 return None
             if not (number := next(releases)):
                 stops.append(rig.drive.quick_stop())
-            return 'busy' if 0 < number < 5 else None
+            return 'busy' if number < 5 else None
 
-        rig.meet = be_busy_with_the_second
-        assert rig.answer(stops[0]) == 'released: the motor coasts'
-        assert not stops[1].done()
+        rig.meet = be_busy
+        rig.wait_until(lambda: len(stops) == 2)
         enable = rig.answer(rig.drive.enable())
         assert not stops[1].done() and 'a stop is on its way' in enable
-        rig.answer(stops[1])
+        assert [rig.answer(stop) for stop in stops] == ['released: the motor coasts'] * 2
+        assert next(releases) == 6, 'it is written once, and while the drive is busy'
         assert 'enabled' in rig.answer(rig.drive.enable())
 
 
