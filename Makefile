@@ -16,7 +16,7 @@ WITHOUT_ROS = env -u AMENT_PREFIX_PATH -u CMAKE_PREFIX_PATH -u COLCON_PREFIX_PAT
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo run test lint types unit ros mutants campaign fuzz bench docs pages
-.PHONY: all bench-gate build clean coverage exhaustive golden laws soak
+.PHONY: all bench-gate build clean coverage exhaustive golden laws masters soak
 
 help: ## list the targets
 	@echo 'make demo and make test are all one needs; each sets up what it needs in this folder.'
@@ -46,8 +46,8 @@ ifdef FULL
 	@$(MAKE) --no-print-directory other-libraries
 endif
 
-all: ## all that says whether it is right: test, docs, mutants, campaign, exhaustive (hours)
-	@for stage in test docs mutants campaign exhaustive; do \
+all: ## all that says whether it is right: test, docs, masters, mutants, campaign, exhaustive (hours)
+	@for stage in test docs masters mutants campaign exhaustive; do \
 		$(MAKE) --no-print-directory $$stage FULL=1 || exit; \
 	done
 
@@ -104,6 +104,10 @@ other-libraries: setup
 ros: setup ## end-to-end tests with rclpy (CONNECTION=classic_v2: over another one; CONNECTION=all: over every)
 	@echo '== ros: driver, simulated drive and clients, each a process of its own'
 	@tools/run python $(PYTEST) -n $$(tools/workers $(if $(BESIDE),6,8)) $(if $(CONNECTION),--connection $(CONNECTION)) test/ros
+
+# One after the other: LinuxCNC's have one room on a machine.
+masters: setup ## masters of others (LinuxCNC's, mbpoll, pymodbus, minimalmodbus) run simulated drives
+	@$(WITHOUT_ROS) .venv/bin/python $(PYTEST) -n 0 test/masters
 
 coverage: setup ## which lines and branches of the driver the tests go through, unit and ros
 	@rm -rf .venv/coverage && mkdir .venv/coverage

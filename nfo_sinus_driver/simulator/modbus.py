@@ -18,6 +18,7 @@ from nfo_sinus_driver.simulator.protocol import Station
 READ = 3
 READ_INPUT = 4
 WRITE_SINGLE = 6
+DIAGNOSTICS = 8
 WRITE_MULTIPLE = 16
 REPORT_SLAVE_ID = 17
 WRITE_AND_READ = 23
@@ -101,6 +102,8 @@ class Requests(abc.ABC):
             return self._write_and_read(data)
         if function == REPORT_SLAVE_ID:
             return self._report_slave_id(data)
+        if function == DIAGNOSTICS:
+            return self._loop_back(data)
         assert function == ENCAPSULATED
         return self._identify(data)
 
@@ -133,6 +136,12 @@ class Requests(abc.ABC):
             raise Refused(Reason.VALUE, f'a write of {count} and read of {wanted} is malformed')
         read = self.write_and_read(register, words, source, wanted)
         return pymodbus_compat.encode_registers(WRITE_AND_READ, read)
+
+    @staticmethod
+    def _loop_back(data: bytes) -> bytes:
+        if data[:2] != bytes(2):
+            raise Refused(Reason.FUNCTION, 'of function 08 there is the loopback alone')
+        return bytes((DIAGNOSTICS,)) + data
 
     def _report_slave_id(self, data: bytes) -> bytes:
         if data:

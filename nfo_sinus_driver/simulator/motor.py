@@ -386,6 +386,11 @@ _MEASURED: Mapping[Role, Callable[[Motor, Counters], float]] = {
 }
 
 
+def measured(role: Role, motor: Motor, counters: Counters) -> float:
+    """Return what is measured, in engineering units."""
+    return _MEASURED[role](motor, counters)
+
+
 def measure(
     role: Role | None, parameter: Parameter, protocol: str, motor: Motor, counters: Counters
 ) -> int | None:

@@ -54,8 +54,9 @@ def hardest(model: str = 'sinus_g2') -> Mapping[str, str]:
 def ramps(model: str, up: float, down: float) -> dict[str, float]:
     """Return the settings of a drive family for its ramps, s; of a file those that it names."""
     if model.endswith(SUFFIX):
-        file = _file(model)
-        return {key: time for key, time in ((file.accel, up), (file.decel, down)) if key}
+        simulated = _file(model).simulated
+        found = ((simulated.accel, up), (simulated.decel, down))
+        return {key: time for key, time in found if key}
     return dict(zip(_RAMPS[model], (up, down), strict=True))
 
 

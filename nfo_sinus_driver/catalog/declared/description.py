@@ -247,6 +247,47 @@ class Timeout:
 
 
 @dataclass(frozen=True)
+class Shown:
+    """
+    A register that is only read, and not by this driver.
+
+    :ivar parameter: how it carries its value.
+    :ivar quantity: what that is; ``None``: the set-point.
+    """
+
+    parameter: Parameter
+    quantity: Role | None
+
+
+@dataclass(frozen=True)
+class Copied:
+    """A register in which some bits of another one stand, the lowest first."""
+
+    register: int
+    shift: int
+    mask: int
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """
+    What a file says for the simulated drive alone.
+
+    :ivar accel, decel: the parameters of its ramps, or ``''``.
+    :ivar loopback: it answers function 08, sub-function 0.
+    :ivar reverse: the register of commands, and the bit in it that turns the direction round.
+    :ivar registers: what stands in those that this driver does not read; a number, or where that
+        comes from.
+    """
+
+    accel: str = ''
+    decel: str = ''
+    loopback: bool = False
+    reverse: tuple[int, int] | None = None
+    registers: Mapping[int, int | Shown | Copied] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Description:
     """
     A drive, as its file describes it.
@@ -264,6 +305,7 @@ class Description:
     :ivar pole_pairs: of the motor; 0: not known.
     :ivar stop_mode: the parameter that says how it stops, and its value for coasting.
     :ivar defaults: with what value a parameter leaves the factory, by key.
+    :ivar simulated: what is for the simulated drive alone.
     :ivar unused: which keys of the file have no effect, a sentence each.
     """
 
@@ -301,8 +343,7 @@ class Description:
     timeout: Timeout | None = None
     defaults: Mapping[str, Value] = field(default_factory=dict)
     pole_pairs: int = 0
-    accel: str = ''
-    decel: str = ''
+    simulated: Simulated = field(default_factory=Simulated)
     unused: Sequence[str] = ()
 
     @property

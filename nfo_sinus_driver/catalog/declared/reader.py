@@ -37,6 +37,7 @@ from nfo_sinus_driver.catalog.declared.register_map import (
 )
 from nfo_sinus_driver.catalog.declared.registers import Use
 from nfo_sinus_driver.catalog.declared.settings import Settings, role_parameters
+from nfo_sinus_driver.catalog.declared.simulated import read_simulated
 from nfo_sinus_driver.catalog.declared.unused import unused
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems, load, number_of, shown
 from nfo_sinus_driver.catalog.parameter import Access, Parameter, Value
@@ -140,8 +141,9 @@ class _Reader:
             timeout=self._timeout(settings),
             defaults={**{key: first for key, (first, *_) in identify.items()}, **settings.defaults},
             pole_pairs=root.get('motor').integer('pole_pairs'),
-            accel=settings.known(root.get('simulated').get('accel')),
-            decel=settings.known(root.get('simulated').get('decel')),
+            simulated=read_simulated(
+                root.get('simulated'), self._map, settings, self._problems
+            ),
             unused=unused(root, self._problems),
         )
 

@@ -10,12 +10,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from nfo_sinus_driver.catalog import Kind, Role, to_words
-from nfo_sinus_driver.catalog.declared import FAULT_KEY, STATUS_KEY, Description, drive_number
+from nfo_sinus_driver.catalog.declared import (
+    FAULT_KEY,
+    STATUS_KEY,
+    Description,
+    Shown,
+    drive_number,
+)
 from nfo_sinus_driver.simulator._declared.orders import Orders, Place
 from nfo_sinus_driver.simulator._declared.status import Wish, compose
 from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused
-from nfo_sinus_driver.simulator.motor import Nameplate, nearest
+from nfo_sinus_driver.simulator.motor import Nameplate, measured, nearest
 
 #: How much it counts that a condition of the status is right.
 _WEIGHTS = {'fault': 100, 'running': 50, 'remote': 50, 'local': 50, 'stopping': 20}
@@ -60,7 +66,7 @@ class DeclaredControlUnit(ControlUnit):
         self._words: dict[Place, int] = {}
         #: Where nothing else was commanded since the last word.
         self._newest: set[Place] = set()
-        self._run = self._reverse = self._coasts = self._quick = False
+        self._run = self._reverse = self._coasts = self._quick = self._turned_round = False
         self._silent_for = self._braked_for = 0.0
         self.local = False
 
@@ -87,6 +93,9 @@ class DeclaredControlUnit(ControlUnit):
             self._reverse = way < 0
             # the word of the direction may be the run command, too
             done |= {'run'} if orders.has_run(place) else set()
+        turned_round = self._drive.simulated.reverse
+        if turned_round is not None and place == (turned_round[0], False):
+            self._turned_round = bool(word & turned_round[1])
         removes = orders.removes_run(place, word)
         self._newest = {place} if done or removes else self._newest | {place}
         if removes:
@@ -145,6 +154,21 @@ class DeclaredControlUnit(ControlUnit):
         if role in _SIZES and not address.number.signed:
             measured = abs(measured)
         return nearest(parameter, measured / self.scale(key), 'modbus')
+
+    def shown(self, what: Shown) -> int:
+        """Return the word of a register that the driver does not read."""
+        parameter = what.parameter
+        scale = self.memory.number(parameter.scale, 1.0) or 1.0 if parameter.scale else 1.0
+        if what.quantity is None:
+            key = self._drive.setpoint.key
+            value = self.memory.number(key) * self.scale(key)
+        else:
+            value = measured(what.quantity, self.motor, self.counters)
+        if not parameter.at('modbus').number.signed:
+            value = abs(value)
+        return to_words(
+            parameter.at('modbus').number.encode(nearest(parameter, value / scale, 'modbus'))
+        )[0]
 
     def _measured(self, role: Role | None) -> float | None:
         motor = self.motor
@@ -282,12 +306,13 @@ class DeclaredControlUnit(ControlUnit):
         value = max(-most, min(most, value))
         if place.mode == 'Speed':
             value = value * self.motor.plate.pole_pairs / 60
-        return -abs(value) if self._reverse and place.direction is not None else value
+        value = -abs(value) if self._reverse and place.direction is not None else value
+        return -value if self._turned_round else value
 
     def _set_ramps(self) -> None:
-        number, drive, motor = self.memory.number, self._drive, self.motor
-        motor.accel = max(_QUICKEST, number(drive.accel) if drive.accel else _RAMP)
-        motor.retard = max(_QUICKEST, number(drive.decel) if drive.decel else _RAMP)
+        number, ramps, motor = self.memory.number, self._drive.simulated, self.motor
+        motor.accel = max(_QUICKEST, number(ramps.accel) if ramps.accel else _RAMP)
+        motor.retard = max(_QUICKEST, number(ramps.decel) if ramps.decel else _RAMP)
         if self._quick and not self._run:
             motor.retard = max(_QUICKEST, motor.retard * _QUICKER)
 
@@ -303,7 +328,7 @@ class DeclaredControlUnit(ControlUnit):
         self._words.clear()
         self._newest.clear()
         self._orders = Orders(self._drive)
-        self._run = self._reverse = self._coasts = self._quick = False
+        self._run = self._reverse = self._coasts = self._quick = self._turned_round = False
         self.memory.put(self._drive.setpoint.key, 0)
 
     # ---- the line ----

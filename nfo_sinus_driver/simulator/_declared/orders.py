@@ -9,8 +9,8 @@ years write others. So of a register with the run command those bits count in wh
 forward or reverse, differs from any other command there:
 
 - a word that is a run word in them runs;
-- one that is another command, in the bits in which that differs from a run word, is that, and where
-  it is one by more bits, not the one by fewer;
+- one that is another command, in the bits in which that differs from a run word, but for those of
+  the direction, is that, and where it is one by more bits, not the one by fewer;
 - any other takes the run command away, and so do these.
 
 A word that is repeated changes nothing: a PLC writes cyclically. A reset counts from its first
@@ -120,7 +120,7 @@ class Orders:
             name: _Order(
                 tuple(
                     word if word.place != place
-                    else word.by(counts if name == _RUN else word.differs(self._runs))
+                    else word.by(counts if name == _RUN else self._bits_of(word))
                     for word in words
                 ),
                 shown,
@@ -129,6 +129,12 @@ class Orders:
         }
         self.places = {word.place for words, _ in rows.values() for word in words}
         self.places |= {way.place for way in self._directions}
+
+    def _bits_of(self, word: _Word) -> int:
+        """Return the bits by which a word is no run command, whichever way the motor turns."""
+        bits = word.differs(self._runs)
+        of_direction = _union(run.differs(self._runs) for run in self._runs)
+        return bits & ~of_direction or bits
 
     def made_by(self, place: Place, word: int) -> Collection[str]:
         """Take a word that was written; return the commands that are complete by it."""

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import struct
 
 from nfo_sinus_driver.catalog import Access, Parameter, to_bytes, to_words
-from nfo_sinus_driver.catalog.declared import STATUS_KEY, Description
+from nfo_sinus_driver.catalog.declared import STATUS_KEY, Copied, Description, Shown
 from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator._declared.control_unit import DeclaredControlUnit
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
@@ -37,6 +37,8 @@ class Server(modbus.Requests):
         self._commands = self._unit.command_places
         self._at = dict(self._places(file, coils=False))
         self._coils = dict(self._places(file, coils=True))
+        if file.simulated.loopback:
+            self.functions |= {modbus.DIAGNOSTICS}
         # what the file does not write by is refused
         self.functions -= {modbus.WRITE_SINGLE, modbus.WRITE_MULTIPLE} - set(file.line.write)
 
@@ -65,10 +67,19 @@ class Server(modbus.Requests):
         if register in status.registers and not status.coils:
             return self._unit.status_word >> status.shift(register) & 0xFFFF
         if register not in self._at:
-            raise Refused(Reason.ADDRESS, f'there is no register {register:04X}h')
+            return self._word_for_others(register)
         parameter, part = self._at[register]
         raw = self.drive.read_raw(parameter.key)
         return to_words(parameter.at('modbus').number.encode(raw))[part]
+
+    def _word_for_others(self, register: int) -> int:
+        """Return what stands in a register that the driver does not read."""
+        found = self._file.simulated.registers.get(register)
+        if found is None:
+            raise Refused(Reason.ADDRESS, f'there is no register {register:04X}h')
+        if isinstance(found, Copied):
+            return self._word(found.register) >> found.shift & found.mask
+        return self._unit.shown(found) if isinstance(found, Shown) else found
 
     def write(self, register: int, words: Sequence[int]) -> None:
         """Write registers one after the other; of a parameter of two both are needed."""

@@ -160,6 +160,8 @@ MEANT = {
     41: ('delta_vfd_el', 0x2000, 0x12),
     42: ('delta_vfd_el', 0x2000, 0x01),
     43: ('delta_vfd_el', 0x2001, 0.1),
+    45: ('siemens_v20', 99, 0x0C7F),
+    46: ('siemens_v20', 99, 0x0C7E),
 }
 
 
@@ -190,6 +192,51 @@ def test_a_simulated_drive_answers_a_write_alike(number: int) -> None:
     server = drive.servers['modbus']
     answer = server.answer(CAPTURES[number].message[1:])
     assert answer == _message('modbus_rtu', CAPTURES[number].response)[1:]
+
+
+@pytest.mark.parametrize(('name', 'number'), [('yaskawa_v1000', 11), ('delta_ms300', 34)])
+def test_a_simulated_drive_loops_back_alike(name: str, number: int) -> None:
+    server = simulated_drive(str(SHIPPED[name])).servers['modbus']
+    capture = CAPTURES[number]
+    assert server.answer(capture.message[1:]) == capture.response[1:-2]
+
+
+def test_a_simulated_drive_shows_the_set_point_at_standstill_alike() -> None:
+    server = simulated_drive(str(SHIPPED['delta_ms300'])).servers['modbus']
+    server.write(0x2001, (0x1770,))
+    for number in (29, 31):
+        capture = CAPTURES[number]
+        answer = _message(capture.protocol, capture.response)
+        assert server.answer(capture.message[1:]) == answer[1:]
+
+
+def test_a_simulated_drive_shows_four_registers_of_a_run_alike() -> None:
+    """Its status has two bits more there: outputs, of which the file says nothing."""
+    drive = simulated_drive(str(SHIPPED['yaskawa_v1000']))
+    for required in read(SHIPPED['yaskawa_v1000']).requires:
+        drive.set_from_keypad(required.key, required.value)
+    server = drive.servers['modbus']
+    server.write(0x0002, (0x01F4,))
+    server.write(0x0001, (0x0001,))
+    drive.advance(10.0)
+    capture = CAPTURES[9]
+    answer, printed = server.answer(capture.message[1:]), capture.response[1:-2]
+    outputs = 0x0060
+    assert int.from_bytes(answer[2:4], 'big') == int.from_bytes(printed[2:4], 'big') & ~outputs
+    assert answer[:2] + answer[4:] == printed[:2] + printed[4:]
+
+
+@pytest.mark.parametrize(('number', 'turns'), [(45, True), (46, False)])
+def test_a_simulated_drive_obeys_words_of_fluidnc(number: int, turns: bool) -> None:
+    drive = simulated_drive(str(SHIPPED['siemens_v20']))
+    server = drive.servers['modbus']
+    server.write(100, (0x2000,))
+    for word in (0x047E, 0x047F):
+        server.write(99, (word,))
+    server.answer(CAPTURES[number].message[1:])
+    drive.advance(60.0)
+    # bit 11 of the first is reverse
+    assert round(drive.motor.frequency) == (-25 if turns else 0)
 
 
 def test_a_simulated_drive_shows_60_hz_alike() -> None:

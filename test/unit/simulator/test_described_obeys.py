@@ -69,7 +69,7 @@ class Master:
         ('toshiba_vf_s11', 0xFA00, (), 0xC640, -1),
         # control words with one bit more
         ('siemens_v20', 99, (0x047E, 0x047F), 0x0C7E, 0),
-        ('siemens_v20', 99, (0x047E, 0x047F), 0x0C7F, 1),
+        ('siemens_v20', 99, (0x047E, 0x047F), 0x0C7F, -1),
         ('danfoss_fc101', 2809, (), 0x0C7C, 1),
         ('danfoss_fc101', 2809, (), 0x8C7C, -1),
         ('danfoss_fc101', 2809, (0x047C,), 0x0C3C, 0),

@@ -38,7 +38,7 @@ def test_ten_files_have_all_that_a_run_needs() -> None:
     for file in files:
         assert file.reset and (file.setpoint.signed or file.setpoint.direction), file.name
     # which parameters its registers are is to be set at the drive
-    assert [file.name for file in files if not file.accel] == ['lenze_i500']
+    assert [file.name for file in files if not file.simulated.accel] == ['lenze_i500']
 
 
 @pytest.mark.parametrize(('name', 'protocol'), RUNS)
@@ -53,7 +53,7 @@ def test_a_run(name: str, protocol: str) -> None:
             rig.follow(-15.0)
             assert rig.drive.snapshot.setpoint == pytest.approx(rig.unit(-15.0), rel=1e-3)
 
-        ramp = rig.file.accel
+        ramp = rig.file.simulated.accel
         if ramp:
             rig.result(rig.drive.parameters.change({ramp: 1.0}))
             assert rig.far.peek(ramp) == 1.0
