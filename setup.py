@@ -60,6 +60,7 @@ setup(
     package_data={
         NAME: [
             'catalog/declared/*.json',
+            'cli/check/*.csv',
             'families/*/*.csv',
             'families/*/*.vfd.yaml',
             'families/*/*/*.csv',

@@ -15,6 +15,7 @@ import signal
 import sys
 from typing import NoReturn
 
+from nfo_sinus_driver.cli.check.verb import Check
 from nfo_sinus_driver.cli.console import (
     CliError,
     OutputLost,
@@ -82,7 +83,7 @@ VERBS: dict[str, Verb] = {
     type(verb).__name__.lower(): verb
     for verb in (
         Scan(), Info(), List(), Get(), Set(), Dump(), Load(), Diff(), Errors(), Monitor(),
-        Family(), Completion(), Ack(), Run(), Stop(),
+        Check(), Family(), Completion(), Ack(), Run(), Stop(),
     )
 }
 

@@ -1,0 +1,301 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+For each reading of ``readings.csv`` what a drive shows of it.
+
+The numbers are those of ``docs/readings.md``. What is asked and compared stands here as the manuals
+print it, not as the driver's tables have it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+import csv
+from dataclasses import dataclass
+import enum
+import functools
+from pathlib import Path
+import re
+
+from nfo_sinus_driver.catalog import Kind
+from nfo_sinus_driver.cli.check.sight import Sight
+
+_TABLE = Path(__file__).parent / 'readings.csv'
+_ANY = 'any'
+#: Registers of both Sinus [M0 §6.2, M1].
+_INV_ST, _DRIVE_STATUS, _MODE, _COMMAND = 0x2A5, 0x258, 0x294, 0x298
+_UNKNOWN_REGISTER = 2
+#: In no table of any manual.
+_NOWHERE = 0xFFF0
+_READ_DEVICE = bytes((43, 14, 1, 0))
+_REPORT = bytes((17,))
+_BY_INPUT = bytes.fromhex('04 02A5 0001')
+
+
+class Verdict(enum.Enum):
+    """What a drive shows of a reading."""
+
+    CONFIRMED = 'confirmed'
+    CONTRADICTED = 'CONTRADICTED'
+    NOT_SEEN = 'not seen'
+
+
+@dataclass(frozen=True)
+class Reading:
+    """
+    One row of the table.
+
+    :ivar part: ``read``, or ``eyes``: a person says what the keypad shows.
+    :ivar shows: what looks, or the parameter that is asked about.
+    """
+
+    number: int
+    families: frozenset[str]
+    protocols: frozenset[str]
+    part: str
+    shows: str
+    expectation: str
+
+    def fits(self, family: str, protocol: str) -> bool:
+        """Return whether it is one of such a drive."""
+        kinds = {protocol, 'modbus', *(() if protocol == 'modbus_tcp' else ('serial',)), _ANY}
+        return bool(self.families & {family, _ANY}) and bool(self.protocols & kinds)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What came of one reading: ``saw`` has the bytes, or why nothing was seen."""
+
+    reading: Reading
+    verdict: Verdict
+    saw: str
+
+
+Found = tuple[Verdict, str]
+_looks: dict[str, Callable[[Sight], Found]] = {}
+
+
+@functools.cache
+def table() -> tuple[Reading, ...]:
+    """Return all readings that a drive can show without being written to."""
+    with _TABLE.open(newline='', encoding='utf-8') as file:
+        return tuple(
+            Reading(
+                int(row['number']), frozenset(row['families'].split('|')),
+                frozenset(row['protocols'].split('|')), row['part'], row['shows'],
+                row['expectation'],
+            )
+            for row in csv.DictReader(file)
+        )
+
+
+def look(sight: Sight, protocol: str) -> Iterator[Seen]:
+    """Yield what a drive shows of each reading that needs no person."""
+    for reading in table():
+        if reading.part == 'read' and reading.fits(sight.model.name, protocol):
+            verdict, saw = _looks[reading.shows](sight)
+            yield Seen(reading, verdict, saw)
+
+
+def looks() -> Collection[str]:
+    """Return the names of what looks."""
+    return _looks.keys()
+
+
+def _looking(function: Callable[[Sight], Found]) -> Callable[[Sight], Found]:
+    _looks[function.__name__.lstrip('_')] = function
+    return function
+
+
+def _judged(confirmed: bool, saw: str) -> Found:
+    return (Verdict.CONFIRMED if confirmed else Verdict.CONTRADICTED), saw
+
+
+def _not_seen(why: str) -> Found:
+    return Verdict.NOT_SEEN, why
+
+
+def _hex(words: Iterable[int] | None) -> str:
+    return 'nothing' if words is None else ' '.join(f'{word:04X}h' for word in words)
+
+
+def _came(sight: Sight, pdu: bytes) -> str:
+    answer = sight.ask(pdu)
+    if answer.refused_with is not None:
+        return f'function {pdu[0]:02}: refused with {answer.refused_with}'
+    return f'function {pdu[0]:02}: {"answered" if answer.pdu else "no answer"}'
+
+
+@_looking
+def _error_log_of_32(sight: Sight) -> Found:
+    # an entry is two words, each four registers behind the one before
+    register = 0xC000 + 4 * 32
+    words = sight.words(register, 2)
+    if words is None:
+        return _judged(sight.words(0xC000, 2) is not None, f'entry 33, {register:04X}h: refused')
+    if not any(words):
+        return _not_seen(f'entry 33, {register:04X}h: answered, and empty')
+    return _judged(False, f'entry 33, {register:04X}h: {_hex(words)}')
+
+
+@_looking
+def _wrong_sum(sight: Sight) -> Found:
+    answer = sight.wire.ask(bytes.fromhex('03 0000 0001'), spoiled=True)
+    return _judged(not answer.frame, f'to a wrong sum: {answer.frame.hex(" ") or "no answer"}')
+
+
+@_looking
+def _speed_scale(sight: Sight) -> Found:
+    numbers = sight.words(0x268, 2), sight.words(0x26A, 2)
+    read = [words for words in numbers if words is not None]
+    saw = f'0268h: {_hex(numbers[0])}, 026Ah: {_hex(numbers[1])}'
+    return _judged(len(read) == 2 and all(map(any, read)), saw)
+
+
+@_looking
+def _signed_temperature(sight: Sight) -> Found:
+    word = sight.word(0x454)
+    if word is None:
+        return _not_seen('0454h is not answered')
+    signed = (word ^ 0x8000) - 0x8000
+    return _judged(-100 <= signed <= 150, f'0454h: {word:04X}h = {signed}')
+
+
+@_looking
+def _status_of_two_words(sight: Sight) -> Found:
+    words = sight.words(_DRIVE_STATUS, 2)
+    # the low word stands first
+    return _judged(words is not None and words[1] == 0, f'0258h: {_hex(words)}')
+
+
+@_looking
+def _two_versions(sight: Sight) -> Found:
+    pdu = sight.ask(_READ_DEVICE).pdu
+    objects, at = {}, 7
+    while len(pdu) >= at + 2 and len(pdu) >= at + 2 + pdu[at + 1]:
+        objects[pdu[at]] = pdu[at + 2 : at + 2 + pdu[at + 1]]
+        at += 2 + pdu[at + 1]
+    if 2 not in objects:
+        return _not_seen(_came(sight, _READ_DEVICE))
+    text = objects[2].decode('ascii', 'replace')
+    both = [part.strip() for part in text.split('/')]
+    right = len(both) == 2 and all(re.fullmatch(r'[0-9.]+', part) for part in both)
+    return _judged(right, f'object 2: {text!r}')
+
+
+@_looking
+def _number_as_printed(sight: Sight) -> Found:
+    word = sight.word(_INV_ST)
+    codes = sight.model.status_codes
+    if word is not None:
+        return _judged(word in codes, f'02A5h: {word:04X}h')
+    # not the one below, which acknowledges; the one above is not in the tables
+    above = sight.word(_INV_ST + 1)
+    return _judged(False, f'02A5h: refused, 02A6h: {_hex(above if above is None else (above,))}')
+
+
+@_looking
+def _bits_and_code(sight: Sight) -> Found:
+    # one register, or two with the low word first
+    words = sight.words(_DRIVE_STATUS) or sight.words(_DRIVE_STATUS, 2)
+    status, code = words[0] if words else None, sight.word(_INV_ST)
+    if status is None or code is None or code not in sight.model.status_codes:
+        return _not_seen('no status, or no status code of the manual')
+    kind = sight.model.status_codes[code].kind
+    fault, alarm = bool(status & 1 << 3), bool(status & 1 << 7)
+    saw = f'0258h: {status:04X}h, 02A5h: {code} ({kind.value})'
+    if kind is Kind.FAULT or kind is Kind.ALARM or fault or alarm:
+        return _judged((fault, alarm) == (kind is Kind.FAULT, kind is Kind.ALARM), saw)
+    return _not_seen(f'no fault and no alarm is active: {saw}')
+
+
+def _mode(sight: Sight, known: range) -> Found:
+    word = sight.word(_MODE)
+    return _judged(word in known, f'0294h: {_hex(None if word is None else (word,))}')
+
+
+@_looking
+def _mode_to_3(sight: Sight) -> Found:
+    return _mode(sight, range(4))
+
+
+@_looking
+def _mode_from_1(sight: Sight) -> Found:
+    return _mode(sight, range(1, 4))
+
+
+@_looking
+def _smode(sight: Sight) -> Found:
+    word = sight.word(_COMMAND)
+    if word is None:
+        return _not_seen('0298h cannot be read')
+    return _judged(word in (0, 0x081, 0x101), f'0298h: {word:04X}h')
+
+
+@_looking
+def _actual_references(sight: Sight) -> Found:
+    frequency, speed = sight.words(0x518), sight.words(0x260)
+    saw = f'0518h: {_hex(frequency)}, 0260h: {_hex(speed)}'
+    return _judged(frequency is not None and speed is not None, saw)
+
+
+@_looking
+def _newer_functions(sight: Sight) -> Found:
+    requests = _BY_INPUT, _REPORT, _READ_DEVICE
+    has = [sight.ask(pdu).pdu[:1] == pdu[:1] for pdu in requests]
+    saw = ', '.join(_came(sight, pdu) for pdu in requests)
+    if not any(has):
+        return _not_seen(f'an older drive has none of them: {saw}')
+    return _judged(has == [False, True, True], saw)
+
+
+@_looking
+def _input_registers(sight: Sight) -> Found:
+    requests = _BY_INPUT, _REPORT, _READ_DEVICE
+    has = [sight.ask(pdu).pdu[:1] == pdu[:1] for pdu in requests]
+    return _judged(has == [True, False, False], ', '.join(_came(sight, pdu) for pdu in requests))
+
+
+@_looking
+def _all_registers(sight: Sight) -> Found:
+    missing = [
+        f'{parameter.at("modbus").index:04X}h'
+        for parameter in sight.parameters.values()
+        if sight.words(parameter.at('modbus').index, parameter.at('modbus').codec.size // 2) is None
+    ]
+    return _judged(not missing, f'not answered: {", ".join(missing) or "none"}')
+
+
+@_looking
+def _code_to_63(sight: Sight) -> Found:
+    word = sight.word(_INV_ST)
+    return _judged(word in range(64), f'02A5h: {_hex(None if word is None else (word,))}')
+
+
+@_looking
+def _unknown_register(sight: Sight) -> Found:
+    answer = sight.read(_NOWHERE)
+    if not answer.pdu:
+        return _not_seen(f'{_NOWHERE:04X}h: no answer')
+    saw = f'{_NOWHERE:04X}h: {answer.pdu.hex(" ")}'
+    return _judged(answer.refused_with == _UNKNOWN_REGISTER, saw)
+
+
+@_looking
+def _speed_in_every_mode(sight: Sight) -> Found:
+    words = sight.words(0x264)
+    return _judged(words is not None, f'0264h: {_hex(words)}')
+
+
+@_looking
+def _reported_id(sight: Sight) -> Found:
+    pdu = sight.ask(_REPORT).pdu
+    if pdu[:1] != _REPORT:
+        return _not_seen(_came(sight, _REPORT))
+    count, text = pdu[1], pdu[2:]
+    with_run_byte = text[1:2] in (b'\x00', b'\xff') and text[2:].isascii()
+    # what it says may have the serial number in it
+    saw = f'function 17: {len(text)} bytes, count {count}'
+    plain = len(text) == 16 and text.isascii()
+    return _judged(count == len(text) and (plain or with_run_byte), saw)

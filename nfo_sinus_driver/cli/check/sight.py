@@ -1,0 +1,152 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What one drive has answered; nothing is written, nor read what has an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+import math
+import statistics
+import struct
+
+from nfo_sinus_driver.catalog import Family, Parameter
+from nfo_sinus_driver.cli.check.wire import Answer, Wire
+
+HOLDING, INPUT = 3, 4
+_SPACES = {'register': HOLDING, 'register_16': HOLDING, 'input': INPUT}
+#: How often a request is repeated that gets no answer.
+_TRIES = 3
+#: How many answers are timed, and from how many of each pause.
+_TIMED, _OF_EACH_PAUSE = 50, 5
+#: The pauses between two requests that are tried, s.
+_PAUSES = (0.02, 0.01, 0.005, 0.0035, 0.002, 0.001)
+
+
+@dataclass(frozen=True)
+class Register:
+    """
+    What came of one parameter.
+
+    :ivar words: raw; ``None``: none.
+    :ivar refused_with: the exception code; ``None``: it was answered, or nothing came.
+    :ivar remark: what is odd in the value.
+    """
+
+    key: str
+    index: int
+    words: tuple[int, ...] | None
+    refused_with: int | None
+    value: str = ''
+    remark: str = ''
+
+
+@dataclass(frozen=True)
+class Timing:
+    """
+    How soon a drive answers, s.
+
+    :ivar least_pause: the least silence before a request with which each was answered.
+    """
+
+    least: float
+    median: float
+    p99: float
+    least_pause: float
+
+
+class Sight:
+    """One drive, looked at."""
+
+    def __init__(self, wire: Wire, model: Family) -> None:
+        self.wire = wire
+        self.model = model
+        self._asked: dict[bytes, Answer] = {}
+
+    def ask(self, pdu: bytes) -> Answer:
+        """Return what a request got, asked once; one without an answer is repeated."""
+        if pdu not in self._asked:
+            for _ in range(_TRIES):
+                self._asked[pdu] = answer = self.wire.ask(pdu)
+                if answer.pdu:
+                    break
+        return self._asked[pdu]
+
+    def read(self, register: int, count: int = 1, function: int = HOLDING) -> Answer:
+        """Return what a read got."""
+        return self.ask(struct.pack('>BHH', function, register, count))
+
+    def words(
+        self, register: int, count: int = 1, function: int = HOLDING
+    ) -> tuple[int, ...] | None:
+        """Return the words of registers, or ``None`` if they were not answered."""
+        pdu = self.read(register, count, function).pdu
+        right = len(pdu) == 2 + 2 * count and pdu[:2] == bytes((function, 2 * count))
+        return struct.unpack(f'>{count}H', pdu[2:]) if right else None
+
+    def word(self, register: int) -> int | None:
+        """Return one word, or ``None``."""
+        found = self.words(register)
+        return found[0] if found else None
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Those that can be read without an effect, in registers."""
+        return {
+            parameter.key: parameter
+            for parameter in self.model.values()
+            if parameter.is_readable
+            and 'modbus' in parameter.addresses
+            and parameter.at('modbus').space in _SPACES
+            and parameter.at('modbus').sub_index is None
+        }
+
+    def registers(self, step: Callable[[], None] = lambda: None) -> Iterator[Register]:
+        """Read every parameter; yield what came of each."""
+        for key, parameter in self.parameters.items():
+            step()
+            address = parameter.at('modbus')
+            count, function = address.codec.size // 2, _SPACES[address.space]
+            words = self.words(address.index, count, function)
+            if words is None:
+                refused = self.read(address.index, count, function).refused_with
+                yield Register(key, address.index, None, refused)
+                continue
+            value, remark = _means(parameter, struct.pack(f'>{count}H', *words))
+            yield Register(key, address.index, words, None, value, remark)
+
+    def timing(self, register: int, set_gap: Callable[[float], None] | None) -> Timing:
+        """Measure how soon reads are answered, and with how short a silence before them."""
+        request = struct.pack('>BHH', HOLDING, register, 1)
+        firsts = sorted(
+            answer.first for answer in (self.wire.ask(request) for _ in range(_TIMED))
+            if answer.pdu
+        )
+        least_pause = math.nan
+        for pause in _PAUSES if set_gap is not None else ():
+            assert set_gap is not None
+            set_gap(pause)
+            if not all(self.wire.ask(request).pdu for _ in range(_OF_EACH_PAUSE)):
+                break
+            least_pause = pause
+        if set_gap is not None:
+            set_gap(_PAUSES[0])
+        if not firsts:
+            return Timing(math.nan, math.nan, math.nan, least_pause)
+        p99 = firsts[math.ceil(0.99 * len(firsts)) - 1]
+        return Timing(firsts[0], statistics.median(firsts), p99, least_pause)
+
+
+def _means(parameter: Parameter, data: bytes) -> tuple[str, str]:
+    """Return what the tables make of words, and what is odd in it."""
+    try:
+        value = parameter.decode(data, 'modbus')
+    except ValueError as error:
+        return '', str(error)
+    shown = f'{value:g} {parameter.unit}'.strip() if isinstance(value, float) else str(value)
+    if isinstance(value, float) and parameter.minimum is not None and value < parameter.minimum:
+        return shown, f'below {parameter.minimum:g}'
+    if isinstance(value, float) and parameter.maximum is not None and value > parameter.maximum:
+        return shown, f'above {parameter.maximum:g}'
+    return shown, ''

@@ -1,0 +1,183 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The verb ``check``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator
+import contextlib
+import math
+from pathlib import Path
+import sys
+
+from nfo_sinus_driver.catalog import Family, load_family
+from nfo_sinus_driver.cli.check import report
+from nfo_sinus_driver.cli.check.readings import Reading, Seen, Verdict, look, table
+from nfo_sinus_driver.cli.check.sight import Register, Sight
+from nfo_sinus_driver.cli.check.wire import SerialWire, TcpWire, Wire
+from nfo_sinus_driver.cli.console import (
+    CliError,
+    UsageError,
+    as_json,
+    can_ask,
+    progress,
+    put,
+    remark,
+)
+from nfo_sinus_driver.cli.options import Verb, add_flag
+from nfo_sinus_driver.link import BusSettings, PortError
+from nfo_sinus_driver.link.ports.port import port_of
+
+#: The silence before a request, until it is known how short it may be, s.
+_GAP = 0.02
+_PROTOCOLS = ('modbus_rtu', 'modbus_ascii', 'modbus_tcp')
+#: So near are two values that are the same.
+_SAME = 0.02
+#: Functions that drives may have or not, each as a request that changes nothing.
+_FUNCTIONS = {
+    4: '04 02A5 0001', 8: '08 0000 A537', 17: '11', 43: '2B 0E 01 00',
+}
+_NONE_ANSWERS = 2
+
+
+class Check(Verb):
+    """
+    Ask a drive what it shows of the readings of its manual; nothing is written.
+
+    The exit status is 0 if it contradicts none, 1 if it does, and 2 if nothing answers.
+    """
+
+    failed = _NONE_ANSWERS
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add what may be typed."""
+        parser.add_argument(
+            '--report', metavar='FILE', type=Path,
+            help='write a JSON file, to be sent: it has no name, path or serial number',
+        )
+        add_flag(parser, '--no-questions', 'ask nothing about what the keypad shows')
+
+    def main(self, options: argparse.Namespace) -> int:
+        """Ask, and report."""
+        if options.protocol not in _PROTOCOLS:
+            spoken = ', '.join(_PROTOCOLS)
+            raise UsageError(f'check asks by {spoken} alone, not by {options.protocol}')
+        if options.report is not None and options.report.exists():
+            raise UsageError(f'{options.report} exists: name another file')
+        try:
+            settings = BusSettings(
+                options.port, options.protocol, options.baud_rate, options.char_format
+            )
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+        model = load_family(options.model)
+        try:
+            with _wire(settings, options) as (wire, set_gap):
+                sight = Sight(wire, model)
+                at = next(iter(sight.parameters.values())).at('modbus').index
+                if not sight.read(at).pdu:
+                    raise CliError(
+                        f'the drive at address {options.address} does not answer: check '
+                        f'{model.profile.line_check.get(options.protocol, "the line")}'
+                    )
+                timing = sight.timing(at, set_gap)
+                with progress('reading the registers', len(sight.parameters)) as step:
+                    registers = list(sight.registers(step))
+                functions = _functions(sight)
+                seen = list(look(sight, options.protocol))
+        except (PortError, OSError) as error:
+            raise CliError(str(error)) from error
+        asks = can_ask() and not options.no_questions and not options.json
+        seen += _questions(model, registers, options.protocol, asks=asks)
+        facts = {
+            'model': model.name, 'protocol': options.protocol, 'functions': functions,
+            'baud_rate': settings.line.baud_rate, 'char_format': settings.line.char_format,
+        }
+        document = report.document(sight, facts, seen, registers, timing)
+        if options.report is not None:
+            try:
+                options.report.write_text(as_json(document, indent=1) + '\n', encoding='utf-8')
+            except OSError as error:
+                raise CliError(f'{options.report}: {error.strerror}') from error
+        if options.json:
+            put(as_json(document, indent=1))
+        else:
+            for line in report.screen(seen, registers, timing, functions):
+                put(line)
+        return int(any(one.verdict is Verdict.CONTRADICTED for one in seen))
+
+
+@contextlib.contextmanager
+def _wire(
+    settings: BusSettings, options: argparse.Namespace
+) -> Iterator[tuple[Wire, Callable[[float], None] | None]]:
+    """Open the line; yield the drive on it, and what sets the silence before a request."""
+    if options.protocol == 'modbus_tcp':
+        host, _, port = options.port.removeprefix('socket://').rpartition(':')
+        connection = TcpWire(host, int(port), options.address)
+        with contextlib.closing(connection):
+            yield connection, None
+        return
+    try:
+        port = port_of(options.port, settings.line, options.trace)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    port.open()
+    try:
+        ascii_frames = options.protocol == 'modbus_ascii'
+        wire = SerialWire(port, options.address, _GAP, ascii_frames=ascii_frames)
+        yield wire, lambda gap: setattr(wire, 'gap', gap)
+    finally:
+        port.close()
+
+
+def _functions(sight: Sight) -> str:
+    found = []
+    for number, request in _FUNCTIONS.items():
+        answer = sight.ask(bytes.fromhex(request))
+        came = 'no answer' if not answer.pdu else 'yes'
+        if answer.refused_with is not None:
+            came = f'refused with {answer.refused_with}'
+        found.append(f'{number:02} {came}')
+    return ', '.join(found)
+
+
+def _questions(
+    model: Family, registers: list[Register], protocol: str, *, asks: bool
+) -> Iterator[Seen]:
+    """Ask what the keypad shows; an empty answer leaves a question out."""
+    for reading in table():
+        if reading.part != 'eyes' or not reading.fits(model.name, protocol):
+            continue
+        key = reading.shows
+        found = next((one for one in registers if one.key == key and one.words), None)
+        if found is None:
+            yield Seen(reading, Verdict.NOT_SEEN, f'{key} was not answered')
+        elif not asks:
+            yield Seen(reading, Verdict.NOT_SEEN, 'nothing was asked')
+        else:
+            yield _asked(reading, model[key].name, model[key].unit, found)
+
+
+def _asked(reading: Reading, name: str, unit: str, found: Register) -> Seen:
+    words = ' '.join(f'{word:04X}h' for word in found.words or ())
+    while True:
+        sys.stderr.write(
+            f'{name} reads {found.value} ({words}). What does the keypad show, in {unit}? '
+            '(Enter: leave it out) '
+        )
+        sys.stderr.flush()
+        given = sys.stdin.readline().strip().replace(',', '.')
+        if not given:
+            return Seen(reading, Verdict.NOT_SEEN, 'it was left out')
+        try:
+            shown = float(given)
+        except ValueError:
+            remark(f'{given} is no number')
+            continue
+        value = float(found.value.split()[0])
+        same = math.isclose(shown, value, rel_tol=_SAME, abs_tol=10 ** -9)
+        verdict = Verdict.CONFIRMED if same else Verdict.CONTRADICTED
+        return Seen(reading, verdict, f'{name}: {words} = {found.value}; the keypad shows {given}')
