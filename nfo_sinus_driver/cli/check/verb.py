@@ -27,6 +27,7 @@ from nfo_sinus_driver.cli.console import (
     remark,
 )
 from nfo_sinus_driver.cli.options import Verb, add_flag
+from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.link import BusSettings, PortError
 from nfo_sinus_driver.link.ports.port import port_of
 
@@ -72,16 +73,12 @@ class Check(Verb):
             )
         except ValueError as error:
             raise UsageError(str(error)) from None
+        _require_standstill(options)
         model = load_family(options.model)
         try:
             with _wire(settings, options) as (wire, set_gap):
                 sight = Sight(wire, model)
                 at = next(iter(sight.parameters.values())).at('modbus').index
-                if not sight.read(at).pdu:
-                    raise CliError(
-                        f'the drive at address {options.address} does not answer: check '
-                        f'{model.profile.line_check.get(options.protocol, "the line")}'
-                    )
                 timing = sight.timing(at, set_gap)
                 with progress('reading the registers', len(sight.parameters)) as step:
                     registers = list(sight.registers(step))
@@ -107,6 +104,22 @@ class Check(Verb):
             for line in report.screen(seen, registers, timing, functions):
                 put(line)
         return int(any(one.verdict is Verdict.CONTRADICTED for one in seen))
+
+
+def _require_standstill(options: argparse.Namespace) -> None:
+    """
+    Make sure that nothing asked for here stops a motor.
+
+    What a drive does not know, or a wrong sum, may be a serial fault while the bus has control, and
+    that stops the motor [C99].
+    """
+    with Session(options) as session:
+        status = session.drive().read_status()
+    if status.driven and status.from_bus:
+        raise CliError(
+            'the motor runs by the bus: a request that the drive does not know may be a fault then, '
+            'which stops it. Stop it first (nfo-sinus stop)'
+        )
 
 
 @contextlib.contextmanager

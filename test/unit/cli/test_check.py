@@ -77,10 +77,19 @@ def test_a_drive_that_is_otherwise_ends_with_1(make_bench: MakeBench) -> None:
     assert 'CONTRADICTED:\n  C51 MODE is 0 to 3: 0294h: 0004h' in done.out
 
 
+@pytest.mark.parametrize('model', ['sinus_g2', 'sinus_optimal'])
+def test_a_motor_that_the_bus_runs_runs_on(make_bench: MakeBench, model: str) -> None:
+    bench = make_bench(model=model, serial_numbers=[])
+    bench.run_by_bus()
+    done = bench.run('check')
+    assert done.status == 2 and 'Stop it first' in done.err
+    assert bench.state()['turning'] and not bench.state()['faults']
+
+
 def test_without_an_answer_it_ends_with_2(make_bench: MakeBench) -> None:
     bench = make_bench()
     done = bench.run('check', '--address', 9)
-    assert done.status == 2 and 'does not answer: check' in done.err
+    assert done.status == 2 and 'no response from address 9: check' in done.err
     done = bench.run('check', '--protocol', 'classic')
     assert done.status == 2 and 'not by classic' in done.err
 
