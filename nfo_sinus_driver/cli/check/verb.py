@@ -117,8 +117,8 @@ def _require_standstill(options: argparse.Namespace) -> None:
         status = session.drive().read_status()
     if status.driven and status.from_bus:
         raise CliError(
-            'the motor runs by the bus: a request that the drive does not know may be a fault then, '
-            'which stops it. Stop it first (nfo-sinus stop)'
+            'the motor runs by the bus: a request that the drive does not know may be a fault '
+            'then, which stops it. Stop it first (nfo-sinus stop)'
         )
 
 
