@@ -5,7 +5,8 @@
 What must hold for each motor of a line that stops answering, judged from both ends of the line.
 
 S1: a drive that was asked in vain, and sent no valid frame for ``lost_after`` since that request,
-is lost: this is told within 0.3 s, and ``enabled`` is false. Where no drive of the line answers and
+is lost: this is told within 0.3 s, in noise with the end of the request under way, for which the
+line is silent first; and ``enabled`` is false. Where no drive of the line answers and
 two were asked in vain (one, if the line has one), each that is enabled counts as asked from the
 first of these requests on.
 
@@ -321,7 +322,8 @@ class LineLaws:
         """Judge S1."""
         lost_at = self.lost_at(number)
         # an answer that comes before a loss has to be told may be in time
-        if self._clock.now <= lost_at + _TOLD + self._waits_longer + _SLACK:
+        within = _TOLD + self._waits_longer + (self._under_way if self.noise else 0.0)
+        if self._clock.now <= lost_at + within + _SLACK:
             return
         self._due(unit, lost_at, _AFTER_LOSS)
         snapshot = self._rig.notes_of[number].snapshot

@@ -17,9 +17,10 @@ import enum
 import functools
 from pathlib import Path
 import re
+from typing import Any, TypeVar
 
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.cli.check.sight import Sight
+from nfo_sinus_driver.cli.check.sight import ClassicSight, ModbusSight, Sight
 
 _TABLE = Path(__file__).parent / 'readings.csv'
 _ANY = 'any'
@@ -59,7 +60,9 @@ class Reading:
 
     def fits(self, family: str, protocol: str) -> bool:
         """Return whether it is one of such a drive."""
-        kinds = {protocol, 'modbus', *(() if protocol == 'modbus_tcp' else ('serial',)), _ANY}
+        kinds = {protocol, protocol.partition('_')[0], _ANY}
+        if protocol in ('modbus_rtu', 'modbus_ascii'):
+            kinds.add('modbus_serial')
         return bool(self.families & {family, _ANY}) and bool(self.protocols & kinds)
 
 
@@ -73,7 +76,8 @@ class Seen:
 
 
 Found = tuple[Verdict, str]
-_looks: dict[str, Callable[[Sight], Found]] = {}
+_S = TypeVar('_S', bound=Sight)
+_looks: dict[str, Callable[[Any], Found]] = {}
 
 
 @functools.cache
@@ -103,7 +107,7 @@ def looks() -> Collection[str]:
     return _looks.keys()
 
 
-def _looking(function: Callable[[Sight], Found]) -> Callable[[Sight], Found]:
+def _looking(function: Callable[[_S], Found]) -> Callable[[_S], Found]:
     _looks[function.__name__.lstrip('_')] = function
     return function
 
@@ -128,7 +132,7 @@ def _came(sight: Sight, pdu: bytes) -> str:
 
 
 @_looking
-def _error_log_of_32(sight: Sight) -> Found:
+def _error_log_of_32(sight: ModbusSight) -> Found:
     # an entry is two words, each four registers behind the one before
     register = 0xC000 + 4 * 32
     words = sight.words(register, 2)
@@ -140,13 +144,13 @@ def _error_log_of_32(sight: Sight) -> Found:
 
 
 @_looking
-def _wrong_sum(sight: Sight) -> Found:
+def _wrong_sum(sight: ModbusSight) -> Found:
     answer = sight.wire.ask(bytes.fromhex('03 0000 0001'), spoiled=True)
     return _judged(not answer.frame, f'to a wrong sum: {answer.frame.hex(" ") or "no answer"}')
 
 
 @_looking
-def _speed_scale(sight: Sight) -> Found:
+def _speed_scale(sight: ModbusSight) -> Found:
     numbers = sight.words(0x268, 2), sight.words(0x26A, 2)
     read = [words for words in numbers if words is not None]
     saw = f'0268h: {_hex(numbers[0])}, 026Ah: {_hex(numbers[1])}'
@@ -154,7 +158,7 @@ def _speed_scale(sight: Sight) -> Found:
 
 
 @_looking
-def _signed_temperature(sight: Sight) -> Found:
+def _signed_temperature(sight: ModbusSight) -> Found:
     word = sight.word(0x454)
     if word is None:
         return _not_seen('0454h is not answered')
@@ -163,14 +167,14 @@ def _signed_temperature(sight: Sight) -> Found:
 
 
 @_looking
-def _status_of_two_words(sight: Sight) -> Found:
+def _status_of_two_words(sight: ModbusSight) -> Found:
     words = sight.words(_DRIVE_STATUS, 2)
     # the low word stands first
     return _judged(words is not None and words[1] == 0, f'0258h: {_hex(words)}')
 
 
 @_looking
-def _two_versions(sight: Sight) -> Found:
+def _two_versions(sight: ModbusSight) -> Found:
     pdu = sight.ask(_READ_DEVICE).pdu
     objects, at = {}, 7
     while len(pdu) >= at + 2 and len(pdu) >= at + 2 + pdu[at + 1]:
@@ -185,7 +189,7 @@ def _two_versions(sight: Sight) -> Found:
 
 
 @_looking
-def _number_as_printed(sight: Sight) -> Found:
+def _number_as_printed(sight: ModbusSight) -> Found:
     word = sight.word(_INV_ST)
     codes = sight.model.status_codes
     if word is not None:
@@ -196,7 +200,7 @@ def _number_as_printed(sight: Sight) -> Found:
 
 
 @_looking
-def _bits_and_code(sight: Sight) -> Found:
+def _bits_and_code(sight: ModbusSight) -> Found:
     # one register, or two with the low word first
     words = sight.words(_DRIVE_STATUS) or sight.words(_DRIVE_STATUS, 2)
     status, code = words[0] if words else None, sight.word(_INV_ST)
@@ -210,23 +214,23 @@ def _bits_and_code(sight: Sight) -> Found:
     return _not_seen(f'no fault and no alarm is active: {saw}')
 
 
-def _mode(sight: Sight, known: range) -> Found:
+def _mode(sight: ModbusSight, known: range) -> Found:
     word = sight.word(_MODE)
     return _judged(word in known, f'0294h: {_hex(None if word is None else (word,))}')
 
 
 @_looking
-def _mode_to_3(sight: Sight) -> Found:
+def _mode_to_3(sight: ModbusSight) -> Found:
     return _mode(sight, range(4))
 
 
 @_looking
-def _mode_from_1(sight: Sight) -> Found:
+def _mode_from_1(sight: ModbusSight) -> Found:
     return _mode(sight, range(1, 4))
 
 
 @_looking
-def _smode(sight: Sight) -> Found:
+def _smode(sight: ModbusSight) -> Found:
     word = sight.word(_COMMAND)
     if word is None:
         return _not_seen('0298h cannot be read')
@@ -234,14 +238,14 @@ def _smode(sight: Sight) -> Found:
 
 
 @_looking
-def _actual_references(sight: Sight) -> Found:
+def _actual_references(sight: ModbusSight) -> Found:
     frequency, speed = sight.words(0x518), sight.words(0x260)
     saw = f'0518h: {_hex(frequency)}, 0260h: {_hex(speed)}'
     return _judged(frequency is not None and speed is not None, saw)
 
 
 @_looking
-def _newer_functions(sight: Sight) -> Found:
+def _newer_functions(sight: ModbusSight) -> Found:
     requests = _BY_INPUT, _REPORT, _READ_DEVICE
     has = [sight.ask(pdu).pdu[:1] == pdu[:1] for pdu in requests]
     saw = ', '.join(_came(sight, pdu) for pdu in requests)
@@ -251,14 +255,14 @@ def _newer_functions(sight: Sight) -> Found:
 
 
 @_looking
-def _input_registers(sight: Sight) -> Found:
+def _input_registers(sight: ModbusSight) -> Found:
     requests = _BY_INPUT, _REPORT, _READ_DEVICE
     has = [sight.ask(pdu).pdu[:1] == pdu[:1] for pdu in requests]
     return _judged(has == [True, False, False], ', '.join(_came(sight, pdu) for pdu in requests))
 
 
 @_looking
-def _all_registers(sight: Sight) -> Found:
+def _all_registers(sight: ModbusSight) -> Found:
     missing = [
         f'{parameter.at("modbus").index:04X}h'
         for parameter in sight.parameters.values()
@@ -268,13 +272,13 @@ def _all_registers(sight: Sight) -> Found:
 
 
 @_looking
-def _code_to_63(sight: Sight) -> Found:
+def _code_to_63(sight: ModbusSight) -> Found:
     word = sight.word(_INV_ST)
     return _judged(word in range(64), f'02A5h: {_hex(None if word is None else (word,))}')
 
 
 @_looking
-def _unknown_register(sight: Sight) -> Found:
+def _unknown_register(sight: ModbusSight) -> Found:
     answer = sight.read(_NOWHERE)
     if not answer.pdu:
         return _not_seen(f'{_NOWHERE:04X}h: no answer')
@@ -283,13 +287,13 @@ def _unknown_register(sight: Sight) -> Found:
 
 
 @_looking
-def _speed_in_every_mode(sight: Sight) -> Found:
+def _speed_in_every_mode(sight: ModbusSight) -> Found:
     words = sight.words(0x264)
     return _judged(words is not None, f'0264h: {_hex(words)}')
 
 
 @_looking
-def _reported_id(sight: Sight) -> Found:
+def _reported_id(sight: ModbusSight) -> Found:
     pdu = sight.ask(_REPORT).pdu
     if pdu[:1] != _REPORT:
         return _not_seen(_came(sight, _REPORT))
@@ -299,3 +303,48 @@ def _reported_id(sight: Sight) -> Found:
     saw = f'function 17: {len(text)} bytes, count {count}'
     plain = len(text) == 16 and text.isascii()
     return _judged(count == len(text) and (plain or with_run_byte), saw)
+
+
+# --- on Classic -----------------------------------------------------------------------------------
+
+
+@_looking
+def _classic_error_log(sight: ClassicSight) -> Found:
+    # an entry is two words
+    number = 0x200 + 2 * 32
+    word = sight.word(number)
+    if word is None:
+        confirmed = sight.is_refused(number) and sight.word(0x200) is not None
+        return _judged(confirmed, f'entry 33, E{number:04X}: NAK')
+    if not word:
+        return _not_seen(f'entry 33, E{number:04X}: answered, and empty')
+    return _judged(False, f'entry 33, E{number:04X}: {word:04X}h')
+
+
+@_looking
+def _both_words_of_the_scale(sight: ClassicSight) -> Found:
+    words = [sight.word(number) for number in (0xE1, 0xE2, 0xE3, 0xE4)]
+    saw = ', '.join('nothing' if word is None else f'{word:04X}h' for word in words)
+    saw = f'E00E1 to E00E4: {saw}'
+    if all(word is None for word in words):
+        return _not_seen(f'an older drive has none of them: {saw}')
+    # of each the low word has the higher number
+    return _judged(None not in words and bool(words[1]) and bool(words[3]), saw)
+
+
+@_looking
+def _sum_with_the_end(sight: ClassicSight) -> Found:
+    answer = sight.ask(bytes((0x00, 0xE9)))
+    if not answer.frame:
+        return _not_seen('E00E9: no answer')
+    return _judged(bool(answer.pdu), f'E00E9: {answer.frame.hex(" ")}')
+
+
+@_looking
+def _own_address_and_upper_case(sight: ClassicSight) -> Found:
+    frames = [sight.ask(sight.request(one)).frame for one in sight.parameters.values()]
+    digits = b''.join(frame[8:12] for frame in frames if len(frame) > 12)
+    if not re.search(rb'[A-Fa-f]', digits):
+        return _not_seen('no digit of what came is a letter')
+    lower = re.search(rb'[a-f]', digits)
+    return _judged(lower is None, 'digits in lower case' if lower else 'digits in upper case')

@@ -27,7 +27,7 @@ def screen(
     """
     Yield the lines for people.
 
-    :param refused: which of the functions 04, 08, 17 and 43 it has.
+    :param refused: which of the functions 04, 08, 17 and 43 it has; nothing: it speaks no Modbus.
     """
     yield (
         f'line: first byte after {_ms(timing.least)} least, {_ms(timing.median)} median, '
@@ -35,9 +35,10 @@ def screen(
         + ('' if math.isnan(timing.least_pause) else
            f'; answers after a silence of {_ms(timing.least_pause)}')
     )
-    yield f'functions: {refused}'
+    if refused:
+        yield f'functions: {refused}'
     answered = [register for register in registers if register.words is not None]
-    yield f'registers: {len(answered)} of {len(registers)} answered'
+    yield f'parameters: {len(answered)} of {len(registers)} answered'
     odd = [register for register in registers if register.words is None or register.remark]
     for register in odd[:_MOST_SHOWN]:
         code = register.refused_with

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 import math
@@ -12,7 +13,7 @@ import statistics
 import struct
 
 from nfo_sinus_driver.catalog import Family, Parameter
-from nfo_sinus_driver.cli.check.wire import Answer, Wire
+from nfo_sinus_driver.cli.check.wire import NAK, Answer, Wire
 
 HOLDING, INPUT = 3, 4
 _SPACES = {'register': HOLDING, 'register_16': HOLDING, 'input': INPUT}
@@ -30,7 +31,8 @@ class Register:
     What came of one parameter.
 
     :ivar words: raw; ``None``: none.
-    :ivar refused_with: the exception code; ``None``: it was answered, or nothing came.
+    :ivar refused_with: the exception code, on Classic NAK; ``None``: it was answered, or nothing
+        came.
     :ivar remark: what is odd in the value.
     """
 
@@ -56,8 +58,8 @@ class Timing:
     least_pause: float
 
 
-class Sight:
-    """One drive, looked at."""
+class Sight(abc.ABC):
+    """One drive, looked at, over one of the protocols."""
 
     def __init__(self, wire: Wire, model: Family) -> None:
         self.wire = wire
@@ -72,6 +74,50 @@ class Sight:
                 if answer.pdu:
                     break
         return self._asked[pdu]
+
+    @property
+    @abc.abstractmethod
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Those that can be read without an effect."""
+
+    @abc.abstractmethod
+    def register(self, parameter: Parameter) -> Register:
+        """Return what comes of a parameter."""
+
+    @abc.abstractmethod
+    def request(self, parameter: Parameter) -> bytes:
+        """Return what asks for its first word."""
+
+    def registers(self, step: Callable[[], None] = lambda: None) -> Iterator[Register]:
+        """Read every parameter; yield what came of each."""
+        for parameter in self.parameters.values():
+            step()
+            yield self.register(parameter)
+
+    def timing(self, set_gap: Callable[[float], None] | None) -> Timing:
+        """Measure how soon reads are answered, and with how short a silence before them."""
+        request = self.request(next(iter(self.parameters.values())))
+        firsts = sorted(
+            answer.first for answer in (self.wire.ask(request) for _ in range(_TIMED))
+            if answer.pdu
+        )
+        least_pause = math.nan
+        for pause in _PAUSES if set_gap is not None else ():
+            assert set_gap is not None
+            set_gap(pause)
+            if not all(self.wire.ask(request).pdu for _ in range(_OF_EACH_PAUSE)):
+                break
+            least_pause = pause
+        if set_gap is not None:
+            set_gap(_PAUSES[0])
+        if not firsts:
+            return Timing(math.nan, math.nan, math.nan, least_pause)
+        p99 = firsts[math.ceil(0.99 * len(firsts)) - 1]
+        return Timing(firsts[0], statistics.median(firsts), p99, least_pause)
+
+
+class ModbusSight(Sight):
+    """A drive, looked at over Modbus."""
 
     def read(self, register: int, count: int = 1, function: int = HOLDING) -> Answer:
         """Return what a read got."""
@@ -102,46 +148,66 @@ class Sight:
             and parameter.at('modbus').sub_index is None
         }
 
-    def registers(self, step: Callable[[], None] = lambda: None) -> Iterator[Register]:
-        """Read every parameter; yield what came of each."""
-        for key, parameter in self.parameters.items():
-            step()
-            address = parameter.at('modbus')
-            count, function = address.codec.size // 2, _SPACES[address.space]
-            words = self.words(address.index, count, function)
-            if words is None:
-                refused = self.read(address.index, count, function).refused_with
-                yield Register(key, address.index, None, refused)
-                continue
-            value, remark = _means(parameter, struct.pack(f'>{count}H', *words))
-            yield Register(key, address.index, words, None, value, remark)
+    def request(self, parameter: Parameter) -> bytes:
+        """Return what asks for its first register."""
+        address = parameter.at('modbus')
+        return struct.pack('>BHH', _SPACES[address.space], address.index, 1)
 
-    def timing(self, register: int, set_gap: Callable[[float], None] | None) -> Timing:
-        """Measure how soon reads are answered, and with how short a silence before them."""
-        request = struct.pack('>BHH', HOLDING, register, 1)
-        firsts = sorted(
-            answer.first for answer in (self.wire.ask(request) for _ in range(_TIMED))
-            if answer.pdu
-        )
-        least_pause = math.nan
-        for pause in _PAUSES if set_gap is not None else ():
-            assert set_gap is not None
-            set_gap(pause)
-            if not all(self.wire.ask(request).pdu for _ in range(_OF_EACH_PAUSE)):
-                break
-            least_pause = pause
-        if set_gap is not None:
-            set_gap(_PAUSES[0])
-        if not firsts:
-            return Timing(math.nan, math.nan, math.nan, least_pause)
-        p99 = firsts[math.ceil(0.99 * len(firsts)) - 1]
-        return Timing(firsts[0], statistics.median(firsts), p99, least_pause)
+    def register(self, parameter: Parameter) -> Register:
+        """Return what comes of a parameter."""
+        address = parameter.at('modbus')
+        count, function = address.codec.size // 2, _SPACES[address.space]
+        words = self.words(address.index, count, function)
+        if words is None:
+            refused = self.read(address.index, count, function).refused_with
+            return Register(parameter.key, address.index, None, refused)
+        value, remark = _means(parameter, 'modbus', struct.pack(f'>{count}H', *words))
+        return Register(parameter.key, address.index, words, None, value, remark)
 
 
-def _means(parameter: Parameter, data: bytes) -> tuple[str, str]:
+class ClassicSight(Sight):
+    """A drive, looked at over Classic; each word has a number of its own."""
+
+    def word(self, number: int) -> int | None:
+        """Return the word with a number, or ``None``."""
+        pdu = self.ask(number.to_bytes(2, 'big')).pdu
+        return int.from_bytes(pdu, 'big') if len(pdu) == 2 else None
+
+    def is_refused(self, number: int) -> bool:
+        """Return whether it answers NAK."""
+        return self.ask(number.to_bytes(2, 'big')).pdu == NAK
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Those that can be read without an effect."""
+        return {
+            parameter.key: parameter
+            for parameter in self.model.values()
+            if parameter.is_readable and 'classic' in parameter.addresses
+        }
+
+    def request(self, parameter: Parameter) -> bytes:
+        """Return what asks for its first word."""
+        return parameter.at('classic').index.to_bytes(2, 'big')
+
+    def register(self, parameter: Parameter) -> Register:
+        """Return what comes of a parameter."""
+        address = parameter.at('classic')
+        second = address.sub_index
+        numbers = [address.index, *(() if second is None else (second,))]
+        words = [word for word in map(self.word, numbers) if word is not None]
+        if len(words) < len(numbers):
+            code = NAK[0] if any(map(self.is_refused, numbers)) else None
+            return Register(parameter.key, address.index, None, code)
+        data = struct.pack(f'>{len(words)}H', *words)
+        value, remark = _means(parameter, 'classic', data)
+        return Register(parameter.key, address.index, tuple(words), None, value, remark)
+
+
+def _means(parameter: Parameter, protocol: str, data: bytes) -> tuple[str, str]:
     """Return what the tables make of words, and what is odd in it."""
     try:
-        value = parameter.decode(data, 'modbus')
+        value = parameter.decode(data, protocol)
     except ValueError as error:
         return '', str(error)
     shown = f'{value:g} {parameter.unit}'.strip() if isinstance(value, float) else str(value)

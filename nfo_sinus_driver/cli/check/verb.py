@@ -15,8 +15,8 @@ import sys
 from nfo_sinus_driver.catalog import Family, load_family
 from nfo_sinus_driver.cli.check import report
 from nfo_sinus_driver.cli.check.readings import Reading, Seen, Verdict, look, table
-from nfo_sinus_driver.cli.check.sight import Register, Sight
-from nfo_sinus_driver.cli.check.wire import SerialWire, TcpWire, Wire
+from nfo_sinus_driver.cli.check.sight import ClassicSight, ModbusSight, Register, Sight
+from nfo_sinus_driver.cli.check.wire import ClassicWire, SerialWire, TcpWire, Wire
 from nfo_sinus_driver.cli.console import (
     CliError,
     UsageError,
@@ -33,7 +33,7 @@ from nfo_sinus_driver.link.ports.port import port_of
 
 #: The silence before a request, until it is known how short it may be, s.
 _GAP = 0.02
-_PROTOCOLS = ('modbus_rtu', 'modbus_ascii', 'modbus_tcp')
+_PROTOCOLS = ('modbus_rtu', 'modbus_ascii', 'modbus_tcp', 'classic')
 #: So near are two values that are the same.
 _SAME = 0.02
 #: Functions that drives may have or not, each as a request that changes nothing.
@@ -77,12 +77,12 @@ class Check(Verb):
         model = load_family(options.model)
         try:
             with _wire(settings, options) as (wire, set_gap):
-                sight = Sight(wire, model)
-                at = next(iter(sight.parameters.values())).at('modbus').index
-                timing = sight.timing(at, set_gap)
+                is_classic = options.protocol == 'classic'
+                sight = ClassicSight(wire, model) if is_classic else ModbusSight(wire, model)
+                timing = sight.timing(set_gap)
                 with progress('reading the registers', len(sight.parameters)) as step:
                     registers = list(sight.registers(step))
-                functions = _functions(sight)
+                functions = '' if is_classic else _functions(sight)
                 seen = list(look(sight, options.protocol))
         except (PortError, OSError) as error:
             raise CliError(str(error)) from error
@@ -139,8 +139,12 @@ def _wire(
         raise UsageError(str(error)) from None
     port.open()
     try:
-        ascii_frames = options.protocol == 'modbus_ascii'
-        wire = SerialWire(port, options.address, _GAP, ascii_frames=ascii_frames)
+        wire: SerialWire | ClassicWire
+        if options.protocol == 'classic':
+            wire = ClassicWire(port, options.address, _GAP)
+        else:
+            ascii_frames = options.protocol == 'modbus_ascii'
+            wire = SerialWire(port, options.address, _GAP, ascii_frames=ascii_frames)
         yield wire, lambda gap: setattr(wire, 'gap', gap)
     finally:
         port.close()

@@ -1,11 +1,13 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Modbus requests in frames that nothing of the driver's own codec makes or reads."""
+"""Requests in frames that nothing of the driver's own codecs makes or reads."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+import functools
+import operator
 import struct
 import time
 from typing import NamedTuple, Protocol
@@ -18,6 +20,9 @@ _FIRST, _LAST = 0.5, 0.05
 #: The longest answer of Modbus.
 _MOST = 260
 _CONNECTS_WITHIN = 5.0
+#: What a Classic drive answers where there is no such parameter, and how long a REPLY is.
+NAK = b'\x15'
+_REPLY = 14
 #: How much is added to the sum of a frame that is to be none.
 _SPOILED = 0x0101
 
@@ -26,7 +31,8 @@ class Answer(NamedTuple):
     """
     What came for one request.
 
-    :ivar pdu: function and data; nothing: no frame that belongs to the request.
+    :ivar pdu: function and data, on Classic what :class:`ClassicWire` says; nothing: no frame that
+        belongs to the request.
     :ivar frame: every byte that came.
     :ivar first: from the last byte sent to the first that came, s; infinite: none did.
     """
@@ -88,6 +94,51 @@ class SerialWire:
         answer = self._unpack(frame)
         belongs = answer[:1] == message[:1] and answer[1:2] in (pdu[:1], bytes((pdu[0] | 0x80,)))
         return Answer(answer[1:] if belongs else b'', frame, first)
+
+
+class ClassicWire:
+    """
+    A drive on a Classic line.
+
+    A request is the number of a parameter, in two bytes; an answer its word, in two bytes, or NAK.
+    """
+
+    has_sum = True
+
+    def __init__(self, port: Port, unit: int, gap: float) -> None:
+        self._port = port
+        self._unit = unit
+        #: The least silence before a request, s.
+        self.gap = gap
+
+    def ask(self, pdu: bytes, *, spoiled: bool = False) -> Answer:
+        """Send an ENQUIRY, which has no sum, and return what came."""
+        assert not spoiled, 'an ENQUIRY has no sum'
+        port, address = self._port, bytes((0x20 + self._unit,))
+        while port.read(time.monotonic() + self.gap):
+            # what is left of an answer that came too late
+            pass
+        parameter = b'E' + pdu.hex().upper().encode()
+        port.write(b'\x04' + address + parameter + b'\x05')
+        sent = time.monotonic()
+        frame, first = b'', float('inf')
+        until = sent + _FIRST
+        while len(frame) < _MOST and (data := port.read(until)):
+            now = time.monotonic()
+            first = min(first, now - sent)
+            frame, until = frame + data, now + _LAST
+            if frame == address + NAK or len(frame) == _REPLY:
+                break
+        if frame == address + NAK:
+            return Answer(NAK, frame, first)
+        head = address + b'\x02' + parameter + b'='
+        whole = len(frame) == _REPLY and frame.startswith(head) and frame[12:13] == b'\x03'
+        right = whole and functools.reduce(operator.xor, frame[2:13]) == frame[13]
+        try:
+            word = bytes.fromhex(frame[8:12].decode('ascii')) if right else b''
+        except ValueError:
+            word = b''
+        return Answer(word, frame, first)
 
 
 class TcpWire:

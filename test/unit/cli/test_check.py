@@ -17,7 +17,7 @@ from support.described import SHIPPED
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.check.readings import Verdict
-from nfo_sinus_driver.cli.check.sight import Sight
+from nfo_sinus_driver.cli.check.sight import ModbusSight
 from nfo_sinus_driver.cli.check.verb import Check, _questions
 from nfo_sinus_driver.cli.check.wire import Answer
 from nfo_sinus_driver.simulator.family import simulated_drive
@@ -29,10 +29,11 @@ from nfo_sinus_driver.simulator.family import simulated_drive
         {},
         {'protocol': 'modbus_ascii'},
         {'protocol': 'modbus_tcp'},
+        {'protocol': 'classic'},
         {'model': 'sinus_optimal', 'serial_numbers': []},
         {'model': str(SHIPPED['yaskawa_v1000']), 'serial_numbers': []},
     ],
-    ids=['rtu', 'ascii', 'tcp', 'optimal', 'described'],
+    ids=['rtu', 'ascii', 'tcp', 'classic', 'optimal', 'described'],
 )
 def test_a_drive_is_as_the_readings_say(make_bench: MakeBench, options: dict[str, object]) -> None:
     model = str(options.get('model', 'sinus_g2'))
@@ -44,8 +45,10 @@ def test_a_drive_is_as_the_readings_say(make_bench: MakeBench, options: dict[str
         more = '--family', model, '--address', 1, '--baud-rate', 19200, '--char-format', '8E1'
     done = bench.run('check', *more)
     assert done.status == 0, done.out + done.err
-    assert 'CONTRADICTED: none' in done.out and 'C87' in done.out
-    has_sum = options.get('protocol') != 'modbus_tcp'
+    assert 'CONTRADICTED: none' in done.out
+    protocol = options.get('protocol')
+    assert ('C44' if protocol == 'classic' else 'C87') in done.out
+    has_sum = protocol not in ('modbus_tcp', 'classic')
     assert (re.search(r'confirmed: .*\bC8\b', done.out) is not None) is has_sum
     assert bench.state()['writes'] == bench.state()['command_writes'] == {}
 
@@ -90,8 +93,8 @@ def test_without_an_answer_it_ends_with_2(make_bench: MakeBench) -> None:
     bench = make_bench()
     done = bench.run('check', '--address', 9)
     assert done.status == 2 and 'no response from address 9: check' in done.err
-    done = bench.run('check', '--protocol', 'classic')
-    assert done.status == 2 and 'not by classic' in done.err
+    done = bench.run('check', '--protocol', 'canopen')
+    assert done.status == 2 and 'not by canopen' in done.err
 
 
 class _Direct:
@@ -120,7 +123,7 @@ def test_a_question_is_answered_by_what_the_keypad_shows(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     model = load_family('sinus_g2')
-    registers = list(Sight(_Direct(), model).registers())
+    registers = list(ModbusSight(_Direct(), model).registers())
     # the second question is left out
     monkeypatch.setattr(sys, 'stdin', io.StringIO(f'{typed}\n'))
     seen = list(_questions(model, registers, 'modbus_rtu', asks=True))

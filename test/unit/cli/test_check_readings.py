@@ -14,14 +14,18 @@ import pytest
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.check import readings
 from nfo_sinus_driver.cli.check.readings import Verdict, look, table
-from nfo_sinus_driver.cli.check.sight import Sight
-from nfo_sinus_driver.cli.check.wire import Answer
+from nfo_sinus_driver.cli.check.sight import ClassicSight, ModbusSight
+from nfo_sinus_driver.cli.check.wire import NAK, Answer
+from nfo_sinus_driver.simulator.classic import Wrong
 from nfo_sinus_driver.simulator.family import simulated_drive
+from nfo_sinus_driver.simulator.sinus_g2.servers import ClassicServer
 
 _PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'readings.md'
 G2, OPTIMAL = 'sinus_g2', 'sinus_optimal'
 #: What answers in place of the drive, by the request; ``None``: the drive.
 Turn = Callable[[bytes], bytes | None]
+#: The same of Classic, by the number of the parameter and the drive's own frame.
+ClassicTurn = Callable[[int, bytes], Answer | None]
 
 
 class Direct:
@@ -42,8 +46,36 @@ class Direct:
         return Answer(answer, answer, 0.001)
 
 
+class DirectClassic:
+    """A simulated G2, asked over Classic without a line."""
+
+    has_sum = True
+
+    def __init__(self, turn: ClassicTurn = lambda number, frame: None) -> None:
+        server = simulated_drive(G2).servers['classic']
+        assert isinstance(server, ClassicServer)
+        self._server = server
+        self._turn = turn
+
+    def ask(self, pdu: bytes, *, spoiled: bool = False) -> Answer:
+        assert not spoiled
+        number = int.from_bytes(pdu, 'big')
+        try:
+            word = self._server.enquiry(number).to_bytes(2, 'big')
+        except Wrong:
+            word = NAK
+        body = b'E' + pdu.hex().upper().encode() + b'=' + word.hex().upper().encode() + b'\x03'
+        frame = b'!\x15' if word == NAK else b'!\x02' + body + b'?'
+        return self._turn(number, frame) or Answer(word, frame, 0.001)
+
+
+def classic_verdicts(wire: DirectClassic) -> dict[int, Verdict]:
+    sight = ClassicSight(wire, load_family(G2))
+    return {seen.reading.number: seen.verdict for seen in look(sight, 'classic')}
+
+
 def verdicts(wire: Direct, model: str) -> dict[int, Verdict]:
-    sight = Sight(wire, load_family(model))
+    sight = ModbusSight(wire, load_family(model))
     return {seen.reading.number: seen.verdict for seen in look(sight, 'modbus_rtu')}
 
 
@@ -99,6 +131,26 @@ TURNED = [
 ]
 
 
+CLASSIC_TURNED: list[tuple[int, ClassicTurn]] = [
+    (4, lambda number, frame: Answer(b'\5\0', frame, 0.1) if number == 0x240 else None),
+    (25, lambda number, frame: Answer(NAK, frame, 0.1) if number == 0xE2 else None),
+    # whole, but for its sum
+    (44, lambda number, frame: Answer(b'', frame, 0.1) if number == 0xE9 else None),
+    (86, lambda number, frame: Answer(b'\0\0', frame.lower(), 0.1)),
+]
+
+
+def test_no_reading_is_contradicted_by_a_simulated_drive_on_classic() -> None:
+    assert classic_verdicts(DirectClassic()) == dict.fromkeys((4, 25, 44, 86), Verdict.CONFIRMED)
+
+
+@pytest.mark.parametrize(('number', 'turn'), CLASSIC_TURNED)
+def test_a_drive_that_is_turned_round_on_classic_is_found_out(
+    number: int, turn: ClassicTurn
+) -> None:
+    assert classic_verdicts(DirectClassic(turn))[number] is Verdict.CONTRADICTED
+
+
 @pytest.mark.parametrize('model', [G2, OPTIMAL])
 def test_no_reading_is_contradicted_by_a_simulated_drive(model: str) -> None:
     found = verdicts(Direct(model), model)
@@ -129,6 +181,7 @@ def test_each_reading_that_is_read_has_its_function_and_its_turn() -> None:
     read = [reading for reading in table() if reading.part == 'read']
     assert {reading.shows for reading in read} == set(readings.looks())
     turned = {(number, model) for number, model, _ in TURNED}
+    turned |= {(number, G2) for number, _ in CLASSIC_TURNED}
     every = {(one.number, model) for one in read for model in one.families & {G2, OPTIMAL}}
     assert every == turned - {(87, G2), (87, OPTIMAL)}
     assert {reading.number for reading in table()} <= of_page
@@ -137,7 +190,7 @@ def test_each_reading_that_is_read_has_its_function_and_its_turn() -> None:
 def test_nothing_is_read_that_has_an_effect() -> None:
     asked: list[bytes] = []
     for model in (G2, OPTIMAL):
-        sight = Sight(Direct(model, lambda pdu: asked.append(pdu)), load_family(model))
+        sight = ModbusSight(Direct(model, lambda pdu: asked.append(pdu)), load_family(model))
         list(sight.registers())
         list(look(sight, 'modbus_rtu'))
     assert {pdu[0] for pdu in asked} <= {3, 4, 8, 17, 43}
