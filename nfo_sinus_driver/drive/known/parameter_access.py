@@ -393,7 +393,7 @@ class ParameterAccess:
         parameter = self.model[key]
         return refusal.of(parameter.key if parameter.is_setting else parameter.name)
 
-    def _meant(self, refusal: Refused) -> Refused:
+    def meant(self, refusal: Refused) -> Refused:
         """Return a refusal with what its code means to this family."""
         profile, code = self.model.profile, refusal.code
         if code in profile.busy:
@@ -468,7 +468,7 @@ class ParameterAccess:
                     raise
                 silent -= 1
             except Refused as refusal:
-                meant = self._meant(refusal)
+                meant = self.meant(refusal)
                 if not (meant.is_busy and busy):
                     raise meant from None
                 busy -= 1

@@ -406,6 +406,8 @@ class Setpoint:
     def _done(self, written: Written, error: LinkError | None) -> None:
         if not self.following:
             return
+        if isinstance(error, Refused):
+            error = self._params.meant(error)
         if error is None or isinstance(error, AnotherValue):
             held = None if error is None else error.data
             self._take_note(written.address, written.data, held)

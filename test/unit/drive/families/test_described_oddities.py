@@ -136,6 +136,27 @@ def test_exceptions_have_the_texts_of_the_file_and_what_is_busy_is_asked_again(
         assert rig.far.peek('ramp.accel') == 7.0 and not left
 
 
+@pytest.mark.parametrize(('code', 'goes_on'), [(0x30, True), (0x22, False)])
+def test_the_codes_of_the_file_count_for_set_points_too(
+    tmp_path: Path, code: int, goes_on: bool
+) -> None:
+    line = {'exceptions': {0x22: 'parameters are locked', 0x30: 'later'}, 'busy': [0x30]}
+    with DescribedRig(described(tmp_path, line=line)) as rig:
+        rig.turn()
+        left = [code] * 5
+
+        def refuse(key: str) -> None:
+            if key == 'line.setpoint' and left:
+                raise Refused(left.pop(), 'as the test says')  # type: ignore[arg-type]
+
+        rig.far.control_unit.validate = refuse  # type: ignore[method-assign]
+        rig.send(10.0)
+        rig.pass_time(1.0)
+        assert rig.drive.following is goes_on
+        if not goes_on:
+            assert rig.notes.said('parameters are locked (exception 34)')
+
+
 def test_what_makes_a_setting_take_effect_is_written_after_it(tmp_path: Path) -> None:
     after = [{'register': 50, 'value': 1}]
     with DescribedRig(described(tmp_path, after_write=after)) as rig:
