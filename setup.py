@@ -95,8 +95,5 @@ setup(
             f'record = {NAME}.commands:record',
             f'simulator = {NAME}.commands:simulator',
         ],
-        # loaded by `ros2 doctor` alone
-        'ros2doctor.checks': [f'DriveCheck = {NAME}.node.doctor:DriveCheck'],
-        'ros2doctor.report': [f'DriveReport = {NAME}.node.doctor:DriveReport'],
     },
 )

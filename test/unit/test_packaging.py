@@ -48,7 +48,6 @@ ON_NOBLE = {
 #: The driver says so, a test is skipped.
 OPTIONAL = {
     'nfo_sinus_driver/demo/bags_rosbags.py': {'rosbags'},
-    'nfo_sinus_driver/node/doctor.py': {'ros2doctor'},
     'test/ros/stand_ins/rosbag2_py.py': {'rosbags'},
 }
 

@@ -1,4 +1,0 @@
-# Copyright 2026 The nfo_sinus_driver authors
-# SPDX-License-Identifier: Apache-2.0
-
-"""Stands in for ros2doctor."""
