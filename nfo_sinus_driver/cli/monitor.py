@@ -10,10 +10,8 @@ from collections.abc import Mapping, Sequence
 import contextlib
 import dataclasses
 from datetime import datetime
-import importlib.util
 import itertools
 import math
-import os
 import queue
 import sys
 import threading
@@ -22,7 +20,7 @@ from typing import Any
 
 from nfo_sinus_driver.bus import Priority, Statistics
 from nfo_sinus_driver.catalog import Kind, Role, State
-from nfo_sinus_driver.cli.console import UsageError, as_json, columns, put, remark, say
+from nfo_sinus_driver.cli.console import as_json, columns, put, remark, say
 from nfo_sinus_driver.cli.options import Verb, add_flag, addresses, period, times
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, InverterStatus
@@ -52,8 +50,6 @@ _COLUMNS = (
     '', 'used', 'cycle', 'min', 'median', 'p99', 'max', 'requests', 'no answer', 'damaged',
     'refused', 'repeated',
 )
-#: The view of the running driver: only there ROS is known.
-_ROS_VIEW = 'nfo_sinus_driver.node.monitor'
 #: How long the present reading may take at the end, s.
 _LAST_READING = 2.0
 _CONDITIONS = {Kind.FAULT: Condition.FAULT, Kind.ALARM: Condition.ALARM}
@@ -74,10 +70,6 @@ class Monitor(Verb):
             parser, '--lines',
             'a line each time, where a terminal would show the view; so does --count',
         )
-        add_flag(
-            parser, '--ros',
-            'show the drives of running drivers, on the graph of ROS, instead of a line',
-        )
         parser.add_argument(
             '--addresses', type=addresses, default=(), metavar='LIST',
             help='several drives of the line, such as 1-10,20 (default: that of --address)',
@@ -85,12 +77,6 @@ class Monitor(Verb):
 
     def main(self, options: argparse.Namespace) -> int:
         """Show it until the operator ends it, and then how the line was doing."""
-        if options.ros:
-            if importlib.util.find_spec('rclpy') is None:
-                raise UsageError('--ros needs ROS 2: source /opt/ros/jazzy/setup.bash first')
-            if options.json or options.lines or options.count or options.addresses:
-                raise UsageError('--ros shows the drives of running drivers, with no other option')
-            os.execv(sys.executable, [sys.executable, '-m', _ROS_VIEW])
         view = is_terminal() and not (options.json or options.lines or options.count)
         missing = why_unavailable() if view else ''
         if missing:

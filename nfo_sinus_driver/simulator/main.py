@@ -61,7 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         del arguments[arguments.index(_ROS_ARGS) :]
     if arguments[:1] == ['inject']:
         return inject(arguments[1:])
-    parser = _parser(with_experts='--help-all' in arguments)
+    parser = _parser()
     try:
         options = parser.parse_args(arguments)
         with _signals_that_quit(), _simulator(options) as simulator:
@@ -182,12 +182,8 @@ def _span(text: str) -> tuple[float, float]:
     return _seconds(low), _seconds(high if colon else low)
 
 
-def _parser(*, with_experts: bool = False) -> Parser:
-    """
-    Return the parser: an option is an argument of :class:`Simulator` or of :class:`PlcSetting`.
-
-    Its help shows what the manuals leave open only ``with_experts``.
-    """
+def _parser() -> Parser:
+    """Return the parser: an option is an argument of :class:`Simulator` or :class:`PlcSetting`."""
     parser = Parser(
         prog='simulator',
         description='Simulates whole drives on a pseudo-terminal or TCP port.',
@@ -195,13 +191,12 @@ def _parser(*, with_experts: bool = False) -> Parser:
     )
     flag, off, repeated = ({'action': how} for how in ('store_true', 'store_false', 'append'))
     seconds = {'type': _seconds, 'metavar': 'SECONDS'}
-    path, no_help = {'metavar': 'PATH'}, argparse.SUPPRESS
+    path = {'metavar': 'PATH'}
 
     def add(name: str, text: str, **how: Any) -> None:
         parser.add_argument(name, help=text, **how)
 
     add('--version', 'the version', action='version', version=f'nfo_sinus_driver {VERSION}')
-    add('--help-all', 'show what can be chosen of a drive, too', action='help')
     # ---- the line ----
     add('--protocol', 'default: modbus_rtu; with --family as its file says', choices=PROTOCOLS)
     add('--model', f'default: {USUAL}', default=USUAL, choices=simulated())
@@ -214,8 +209,6 @@ def _parser(*, with_experts: bool = False) -> Parser:
     add('--tcp', 'serve a TCP port of 127.0.0.1 (0: any free one)', type=int, metavar='PORT')
     add('--also', 'serve the same drives by another protocol as well, at a link or TCP port; may '
         'be repeated', **repeated, metavar='PROTOCOL:PLACE')
-    # the name of older versions
-    add('--baud', no_help, dest='baud_rate', type=int)
     add('--baud-rate', 'default: 19200, of classic and movitrac 9600, of canopen 125000 (bit/s); '
         'with --family as its file says', type=int)
     add('--char-format', 'default: 8E1, of classic and modbus_ascii 7E1, of movitrac 8N1; with '
@@ -261,7 +254,7 @@ def _parser(*, with_experts: bool = False) -> Parser:
         'standard one', **flag, default=None)
     # ---- what the manuals leave open ----
     for option in every_option():
-        add(f'--{option.name.replace("_", "-")}', option.text if with_experts else no_help,
+        add(f'--{option.name.replace("_", "-")}', option.text,
             choices=tuple(filter(None, option.choices)))
     return parser
 

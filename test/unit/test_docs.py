@@ -151,8 +151,7 @@ def test_what_is_made_of_the_pages_is_current(monkeypatch: pytest.MonkeyPatch) -
 
 def test_simulator_and_make_targets_are_documented() -> None:
     names = options(_parser()) | options(_inject_parser())
-    # a name of older versions
-    assert names - documented(read(DOCS / 'simulator.md')) == {'--baud'}
+    assert names - documented(read(DOCS / 'simulator.md')) == set()
     assert make_targets() >= {'demo', 'test'}
     assert make_targets() - named_targets(read(DOCS / 'development.md')) == set()
 

@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
 
 from cli_bench import COMMAND, Bench
 import pytest
@@ -94,19 +92,3 @@ def test_where_the_view_cannot_be_drawn_it_goes_on_line_by_line(
         terminal.wait_for('the view ', ': export ', '24 Stop')
         terminal.press('\x03')
         assert terminal.wait() == 0
-
-
-def test_beside_ros_it_needs_ros(bench: Bench) -> None:
-    program = """
-import importlib.util, sys
-found = importlib.util.find_spec
-importlib.util.find_spec = lambda name: None if name == 'rclpy' else found(name)
-from nfo_sinus_driver.cli.main import main
-sys.exit(main())
-"""
-    done = subprocess.run(
-        [sys.executable, '-c', program, 'monitor', '--ros'],
-        capture_output=True, text=True, timeout=60, check=False,
-    )
-    assert done.returncode == 2
-    assert 'source /opt/ros/jazzy/setup.bash' in done.stderr

@@ -153,7 +153,7 @@ def variant_of(*names):
 
 @pytest.mark.parametrize(('options', 'look', 'found'), [
     ('', the_line, ('modbus_rtu', '19200 8E1', 1)),
-    ('--baud 9600 --char-format 8N2', the_line, ('modbus_rtu', '9600 8N2', 1)),
+    ('--baud-rate 9600 --char-format 8N2', the_line, ('modbus_rtu', '9600 8N2', 1)),
     ('--family yaskawa_v1000', the_line, ('modbus_rtu', '9600 8N1', 31)),
     ('--family yaskawa_v1000 --tcp 0 --protocol modbus_tcp --address 2', the_line,
         ('modbus_tcp', '19200 8E1', 2)),

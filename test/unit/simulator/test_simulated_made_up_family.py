@@ -131,8 +131,7 @@ def test_over_a_line(open_master):
 def test_the_command_line_offers_it(capsys):
     assert {'heat', 'sio-error'} <= every_injection().keys()
     for command, how, offered, experts in (
-        (main, '--help-all', '--most {400,50}', True),
-        (main, '--help', '--help-all', False),
+        (main, '--help', '--most {400,50}', True),
         (inject, '--help', 'let it be too hot', False),
     ):
         with pytest.raises(SystemExit) as left:
