@@ -258,6 +258,9 @@ class LineSource:
     def stop_all(self) -> None:
         """Ignore it: this view only looks."""
 
+    def acknowledge(self, name: str) -> None:
+        """Ignore it: this view only looks."""
+
     # --- on the thread that reads -------------------------------------------------------------
 
     def _work(self) -> None:

@@ -126,6 +126,8 @@ class _DriverNode:
     updated_at: float
     #: The service that stops its drive, or all drives of its line; None: it offers none yet.
     stop: Client | None = None
+    #: The same of that which acknowledges the fault of its drive.
+    acknowledge: Client | None = None
     status: DriveStatus = field(default_factory=DriveStatus)
     inv_st: InvSt = field(default_factory=InvSt)
     telemetry: Telemetry | None = None
@@ -147,7 +149,7 @@ class _DriverNode:
 
 @dataclass
 class _Call:
-    """A call of a stop."""
+    """A call of a stop, or of an acknowledgement."""
 
     who: str
     service: str
@@ -185,6 +187,8 @@ class GraphSource:
         #: The stops that were requested and wait for their service, and since when.
         self._unsent: list[tuple[_DriverNode, float]] = []
         self._calls: list[_Call] = []
+        #: Acknowledgements that are not answered yet.
+        self._acknowledging: list[_Call] = []
         #: Why the last stop of a node is not confirmed, by its name.
         self._failed: dict[str, str] = {}
         self._notes: list[Note] = []
@@ -222,6 +226,7 @@ class GraphSource:
         self._read_log(now)
         self._send_stops(now)
         self._look_after_calls(now)
+        self._look_after_acknowledgements(now)
         notes, self._notes = self._notes, []
         nodes = self._driver_nodes.values()
         return Picture(
@@ -247,6 +252,16 @@ class GraphSource:
             self._call(node)
         if not known:
             self._note(Level.ERROR, '', 'there is no drive to be stopped')
+
+    def acknowledge(self, name: str) -> None:
+        """Call ``~/fault_ack`` of a drive; nothing turns by it."""
+        client, now = self._driver_nodes[name].acknowledge, time.monotonic()
+        if client is None or not client.service_is_ready():
+            why = 'not acknowledged: it offers no such service. Has its driver ended?'
+            self._note(Level.ERROR, name, why)
+            return
+        future = client.call_async(Trigger.Request())
+        self._acknowledging.append(_Call(name, client.srv_name, future, now))
 
     def stops(self, now: float) -> list[str]:
         """Return the stops that are not confirmed, as sentences, failures first."""
@@ -274,23 +289,25 @@ class GraphSource:
                 )
                 node.topics.add(type_, topic, _QOS[type_])
         for node in self._driver_nodes.values():
-            if node.stop is None:
+            if node.stop is None or (node.is_drive and node.acknowledge is None):
                 with contextlib.suppress(_NOT_KNOWN_YET):
-                    self._find_stop(node)
+                    self._find_services(node)
 
     def _wanted(self, name: str) -> bool:
         return not self._spaces or any(
             name == space or name.startswith(f'{space.rstrip("/")}/') for space in self._spaces
         )
 
-    def _find_stop(self, node: _DriverNode) -> None:
+    def _find_services(self, node: _DriverNode) -> None:
         space, _, name = node.name.rpartition('/')
-        verb = 'stop' if node.is_drive else 'stop_all'
+        stop = 'stop' if node.is_drive else 'stop_all'
         for service, types in self._node.get_service_names_and_types_by_node(name, space or '/'):
-            if _TRIGGER in types and service.rpartition('/')[2] == verb:
-                # now, so that both ends have discovered each other before the first stop
+            verb = service.rpartition('/')[2]
+            # now, so that both ends have discovered each other before the first call
+            if _TRIGGER in types and verb == stop and node.stop is None:
                 node.stop = self._caller.create_client(Trigger, service)
-                return
+            if _TRIGGER in types and verb == 'fault_ack' and node.acknowledge is None:
+                node.acknowledge = self._caller.create_client(Trigger, service)
 
     def _take(self, node: _DriverNode, message: object, now: float) -> None:
         if _is_gone(node, now):
@@ -372,6 +389,20 @@ class GraphSource:
                 self._fail(call.who, text)
             waiting.append(call)
         self._calls = waiting
+
+    def _look_after_acknowledgements(self, now: float) -> None:
+        waiting: list[_Call] = []
+        for call in self._acknowledging:
+            if call.future.done():
+                answer = call.future.result()
+                level = Level.INFO if answer.success else Level.ERROR
+                self._note(level, call.who, f'{call.service}: {answer.message}')
+            elif now - call.requested_at > _ANSWER_TIME:
+                text = f'{call.service} has not answered for {_ANSWER_TIME:.0f} s'
+                self._note(Level.ERROR, call.who, text)
+            else:
+                waiting.append(call)
+        self._acknowledging = waiting
 
     def _fail(self, who: str, why: str) -> None:
         self._failed[who] = why
@@ -470,8 +501,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='monitor',
         description='Shows every drive on the graph, in a terminal, and can stop them.',
-        epilog='Keys: s stops the drive that is chosen, a stops all, n goes to the next trouble, '
-        'p plots another quantity, q quits. None of it is a safety function.',
+        epilog='Keys: s stops the drive that is chosen, a stops all, k acknowledges, n goes '
+        'to the next trouble, p plots another quantity, q quits. None of it is a safety function.',
     )
     parser.add_argument(
         'namespaces', nargs='*', metavar='NAMESPACE', help='only drives in these (default: all)'

@@ -205,6 +205,8 @@ class Layout:
             self._source.stop(self._chosen)
         elif key == 'a' and not self._source.only_looks:
             self._source.stop_all()
+        elif key == 'k' and self._drives and not self._source.only_looks:
+            self._source.acknowledge(self._chosen)
 
     @property
     def _at(self) -> int:
@@ -262,9 +264,9 @@ class Layout:
         return [head, *([(f'{name}: {_figures(line)}', 'dim')] for name, line in lines)]
 
     def _keys(self) -> Row:
-        """Return what keys there are, without a stop where the source has none."""
-        stops = '' if self._source.only_looks else 's stop this drive  a stop ALL  '
-        return [(f'{stops}n next trouble  p plot  q quit', 'bold')]
+        """Return what keys there are, without those that act where the source only looks."""
+        acts = '' if self._source.only_looks else 's stop this drive  a stop ALL  k acknowledge  '
+        return [(f'{acts}n next trouble  p plot  q quit', 'bold')]
 
     def _log(self, width: int, height: int) -> list[Row]:
         rows: deque[Row] = deque(maxlen=height)

@@ -115,7 +115,7 @@ class Source(Protocol):
     title: str
     #: What to do while there is no drive.
     advice: str
-    #: Why nothing can be stopped from here; empty: it can.
+    #: Why nothing can be stopped or acknowledged from here; empty: it can.
     only_looks: str
 
     def next_picture(self) -> Picture:
@@ -126,3 +126,6 @@ class Source(Protocol):
 
     def stop_all(self) -> None:
         """Ask that all be stopped; a note reports what came of it."""
+
+    def acknowledge(self, name: str) -> None:
+        """Ask that the fault of a drive be acknowledged; a note reports what came of it."""

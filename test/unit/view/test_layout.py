@@ -56,6 +56,9 @@ class View:
     def stop_all(self) -> None:
         self.stopped.append('all')
 
+    def acknowledge(self, name: str) -> None:
+        self.stopped.append(f'acknowledge {name}')
+
     def change(self, **what: object) -> None:
         self._picture = replace(self._picture, **what)  # type: ignore[arg-type]
         self._layout.take_picture()
@@ -138,9 +141,10 @@ def test_a_fault_is_reported_with_cause_and_remedy_and_trouble_is_found_by_a_key
 
 def test_keys_stop_the_drive_that_is_chosen_and_all() -> None:
     view = View(*conveyor(12))
-    view.press('down', 's', 'a')
+    view.press('down', 's', 'a', 'k')
     # not the one that the order of letters has there, which is drive_10
-    assert view.stopped == ['/conveyor/drive_2', 'all']
+    two = '/conveyor/drive_2'
+    assert view.stopped == [two, 'all', f'acknowledge {two}']
 
 
 def test_the_chosen_one_stays_chosen_when_others_come_and_go() -> None:
@@ -156,14 +160,15 @@ def test_a_source_that_only_looks_has_no_keys_that_stop() -> None:
     view = View(_RUNS, only_looks='looks only')
     text = view.text()
     assert 'looks only' in text and 'stop ALL' not in text and 'stop this' not in text
-    view.press('s', 'a')
+    assert 'acknowledge' not in text
+    view.press('s', 'a', 'k')
     assert view.stopped == []
 
 
 def test_without_drives_it_says_what_to_do() -> None:
     view = View()
     # and no key makes it fall
-    view.press('s', 'n', 'p', 'down', 'page up', 'end', 'x')
+    view.press('s', 'k', 'n', 'p', 'down', 'page up', 'end', 'x')
     text = view.text()
     assert 'no drives  ROS domain 7' in text and '\n    ros2 run nfo_sinus_driver' in text
     assert 'domain:' in view.text(40), 'nothing of it is cut'
