@@ -33,8 +33,21 @@ def read_simulated(
         decel=settings.known(node.get('decel')),
         loopback=node.flag('loopback'),
         reverse=turned,
-        registers=dict(_registers(node.get('registers'), register_map, settings, problems)),
+        registers=_copied_once(
+            dict(_registers(node.get('registers'), register_map, settings, problems)),
+            node, problems,
+        ),
     )
+
+
+def _copied_once(
+    registers: dict[int, int | Shown | Copied], node: Node, problems: Problems
+) -> dict[int, int | Shown | Copied]:
+    """Return the registers, where none copies one that copies."""
+    for found in registers.values():
+        if isinstance(found, Copied) and isinstance(registers.get(found.register), Copied):
+            problems.add(node.line, 'what is simulated copies a register that is a copy, too')
+    return registers
 
 
 def _registers(

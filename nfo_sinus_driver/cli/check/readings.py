@@ -98,7 +98,12 @@ def look(sight: Sight, protocol: str) -> Iterator[Seen]:
     """Yield what a drive shows of each reading that needs no person."""
     for reading in table():
         if reading.part == 'read' and reading.fits(sight.model.name, protocol):
+            sight.missed.clear()
             verdict, saw = _looks[reading.shows](sight)
+            if sight.missed:
+                # a line that fails is no reading that is wrong
+                missed = ', '.join(pdu.hex(' ') for pdu in sight.missed)
+                verdict, saw = _not_seen(f'no answer to {missed}')
             yield Seen(reading, verdict, saw)
 
 
@@ -145,8 +150,13 @@ def _error_log_of_32(sight: ModbusSight) -> Found:
 
 @_looking
 def _wrong_sum(sight: ModbusSight) -> Found:
-    answer = sight.wire.ask(bytes.fromhex('03 0000 0001'), spoiled=True)
-    return _judged(not answer.frame, f'to a wrong sum: {answer.frame.hex(" ") or "no answer"}')
+    request = bytes.fromhex('03 0000 0001')
+    # it may be refused, but not left without an answer
+    sight.ask(request)
+    answer = sight.wire.ask(request, spoiled=True)
+    # without the address, which is the owner's
+    came = answer.frame[1:].hex(' ') or 'no answer'
+    return _judged(not answer.frame, f'to a wrong sum: {came}')
 
 
 @_looking
@@ -163,7 +173,10 @@ def _signed_temperature(sight: ModbusSight) -> Found:
     if word is None:
         return _not_seen('0454h is not answered')
     signed = (word ^ 0x8000) - 0x8000
-    return _judged(-100 <= signed <= 150, f'0454h: {word:04X}h = {signed}')
+    saw = f'0454h: {word:04X}h = {signed}'
+    if 0 <= signed <= 150:
+        return _not_seen(f'it is not below 0: {saw}')
+    return _judged(-100 <= signed < 0, saw)
 
 
 @_looking
@@ -221,6 +234,8 @@ def _mode(sight: ModbusSight, known: range) -> Found:
 
 @_looking
 def _mode_to_3(sight: ModbusSight) -> Found:
+    if sight.word(_MODE) in range(1, 4):
+        return _not_seen(f'it is not 0: 0294h: {sight.word(_MODE):04X}h')
     return _mode(sight, range(4))
 
 
@@ -288,8 +303,8 @@ def _unknown_register(sight: ModbusSight) -> Found:
 
 @_looking
 def _speed_in_every_mode(sight: ModbusSight) -> Found:
-    words = sight.words(0x264)
-    return _judged(words is not None, f'0264h: {_hex(words)}')
+    words, mode = sight.words(0x264), sight.words(0x24C)
+    return _judged(words is not None, f'0264h: {_hex(words)}, control mode {_hex(mode)}')
 
 
 @_looking
@@ -297,6 +312,8 @@ def _reported_id(sight: ModbusSight) -> Found:
     pdu = sight.ask(_REPORT).pdu
     if pdu[:1] != _REPORT:
         return _not_seen(_came(sight, _REPORT))
+    if len(pdu) < 2:
+        return _judged(False, 'function 17: nothing behind it')
     count, text = pdu[1], pdu[2:]
     with_run_byte = text[1:2] in (b'\x00', b'\xff') and text[2:].isascii()
     # what it says may have the serial number in it
@@ -337,7 +354,9 @@ def _sum_with_the_end(sight: ClassicSight) -> Found:
     answer = sight.ask(bytes((0x00, 0xE9)))
     if not answer.frame:
         return _not_seen('E00E9: no answer')
-    return _judged(bool(answer.pdu), f'E00E9: {answer.frame.hex(" ")}')
+    # without the address, which is the owner's; what is damaged has no sum that is right
+    sight.missed.clear()
+    return _judged(bool(answer.pdu), f'E00E9: {answer.frame[1:].hex(" ")}')
 
 
 @_looking

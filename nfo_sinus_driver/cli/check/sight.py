@@ -65,6 +65,8 @@ class Sight(abc.ABC):
         self.wire = wire
         self.model = model
         self._asked: dict[bytes, Answer] = {}
+        #: The requests without an answer, since this was emptied.
+        self.missed: list[bytes] = []
 
     def ask(self, pdu: bytes) -> Answer:
         """Return what a request got, asked once; one without an answer is repeated."""
@@ -73,6 +75,8 @@ class Sight(abc.ABC):
                 self._asked[pdu] = answer = self.wire.ask(pdu)
                 if answer.pdu:
                     break
+        if not self._asked[pdu].pdu:
+            self.missed.append(pdu)
         return self._asked[pdu]
 
     @property

@@ -16,7 +16,7 @@ from nfo_sinus_driver.catalog import Family, load_family
 from nfo_sinus_driver.cli.check import report
 from nfo_sinus_driver.cli.check.readings import Reading, Seen, Verdict, look, table
 from nfo_sinus_driver.cli.check.sight import ClassicSight, ModbusSight, Register, Sight
-from nfo_sinus_driver.cli.check.wire import ClassicWire, SerialWire, TcpWire, Wire
+from nfo_sinus_driver.cli.check.wire import FIRST, ClassicWire, SerialWire, TcpWire, Wire
 from nfo_sinus_driver.cli.console import (
     CliError,
     UsageError,
@@ -29,7 +29,10 @@ from nfo_sinus_driver.cli.console import (
 from nfo_sinus_driver.cli.options import Verb, add_flag
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.link import BusSettings, PortError
+from nfo_sinus_driver.link.modbus.tcp import host_and_port
 from nfo_sinus_driver.link.ports.port import port_of
+from nfo_sinus_driver.link.ports.tcp_connection import Connection, TcpConnection, TracedConnection
+from nfo_sinus_driver.link.ports.trace import Trace
 
 #: The silence before a request, until it is known how short it may be, s.
 _GAP = 0.02
@@ -79,9 +82,13 @@ class Check(Verb):
             with _wire(settings, options) as (wire, set_gap):
                 is_classic = options.protocol == 'classic'
                 sight = ClassicSight(wire, model) if is_classic else ModbusSight(wire, model)
+                if not sight.parameters:
+                    raise UsageError(f'no registers of a {model.name} are known by this protocol')
                 timing = sight.timing(set_gap)
                 with progress('reading the registers', len(sight.parameters)) as step:
                     registers = list(sight.registers(step))
+                if not any(one.words or one.refused_with for one in registers):
+                    raise CliError('the drive does not answer any more')
                 functions = '' if is_classic else _functions(sight)
                 seen = list(look(sight, options.protocol))
         except (PortError, OSError) as error:
@@ -89,7 +96,9 @@ class Check(Verb):
         asks = can_ask() and not options.no_questions and not options.json
         seen += _questions(model, registers, options.protocol, asks=asks)
         facts = {
-            'model': model.name, 'protocol': options.protocol, 'functions': functions,
+            # a file of one's own may be named after its owner
+            'model': model.name if '/' not in options.family else 'described by a file',
+            'protocol': options.protocol, 'functions': functions,
             'baud_rate': settings.line.baud_rate, 'char_format': settings.line.char_format,
         }
         document = report.document(sight, facts, seen, registers, timing)
@@ -127,11 +136,16 @@ def _wire(
     settings: BusSettings, options: argparse.Namespace
 ) -> Iterator[tuple[Wire, Callable[[float], None] | None]]:
     """Open the line; yield the drive on it, and what sets the silence before a request."""
+    first = max(FIRST, options.response_timeout)
     if options.protocol == 'modbus_tcp':
-        host, _, port = options.port.removeprefix('socket://').rpartition(':')
-        connection = TcpWire(host, int(port), options.address)
+        try:
+            connection: Connection = TcpConnection(*host_and_port(options.port))
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+        if options.trace:
+            connection = TracedConnection(connection, Trace(options.trace))
         with contextlib.closing(connection):
-            yield connection, None
+            yield TcpWire(connection, options.address, first), None
         return
     try:
         port = port_of(options.port, settings.line, options.trace)
@@ -139,12 +153,13 @@ def _wire(
         raise UsageError(str(error)) from None
     port.open()
     try:
+        gap = max(_GAP, load_family(options.model).profile.gap)
         wire: SerialWire | ClassicWire
         if options.protocol == 'classic':
-            wire = ClassicWire(port, options.address, _GAP)
+            wire = ClassicWire(port, options.address, gap, first)
         else:
             ascii_frames = options.protocol == 'modbus_ascii'
-            wire = SerialWire(port, options.address, _GAP, ascii_frames=ascii_frames)
+            wire = SerialWire(port, options.address, gap, first, ascii_frames=ascii_frames)
         yield wire, lambda gap: setattr(wire, 'gap', gap)
     finally:
         port.close()
@@ -169,9 +184,11 @@ def _questions(
         if reading.part != 'eyes' or not reading.fits(model.name, protocol):
             continue
         key = reading.shows
-        found = next((one for one in registers if one.key == key and one.words), None)
+        found = next((one for one in registers if one.key == key and one.value), None)
         if found is None:
             yield Seen(reading, Verdict.NOT_SEEN, f'{key} was not answered')
+        elif not any(found.words or ()):
+            yield Seen(reading, Verdict.NOT_SEEN, f'{key} is 0, by whatever factor')
         elif not asks:
             yield Seen(reading, Verdict.NOT_SEEN, 'nothing was asked')
         else:
@@ -195,6 +212,8 @@ def _asked(reading: Reading, name: str, unit: str, found: Register) -> Seen:
             remark(f'{given} is no number')
             continue
         value = float(found.value.split()[0])
-        same = math.isclose(shown, value, rel_tol=_SAME, abs_tol=10 ** -9)
+        # the keypad may show fewer digits
+        last = 10 ** -len(given.partition('.')[2])
+        same = math.isclose(shown, value, rel_tol=_SAME, abs_tol=last)
         verdict = Verdict.CONFIRMED if same else Verdict.CONTRADICTED
         return Seen(reading, verdict, f'{name}: {words} = {found.value}; the keypad shows {given}')

@@ -13,13 +13,15 @@ import time
 from typing import NamedTuple, Protocol
 
 from nfo_sinus_driver.link.ports.port import Port
-from nfo_sinus_driver.link.ports.tcp_connection import TcpConnection
+from nfo_sinus_driver.link.ports.tcp_connection import Connection
 
-#: How long the first byte is waited for, and after the last one, s.
-_FIRST, _LAST = 0.5, 0.05
+#: How long the first byte is waited for at least, and a byte after the last one, s.
+FIRST, _LAST = 0.5, 0.05
 #: The longest answer of Modbus.
 _MOST = 260
 _CONNECTS_WITHIN = 5.0
+#: Exceptions of a gateway: no path to the drive, or no answer of it.
+_OF_GATEWAY = (b'\x0a', b'\x0b')
 #: What a Classic drive answers where there is no such parameter, and how long a REPLY is.
 NAK = b'\x15'
 _REPLY = 14
@@ -62,73 +64,89 @@ class Wire(Protocol):
         """
 
 
-class SerialWire:
-    """A drive on a serial line; each request waits until the line was silent for a while."""
+class _OnPort:
+    """
+    A drive on a serial line; each request waits until the line was silent for a while.
+
+    An adapter may return every byte that is sent: the first read tells, whose answer is another.
+
+    :ivar gap: the least silence before a request, s.
+    """
 
     has_sum = True
 
-    def __init__(self, port: Port, unit: int, gap: float, *, ascii_frames: bool) -> None:
+    def __init__(self, port: Port, unit: int, gap: float, first: float) -> None:
         self._port = port
         self._unit = unit
-        #: The least silence before a request, s.
         self.gap = gap
+        #: How long the first byte is waited for, s.
+        self._first = first
+        self._echoes: bool | None = None
+
+    def _send(self, request: bytes, is_whole: Callable[[bytes], bool]) -> tuple[bytes, float]:
+        """Send a request; return what came for it, without an echo, and after how long, s."""
+        port = self._port
+        while port.read(time.monotonic() + self.gap):
+            # what is left of an answer that came too late
+            pass
+        port.write(request)
+        sent = time.monotonic()
+        came, first = b'', float('inf')
+        until = sent + self._first
+        while len(came) < 3 * _MOST and (data := port.read(until)):
+            now = time.monotonic()
+            came += data
+            if self._echoes is None and is_whole(came) and came != request:
+                self._echoes = False
+            if self._echoes is None and came.startswith(request) and is_whole(came[len(request) :]):
+                self._echoes = True
+            answer = came[len(request) :] if self._echoes else came
+            if answer and (self._echoes is not None or not request.startswith(answer)):
+                first, until = min(first, now - sent), now + _LAST
+            # the first request is a read, whose echo is not its answer
+            if is_whole(answer) and self._echoes is not None:
+                break
+        return came[len(request) :] if self._echoes else came, first
+
+
+class SerialWire(_OnPort):
+    """A drive on a Modbus RTU or ASCII line."""
+
+    def __init__(
+        self, port: Port, unit: int, gap: float, first: float, *, ascii_frames: bool
+    ) -> None:
+        super().__init__(port, unit, gap, first)
         self._pack: Callable[[bytes, int], bytes] = _ascii if ascii_frames else _rtu
         self._unpack = _from_ascii if ascii_frames else _from_rtu
 
     def ask(self, pdu: bytes, *, spoiled: bool = False) -> Answer:
         """Send a request, and return what came."""
-        port, message = self._port, bytes((self._unit,)) + pdu
-        while port.read(time.monotonic() + self.gap):
-            # what is left of an answer that came too late
-            pass
-        port.write(self._pack(message, _SPOILED if spoiled else 0))
-        sent = time.monotonic()
-        frame, first = b'', float('inf')
-        until = sent + _FIRST
-        while len(frame) < 2 * _MOST and (data := port.read(until)):
-            now = time.monotonic()
-            first = min(first, now - sent)
-            frame, until = frame + data, now + _LAST
-            if self._unpack(frame):
-                break
+        message = bytes((self._unit,)) + pdu
+        request = self._pack(message, _SPOILED if spoiled else 0)
+        frame, first = self._send(request, lambda came: bool(self._unpack(came)))
         answer = self._unpack(frame)
         belongs = answer[:1] == message[:1] and answer[1:2] in (pdu[:1], bytes((pdu[0] | 0x80,)))
         return Answer(answer[1:] if belongs else b'', frame, first)
 
 
-class ClassicWire:
+class ClassicWire(_OnPort):
     """
     A drive on a Classic line.
 
     A request is the number of a parameter, in two bytes; an answer its word, in two bytes, or NAK.
     """
 
-    has_sum = True
-
-    def __init__(self, port: Port, unit: int, gap: float) -> None:
-        self._port = port
-        self._unit = unit
-        #: The least silence before a request, s.
-        self.gap = gap
-
     def ask(self, pdu: bytes, *, spoiled: bool = False) -> Answer:
         """Send an ENQUIRY, which has no sum, and return what came."""
         assert not spoiled, 'an ENQUIRY has no sum'
-        port, address = self._port, bytes((0x20 + self._unit,))
-        while port.read(time.monotonic() + self.gap):
-            # what is left of an answer that came too late
-            pass
+        address = bytes((0x20 + self._unit,))
         parameter = b'E' + pdu.hex().upper().encode()
-        port.write(b'\x04' + address + parameter + b'\x05')
-        sent = time.monotonic()
-        frame, first = b'', float('inf')
-        until = sent + _FIRST
-        while len(frame) < _MOST and (data := port.read(until)):
-            now = time.monotonic()
-            first = min(first, now - sent)
-            frame, until = frame + data, now + _LAST
-            if frame == address + NAK or len(frame) == _REPLY:
-                break
+        frame, first = self._send(
+            b'\x04' + address + parameter + b'\x05',
+            lambda came: came.startswith(address) and (
+                came == address + NAK or len(came) == _REPLY
+            ),
+        )
         if frame == address + NAK:
             return Answer(NAK, frame, first)
         head = address + b'\x02' + parameter + b'='
@@ -142,40 +160,44 @@ class ClassicWire:
 
 
 class TcpWire:
-    """A drive behind a Modbus TCP gateway."""
+    """A drive behind a Modbus TCP gateway, whose own refusals are no answer of the drive."""
 
     has_sum = False
 
-    def __init__(self, host: str, port: int, unit: int) -> None:
-        self._connection = TcpConnection(host, port)
+    def __init__(self, connection: Connection, unit: int, first: float) -> None:
+        self._connection = connection
         self._unit = unit
+        self._first = first
         self._number = 0
-        self._connection.open()
+        #: What has come and is no whole frame yet.
+        self._rest = b''
+        connection.open()
         deadline = time.monotonic() + _CONNECTS_WITHIN
-        while not self._connection.connected(deadline):
+        while not connection.connected(deadline):
             if time.monotonic() >= deadline:
-                raise ConnectionError(f'{host}:{port} does not answer')
+                raise ConnectionError('the gateway does not answer')
 
     def ask(self, pdu: bytes, *, spoiled: bool = False) -> Answer:
-        """Send a request, and return what came."""
-        self._number += 1
+        """Send a request, and return what came; what came for one before is passed over."""
+        self._number = self._number % 0xFFFF + 1
         head = struct.pack('>HHHB', self._number, 0, len(pdu) + 1, self._unit)
         self._connection.write(head + pdu)
         sent = time.monotonic()
-        frame, first = b'', float('inf')
-        until = sent + _FIRST
+        until = sent + self._first
         while data := self._connection.read(until):
             now = time.monotonic()
-            first = min(first, now - sent)
-            frame, until = frame + data, now + _LAST
-            if len(frame) > 6 and len(frame) == 6 + int.from_bytes(frame[4:6], 'big'):
-                break
-        belongs = frame[:4] == head[:4] and len(frame) > 7
-        return Answer(frame[7:] if belongs else b'', frame, first)
+            self._rest += data
+            while len(self._rest) > 6 and len(self._rest) >= (end := _end_of(self._rest)):
+                frame, self._rest = self._rest[:end], self._rest[end:]
+                if frame[:4] == head[:4]:
+                    answer = frame[7:]
+                    is_gateway = answer[1:] in _OF_GATEWAY and answer[0] & 0x80
+                    return Answer(b'' if is_gateway else answer, frame, now - sent)
+        return Answer(b'', b'', float('inf'))
 
-    def close(self) -> None:
-        """Close the connection."""
-        self._connection.close()
+
+def _end_of(frames: bytes) -> int:
+    return 6 + int.from_bytes(frames[4:6], 'big')
 
 
 def _crc(message: bytes) -> int:

@@ -194,7 +194,7 @@ class TcpLink(ModbusLink):
     def on_port(cls, port: str, settings: LineSettings, trace: str = '') -> TcpLink:
         """Return the link to a gateway; of the settings only those of time count."""
 
-        host_and_port = _host_and_port(port)
+        where = host_and_port(port)
         kept = Trace(trace) if trace else None
 
         def connection(host: str, number: int) -> Connection:
@@ -202,7 +202,7 @@ class TcpLink(ModbusLink):
             return made if kept is None else TracedConnection(made, kept)
 
         return cls(
-            *host_and_port,
+            *where,
             settings.response_timeout,
             connection,
             request_gap=settings.request_gap,
@@ -522,7 +522,7 @@ class TcpLink(ModbusLink):
         return PortError(f'the connection to {self._name} was lost ({why}): {hint}')
 
 
-def _host_and_port(port: str) -> tuple[str, int]:
+def host_and_port(port: str) -> tuple[str, int]:
     """Return where a gateway is: ``host``, ``host:port`` or ``[IPv6 address]:port``."""
     try:
         parts = urlsplit(f'//{port}')

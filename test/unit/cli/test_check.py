@@ -28,12 +28,16 @@ from nfo_sinus_driver.simulator.family import simulated_drive
     [
         {},
         {'protocol': 'modbus_ascii'},
+        {'echo': True},
         {'protocol': 'modbus_tcp'},
         {'protocol': 'classic'},
+        {'protocol': 'classic', 'echo': True},
         {'model': 'sinus_optimal', 'serial_numbers': []},
         {'model': str(SHIPPED['yaskawa_v1000']), 'serial_numbers': []},
     ],
-    ids=['rtu', 'ascii', 'tcp', 'classic', 'optimal', 'described'],
+    ids=[
+        'rtu', 'ascii', 'echo', 'tcp', 'classic', 'classic, echo', 'optimal', 'described',
+    ],
 )
 def test_a_drive_is_as_the_readings_say(make_bench: MakeBench, options: dict[str, object]) -> None:
     model = str(options.get('model', 'sinus_g2'))
@@ -63,7 +67,11 @@ def test_a_file_to_send_has_nothing_that_tells_whose_drive_it_is(
     found = json.loads(text)
     assert found['model'] == 'sinus_g2' and len(found['registers']) > 100
     assert {one['verdict'] for one in found['readings']} == {'confirmed', 'not seen'}
-    assert all(own not in text for own in ('NFO1001', str(tmp_path), bench.simulator.port))
+    serial = 'NFO1001'
+    encoded = serial.encode()
+    own = (serial, encoded.hex(), encoded.hex(' '), encoded[:6].hex(' ', 2), str(tmp_path))
+    assert all(each.lower() not in text.lower() for each in own)
+    assert bench.simulator.port not in text and 'serial.address' not in text
     # another one does not replace it
     again = bench.run('check', '--report', path)
     assert again.status == 2 and 'exists: name another file' in again.err
@@ -87,6 +95,22 @@ def test_a_motor_that_the_bus_runs_runs_on(make_bench: MakeBench, model: str) ->
     done = bench.run('check')
     assert done.status == 2 and 'Stop it first' in done.err
     assert bench.state()['turning'] and not bench.state()['faults']
+
+
+def test_a_file_of_ones_own_is_not_named(make_bench: MakeBench, tmp_path: Path) -> None:
+    mine = tmp_path / 'acme_hall_3.vfd.yaml'
+    mine.write_text(SHIPPED['yaskawa_v1000'].read_text())
+    bench = make_bench(model=str(mine), serial_numbers=[])
+    bench.options = bench.options[:4]
+    line = ('--address', 1, '--baud-rate', 19200, '--char-format', '8E1')
+    done = bench.run('check', '--family', mine, *line, '--json')
+    assert done.status == 0 and 'acme' not in done.out, done.out
+
+
+@pytest.mark.parametrize('port', ['[::1]:1', '127.0.0.1', 'socket://127.0.0.1:1', 'nowhere:x'])
+def test_a_port_that_is_none_is_a_sentence(make_bench: MakeBench, port: str) -> None:
+    done = make_bench().run('check', '--protocol', 'modbus_tcp', '--port', port)
+    assert done.status == 2 and 'Traceback' not in done.err and done.err.startswith('nfo-sinus')
 
 
 def test_without_an_answer_it_ends_with_2(make_bench: MakeBench) -> None:

@@ -112,6 +112,7 @@ def test_a_bit_turns_the_direction_of_a_v20_round(word: int, turned: int) -> Non
 @pytest.mark.parametrize(('entry', 'said'), [
     ('{register: 0x2222}', 'says one of shows, copies, value'),
     ('{register: 0x2222, value: 1, copies: 0x2000}', 'says one of shows, copies, value'),
+    ('{register: 0x2222, copies: 0x2222}', 'copies a register that is a copy, too'),
     ('{register: 0x2001, value: 1}', 'stand in the same register'),
     ('{register: 0x2222, shows: noise}', 'choose one of setpoint, actual_frequency'),
     ('{register: 0x2222, shows: setpoint, scaled_by: no.such}', 'no.such is none of'),
