@@ -64,6 +64,8 @@ class Laws(History):
         #: When it was last shown as not enabled.
         self._not_enabled_at = -math.inf
         self._last_reported: dict[str, Any] = {}
+        #: When a motor that another master runs stood last, for it has no set-point.
+        self._idle_at = -math.inf
         #: How much had been asked when an acknowledgement let the motor go.
         self._turned_from: int | None = None
 
@@ -147,7 +149,12 @@ class Laws(History):
             # a drive that is not connected is not watched
             if not self._connected:
                 self._no_run_from = max(self._no_run_from, self.now + self.noticed)
-            late = max(self._no_run_from, since + self.noticed)
+            late = since + self.noticed
+            if not self.turning:
+                self._idle_at = self.now
+            # a motor that stands may stand on its way to a stop, by what the drive shows
+            idle = max(late, self._idle_at + self.noticed)
+            late = max(self._no_run_from, min(idle, late + self.shown.patience('standstill')))
         else:
             late = self._no_run_from
         if self.now > late:

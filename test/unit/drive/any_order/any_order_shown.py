@@ -96,6 +96,11 @@ class Times:
         )
 
 
+#: A status that shows a run along a ramp, too, shows so much later that one goes on at standstill,
+#: s (docs/faults_and_stops.md).
+_STANDSTILL = 1.5
+
+
 class Shown(abc.ABC):
     """
     What one simulated drive shows, and what may be written to it.
@@ -106,6 +111,7 @@ class Shown(abc.ABC):
         motor may have current until the stop that follows the acknowledgement.
     :cvar polls_wait: what a command has to read takes so long that the polls wait for it.
     :ivar refuses_stop: it may refuse a stop in a fault, and go on by it afterwards.
+    :cvar runs_along_ramp: its status shows a run on the way to a stop, too.
     """
 
     times = Times()
@@ -113,6 +119,7 @@ class Shown(abc.ABC):
     powered_by_acknowledgement = False
     refuses_stop = False
     polls_wait = False
+    runs_along_ramp = False
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -170,7 +177,7 @@ class Shown(abc.ABC):
 
     def patience(self, name: str) -> float:
         """Return how much later than others a fact may be reported, s."""
-        return 0.0
+        return _STANDSTILL if name == 'standstill' and self.runs_along_ramp else 0.0
 
     @abc.abstractmethod
     def reads_status(self, request: Request) -> bool:
@@ -283,7 +290,7 @@ class ShownG2(ShownSinus):
 
     def patience(self, name: str) -> float:
         # it is not read with every poll
-        return 1.0 if name == 'control mode' else 0.0
+        return 1.0 if name == 'control mode' else super().patience(name)
 
     def wrong(self, key: str, number: int) -> Complaints:
         yield from super().wrong(key, number)
@@ -293,6 +300,8 @@ class ShownG2(ShownSinus):
 
 class ShownDs402(ShownG2):
     """What a G2 shows by the drive profile of its CANopen module."""
+
+    runs_along_ramp = True
 
     @property
     def hides_stop(self) -> bool:
@@ -354,6 +363,7 @@ class ShownMovitrac(Shown):
     """What a MOVITRAC shows; who enables it reads what all its terminals are for."""
 
     polls_wait = True
+    runs_along_ramp = True
 
     def __init__(self, rig: Rig) -> None:
         super().__init__(rig)
@@ -408,7 +418,8 @@ class ShownMovitrac(Shown):
         }
 
     def patience(self, name: str) -> float:
-        return self.times.control_reported if name in ('by bus', 'running') else 0.0
+        told_late = name in ('by bus', 'running')
+        return self.times.control_reported if told_late else super().patience(name)
 
     def reads_status(self, request: Request) -> bool:
         return request == ('fieldbus.inverter_status', None)
@@ -468,6 +479,8 @@ class BehindPlc(Shown):
 class ShownG2BehindPlc(BehindPlc, ShownG2):
     """A G2 with the option card of PROFINET."""
 
+    runs_along_ramp = True
+
     @property
     def standing(self) -> bool:
         # only a new edge of bit 0 leads out of that state
@@ -480,6 +493,8 @@ class ShownOptimalBehindPlc(BehindPlc, ShownOptimal):
 
 class ShownH(BehindPlc):
     """A Sinus H."""
+
+    runs_along_ramp = True
 
     @property
     def by_bus(self) -> bool:

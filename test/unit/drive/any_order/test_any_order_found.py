@@ -9,7 +9,7 @@ from concurrent.futures import Future
 import itertools
 
 from any_order_machine import AnyOrder
-from any_order_machines import Canopen, G2DriveControl, G2ModeScmd, Movitrac
+from any_order_machines import Canopen, CanopenDs402, G2DriveControl, G2ModeScmd, Movitrac
 import pytest
 from support.rig import Rig
 
@@ -44,6 +44,22 @@ def test_a_start_that_the_run_input_ends_does_not_wait_for_it() -> None:
         assert not state.laws.standing
         state.run_input_on(wait=3.0)
         assert not state.rig.far.motor.driven
+    finally:
+        state.teardown()
+
+
+def test_a_run_at_standstill_that_a_fault_has_held_back_is_removed() -> None:
+    # another master's words came while the fault stood; its set-points were refused
+    state = CanopenDs402()
+    state.begin(refuses='all', delay=1, restart_after=1)
+    try:
+        state.fault(7, standing=True, wait=0.02)
+        state.run_by_another(wait=0.0)
+        state.end_cause(wait=2.2)
+        assert state.rig.far.motor.driven and not state.rig.far.motor.frequency
+        state.let(2.0)
+        assert not state.laws.standing
+        assert state.rig.notes.said(Cause.RUN_COMMAND_STANDS)
     finally:
         state.teardown()
 
