@@ -15,7 +15,7 @@ import time
 from typing import Any, TypeVar
 
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.cli.console import say
+from nfo_sinus_driver.cli.console import CliError, say
 from nfo_sinus_driver.cli.screen import Screen
 from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.drive import (
@@ -38,6 +38,8 @@ _POLL_RATE = 20.0
 #: How often it is looked whether something is done, or whether a motor has stopped, s.
 _LOOK_PERIOD = 0.02
 _STOP_LOOK_PERIOD = 0.05
+#: How long the stop may take that comes with connecting, and how often an enable waits for it, s.
+_LONGEST_STOP, _RETRY_PERIOD = 5.0, 0.1
 #: How long a drive may take for all that a command consists of, s; it gives up earlier by itself.
 _LONGEST = 15.0
 #: How long a stop that is not confirmed is retried, s.
@@ -115,6 +117,48 @@ class ControlSession(Listener):
         drive = self.command(control_method=method, reference=reference)
         self.finish(drive.connect())
         return drive
+
+    def require_ready(self) -> None:
+        """
+        Ensure that the motor stands, without a fault; nothing is written.
+
+        :raises CliError: it cannot be started.
+        """
+        self.offline.identify(thoroughly=False)
+        status = self.offline.read_status()
+        shown = self.offline.state.describe()
+        if status.driven:
+            by = 'the bus: nfo-sinus stop stops it' if status.from_bus else 'keypad or terminals'
+            raise CliError(f'the motor runs already ({shown}), by {by}')
+        if status.faulted:
+            fault = status.listed
+            raise CliError(
+                f'fault {shown} is active: {fault.description}. {fault.remedy}; '
+                'then type nfo-sinus ack'
+            )
+
+    def connect(self) -> None:
+        """Connect the drive that :meth:`command` has returned (Ended, DriveError)."""
+        self.wait(self.drive.connect())
+        self.drive.activate()
+
+    def enable(self) -> None:
+        """
+        Enable it, once the stop is confirmed that connecting has made sure of.
+
+        :raises Ended: a signal came first.
+        :raises DriveError: it cannot be enabled.
+        """
+        deadline = time.monotonic() + _LONGEST_STOP
+        while True:
+            try:
+                self.wait(self.drive.enable())
+                return
+            except DriveError as error:
+                pending = error.report.cause is Cause.STOP_PENDING
+                if not pending or time.monotonic() >= deadline:
+                    raise
+            self.pause(_RETRY_PERIOD)
 
     # --- waiting ------------------------------------------------------------------------------
 

@@ -30,8 +30,6 @@ from nfo_sinus_driver.drive.motion.starting import read_limits
 _PERIOD = 0.1
 #: How long the report may take why it was stopped, s.
 _LONGEST_REPORT = 1.0
-#: How long the stop may take that comes with connecting, s.
-_LONGEST_STOP = 5.0
 #: The same as the parameter ``shutdown_timeout`` of the driver has, s.
 _SHUTDOWN_TIMEOUT = 4.0
 #: Why a motor follows set-points no more.
@@ -115,7 +113,7 @@ class _Run:
 
         :raises CliError: it cannot be run, and nothing was written.
         """
-        self._require_ready()
+        self._control.require_ready()
         self._require_setpoint(self._control_mode())
         # whatever happens from here on, it is stopped
         status, why, signal = _FAILED, 'an error in this command', ''
@@ -134,22 +132,6 @@ class _Run:
         finally:
             confirmed = self._end(why, signal)
         return status if confirmed else _FAILED
-
-    def _require_ready(self) -> None:
-        """Ensure that the motor stands, without a fault; nothing is written."""
-        offline = self._control.offline
-        offline.identify(thoroughly=False)
-        status = offline.read_status()
-        shown = offline.state.describe()
-        if status.driven:
-            by = 'the bus: nfo-sinus stop stops it' if status.from_bus else 'keypad or terminals'
-            raise CliError(f'the motor runs already ({shown}), by {by}')
-        if status.faulted:
-            fault = status.listed
-            raise CliError(
-                f'fault {shown} is active: {fault.description}. {fault.remedy}; '
-                'then type nfo-sinus ack'
-            )
 
     def _control_mode(self) -> str:
         """Return the control mode of the drive, which is the expected one."""
@@ -189,21 +171,9 @@ class _Run:
             )
 
     def _start(self) -> None:
-        """Connect and enable, once the stop is confirmed that connecting has made sure of."""
-        control, drive = self._control, self._drive
-        control.wait(drive.connect())
-        drive.activate()
-        control.show = self._show
-        deadline = time.monotonic() + _LONGEST_STOP
-        while True:
-            try:
-                control.wait(drive.enable())
-                break
-            except DriveError as error:
-                pending = error.report.cause is Cause.STOP_PENDING
-                if not pending or time.monotonic() >= deadline:
-                    raise
-            control.pause(_PERIOD)
+        self._control.connect()
+        self._control.show = self._show
+        self._control.enable()
         if self._options.seconds is not None:
             self._ends_at = time.monotonic() + self._options.seconds
 

@@ -10,7 +10,7 @@ print it, not as the driver's tables have it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 import csv
 from dataclasses import dataclass
 import enum
@@ -21,6 +21,7 @@ from typing import Any, TypeVar
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.cli.check.sight import ClassicSight, ModbusSight, Sight
+from nfo_sinus_driver.cli.check.turn import Moment
 
 _TABLE = Path(__file__).parent / 'readings.csv'
 _ANY = 'any'
@@ -47,8 +48,10 @@ class Reading:
     """
     One row of the table.
 
-    :ivar part: ``read``, or ``eyes``: a person says what the keypad shows.
+    :ivar part: ``read``, ``eyes``: a person says what the keypad shows, or ``turn``.
     :ivar shows: what looks, or the parameter that is asked about.
+    :ivar moment: of ``turn`` the moment at which that parameter is read.
+    :ivar words: and the first words, signed, that show the reading, as ranges.
     """
 
     number: int
@@ -56,6 +59,8 @@ class Reading:
     protocols: frozenset[str]
     part: str
     shows: str
+    moment: str
+    words: tuple[tuple[int, int], ...]
     expectation: str
 
     def fits(self, family: str, protocol: str) -> bool:
@@ -82,13 +87,13 @@ _looks: dict[str, Callable[[Any], Found]] = {}
 
 @functools.cache
 def table() -> tuple[Reading, ...]:
-    """Return all readings that a drive can show without being written to."""
+    """Return all readings that a drive can show."""
     with _TABLE.open(newline='', encoding='utf-8') as file:
         return tuple(
             Reading(
                 int(row['number']), frozenset(row['families'].split('|')),
-                frozenset(row['protocols'].split('|')), row['part'], row['shows'],
-                row['expectation'],
+                frozenset(row['protocols'].split('|')), row['part'], row['shows'], row['moment'],
+                tuple(map(_range, row['words'].split())), row['expectation'],
             )
             for row in csv.DictReader(file)
         )
@@ -105,6 +110,29 @@ def look(sight: Sight, protocol: str) -> Iterator[Seen]:
                 missed = ', '.join(pdu.hex(' ') for pdu in sight.missed)
                 verdict, saw = _not_seen(f'no answer to {missed}')
             yield Seen(reading, verdict, saw)
+
+
+def turned(
+    moments: Sequence[Moment], family: str, protocol: str
+) -> Iterator[Seen]:
+    """Yield what a drive has shown of each reading while its motor turned."""
+    for reading in table():
+        if reading.part != 'turn' or not reading.fits(family, protocol):
+            continue
+        moment = next((one for one in moments if one.name == reading.moment), None)
+        words = moment.words.get(reading.shows) if moment is not None else None
+        if moment is None or not words:
+            why = 'not answered' if moment is None or moment.as_expected is not None else moment.saw
+            yield Seen(reading, *_not_seen(f'{reading.moment}: {why}'))
+            continue
+        right = any(least <= words[0] <= most for least, most in reading.words)
+        numbers = _hex(word & 0xFFFF for word in words)
+        yield Seen(reading, *_judged(right, f'{reading.moment}, {reading.shows}: {numbers}'))
+
+
+def _range(text: str) -> tuple[int, int]:
+    least, _, most = text.partition('..')
+    return int(least), int(most or least)
 
 
 def looks() -> Collection[str]:

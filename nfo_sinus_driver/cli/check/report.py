@@ -13,16 +13,22 @@ from typing import Any
 from nfo_sinus_driver.catalog import Role
 from nfo_sinus_driver.cli.check.readings import Seen, Verdict
 from nfo_sinus_driver.cli.check.sight import Register, Sight, Timing
+from nfo_sinus_driver.cli.check.turn import Moment
 from nfo_sinus_driver.version import VERSION
 
 #: So many registers with something odd are on the screen; the file has all.
 _MOST_SHOWN = 12
+_EXPECTED = {True: '', False: 'NOT AS EXPECTED: ', None: ''}
 #: What tells one drive from all others.
 _OWN = (Role.BUS_ADDRESS,)
 
 
 def screen(
-    seen: Sequence[Seen], registers: Sequence[Register], timing: Timing, refused: str
+    seen: Sequence[Seen],
+    registers: Sequence[Register],
+    timing: Timing,
+    refused: str,
+    moments: Sequence[Moment],
 ) -> Iterator[str]:
     """
     Yield the lines for people.
@@ -47,6 +53,8 @@ def screen(
         yield f'  {register.index:04X}h {register.key}:{words} {why}'
     if len(odd) > _MOST_SHOWN:
         yield f'  and {len(odd) - _MOST_SHOWN} more'
+    for moment in moments:
+        yield f'{moment.name}: {_EXPECTED[moment.as_expected]}{moment.saw}'
     for verdict in Verdict:
         of_it = [one for one in seen if one.verdict is verdict]
         if verdict is Verdict.CONFIRMED:
@@ -63,6 +71,7 @@ def document(
     seen: Sequence[Seen],
     registers: Sequence[Register],
     timing: Timing,
+    moments: Sequence[Moment],
 ) -> Mapping[str, Any]:
     """Return what is sent: nothing of it tells whose drive it is, or which."""
     own = {sight.model.roles[role] for role in _OWN if role in sight.model.roles}
@@ -76,6 +85,16 @@ def document(
                 'expectation': one.reading.expectation,
             }
             for one in seen
+        ],
+        'moments': [
+            {
+                'name': moment.name, 'saw': moment.saw, 'as_expected': moment.as_expected,
+                'words': {
+                    key: _words(word & 0xFFFF for word in words)
+                    for key, words in moment.words.items()
+                },
+            }
+            for moment in moments
         ],
         'registers': [
             {

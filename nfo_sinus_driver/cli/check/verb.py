@@ -14,8 +14,9 @@ import sys
 
 from nfo_sinus_driver.catalog import Family, load_family
 from nfo_sinus_driver.cli.check import report
-from nfo_sinus_driver.cli.check.readings import Reading, Seen, Verdict, look, table
+from nfo_sinus_driver.cli.check.readings import Reading, Seen, Verdict, look, table, turned
 from nfo_sinus_driver.cli.check.sight import ClassicSight, ModbusSight, Register, Sight
+from nfo_sinus_driver.cli.check.turn import Moment, agreed, turn
 from nfo_sinus_driver.cli.check.wire import FIRST, ClassicWire, SerialWire, TcpWire, Wire
 from nfo_sinus_driver.cli.console import (
     CliError,
@@ -48,9 +49,10 @@ _NONE_ANSWERS = 2
 
 class Check(Verb):
     """
-    Ask a drive what it shows of the readings of its manual; nothing is written.
+    Ask a drive what it shows of the readings of its manual; without --turn nothing is written.
 
-    The exit status is 0 if it contradicts none, 1 if it does, and 2 if nothing answers.
+    The exit status is 0 if it contradicts none, 1 if it does or a motor does not what it should,
+    and 2 if nothing answers.
     """
 
     failed = _NONE_ANSWERS
@@ -62,6 +64,9 @@ class Check(Verb):
             help='write a JSON file, to be sent: it has no name, path or serial number',
         )
         add_flag(parser, '--no-questions', 'ask nothing about what the keypad shows')
+        add_flag(
+            parser, '--turn', 'then turn the motor, at 5 Hz at most, with a person beside it'
+        )
 
     def main(self, options: argparse.Namespace) -> int:
         """Ask, and report."""
@@ -76,6 +81,8 @@ class Check(Verb):
             )
         except ValueError as error:
             raise UsageError(str(error)) from None
+        if options.turn and not can_ask():
+            raise UsageError('--turn needs a terminal: Enter stops the motor')
         _require_standstill(options)
         model = load_family(options.model)
         try:
@@ -95,13 +102,15 @@ class Check(Verb):
             raise CliError(str(error)) from error
         asks = can_ask() and not options.no_questions and not options.json
         seen += _questions(model, registers, options.protocol, asks=asks)
+        moments, status = _turn(options, model) if options.turn else ([], 0)
+        seen += turned(moments, model.name, options.protocol)
         facts = {
             # a file of one's own may be named after its owner
             'model': model.name if '/' not in options.family else 'described by a file',
             'protocol': options.protocol, 'functions': functions,
             'baud_rate': settings.line.baud_rate, 'char_format': settings.line.char_format,
         }
-        document = report.document(sight, facts, seen, registers, timing)
+        document = report.document(sight, facts, seen, registers, timing, moments)
         if options.report is not None:
             try:
                 options.report.write_text(as_json(document, indent=1) + '\n', encoding='utf-8')
@@ -110,9 +119,20 @@ class Check(Verb):
         if options.json:
             put(as_json(document, indent=1))
         else:
-            for line in report.screen(seen, registers, timing, functions):
+            for line in report.screen(seen, registers, timing, functions, moments):
                 put(line)
-        return int(any(one.verdict is Verdict.CONTRADICTED for one in seen))
+        return status or int(any(one.verdict is Verdict.CONTRADICTED for one in seen))
+
+
+def _turn(options: argparse.Namespace, model: Family) -> tuple[list[Moment], int]:
+    """Turn the motor, if the operator has typed the word for it."""
+    if not agreed(model):
+        remark('nothing was turned')
+        return [], 0
+    rows = [one for one in table() if one.part == 'turn']
+    return turn(
+        options, model, [one.shows for one in rows if one.fits(model.name, options.protocol)]
+    )
 
 
 def _require_standstill(options: argparse.Namespace) -> None:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
 import json
 import os
@@ -223,15 +223,26 @@ class Bench:
             assert process.poll() is None, process.communicate()
             yield process
 
-    def on_terminal(self, *arguments: object, ask: str = '', answer: str = '') -> Done:
-        """Run it on a terminal, and answer what it asks."""
+    def on_terminal(
+        self,
+        *arguments: object,
+        ask: str = '',
+        answer: str = '',
+        answers: Sequence[tuple[str, str | Callable[[], str]]] = (),
+    ) -> Done:
+        """
+        Run it on a terminal, and answer what it asks.
+
+        :param answers: what it asks, one after the other, and what is answered, or done first.
+        """
+        left = list(answers or ([(ask, answer)] if ask else []))
         process, terminal = pty.fork()
         if not process:
             os.chdir(ROOT)
             os.environ['TERM'] = 'xterm'
             command = [*COMMAND, *self.options, *map(str, arguments)]
             os.execv(command[0], command)
-        said = ''
+        said, seen = '', 0
         deadline = time.monotonic() + PATIENCE
         while True:
             wait = deadline - time.monotonic()
@@ -244,9 +255,11 @@ class Bench:
             if not data:
                 break
             said += data.decode(errors='replace')
-            if ask and ask in said:
-                os.write(terminal, answer.encode())
-                ask = ''
+            while left and (at := said.find(left[0][0], seen)) >= 0:
+                wanted, gives = left.pop(0)
+                seen = at + len(wanted)
+                os.write(terminal, (gives if isinstance(gives, str) else gives()).encode())
+                deadline = time.monotonic() + PATIENCE
         os.close(terminal)
         status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
         return Done(status, re.sub(r'[^\n]*\r(?!\n)', '', said.replace('\r\n', '\n')), said)
