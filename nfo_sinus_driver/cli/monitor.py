@@ -20,7 +20,7 @@ from typing import Any
 
 from nfo_sinus_driver.bus import Priority, Statistics
 from nfo_sinus_driver.catalog import Kind, Role, State
-from nfo_sinus_driver.cli.console import as_json, columns, put, remark, say
+from nfo_sinus_driver.cli.console import CliError, as_json, columns, put, remark, say
 from nfo_sinus_driver.cli.options import Verb, add_flag, addresses, period, times
 from nfo_sinus_driver.cli.session import OfflineDrive, Session
 from nfo_sinus_driver.drive import DriveError, InverterStatus
@@ -33,6 +33,7 @@ from nfo_sinus_driver.view.picture import (
     Measured,
     Note,
     Picture,
+    error_line,
 )
 
 #: What is measured, by its name in the messages of the driver; its width and its decimals.
@@ -50,6 +51,8 @@ _COLUMNS = (
     '', 'used', 'cycle', 'min', 'median', 'p99', 'max', 'requests', 'no answer', 'damaged',
     'refused', 'repeated',
 )
+#: So many entries of an error log are shown.
+_MOST_ERRORS = 8
 #: How long the present reading may take at the end, s.
 _LAST_READING = 2.0
 _CONDITIONS = {Kind.FAULT: Condition.FAULT, Kind.ALARM: Condition.ALARM}
@@ -234,6 +237,9 @@ class LineSource:
         for drive in drives:
             self._set(drive, Condition.SILENT, 'being asked')
         self._line: dict[str, Statistics] = {}
+        #: The drives whose error logs are to be read, and what came of those that were.
+        self._wanted: set[str] = set()
+        self._errors: dict[str, Sequence[str]] = {}
         self._logged: dict[int, str] = {}
         self._notes: queue.SimpleQueue[Note] = queue.SimpleQueue()
         self._closing = threading.Event()
@@ -249,7 +255,10 @@ class LineSource:
         """Return what was read last."""
         notes = [self._notes.get() for _ in range(self._notes.qsize())]
         now = time.monotonic()
-        views = [dataclasses.replace(view, age=now - at) for view, at in self._views.values()]
+        views = [
+            dataclasses.replace(view, age=now - at, errors=self._errors.get(view.name, ()))
+            for view, at in self._views.values()
+        ]
         return Picture(views, self._line, notes)
 
     def stop(self, name: str) -> None:
@@ -260,6 +269,11 @@ class LineSource:
 
     def acknowledge(self, name: str) -> None:
         """Ignore it: this view only looks."""
+
+    def read_errors(self, name: str) -> None:
+        """Read the error log of a drive with the next round."""
+        self._errors.pop(name, None)
+        self._wanted.add(name)
 
     # --- on the thread that reads -------------------------------------------------------------
 
@@ -303,6 +317,9 @@ class LineSource:
             measured=Measured(**values),
             line=self._session.statistics(drive.address),
         )
+        if (name := _name(drive)) in self._wanted:
+            self._wanted.discard(name)
+            self._errors[name] = _error_lines(drive)
 
     def _set(
         self, drive: OfflineDrive, condition: Condition, status: str, **more: Any
@@ -315,6 +332,17 @@ class LineSource:
         if self._logged.get(drive.address) != text:
             self._logged[drive.address] = text
             self._notes.put(Note(time.time(), level, _name(drive), text))
+
+
+def _error_lines(drive: OfflineDrive) -> Sequence[str]:
+    try:
+        entries = drive.error_log(_MOST_ERRORS)
+    except (CliError, DriveError) as error:
+        return (say(error),)
+    lines = [
+        error_line(entry.code, entry.text, entry.operating_time, math.nan) for entry in entries
+    ]
+    return lines or ['empty']
 
 
 def _name(drive: OfflineDrive) -> str:

@@ -20,7 +20,9 @@ import threading
 import time
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from nfo_sinus_msgs.msg import BusStatistics, DriveStatus, ErrorLogEntry, InvSt, Telemetry
+from nfo_sinus_msgs.srv import GetErrorLog
 from rcl_interfaces.msg import Log
 import rclpy
 from rclpy.client import Client
@@ -45,6 +47,7 @@ from nfo_sinus_driver.view.picture import (
     Measured,
     Note,
     Picture,
+    error_line,
 )
 
 #: How often the graph is searched for nodes, s.
@@ -76,6 +79,9 @@ _QOS = {
 }
 _TYPES = {f'nfo_sinus_msgs/msg/{message_type.__name__}': message_type for message_type in _QOS}
 _TRIGGER = 'std_srvs/srv/Trigger'
+_GET_ERROR_LOG = 'nfo_sinus_msgs/srv/GetErrorLog'
+#: So many entries of an error log are shown.
+_MOST_ERRORS = 8
 #: The name while it is not known yet which node a publisher belongs to.
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'
 _NOT_KNOWN_YET = rclpy_implementation.RCLError
@@ -128,6 +134,9 @@ class _DriverNode:
     stop: Client | None = None
     #: The same of that which acknowledges the fault of its drive.
     acknowledge: Client | None = None
+    #: The same of that which reads the error log of its drive, and what has come of that.
+    error_log: Client | None = None
+    errors: Sequence[str] = ()
     status: DriveStatus = field(default_factory=DriveStatus)
     inv_st: InvSt = field(default_factory=InvSt)
     telemetry: Telemetry | None = None
@@ -149,7 +158,7 @@ class _DriverNode:
 
 @dataclass
 class _Call:
-    """A call of a stop, or of an acknowledgement."""
+    """A call of a service, and which node it is about."""
 
     who: str
     service: str
@@ -189,6 +198,8 @@ class GraphSource:
         self._calls: list[_Call] = []
         #: Acknowledgements that are not answered yet.
         self._acknowledging: list[_Call] = []
+        #: Error logs that are being read.
+        self._reading: list[_Call] = []
         #: Why the last stop of a node is not confirmed, by its name.
         self._failed: dict[str, str] = {}
         self._notes: list[Note] = []
@@ -227,6 +238,7 @@ class GraphSource:
         self._send_stops(now)
         self._look_after_calls(now)
         self._look_after_acknowledgements(now)
+        self._look_after_error_logs(now)
         notes, self._notes = self._notes, []
         nodes = self._driver_nodes.values()
         return Picture(
@@ -263,6 +275,17 @@ class GraphSource:
         future = client.call_async(Trigger.Request())
         self._acknowledging.append(_Call(name, client.srv_name, future, now))
 
+    def read_errors(self, name: str) -> None:
+        """Call ``~/get_error_log`` of a drive."""
+        node, now = self._driver_nodes[name], time.monotonic()
+        client = node.error_log
+        if client is None or not client.service_is_ready():
+            node.errors = ('its driver offers no error log',)
+            return
+        node.errors = ()
+        request = GetErrorLog.Request(max_entries=_MOST_ERRORS)
+        self._reading.append(_Call(name, client.srv_name, client.call_async(request), now))
+
     def stops(self, now: float) -> list[str]:
         """Return the stops that are not confirmed, as sentences, failures first."""
         waiting = [
@@ -289,7 +312,9 @@ class GraphSource:
                 )
                 node.topics.add(type_, topic, _QOS[type_])
         for node in self._driver_nodes.values():
-            if node.stop is None or (node.is_drive and node.acknowledge is None):
+            if node.stop is None or (
+                node.is_drive and (node.acknowledge is None or node.error_log is None)
+            ):
                 with contextlib.suppress(_NOT_KNOWN_YET):
                     self._find_services(node)
 
@@ -308,6 +333,8 @@ class GraphSource:
                 node.stop = self._caller.create_client(Trigger, service)
             if _TRIGGER in types and verb == 'fault_ack' and node.acknowledge is None:
                 node.acknowledge = self._caller.create_client(Trigger, service)
+            if _GET_ERROR_LOG in types and node.error_log is None:
+                node.error_log = self._caller.create_client(GetErrorLog, service)
 
     def _take(self, node: _DriverNode, message: object, now: float) -> None:
         if _is_gone(node, now):
@@ -323,11 +350,10 @@ class GraphSource:
         elif isinstance(message, BusStatistics):
             node.statistics, node.updated_at = message, now
         elif isinstance(message, ErrorLogEntry):
-            stamp = message.stamp.sec + message.stamp.nanosec / 1e9
-            text = f'{_ERROR_LOG}{message.code} {message.text}'
-            if not math.isnan(message.operating_time):
-                text += f', at {message.operating_time:.1f} h of operation'
-            self._note(Level.WARNING, node.name, text, stamp or math.nan)
+            text = error_line(message.code, message.text, message.operating_time, math.nan)
+            self._note(Level.WARNING, node.name, f'{_ERROR_LOG}{text}', _seconds(message.stamp))
+            if node.errors:
+                self.read_errors(node.name)
 
     def _read_log(self, now: float) -> None:
         lines = self._rosout.take_messages()
@@ -404,12 +430,39 @@ class GraphSource:
                 waiting.append(call)
         self._acknowledging = waiting
 
+    def _look_after_error_logs(self, now: float) -> None:
+        waiting: list[_Call] = []
+        for call in self._reading:
+            node = self._driver_nodes[call.who]
+            if call.future.done():
+                node.errors = _errors(call.future.result())
+            elif now - call.requested_at > _ANSWER_TIME:
+                node.errors = (f'not read: {call.service} has not answered',)
+            else:
+                waiting.append(call)
+        self._reading = waiting
+
     def _fail(self, who: str, why: str) -> None:
         self._failed[who] = why
         self._note(Level.ERROR, who, why)
 
     def _note(self, level: Level, who: str, text: str, at: float | None = None) -> None:
         self._notes.append(Note(time.time() if at is None else at, level, who, text))
+
+
+def _errors(answer: GetErrorLog.Response) -> Sequence[str]:
+    """Return an error log for people."""
+    if not answer.success:
+        return (answer.message,)
+    return tuple(
+        error_line(entry.code, entry.text, entry.operating_time, _seconds(entry.stamp))
+        for entry in answer.entries
+    ) or ('empty',)
+
+
+def _seconds(stamp: Time) -> float:
+    """Return a time in s; NaN: it is not known."""
+    return stamp.sec + stamp.nanosec / 1e9 or math.nan
 
 
 def _is_gone(node: _DriverNode, now: float) -> bool:
@@ -444,6 +497,7 @@ def _drive_view(node: _DriverNode, now: float) -> DriveView:
         now - node.updated_at,
         measured,
         node.statistics,
+        node.errors,
     )
 
 
@@ -502,7 +556,8 @@ def _parser() -> argparse.ArgumentParser:
         prog='monitor',
         description='Shows every drive on the graph, in a terminal, and can stop them.',
         epilog='Keys: s stops the drive that is chosen, a stops all, k acknowledges, n goes '
-        'to the next trouble, p plots another quantity, q quits. None of it is a safety function.',
+        'to the next trouble, e shows the error log, p plots another quantity, q quits. None of it '
+        'is a safety function.',
     )
     parser.add_argument(
         'namespaces', nargs='*', metavar='NAMESPACE', help='only drives in these (default: all)'

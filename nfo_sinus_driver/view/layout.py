@@ -37,6 +37,8 @@ _FULL = 0.9
 _WIDE = 120
 _TABLE_WIDTH = 79
 _PLOT_HEIGHT = 3
+#: How many lines of the log there are, where the screen has room for so many.
+_LOG_HEIGHT = 6
 #: What is older is shown as old, s.
 _FRESH = 4.0
 
@@ -173,6 +175,8 @@ class Layout:
         self._pictures = 0
         self._notes: deque[Note] = deque(maxlen=_MOST_NOTES)
         self._quantities = list(_QUANTITIES)
+        #: The drive whose error log is shown, in the place of plots; '': none is.
+        self._errors_of = ''
 
     def take_picture(self) -> None:
         """Take the next picture."""
@@ -200,7 +204,12 @@ class Layout:
         elif key == 'n':
             self._choose_trouble()
         elif key == 'p':
+            self._errors_of = ''
             self._quantities.append(self._quantities.pop(0))
+        elif key == 'e' and self._drives:
+            self._errors_of = '' if self._errors_of else self._chosen
+            if self._errors_of:
+                self._source.read_errors(self._chosen)
         elif key == 's' and self._drives and not self._source.only_looks:
             self._source.stop(self._chosen)
         elif key == 'a' and not self._source.only_looks:
@@ -216,6 +225,9 @@ class Layout:
     def _choose(self, place: int) -> None:
         if self._drives:
             self._chosen = self._drives[max(0, min(place, len(self._drives) - 1))].name
+        if self._errors_of not in ('', self._chosen):
+            self._errors_of = self._chosen
+            self._source.read_errors(self._chosen)
 
     def _choose_trouble(self) -> None:
         """Choose the next drive that needs attention."""
@@ -232,7 +244,7 @@ class Layout:
         rule: Row = [('─' * width, 'dim')]
         head = self._head()[: 2 + height // 40]
         stops = [row for why in self._picture.stops for row in wrapped([(why, _ALERT)], width)]
-        log = self._log(width, height // 6)
+        log = self._log(width, max(height // 6, min(_LOG_HEIGHT, height // 4)))
         end = [*stops[:4], rule, *log, self._keys()]
         room = max(0, height - len(head) - len(end))
         if width >= _WIDE:
@@ -265,8 +277,8 @@ class Layout:
 
     def _keys(self) -> Row:
         """Return what keys there are, without those that act where the source only looks."""
-        acts = '' if self._source.only_looks else 's stop this drive  a stop ALL  k acknowledge  '
-        return [(f'{acts}n next trouble  p plot  q quit', 'bold')]
+        acts = '' if self._source.only_looks else 's stop this  a stop ALL  k acknowledge  '
+        return [(f'{acts}n next trouble  e errors  p plot  q quit', 'bold')]
 
     def _log(self, width: int, height: int) -> list[Row]:
         rows: deque[Row] = deque(maxlen=height)
@@ -306,6 +318,10 @@ class Layout:
         figures = '' if drive.line is None else f'line: {_figures(drive.line)}'
         line = wrapped([(figures, 'dim')], width)
         rows = [row for whole in _in_full(drive) for row in wrapped(whole, width)]
+        if self._errors_of == drive.name:
+            errors = drive.errors or ('being read',)
+            entries = [[('error log: ', 'dim'), (text, '')] for text in errors]
+            return [*rows, *(row for entry in entries for row in wrapped(entry, width)), *line]
         # a small plot rather than all figures of the line
         plots = self._plots(drive, width, max(2, height - len(rows) - len(line)))
         return [*rows, *plots, *line]

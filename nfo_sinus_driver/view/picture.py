@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from enum import Enum
 import math
 from typing import Any, Protocol
@@ -57,6 +58,7 @@ class DriveView:
     :ivar remedy: what to do about it.
     :ivar age: s since it was last reported.
     :ivar line: how the line does with this drive; None: not known.
+    :ivar errors: its error log, an entry a line, newest first, or why there is none.
     """
 
     name: str
@@ -72,6 +74,21 @@ class DriveView:
     age: float = 0.0
     measured: Measured = field(default_factory=Measured)
     line: Figures | None = None
+    errors: Sequence[str] = ()
+
+
+def error_line(code: int, text: str, operating_time: float, at: float) -> str:
+    """
+    Return one entry of an error log.
+
+    :param operating_time: h; :param at: when, s of ``time.time``; NaN: not known.
+    """
+    parts = [f'{code} {text}']
+    if not math.isnan(at):
+        parts.append(f'{datetime.fromtimestamp(at):%Y-%m-%d %H:%M}')
+    if not math.isnan(operating_time):
+        parts.append(f'at {operating_time:.1f} h of operation')
+    return ', '.join(parts)
 
 
 class Level(Enum):
@@ -129,3 +146,6 @@ class Source(Protocol):
 
     def acknowledge(self, name: str) -> None:
         """Ask that the fault of a drive be acknowledged; a note reports what came of it."""
+
+    def read_errors(self, name: str) -> None:
+        """Ask that the error log of a drive be read; a later picture has it."""

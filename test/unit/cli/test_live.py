@@ -24,6 +24,8 @@ def test_a_fault_and_a_lost_drive_are_shown_and_nothing_is_written(bench: Bench)
         inject('fault', 4, address=2)
         terminal.wait_for('✗ 1 fault', '4 PTC Temp')
         terminal.press('n')
+        terminal.press('e')
+        terminal.wait_for('error log: 4 PTC Temp')
         terminal.wait_for('to be acknowledged', 'why: Motor overheating', 'do: Let the motor cool')
         # keys that stop elsewhere
         terminal.press('sa')

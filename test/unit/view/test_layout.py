@@ -43,6 +43,7 @@ class View:
     def __init__(self, *drives: DriveView, only_looks: str = '') -> None:
         self.only_looks = only_looks
         self.stopped: list[str] = []
+        self.read: list[str] = []
         self._picture = Picture(drives, {'/bus': _LINE}, ())
         self._layout = Layout(self)
         self._layout.take_picture()
@@ -58,6 +59,9 @@ class View:
 
     def acknowledge(self, name: str) -> None:
         self.stopped.append(f'acknowledge {name}')
+
+    def read_errors(self, name: str) -> None:
+        self.read.append(name)
 
     def change(self, **what: object) -> None:
         self._picture = replace(self._picture, **what)  # type: ignore[arg-type]
@@ -114,11 +118,11 @@ def test_every_drive_is_in_the_table_and_the_chosen_one_in_full(
 
 def test_the_table_scrolls_by_pages() -> None:
     view = View(*conveyor(32))
-    assert 'drive 1-6/32' in view.text()
+    assert 'drive 1-5/32' in view.text()
     view.press('page down', 'page down')
-    assert '>drive_13' in view.text() and 'drive 8-13/32' in view.text()
+    assert '>drive_11' in view.text() and 'drive 7-11/32' in view.text()
     view.press('page up')
-    assert '>drive_7' in view.text()
+    assert '>drive_6' in view.text()
     view.press('end')
     assert '>drive_32' in view.text()
     view.press('home')
@@ -179,7 +183,7 @@ def test_notes_stand_in_the_log_newest_at_the_end() -> None:
     view = View(_RUNS)
     view.change(notes=[Note(1.8e9 + n, Level.ERROR, '/drive', f'line {n}') for n in range(9)])
     *_, last, _ = view.text().splitlines()
-    assert last.endswith('/drive line 8') and 'line 4' not in view.text()
+    assert last.endswith('/drive line 8') and 'line 2' not in view.text()
 
 
 def test_another_quantity_is_plotted_by_a_key() -> None:
@@ -189,6 +193,29 @@ def test_another_quantity_is_plotted_by_a_key() -> None:
     # high enough for more than one
     text = view.text(80, 30)
     assert text.index('frequency 29.9 Hz, the last') < text.index('torque 20 %, the last')
+
+
+def test_the_error_log_of_the_chosen_drive_is_shown_by_a_key() -> None:
+    drives = conveyor(7)
+    view = View(*drives, only_looks='looks only')
+    assert len(view.text().splitlines()[-1]) <= 80 and 'e errors' in view.text()
+    view.press('e')
+    assert view.read == ['/conveyor/drive_1'] and 'error log: being read' in view.text()
+    entries = '5 Overload, at 12.0 h of operation', '7 DC Low'
+    view.change(drives=[replace(drives[0], errors=entries), *drives[1:]])
+    assert all(f'error log: {entry}' in view.text() for entry in entries)
+    # it goes with the drive that is chosen
+    view.press('down')
+    assert view.read == ['/conveyor/drive_1', '/conveyor/drive_2']
+    assert 'error log: being read' in view.text() and 'DC Low' not in view.text()
+    view.press('e')
+    assert 'error log' not in view.text() and view.stopped == []
+
+
+def test_a_screen_of_24_lines_has_six_lines_of_log() -> None:
+    view = View(_RUNS)
+    view.change(notes=[Note(1.8e9 + n, Level.ERROR, '/drive', f'line {n}') for n in range(9)])
+    assert [n for n in range(9) if f'line {n}' in view.text(80, 24)] == [3, 4, 5, 6, 7, 8]
 
 
 def test_what_is_not_known_is_not_shown_as_zero() -> None:
