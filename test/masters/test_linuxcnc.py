@@ -196,7 +196,7 @@ def test_wj200_vfd(tmp_path: Path) -> None:
     """
     It resets each fault while it is enabled; not enabled it trips the drive, which is refused.
 
-    Newer ones read a coil (0 Hz), too, which no file can say for other masters.
+    That of LinuxCNC 2.10 reads the coil of 0 Hz, too, which no file can say for other masters.
     """
     require('wj200_vfd')
     with drive_of('hitachi_wj200') as drive:
