@@ -30,8 +30,6 @@ _PARITY = {'E': 'even', 'N': 'none'}
 _CYCLES = 0.3
 
 
-
-
 class Drive:
     """The simulated drive of a shipped file, whose line has control."""
 
@@ -47,6 +45,11 @@ class Drive:
     @property
     def has_fault(self) -> bool:
         return bool(self._simulator.state()['faults'])
+
+    def parameter(self, key: str) -> object:
+        """Return what a parameter has."""
+        simulated = next(iter(self._simulator.drives.values()))
+        return simulated.peek(key)
 
     def trip(self) -> int:
         """Let the first fault happen that it has; return its number."""
@@ -134,6 +137,111 @@ def test_vfdb_vfd(tmp_path: Path) -> None:
         wait_until(lambda: master.get('error-code') == number, 'it shows the fault')
         wait_until(lambda: drive.frequency == 0, 'it stands in a fault')
         assert master.get('error-count') == 0, (tmp_path / 'log').read_text()
+
+
+def test_gs2_vfd(tmp_path: Path) -> None:
+    """Its ramps and how it stops are written before the first run."""
+    require('gs2_vfd')
+    with drive_of('automationdirect_gs2') as drive:
+        line = drive.file.line
+        bits, parity, stop_bits = line.char_format
+        own = f'gs2-{uuid.uuid4().hex[:8]}'
+        arguments = [
+            '-n', own, '-d', drive.port, '-r', str(line.baud_rate), '-b', bits,
+            '-p', _PARITY[parity], '-s', stop_bits, '-t', str(line.address),
+            '-A', '0.7', '-D', '0.6', '-X',
+        ]  # fmt: skip
+        with component('gs2_vfd', arguments, own, 'initialized', tmp_path / 'log') as master:
+            assert master.get('initialized') == 0
+            # it takes motors of 600 rpm and more, and 10 Hz and more
+            master.set(**{'nameplate-HZ': 50, 'nameplate-RPM': 1410})
+            master.set(enable=1)
+            wait_until(lambda: master.get('initialized') == 1, 'it has written the ramps')
+            assert drive.parameter('ramp.accel') == 0.7
+            assert drive.parameter('ramp.decel') == 0.6
+            assert drive.parameter('stop.method') == 'Ramp'
+            wait_until(lambda: master.get('is-stopped') == 1, 'it shows that it stands')
+            master.set(spindle_on=1, speed_command=20 * _RPM_OF_HZ)
+            wait_until(lambda: drive.near(20), 'it runs forward')
+            wait_until(lambda: abs(master.get('frequency-out') - 20) < 0.3, 'it shows how fast')
+            wait_until(lambda: master.get('at-speed') == 1, 'it is at its speed')
+            wait_until(lambda: abs(master.get('motor-RPM') - 590) < 20, 'it shows the speed')
+            # it runs, by the line
+            assert int(master.get('status-2')) & 0x82 == 0x82
+            master.set(speed_command=30 * _RPM_OF_HZ)
+            wait_until(lambda: drive.near(30), 'it follows')
+            master.set(spindle_on=0)
+            wait_until(lambda: drive.frequency == 0, 'it stops')
+            wait_until(lambda: master.get('is-stopped') == 1, 'it shows that it stands')
+            master.set(spindle_fwd=0, spindle_on=1)
+            wait_until(lambda: drive.near(-30), 'it runs in reverse')
+            assert int(master.get('status-2')) & 0x18 == 0x18
+            number = drive.trip()
+            wait_until(lambda: master.get('status-1') == number, 'it shows the fault')
+            wait_until(lambda: drive.frequency == 0, 'it stands in a fault')
+            master.set(spindle_on=0)
+            time.sleep(_CYCLES)
+            master.set(err_reset=1)
+            wait_until(lambda: not drive.has_fault, 'the fault is reset')
+            wait_until(lambda: master.get('status-1') == 0, 'it shows none')
+            assert drive.frequency == 0
+            master.set(err_reset=0, spindle_fwd=1, spindle_on=1)
+            wait_until(lambda: drive.near(30), 'it runs again')
+            master.set(enable=0)
+            wait_until(lambda: drive.frequency == 0, 'it stops when it is disabled')
+            assert master.get('error-count') == 0, (tmp_path / 'log').read_text()
+
+
+def test_wj200_vfd(tmp_path: Path) -> None:
+    """
+    It resets each fault while it is enabled; not enabled it trips the drive, which is refused.
+
+    That of LinuxCNC 2.10 reads the coil of 0 Hz, too, which no file can say for other masters.
+    """
+    require('wj200_vfd')
+    with drive_of('hitachi_wj200') as drive:
+        line = drive.file.line
+        bits, parity, stop_bits = line.char_format
+        arguments = [
+            f'--baud={line.baud_rate}', f'--parity={parity}', f'--databits={bits}',
+            f'--stopbits={stop_bits}', f'--device={drive.port}',
+        ]
+        log = tmp_path / 'log'
+        with component('wj200_vfd', arguments, 'wj200-vfd.0', 'is-ready', log) as master:
+            master.set(enable=1, commanded_frequency=20)
+            # it begins when it has the address
+            master.set(mbslaveaddr=line.address or 1)
+            wait_until(lambda: master.get('is-ready') == 1, 'it is ready')
+            assert master.get('is-running') == 0 and master.get('heatsink-temp') == 35
+            master.set(run=1)
+            wait_until(lambda: drive.near(20), 'it runs forward')
+            wait_until(lambda: master.get('is-running') == 1, 'it shows that it runs')
+            wait_until(lambda: master.get('is-at-speed') == 1, 'it is at its speed')
+            assert master.get('motor-current') > 0
+            master.set(commanded_frequency=30)
+            wait_until(lambda: drive.near(30), 'it follows')
+            master.set(run=0)
+            wait_until(lambda: drive.frequency == 0, 'it stops')
+            wait_until(lambda: master.get('is-running') == 0, 'it shows that it stands')
+            master.set(reverse=1, run=1)
+            wait_until(lambda: drive.near(-30), 'it runs in reverse')
+            said = log.read_text()
+            assert 'Modbus error' not in said, said
+            # it resets no fault until it is enabled again
+            master.set(enable=0)
+            drive.trip()
+            wait_until(lambda: master.get('is-alarm') == 1, 'it shows the fault')
+            wait_until(lambda: drive.frequency == 0, 'it stands in a fault')
+            master.set(run=0)
+            time.sleep(_CYCLES)
+            master.set(enable=1)
+            wait_until(lambda: not drive.has_fault, 'the fault is reset')
+            wait_until(lambda: master.get('is-alarm') == 0, 'it shows none')
+            # it wrote no stop in the fault: what the drive then does is stopped now
+            wait_until(lambda: drive.frequency == 0, 'it stops')
+            wait_until(lambda: master.get('is-running') == 0, 'it shows that it stands')
+            master.set(reverse=0, run=1)
+            wait_until(lambda: drive.near(30), 'it runs again')
 
 
 #: Of drives with a state machine: where commands and set-points go, what leads to a run, forward

@@ -156,6 +156,8 @@ def test_an_answer_is_understood(capture: Capture) -> None:
 MEANT = {
     1: ('toshiba_vf_s11', 0xFD00, 60.0),
     3: ('toshiba_vf_s11', 0xFA01, 60.0),
+    21: ('hitachi_wj200', 0x0011, 3),
+    27: ('hitachi_wj200', 0x0000, 1),
     30: ('delta_ms300', 0x0100, 60.0),
     41: ('delta_vfd_el', 0x2000, 0x12),
     42: ('delta_vfd_el', 0x2000, 0x01),
@@ -174,18 +176,27 @@ def test_a_shipped_file_means_what_the_maker_says(
     capture = CAPTURES[number]
     message = capture.message
     assert int.from_bytes(message[2:4], 'big') == register
-    is_read = message[1] == 3
+    is_read, is_coil = message[1] == 3, message[1] == 5
     answer = _message(capture.protocol, capture.response)
     word = answer[3:5] if is_read else message[4:6]
+    if is_coil:
+        word = bytes((word == b'\xff\x00',))
     found = {
         key: parameter.decode(word, 'modbus')
         for key, parameter in read(SHIPPED[name]).parameters.items()
         if parameter.at('modbus').index == register
+        and (parameter.at('modbus').space == 'coil') is is_coil
     }
     assert value in found.values(), found
 
 
-@pytest.mark.parametrize('number', [3, 30, 41, 42, 43])
+def test_a_shipped_file_names_the_trip_that_the_maker_prints() -> None:
+    """The registers behind it, what the drive did as it tripped, are none that the driver reads."""
+    number = int.from_bytes(CAPTURES[21].response[3:5], 'big')
+    assert read(SHIPPED['hitachi_wj200']).faults[number].text == 'E03'
+
+
+@pytest.mark.parametrize('number', [3, 27, 30, 41, 42, 43])
 def test_a_simulated_drive_answers_a_write_alike(number: int) -> None:
     name, _, _ = MEANT[number]
     drive = simulated_drive(str(SHIPPED[name]))

@@ -11,6 +11,7 @@ import textwrap
 
 import pytest
 from support.described import SHIPPED, DescribedRig
+from support.rig import Asked
 
 from nfo_sinus_driver.catalog.declared import read
 from nfo_sinus_driver.drive import Cause
@@ -118,6 +119,32 @@ def test_a_drive_whose_set_point_0_is_a_frequency_is_not_run() -> None:
         rig.connect()
         answer = rig.answer(rig.drive.enable())
         assert '3-02' in answer and not rig.turns, answer
+
+
+def test_a_wj200_that_is_silent_after_its_reset_is_not_lost() -> None:
+    """For a second, says LinuxCNC's wj200_vfd; the coil is taken away behind that."""
+    with DescribedRig(SHIPPED['hitachi_wj200'], lost_after=2.0) as rig:
+        rig.connect()
+        rig.far.trip(3)
+        rig.pass_time(1.0)
+        told: list[bytes] = []
+
+        def restart(asked: Asked) -> None:
+            if asked.key == 'line.coil_3' and asked.data is not None:
+                told.append(asked.data)
+                rig.line.state = 'silent' if asked.data == b'\1' else rig.line.state
+
+        rig.told = restart
+        acknowledged = rig.drive.acknowledge()
+        rig.pass_time(1.1)
+        assert told == [b'\1']
+        rig.line.mend()
+        assert 'acknowledged' in rig.answer(acknowledged)
+        rig.pass_time(3.0)
+        assert told == [b'\1', b'\0'] and not rig.far.faults
+        assert rig.drive.state.contact.connected and not rig.notes.said(Cause.LOST)
+        rig.enable()
+        rig.follow(20.0)
 
 
 @pytest.mark.parametrize('name', SHIPPED)
