@@ -26,7 +26,6 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.bench import Bench, handle_signals, own_domain
 from nfo_sinus_driver.demo.record import why_no_picture
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
@@ -37,6 +36,7 @@ from nfo_sinus_driver.demo.sequence import (
     DomainTakenError,
     StepError,
 )
+from nfo_sinus_driver.node.bags import bags
 from nfo_sinus_driver.node.ros.executor import spinning
 
 #: More often than by default, for a smooth curve.

@@ -30,10 +30,10 @@ import rclpy.utilities
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from nfo_sinus_driver.cli.console import OutputLost, put
-from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.bench import handle_signals
 from nfo_sinus_driver.demo.recording import Recorder, RecordingError, replay_warning
-from nfo_sinus_driver.demo.type_definitions import name_of
+from nfo_sinus_driver.node.bags import bags
+from nfo_sinus_driver.node.bags.type_definitions import name_of
 from nfo_sinus_driver.node.ros.executor import spinning
 from nfo_sinus_driver.node.ros.start import init_ros
 from nfo_sinus_driver.version import VERSION

@@ -14,7 +14,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from nfo_sinus_driver.demo import bags
+from nfo_sinus_driver.node.bags import bags
 
 _EVENT = '/_service_event'
 _STATUS = 'nfo_sinus_msgs/msg/DriveStatus'

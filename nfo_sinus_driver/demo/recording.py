@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool, Trigger
 
-from nfo_sinus_driver.demo import bags
+from nfo_sinus_driver.node.bags import bags
 from nfo_sinus_driver.node.ros.qos import LATCHED, NEWEST, RELIABLE, ROSOUT, newest
 
 _EVENT = '_service_event'

@@ -23,11 +23,11 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
 
-from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.recorded import drives_in, read
+from nfo_sinus_driver.node.bags import bags
 from nfo_sinus_driver.node.ros.qos import LATCHED, NEWEST, RELIABLE
 
-MODULES = ('bags_rosbag2', 'bags_rosbags')
+MODULES = ('by_rosbag2', 'by_rosbags')
 STAND_INS = Path(__file__).with_name('stand_ins')
 MESSAGES: list[tuple[str, Any, QoSProfile]] = [
     ('/nfo_sinus/status', DriveStatus(unit='Hz', connected=True, setpoint=12.5), RELIABLE),
@@ -48,11 +48,11 @@ def modules() -> Iterator[dict[str, ModuleType]]:
     found = {}
     for name in MODULES:
         with contextlib.suppress(ImportError):
-            found[name] = importlib.import_module(f'nfo_sinus_driver.demo.{name}')
+            found[name] = importlib.import_module(f'nfo_sinus_driver.node.bags.{name}')
     yield found
     if missing:
         sys.path.remove(folder)
-        for name in ('rosbag2_py', 'nfo_sinus_driver.demo.bags_rosbag2'):
+        for name in ('rosbag2_py', 'nfo_sinus_driver.node.bags.by_rosbag2'):
             sys.modules.pop(name, None)
 
 
@@ -119,7 +119,7 @@ def test_what_cannot_be_written_is_an_error_of_the_system(
 def test_a_bag_that_was_cut_off_anywhere_has_what_came_before(
     modules: dict[str, ModuleType], tmp_path: Path
 ) -> None:
-    bag = modules['bags_rosbags'].Writer(tmp_path / 'bag', {})
+    bag = modules['by_rosbags'].Writer(tmp_path / 'bag', {})
     for topic, message, offered in MESSAGES:
         bag.add_topic(topic, type(message), offered)
     (file,) = (tmp_path / 'bag').glob('*.mcap')
@@ -205,12 +205,12 @@ def test_a_spoilt_bag_is_a_sentence(modules: dict[str, ModuleType], tmp_path: Pa
 def test_rosbag2_py_is_preferred() -> None:
     pytest.importorskip('rosbags', reason='the stand-in needs rosbags')
     program = (
-        'from nfo_sinus_driver.demo import bags\n'
+        'from nfo_sinus_driver.node.bags import bags\n'
         'assert not bags.why_none()\n'
         'print(bags._module().__name__)'
     )
     path = f'import sys; sys.path.append({str(STAND_INS)!r})\n'
-    for beginning, name in ((path, 'bags_rosbag2'), ('', 'bags_rosbags')):
+    for beginning, name in ((path, 'by_rosbag2'), ('', 'by_rosbags')):
         done = subprocess.run(
             [sys.executable, '-c', beginning + program],
             check=True, capture_output=True, text=True,

@@ -19,9 +19,9 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import Float32, Header
 from std_srvs.srv import SetBool
 
-from nfo_sinus_driver.demo import bags
 from nfo_sinus_driver.demo.record import plot
 from nfo_sinus_driver.demo.recorded import read
+from nfo_sinus_driver.node.bags import bags
 from nfo_sinus_driver.node.ros.qos import RELIABLE
 
 _DRIVE = '/line1/infeed'

@@ -47,7 +47,7 @@ ON_NOBLE = {
 #: What is left out where it is not installed: apt has none of them, or none that is new enough.
 #: The driver says so, a test is skipped.
 OPTIONAL = {
-    'nfo_sinus_driver/demo/bags_rosbags.py': {'rosbags'},
+    'nfo_sinus_driver/node/bags/by_rosbags.py': {'rosbags'},
     'test/ros/stand_ins/rosbag2_py.py': {'rosbags'},
 }
 

@@ -4,7 +4,7 @@
 """
 Stands in for rosbag2_py 0.26 where ROS comes from wheels, which have none.
 
-What bags_rosbag2.py calls, with the names, the order and the exceptions of its sources; the files
+What by_rosbag2.py calls, with the names, the order and the exceptions of its sources; the files
 are written and read by rosbags.
 """
 
@@ -25,7 +25,7 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 import yaml
 
-from nfo_sinus_driver.demo.type_definitions import definition_of
+from nfo_sinus_driver.node.bags.type_definitions import definition_of
 
 
 @dataclass

@@ -18,10 +18,10 @@ from typing import Any
 
 import yaml
 
-from nfo_sinus_driver.demo import cut_off
+from nfo_sinus_driver.node.bags import cut_off
 
 #: Each imports its library; the first one that can be imported is taken.
-_MODULES = ('bags_rosbag2', 'bags_rosbags')
+_MODULES = ('by_rosbag2', 'by_rosbags')
 _INFORMATION = 'rosbag2_bagfile_information'
 
 
@@ -65,7 +65,7 @@ def _read_cut_off(folder: Path, wanted: set[str]) -> Iterator[tuple[str, int, An
     # here and not above: only a reader needs rclpy
     from rclpy.serialization import deserialize_message
 
-    from nfo_sinus_driver.demo.type_definitions import class_of
+    from nfo_sinus_driver.node.bags.type_definitions import class_of
 
     for topic, type_, stamp, data in cut_off.messages(folder):
         if topic in wanted:
@@ -114,5 +114,5 @@ def _module() -> Any:
     # only when it is needed: the demo runs where there is neither
     for name in _MODULES:
         with contextlib.suppress(ImportError):
-            return importlib.import_module(f'nfo_sinus_driver.demo.{name}')
+            return importlib.import_module(f'nfo_sinus_driver.node.bags.{name}')
     return None

@@ -24,8 +24,8 @@ from rosbag2_py import (
 )
 import yaml
 
-from nfo_sinus_driver.demo.bags import metadata
-from nfo_sinus_driver.demo.type_definitions import class_of, hash_of, name_of
+from nfo_sinus_driver.node.bags.bags import metadata
+from nfo_sinus_driver.node.bags.type_definitions import class_of, hash_of, name_of
 
 _CDR = 'cdr'
 _AS_THEY_ARE = ConverterOptions(

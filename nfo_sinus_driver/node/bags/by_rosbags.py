@@ -22,7 +22,7 @@ from rosbags.interfaces import (
 )
 from rosbags.rosbag2 import StoragePlugin, Writer as RosbagsWriter, WriterError
 
-from nfo_sinus_driver.demo.type_definitions import definition_of, hash_of, name_of
+from nfo_sinus_driver.node.bags.type_definitions import definition_of, hash_of, name_of
 
 #: How rosbag2 writes "for ever", s and ns.
 _FOR_EVER = QosTime(9223372036, 854775807)
