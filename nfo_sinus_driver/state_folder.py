@@ -137,15 +137,20 @@ class StateFolder:
             self._locked[drive] = descriptor
 
 
-def _path(drive: str) -> Path:
-    """Return the file of a drive (OSError: there is no folder for it)."""
+def state_path() -> Path:
+    """Return the folder for what this package keeps (OSError: there is no place for it)."""
     get = os.environ.get
     for state in (get('XDG_STATE_HOME', ''), f'{get("HOME", "")}/.local/state'):
         if os.path.isabs(state) and state != '/.local/state':
-            digest = hashlib.sha256(drive.encode()).hexdigest()[:16]
-            readable = re.sub('[^A-Za-z0-9]+', '_', drive)[:60].strip('_')
-            return Path(state, _FOLDER, f'{readable}-{digest}.json')
+            return Path(state, _FOLDER)
     raise OSError('neither XDG_STATE_HOME nor HOME is the path of a folder')
+
+
+def _path(drive: str) -> Path:
+    """Return the file of a drive (OSError: there is no folder for it)."""
+    digest = hashlib.sha256(drive.encode()).hexdigest()[:16]
+    readable = re.sub('[^A-Za-z0-9]+', '_', drive)[:60].strip('_')
+    return state_path() / f'{readable}-{digest}.json'
 
 
 def _lock(descriptor: int) -> bool:

@@ -20,6 +20,8 @@ _TIME_OUT = 'setpoint timeout'
 def explanation(run: Recording) -> Iterator[str]:
     """Yield the lines of the explanation of a drive, with times in s."""
     yield f'{run.drive}, times in s from {run.began:%d %B %Y, %H:%M:%S} on:'
+    if why := run.remarks.get('why'):
+        yield f'kept because of {why}'
     moments = [*_answers(run), *_calls(run), *_enabled(run), *_faults(run), *_stops(run)]
     # what was done comes before what came of it in the same moment
     for time, text in sorted(moments, key=lambda moment: moment[0]):

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import contextlib
 import importlib
+import importlib.util
 import os
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from nfo_sinus_driver.node.bags import cut_off
 
 #: Each imports its library; the first one that can be imported is taken.
 _MODULES = ('by_rosbag2', 'by_rosbags')
+_LIBRARIES = ('rosbag2_py', 'rosbags')
 _INFORMATION = 'rosbag2_bagfile_information'
 
 
@@ -36,6 +38,11 @@ def why_none() -> str:
     )
 
 
+def is_installed() -> bool:
+    """Return whether a library for bags is there, without the time that it takes to import it."""
+    return any(importlib.util.find_spec(name) for name in _LIBRARIES)
+
+
 def create(folder: Path, remarks: dict[str, str]) -> Any:
     """
     Return a new bag, which its library writes; an OSError where that fails.
@@ -43,7 +50,10 @@ def create(folder: Path, remarks: dict[str, str]) -> Any:
     :param folder: the bag, a folder that does not exist.
     :param remarks: what the bag is to say of itself.
     """
-    return _module().Writer(folder, remarks)
+    module = _module()
+    if module is None:
+        raise OSError(why_none())
+    return module.Writer(folder, remarks)
 
 
 def read(folder: Path, is_wanted: Callable[[str], bool]) -> Iterator[tuple[str, int, Any]]:

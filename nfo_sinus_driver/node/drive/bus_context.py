@@ -21,6 +21,7 @@ from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.drive import Report
 from nfo_sinus_driver.drive.change.memory import Memory
 from nfo_sinus_driver.drive.known.settings import BLOCK_SIZE
+from nfo_sinus_driver.node.bags.black_box import BlackBox
 from nfo_sinus_driver.node.drive.graph_watch import PERIOD, GraphWatch
 from nfo_sinus_driver.node.drive.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.drive.setpoint_checks import Origin
@@ -40,11 +41,13 @@ class BusContext:
 
     :ivar retries: how often a request without an answer is repeated.
     :ivar memory: keeps what is to be put back in the drives.
+    :ivar black_box: keeps the last minute of the line.
     """
 
     bus: Bus
     retries: int
     memory: Memory
+    black_box: BlackBox
     publish_queue: PublishQueue = field(default_factory=PublishQueue)
     setpoint_subscriber: SetpointSubscriber = field(default_factory=SetpointSubscriber)
     graph_watch: GraphWatch = field(default_factory=GraphWatch)

@@ -96,7 +96,9 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._drive_parameters = DriveParameters(self)
         queue, follow = context.publish_queue, self._drive_parameters.note_changes
         wording = Wording(self)
-        reporter = Reporter(self, queue, wording, joint, lambda: self.managed, follow)
+        reporter = Reporter(
+            self, queue, context.black_box, wording, joint, lambda: self.managed, follow
+        )
         #: The drive of the node.
         self.managed = ManagedDrive(
             self.get_name(),

@@ -18,14 +18,17 @@ from nfo_sinus_msgs.msg import (
     Measured,
     Telemetry as TelemetryMessage,
 )
+from rcl_interfaces.msg import Log
 from rclpy.lifecycle import LifecycleNodeMixin
 from rclpy.publisher import Publisher
+from rclpy.serialization import serialize_message
 from rclpy.time import Time as NodeTime
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.catalog import Kind
-from nfo_sinus_driver.drive import Event, LogEntry, Report, Severity, Snapshot, Telemetry
+from nfo_sinus_driver.drive import Cause, Event, LogEntry, Report, Severity, Snapshot, Telemetry
+from nfo_sinus_driver.node.bags.black_box import BlackBox
 from nfo_sinus_driver.node.drive import diagnostics
 from nfo_sinus_driver.node.drive.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import messages
@@ -34,10 +37,18 @@ from nfo_sinus_driver.node.messages.serialized import Stamped, float32
 from nfo_sinus_driver.node.messages.stamps import Sequence, Stamps
 from nfo_sinus_driver.node.messages.wording import Wording
 from nfo_sinus_driver.node.ros.publish_queue import PublishQueue
-from nfo_sinus_driver.node.ros.qos import KEPT, LATCHED, RELIABLE
+from nfo_sinus_driver.node.ros.qos import KEPT, LATCHED, RELIABLE, ROSOUT
 
 #: How often the statistics go out and, while the drive is not connected, the status, s.
 _PERIOD = 1.0
+_LEVELS = {
+    Severity.INFO: Log.INFO, Severity.WARNING: Log.WARN, Severity.ERROR: Log.ERROR
+}
+#: What a bag of the black box tells of: stops that were not asked for, faults, losses.
+_TESTIFIES = frozenset((
+    Cause.STOPPED_BECAUSE, Cause.STOPPED_BECAUSE_OF_FAULT, Cause.STOPPING_BECAUSE,
+    Cause.FAULT_APPEARED, Cause.LOST, Cause.LOST_IN_USE, Cause.CANNOT_STOP,
+))
 
 
 class Reporter:
@@ -55,6 +66,7 @@ class Reporter:
         self,
         node: LifecycleNodeMixin,
         queue: PublishQueue,
+        black_box: BlackBox,
         wording: Wording,
         joint: Joint,
         managed: Callable[[], ManagedDrive],
@@ -91,6 +103,20 @@ class Reporter:
         self._joint_states = create(JointState, '~/joint_states', RELIABLE)
         self._telemetry = create(TelemetryMessage, '~/telemetry', RELIABLE)
         self._measured = create(Measured, '~/measured', RELIABLE)
+        self._black_box = black_box
+        topic, stream = node.resolve_topic_name, black_box.stream
+        # the same messages as those that are published
+        self._keep_status = stream(topic('~/status'), DriveStatus, RELIABLE, self._as_status)
+        self._keep_telemetry = stream(
+            topic('~/telemetry'), TelemetryMessage, RELIABLE, self._as_telemetry
+        )
+        self._keep_inv_st = stream(
+            topic('~/inv_st'), InvSt, LATCHED, self._as_inv_st, holds=True
+        )
+        self._keep_diagnosis = stream(
+            '/diagnostics', DiagnosticArray, RELIABLE, lambda _, data: data, holds=True
+        )
+        self._keep_log = stream('/rosout', Log, ROSOUT, self._as_log)
         #: There were subscribers to what each poll gives, when the last one was published.
         self._heard = False
         self._newest: object = None
@@ -102,10 +128,12 @@ class Reporter:
     def on_snapshot(self, snapshot: Snapshot) -> None:
         """Publish a poll, or what has changed since."""
         self._snapshots(snapshot)
+        self._keep_status(snapshot.at, snapshot)
 
     def on_telemetry(self, telemetry: Telemetry) -> None:
         """Publish measured values."""
         self._queue.put(lambda: self._publish_telemetry(telemetry))
+        self._keep_telemetry(telemetry.at, telemetry)
 
     def on_parameters(self, keys: Collection[str]) -> None:
         """Have the ROS parameters follow the drive."""
@@ -137,6 +165,9 @@ class Reporter:
 
     def _log_event(self, event: Event) -> None:
         text = self._wording.say(event.report)
+        self._keep_log(time.monotonic(), (_LEVELS[event.severity], text))
+        if event.cause in _TESTIFIES:
+            self._black_box.testify(f'{self._whole_name}: {text}')
         # one call site for each level: rclpy forbids another level at the same place
         if event.severity is Severity.ERROR:
             self._log.error(text)
@@ -179,6 +210,7 @@ class Reporter:
         if inv_st != self._last_inv_st:
             self._last_inv_st = inv_st
             self._inv_st.publish(messages.inv_st(snapshot, stamp, self._frame_id()))
+            self._keep_inv_st(snapshot.at, snapshot)
 
     def _publish_status(self, snapshot: Snapshot, stamp: Time) -> None:
         if snapshot.stop is not self._stop:
@@ -224,11 +256,38 @@ class Reporter:
         """Publish the diagnosis of the drive if it has changed."""
         if diagnostics.drive_verdict(self._managed(), snapshot) != self._verdict:
             stamp = _message(self._stamps.now())
-            self._diagnostics.publish(diagnostics.array(stamp, self._diagnosis_of(snapshot)))
+            array = diagnostics.array(stamp, self._diagnosis_of(snapshot))
+            self._diagnostics.publish(array)
+            if self._black_box.is_on:
+                # at once: the next diagnosis is made of the same object
+                self._keep_diagnosis(snapshot.at, serialize_message(array))
 
     def diagnosis(self) -> DiagnosticStatus:
         """Return the present diagnosis of the drive, good until the next call."""
         return self._diagnosis_of(self._managed().drive.snapshot)
+
+    # --- for the black box --------------------------------------------------------------------
+
+    def _as_status(self, at: float, snapshot: Snapshot) -> bytes:
+        text = self._wording.say(snapshot.stop)
+        fields = messages.drive_status(snapshot, self._managed().scale, text)
+        return self._pack_status(self.stamp(at), self._frame_id(), fields)
+
+    def _as_telemetry(self, at: float, telemetry: Telemetry) -> bytes:
+        message = messages.telemetry(telemetry, self.stamp(at), self._frame_id())
+        return bytes(serialize_message(message))
+
+    def _as_inv_st(self, at: float, snapshot: Snapshot) -> bytes:
+        return bytes(
+            serialize_message(messages.inv_st(snapshot, self.stamp(at), self._frame_id()))
+        )
+
+    def _as_log(self, at: float, line: tuple[int, str]) -> bytes:
+        level, text = line
+        name = self._whole_name.replace('/', '.')
+        return bytes(
+            serialize_message(Log(stamp=self.stamp(at), level=level, name=name, msg=text))
+        )
 
     def _diagnosis_of(self, snapshot: Snapshot) -> DiagnosticStatus:
         managed = self._managed()

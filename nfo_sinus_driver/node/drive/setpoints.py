@@ -25,7 +25,9 @@ from nfo_sinus_driver.node.drive.bus_context import BusContext
 from nfo_sinus_driver.node.drive.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.drive.setpoint_checks import Origin, Repeated, Sources
 from nfo_sinus_driver.node.messages.messages import Joint, control_mode, require_whole
+from nfo_sinus_driver.node.messages.serialized import float32
 from nfo_sinus_driver.node.ros.log_limit import LogLimit
+from nfo_sinus_driver.node.ros.qos import NEWEST
 
 #: The control mode that each unit is for, and what it is called.
 _UNITS = {
@@ -56,6 +58,9 @@ class Setpoints:
         self._queue = context.publish_queue
         self._node = node
         self._sources = Sources()
+        self._keep = context.black_box.stream(
+            node.resolve_topic_name('~/setpoint'), Float32, NEWEST, lambda _, value: float32(value)
+        )
         self._repeated = Repeated()
         context.subscribe(
             node,
@@ -169,6 +174,7 @@ class Setpoints:
         except DriveError as error:
             self._ignore('refused', self._managed.wording.say(error))
             return
+        self._keep(time.monotonic(), self._managed.scale.shown(value))
         if self._managed.drive.following:
             self._logged_idle = False
             self._warn_of_two(self._sources.take_setpoint(origin, value, time.monotonic()))

@@ -22,6 +22,8 @@ from std_msgs.msg import Float32
 
 from nfo_sinus_driver.bus import Bus
 from nfo_sinus_driver.link import BusSettings
+from nfo_sinus_driver.node.bags import bags
+from nfo_sinus_driver.node.bags.black_box import BlackBox
 from nfo_sinus_driver.node.drive import diagnostics
 from nfo_sinus_driver.node.drive.bus_context import BusContext
 from nfo_sinus_driver.node.drive.setpoint_checks import Origin
@@ -31,11 +33,11 @@ from nfo_sinus_driver.node.messages.stamps import Stamps
 from nfo_sinus_driver.node.parameters.declaring import coerce, declare
 from nfo_sinus_driver.node.parameters.factory_settings import line_of
 from nfo_sinus_driver.node.parameters.parameter_names import require_parameter
-from nfo_sinus_driver.node.parameters.settings import BUS_SETTINGS
+from nfo_sinus_driver.node.parameters.settings import BLACK_BOX, BUS_SETTINGS
 from nfo_sinus_driver.node.ros.qos import RELIABLE
 from nfo_sinus_driver.node.ros.rclpy_internals import given_to, overrides_of
 from nfo_sinus_driver.setting import Setting
-from nfo_sinus_driver.state_folder import StateFolder
+from nfo_sinus_driver.state_folder import StateFolder, state_path
 
 _PERIOD = 1.0
 #: How long the start waits for the port to open, and how often that is checked, s.
@@ -66,15 +68,17 @@ class BusNode(Node):
     def __init__(self, overrides: Sequence[Parameter] = (), single_name: str = '') -> None:
         super().__init__(NAME, parameter_overrides=list(overrides))
         known = dict(BUS_SETTINGS)
-        drives = declare(self, {'drives': known.pop('drives')})['drives']
-        self.drive_names: list[str] = list(drives)
+        own = declare(self, {name: known.pop(name) for name in ('drives', BLACK_BOX.name)})
+        self.drive_names: list[str] = list(own['drives'])
         names = [single_name] if single_name else self.drive_names
         settings = BusSettings(**self._declare_line(known, _families_of(names)))
         self._port = settings.port
         link = settings.open()
         limit = settings.max_requests if link.protocol.most_requests else 0.0
         memory = StateFolder(settings.port)
-        self.bus_context = BusContext(Bus(link, limit), settings.retries, memory)
+        self._whole_name = self.get_fully_qualified_name().lstrip('/')
+        box = self._black_box(own[BLACK_BOX.name])
+        self.bus_context = BusContext(Bus(link, limit), settings.retries, memory, box)
         AllDrives(self, self.bus_context)
         self.bus_context.subscribe(self, {'~/setpoint_all': (Float32, self._on_setpoint_all)})
         publish_queue = self.bus_context.publish_queue
@@ -85,10 +89,22 @@ class BusNode(Node):
         self._logged_port: str | None = ''
         self._logged_remarks: set[str] = set()
         self._diagnosis = diagnostics.Diagnosis()
-        self._whole_name = self.get_fully_qualified_name().lstrip('/')
         self._statistics = self.create_publisher(BusStatistics, '~/statistics', RELIABLE)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', RELIABLE)
         self.bus_context.publish_queue.put_every(_PERIOD, self._report)
+
+    def _black_box(self, seconds: float) -> BlackBox:
+        """Return the black box of the line; it is off where no bag can be written."""
+        missing = bags.why_none() if seconds and not bags.is_installed() else ''
+        if missing:
+            self.get_logger().info(f'the black box is off: {missing}')
+        name = self._whole_name.replace('/', '_')
+        log = self.get_logger()
+        return BlackBox(
+            0.0 if missing else seconds,
+            lambda: state_path() / 'black_box' / name,
+            lambda text: log.warning(text),
+        )
 
     def _declare_line(
         self, known: Mapping[str, Setting], families: Mapping[str, object]
@@ -109,6 +125,7 @@ class BusNode(Node):
         """Open the port and begin to report."""
         bus = self.bus_context.bus
         self.bus_context.publish_queue.start()
+        self.bus_context.black_box.start()
         bus.start()
         # the state of the port is logged before that of the drives
         deadline = time.monotonic() + _LONGEST_OPENING

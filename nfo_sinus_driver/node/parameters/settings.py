@@ -11,6 +11,12 @@ from nfo_sinus_driver.setting import DISABLED, FIXED, START_ONLY, Setting, setti
 
 #: Settings of the nodes alone.
 _DRIVES = Setting(['nfo_sinus'], 'the names of the drive nodes', change=FIXED, name='drives')
+BLACK_BOX = Setting(
+    60.0,
+    'how much of the past is kept in memory, and written to a bag at each stop that was not asked '
+    'for, each fault and each loss',
+    0, 600, unit='s', zero='nothing', change=FIXED, name='black_box',
+)
 _OF_NODE = (
     Setting(
         True, 'configure and activate by itself, and try until it works',
@@ -45,5 +51,7 @@ _OF_NODE = (
     Setting('', 'frame_id of the headers', name='frame_id'),
 )
 
-BUS_SETTINGS = {**settings_of(BusSettings), _DRIVES.name: _DRIVES}
+BUS_SETTINGS = {
+    **settings_of(BusSettings), _DRIVES.name: _DRIVES, BLACK_BOX.name: BLACK_BOX
+}
 DRIVE_SETTINGS = {**settings_of(DriveSettings), **{setting.name: setting for setting in _OF_NODE}}

@@ -130,6 +130,7 @@ class DriverProcess:
         # callbacks that wait for the bus get an error, so that none keeps the executor
         self._context.bus.close()
         self._context.publish_queue.close()
+        self._context.black_box.close()
         self._context.setpoint_subscriber.close(_LAST_CALLBACK)
         end_all(self._executors, _LAST_CALLBACK)
         deadline = time.monotonic() + _LAST_CALLBACK
