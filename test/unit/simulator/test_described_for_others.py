@@ -26,6 +26,9 @@ TO_RUN = {
     'siemens_v20': (99, 0x047E, 0x0C7F),
     'abb_acs355': (0, 0x0476, 0x0477, 0x047F),
     'yaskawa_v1000': (1, 2),
+    'huanyang_gt': (0x1000, 2),
+    'soyan_svd_ps': (0x2000, 2),
+    'invt_gd20': (0x2000, 2),
 }
 #: What a word of them may be wrong by, of two counts of different sizes.
 _COUNTS = 2
