@@ -25,6 +25,8 @@ from nfo_sinus_driver.simulator.simulator import Simulator
 
 #: What its motor is made for.
 _RPM_OF_HZ = 1410 / 50
+#: Of its field, for masters that compare the speed with the set-point.
+_RPM_OF_FIELD = 30
 _PARITY = {'E': 'even', 'N': 'none'}
 #: By then a master that writes cyclically has written several times, s.
 _CYCLES = 0.3
@@ -50,6 +52,13 @@ class Drive:
         """Return what a parameter has."""
         simulated = next(iter(self._simulator.drives.values()))
         return simulated.peek(key)
+
+    def give_setpoint(self, hertz: float) -> None:
+        """Write the set-point to its register, in 0.01 % of the greatest frequency."""
+        simulated = next(iter(self._simulator.drives.values()))
+        with self._simulator.lock:
+            greatest = float(simulated.peek('frequency.maximum'))
+            simulated.write_raw(self.file.setpoint.key, round(10000 * hertz / greatest))
 
     def trip(self) -> int:
         """Let the first fault happen that it has; return its number."""
@@ -242,6 +251,100 @@ def test_wj200_vfd(tmp_path: Path) -> None:
             wait_until(lambda: master.get('is-running') == 0, 'it shows that it stands')
             master.set(reverse=0, run=1)
             wait_until(lambda: drive.near(30), 'it runs again')
+
+
+@contextlib.contextmanager
+def percent_spindle(program: str, drive: Drive, folder: Path) -> Iterator[Component]:
+    """
+    Run a master whose set-points are parts of the greatest frequency.
+
+    It waits only 16 or 30 ms for an answer, and tries again: it counts errors on a slow machine.
+    It knows neither reverse nor a reset, and has one name.
+    """
+    require(program)
+    line = drive.file.line
+    bits, parity, stop_bits = line.char_format
+    arguments = [
+        '-d', drive.port, '-r', str(line.baud_rate), '-b', bits, '-p', _PARITY[parity],
+        '-s', stop_bits, '-t', str(line.address or 1), '-S', str(50 * _RPM_OF_FIELD),
+        '-F', '50', '-f', '1',
+    ]
+    # the pin that is made last
+    ready = {'hy_gt_vfd': 'fault-info', 'svd-ps_vfd': 'AI2'}[program]
+    with component(program, arguments, program, ready, folder / 'log') as master:
+        wait_until(lambda: master.get('dc-bus-voltage') > 0, 'it reads')
+        yield master
+
+
+def run_in_percent(program: str, name: str, folder: Path) -> None:
+    with drive_of(name) as drive, percent_spindle(program, drive, folder) as master:
+        master.set(speed_cmd=20 * _RPM_OF_FIELD, spindle_on=1)
+        wait_until(lambda: drive.near(20), 'it runs forward')
+        wait_until(lambda: abs(master.get('freq-fb') - 20) < 0.3, 'it shows the frequency')
+        assert master.get('freq-cmd') == pytest.approx(20)
+        master.set(speed_cmd=30 * _RPM_OF_FIELD)
+        wait_until(lambda: drive.near(30), 'it follows')
+        wait_until(lambda: master.get('at-speed') == 1, 'it is at its speed')
+        master.set(spindle_on=0)
+        wait_until(lambda: drive.frequency == 0, 'it stops')
+        wait_until(lambda: master.get('freq-fb') == 0, 'it shows that it stands')
+        master.set(spindle_on=1)
+        wait_until(lambda: drive.near(30), 'it runs again')
+        number = drive.trip()
+        wait_until(lambda: drive.frequency == 0, 'it stands in a fault')
+        if program == 'hy_gt_vfd':
+            wait_until(lambda: master.get('fault-info') == number, 'it shows the fault')
+        master.set(spindle_on=0)
+        time.sleep(5 * _CYCLES)
+        assert drive.has_fault, 'its stop is no reset'
+
+
+def test_hy_gt_vfd(tmp_path: Path) -> None:
+    run_in_percent('hy_gt_vfd', 'huanyang_gt', tmp_path)
+
+
+def test_svd_ps_vfd(tmp_path: Path) -> None:
+    """It shows no fault."""
+    run_in_percent('svd-ps_vfd', 'soyan_svd_ps', tmp_path)
+
+
+def test_pi500_vfd(tmp_path: Path) -> None:
+    """Its set-point is F0.01, which this simulated drive keeps, and does not follow."""
+    require('pi500_vfd')
+    own = f'pi500-{uuid.uuid4().hex[:8]}'
+    with drive_of('powtran_pi500') as drive:
+        line = drive.file.line
+        bits, parity, stop_bits = line.char_format
+        arguments = [
+            '--device', drive.port, '--baud', str(line.baud_rate), '--parity', parity,
+            '--databits', bits, '--stopbits', stop_bits, f'names={own}',
+        ]
+        with component('pi500_vfd', arguments, own, 'watchdog-out', tmp_path / 'log') as master:
+            master.set(mbslaveaddr=line.address or 1, enable=1)
+            wait_until(lambda: master.get('is-ready') == 1, 'it is ready')
+            master.set(commanded_frequency=20, run=1)
+            wait_until(lambda: drive.parameter('frequency.keypad') == 20, 'it has the set-point')
+            wait_until(lambda: master.get('is-running') == 1, 'it runs')
+            drive.give_setpoint(20)
+            wait_until(lambda: drive.near(20), 'it runs forward')
+            wait_until(lambda: master.get('is-at-speed') == 1, 'it is at its speed')
+            assert master.get('motor-current') > 0
+            master.set(run=0)
+            wait_until(lambda: drive.frequency == 0, 'it stops')
+            wait_until(lambda: master.get('is-ready') == 1, 'it shows that it stands')
+            master.set(run=1)
+            wait_until(lambda: drive.near(20), 'it runs again')
+            # without enable it resets no fault
+            master.set(enable=0)
+            drive.trip()
+            wait_until(lambda: master.get('is-alarm') == 1, 'it shows the fault')
+            wait_until(lambda: drive.frequency == 0, 'it stands in a fault')
+            master.set(run=0)
+            assert drive.has_fault
+            master.set(enable=1)
+            wait_until(lambda: not drive.has_fault, 'the fault is reset')
+            wait_until(lambda: master.get('is-alarm') == 0, 'it shows none')
+            assert drive.frequency == 0
 
 
 #: Of drives with a state machine: where commands and set-points go, what leads to a run, forward

@@ -8,7 +8,8 @@ A file names whole words, and a real drive looks at bits: masters that have driv
 years write others. So of a register with the run command those bits count in which a run word,
 forward or reverse, differs from any other command there:
 
-- a word that is a run word in them runs;
+- a word that the file names is that command alone (words that are numbers: 5 stops, 7 resets);
+- one that is a run word in them runs;
 - one that is another command, in the bits in which that differs from a run word, but for those of
   the direction, is that, and where it is one by more bits, not the one by fewer;
 - any other takes the run command away, and so do these.
@@ -143,7 +144,8 @@ class Orders:
             for name, order in self._orders.items()
             if order.is_complete_by(place, word)
         }
-        return [
+        named = [name for name in done if self._orders[name].row[-1].value == word]
+        return named or [
             name
             for name, mask in done.items()
             if not any(mask != more and mask & more == mask for more in done.values())

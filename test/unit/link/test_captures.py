@@ -164,6 +164,12 @@ MEANT = {
     43: ('delta_vfd_el', 0x2001, 0.1),
     45: ('siemens_v20', 99, 0x0C7F),
     46: ('siemens_v20', 99, 0x0C7E),
+    62: ('invt_gd20', 0x0004, 50.0),
+    63: ('invt_gd20', 0x000B, 10.0),
+    65: ('invt_gd20', 0x2000, 1),
+    66: ('invt_gd20', 0x2000, 2),
+    67: ('invt_gd20', 0x2000, 5),
+    69: ('powtran_pi500', 0x2000, 7),
 }
 
 
@@ -176,16 +182,15 @@ def test_a_shipped_file_means_what_the_maker_says(
     capture = CAPTURES[number]
     message = capture.message
     assert int.from_bytes(message[2:4], 'big') == register
-    is_read, is_coil = message[1] == 3, message[1] == 5
     answer = _message(capture.protocol, capture.response)
-    word = answer[3:5] if is_read else message[4:6]
-    if is_coil:
-        word = bytes((word == b'\xff\x00',))
+    # of a coil one bit
+    coil = bytes((message[4:6] == b'\xff\x00',))
+    word = {3: answer[3:5], 5: coil, 6: message[4:6], 16: message[7:9]}[message[1]]
     found = {
         key: parameter.decode(word, 'modbus')
         for key, parameter in read(SHIPPED[name]).parameters.items()
         if parameter.at('modbus').index == register
-        and (parameter.at('modbus').space == 'coil') is is_coil
+        and (parameter.at('modbus').space == 'coil') is (message[1] == 5)
     }
     assert value in found.values(), found
 
@@ -196,7 +201,7 @@ def test_a_shipped_file_names_the_trip_that_the_maker_prints() -> None:
     assert read(SHIPPED['hitachi_wj200']).faults[number].text == 'E03'
 
 
-@pytest.mark.parametrize('number', [3, 27, 30, 41, 42, 43])
+@pytest.mark.parametrize('number', [3, 27, 30, 41, 42, 43, 62, 63, 65, 66, 67, 69])
 def test_a_simulated_drive_answers_a_write_alike(number: int) -> None:
     name, _, _ = MEANT[number]
     drive = simulated_drive(str(SHIPPED[name]))
@@ -235,6 +240,16 @@ def test_a_simulated_drive_shows_four_registers_of_a_run_alike() -> None:
     outputs = 0x0060
     assert int.from_bytes(answer[2:4], 'big') == int.from_bytes(printed[2:4], 'big') & ~outputs
     assert answer[:2] + answer[4:] == printed[:2] + printed[4:]
+
+
+def test_a_simulated_drive_obeys_words_that_programs_write_to_a_gd20() -> None:
+    drive = simulated_drive(str(SHIPPED['invt_gd20']))
+    server = drive.servers['modbus']
+    server.write(0x2001, (2500,))
+    for number, frequency in ((65, 25), (66, -25), (67, 0)):
+        server.answer(CAPTURES[number].message[1:])
+        drive.advance(60.0)
+        assert round(drive.motor.frequency) == frequency
 
 
 @pytest.mark.parametrize(('number', 'turns'), [(45, True), (46, False)])

@@ -28,6 +28,9 @@ TO_RUN = {
     'abb_acs355': (0, 0x0476, 0x0477, 0x047F),
     'yaskawa_v1000': (1, 2),
     'automationdirect_gs2': (0x091B, 1),
+    'huanyang_gt': (0x1000, 2),
+    'soyan_svd_ps': (0x2000, 2),
+    'invt_gd20': (0x2000, 2),
 }
 #: Those that run by a coil, and which.
 RUN_COILS = {'hitachi_wj200': 0}

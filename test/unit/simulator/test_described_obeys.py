@@ -121,6 +121,7 @@ def test_a_word_that_is_repeated_changes_nothing(
         ('yaskawa_v1000', 1, 0x08),
         ('siemens_v20', 99, 0x04FE),
         ('siemens_v20', 99, 0x0CFE),
+        ('invt_gd20', 0x2000, 7),
     ],
 )
 def test_a_reset_counts_from_its_first_word_and_once(name: str, register: int, word: int) -> None:
@@ -133,6 +134,21 @@ def test_a_reset_counts_from_its_first_word_and_once(name: str, register: int, w
     master.trip()
     master.write(register, word)
     assert master.has_fault
+
+
+def test_a_word_that_is_a_number_is_one_command() -> None:
+    """5, 6 and 7 differ from a run in the same bit: stop, coast and reset."""
+    master = Master('invt_gd20')
+    master.trip()
+    for word in (5, 6):
+        master.write(0x2000, word)
+        assert master.has_fault
+    master.write(0x2000, 7)
+    assert not master.has_fault
+    master.write(0x2000, 1)
+    assert master.turns == 1
+    master.write(0x2000, 5)
+    assert not master.unit._coasts
 
 
 def test_a_run_word_that_goes_on_is_a_new_one_after_a_fault_took_it() -> None:
