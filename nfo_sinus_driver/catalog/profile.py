@@ -614,6 +614,8 @@ class Profile:
         the exception code of Modbus that means the same, and the text.
     :ivar keeps_run: it keeps its run command without power, and runs again when it is back;
         ``None``: no manual says.
+    :ivar rung: of a drive that a file describes, what its numbers were taken from; ``''``: the file
+        does not say.
     :ivar narrow: what may be greater than the 16 bits that some buses have for it, by its
         parameter: how far it is below 0 at most, as a parameter and what that is multiplied by;
         ``''``: never.
@@ -666,6 +668,7 @@ class Profile:
     resync_reads: Mapping[str, Sequence[str]] = field(default_factory=dict)
     why_refused: Callable[[Callable[[str], int], int | None], tuple[int, str]] | None = None
     keeps_run: bool | None = None
+    rung: str = ''
     narrow: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     inhibited: str = ''
     line_words: Mapping[Value, str] = field(default_factory=dict)

@@ -15,6 +15,13 @@ from nfo_sinus_driver.cli.options import Verb
 
 #: What many manuals print for the register that is sent as 0.
 _PRINTED_FROM = 40001
+#: What the numbers of a file were taken from.
+_RUNGS = {
+    'manual': "from its maker's manual, on no drive yet",
+    'master': 'from a master that runs such drives, on none by this driver yet',
+    'capture': 'from frames of a real drive, on none by this driver yet',
+    'drive': 'has run a real drive',
+}
 
 
 class Family(Verb):
@@ -50,7 +57,8 @@ def check(name: str) -> bool:
         put(str(error))
         return False
     profile = family.profile
-    put(f'{name}: {profile.title}, {len(family.settings)} settings')
+    said = f', {_RUNGS[profile.rung]}' if profile.rung else ''
+    put(f'{name}: {profile.title}, {len(family.settings)} settings{said}')
     for note in (*family.unused, *notes(family)) if catalog.is_described(model) else ():
         put(f'  {note}')
     return True

@@ -293,6 +293,8 @@ class Description:
     A drive, as its file describes it.
 
     :ivar name: the name of the file without ``.vfd.yaml``; :ivar path: the file.
+    :ivar rung: what its numbers were taken from: ``manual``, ``master``, ``capture``, ``drive``; or
+        ``''``.
     :ivar parameters: all, by key, those of commands and status among them.
     :ivar registers: of each key of a command, set-point or parameter, its first register or coil.
     :ivar facts: the conditions of the status, by the names of the file.
@@ -313,6 +315,7 @@ class Description:
     path: str
     title: str
     source: str
+    rung: str
     tested: str
     line: LineDefaults
     parameters: Mapping[str, Parameter]

@@ -112,12 +112,14 @@ class _Reader:
         self._require_one_holder(control, settings)
         after_write = tuple(self._after_write(steps, commands))
         identify = dict(self._identify())
+        source = root.get('source')
         parameters = {**settings.parameters, **measured, **self._map.made}
         return Description(
             name=self._path.name.removesuffix(SUFFIX),
             path=str(self._path),
             title=root.text('title'),
-            source=root.text('source'),
+            source=source.text('text', root.text('source')),
+            rung=source.text('rung'),
             tested=root.text('tested'),
             line=self._line,
             parameters=parameters,

@@ -263,6 +263,7 @@ def profile_of(drive: Description) -> Profile:
         timeout_conditions={} if drive.timeout is None else drive.timeout.conditions,
         pole_pairs=drive.pole_pairs,
         keeps_run=drive.keeps_run,
+        rung=drive.rung,
         fault_code=int if drive.codes is None else drive.codes.code,
         after_write=drive.after_write,
         gap=drive.line.gap,
