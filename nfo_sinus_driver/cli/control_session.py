@@ -85,6 +85,8 @@ class ControlSession(Listener):
     :ivar reported: what the operator was informed of, oldest first.
     :ivar values: what was measured last.
     :ivar answer: what the drive said to its last stop, or what became of that.
+    :ivar interrupted: the first signal that asked for the end, also one that came while a stop was
+        awaited; ``''``: none did.
     """
 
     def __init__(
@@ -101,6 +103,7 @@ class ControlSession(Listener):
         self.reported: list[Report] = []
         self.values: Mapping[Role, float] = {}
         self.answer: Report | None = None
+        self.interrupted = ''
 
     def command(self, **settings: Any) -> Drive:
         """Have the drive to be commanded, with some settings not as usual; nothing is sent."""
@@ -174,6 +177,7 @@ class ControlSession(Listener):
                 'running'
             )
             return ''
+        self.interrupted = self.interrupted or name
         return name
 
     def pause(self, seconds: float) -> None:

@@ -21,6 +21,8 @@ _MOST_SHOWN = 12
 _EXPECTED = {True: '', False: 'NOT AS EXPECTED: ', None: ''}
 #: What tells one drive from all others.
 _OWN = (Role.BUS_ADDRESS,)
+#: And what those end with that are addresses on another bus.
+_ADDRESS = 'address'
 
 
 def screen(
@@ -104,13 +106,14 @@ def document(
                 'remark': register.remark,
             }
             for register in registers
-            if register.key not in own
+            if register.key not in own and not register.key.endswith(_ADDRESS)
         ],
     }
 
 
 def _numbers(seen: Iterable[Seen]) -> str:
-    return ', '.join(f'C{one.reading.number}' for one in seen) or 'none'
+    # a reading may have several rows
+    return ', '.join(dict.fromkeys(f'C{one.reading.number}' for one in seen)) or 'none'
 
 
 def _words(words: Iterable[int]) -> str:

@@ -4,9 +4,10 @@
 """
 What a drive shows while its motor turns, slowly and with a person beside it.
 
-The driver's own drive starts and stops the motor, for it stops one whatever the line does. Enter
-stops the motor at any moment. The line falls silent only where a time-out of the drive that stops
-the motor was read back before.
+One drive of the driver's own starts and stops the motor throughout, for it stops one whatever the
+line does; the port is never given up while the motor may turn. Enter stops the motor at any moment,
+and so does a signal, also one that came while something else was awaited. Where the line is to be
+silent, the worker of the bus sleeps: what wakes it is Enter, or the end of that time.
 """
 
 from __future__ import annotations
@@ -17,34 +18,48 @@ import contextlib
 from dataclasses import dataclass, field
 import functools
 import math
+import os
 import select
 import struct
 import sys
+import termios
+import threading
 import time
 
 from nfo_sinus_driver.bus import Priority
-from nfo_sinus_driver.catalog import Family
+from nfo_sinus_driver.catalog import Family, Role
 from nfo_sinus_driver.catalog.status import QUANTITIES
 from nfo_sinus_driver.cli.console import CliError, say
-from nfo_sinus_driver.cli.control_session import INTERRUPTED, MUTE, ControlSession, Ended
+from nfo_sinus_driver.cli.control_session import INTERRUPTED, ControlSession, Ended
 from nfo_sinus_driver.cli.screen import Screen
-from nfo_sinus_driver.cli.session import OfflineDrive, Session
-from nfo_sinus_driver.drive import DriveError, InverterStatus
+from nfo_sinus_driver.cli.session import Session
+from nfo_sinus_driver.drive import Cause, DriveError, InverterStatus
 from nfo_sinus_driver.drive.motion.starting import read_limits
 from nfo_sinus_driver.signals import HeldSignals
 
 #: The fastest that the motor turns, Hz, and which part of what is nominal.
 _MOST, _PART = 5.0, 0.1
-#: How long it may take to reach that, and how long it is held then, s; what is near, as a share.
-_REACHES, _HOLDS, _NEAR = 15.0, 1.5, 0.15
+#: For how long it is held at that, and without any rise before it counts as not reached, s; what is
+#: near, as a share.
+_HOLDS, _RISES_WITHIN, _NEAR = 1.5, 8.0, 0.15
 #: The longest time-out of a drive that is waited for, and for how much longer it is, s.
 _LONGEST_TIMEOUT, _LONGER = 10.0, 2.0
 #: How long a motor may take to stand, and how long it is looked whether it turns again, s.
-_STANDS, _TURNS_AGAIN = 30.0, 3.0
-#: How long a person may take, and a drive until it answers after power-on, s.
-_BY_HAND, _STARTS = 120.0, 60.0
+_STANDS, _TURNS_AGAIN = 60.0, 3.0
+#: How long a person may take, s.
+_BY_HAND = 120.0
+#: A motor that turns more slowly stands, Hz.
+_STILL = 0.2
+#: By when a drive without power is lost, and by when one with power is connected again, s.
+_LOST_WITHIN, _CONNECTS_WITHIN = 3.0, 30.0
 _PERIOD = 0.05
 _WORD = 'TURN'
+_ENTER = 'Enter'
+#: What is said at other places, or is expected.
+_MUTE = (Cause.FOUND_RUNNING, Cause.FAULT_APPEARED)
+#: What a drive that is switched off leads to.
+_WITHOUT_POWER = (Cause.LOST, Cause.LOST_IN_USE, Cause.CANNOT_STOP, Cause.CANNOT_STOP_BUT_STANDS)
+_DONE, _FAILED = 0, 1
 
 
 @dataclass(frozen=True)
@@ -54,40 +69,44 @@ class Moment:
 
     :ivar saw: for people.
     :ivar as_expected: whether the motor did what it should; ``None``: it was not tried.
+    :ivar hertz: the frequency that it was given; NaN: it was given none, or a speed.
     :ivar words: the raw words of parameters, by their keys.
     """
 
     name: str
     saw: str
     as_expected: bool | None
+    hertz: float = math.nan
     words: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+
+
+class _Left(Exception):
+    """A step cannot be done, for a reason; the next one can."""
 
 
 def agreed(model: Family) -> bool:
     """Say what is going to happen; return whether the operator has typed the word for it."""
     profile = model.profile
+    by_hand = ['you press STOP at the keypad', f'you open the {profile.enable_input}']
     steps = [
         'the bus takes control, and sets the time-out of the drive if it has one',
         'the motor turns forward, in reverse where it can, and is stopped',
-        'it turns, and the line falls silent: the drive has to stop it (where it has such a '
-        'time-out)',
-        'it turns, and you press STOP at the keypad',
-        f'it turns, and you open the {profile.enable_input}',
+        'it turns, and the line falls silent: the drive has to stop it (where it has a time-out)',
+        *(f'it turns, and {step}' for step in by_hand[: 1 + profile.has_enable_input]),
         'it turns, and you switch the drive off and on',
     ]
-    print(
-        f'\nThe motor turns now, at {_MOST:g} Hz at most: take its load off, and have the '
-        'emergency stop in reach. Enter stops it at any moment. The last three are asked for one '
-        'by one.',
+    for line in (
+        '',
+        f'The motor turns now, at {_MOST:g} Hz at most: take its load off, and have the emergency '
+        'stop in reach.',
+        f'{_ENTER} stops it at any moment. If this computer or the cable fails, only the time-out '
+        'of the drive does, if it has one, and the emergency stop.',
         *(f'  {number}. {step}' for number, step in enumerate(steps, 1)),
-        sep='\n', file=sys.stderr,
-    )
-    return _answer(f'Type {_WORD} to begin (Enter: nothing turns): ') == _WORD
-
-
-def _answer(question: str) -> str:
-    print(question, end='', file=sys.stderr, flush=True)
-    return sys.stdin.readline().strip()
+        'From step 4 on each is asked for.',
+    ):
+        print(line, file=sys.stderr)
+    print(f'Type {_WORD} to begin ({_ENTER}: nothing turns): ', end='', file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip() == _WORD
 
 
 def turn(
@@ -100,24 +119,22 @@ def turn(
 
     :param keys: the parameters whose words are wanted.
     """
-    status = 0
-    with HeldSignals() as signals, Screen(live=False) as screen:
-        turning = _Turning(options, screen, signals, keys)
-        try:
-            turning.turn()
-            turning.leave_alone()
-            turning.stop_by_hand('keypad', 'press STOP at the keypad', '')
-            if model.profile.has_enable_input:
-                named = model.profile.enable_input
-                turning.stop_by_hand('input', f'open the {named}', f'close the {named} again')
-            turning.switch_off()
-        except Ended as end:
-            turning.moments.append(Moment('end', f'by {end.key or end}', None))
-            status = end.status
-        except (CliError, DriveError) as error:
-            turning.moments.append(Moment('end', say(error), False))
-        wrong = any(moment.as_expected is False for moment in turning.moments)
-        return turning.moments, status or int(wrong)
+    moments: list[Moment] = []
+    status = _DONE
+    try:
+        session, mute = Session(options, writes=True), set(_MUTE)
+        # before any other thread is there
+        with HeldSignals() as signals, Screen(live=False) as screen, session:
+            control = ControlSession(session, screen, signals, mute)
+            _Turning(options, control, model, mute, keys, moments).run()
+    except Ended as end:
+        moments.append(Moment('end', f'by {end.key or end}', None))
+        status = end.status
+    except (CliError, DriveError, OSError, ValueError) as error:
+        moments.append(Moment('end', say(error), None))
+        status = _FAILED
+    wrong = any(moment.as_expected is False for moment in moments)
+    return moments, status or int(wrong)
 
 
 class _Turning:
@@ -126,228 +143,361 @@ class _Turning:
     def __init__(
         self,
         options: argparse.Namespace,
-        screen: Screen,
-        signals: HeldSignals,
+        control: ControlSession,
+        model: Family,
+        mute: set[Cause],
         keys: Collection[str],
+        moments: list[Moment],
     ) -> None:
         self._options = options
-        self._screen = screen
-        self._signals = signals
+        self._control = control
+        self._enable_input = model.profile.enable_input
+        self._has_enable_input = model.profile.has_enable_input
+        self._mute = mute
         self._keys = keys
-        self.moments: list[Moment] = []
+        self._moments = moments
+        self._mode = self._unit = ''
         #: How fast it turns, in the unit of the control mode; the least set-point.
         self._speed = self._least = 0.0
-        #: The motor is left running, for something else has to stop it.
-        self._left = False
+        #: How long it took from a stop to standstill, s.
+        self._ramp = 0.0
+
+    def run(self) -> None:
+        """Do all steps; however they end, the motor is stopped and control is given back."""
+        control = self._control
+        control.require_ready()
+        self._choose_speed()
+        # given by number, what the time-out depends on is set, too
+        settings = {
+            'control_method': self._options.control_method, 'expected_control_mode': self._mode
+        }
+        timeout = control.command(**settings).settings.wanted_drive_timeout
+        drive = control.command(**settings, drive_timeout=timeout)
+        try:
+            control.connect()
+            self._step('forward', self._turn_both_ways)
+            self._step('silence', self._leave_alone)
+            by_hand = [('keypad', 'press STOP at the keypad', '')]
+            if self._has_enable_input:
+                named = self._enable_input
+                by_hand.append(('input', f'open the {named}', f'close the {named} again'))
+            for name, what, again in by_hand:
+                self._step(name, functools.partial(self._stop_by_hand, name, what, again))
+            self._step('power', self._switch_off)
+        finally:
+            if drive.identity is not None:
+                self._give_back()
 
     # --- the steps ----------------------------------------------------------------------------
 
-    def turn(self) -> None:
+    def _step(self, name: str, do: Callable[[], None]) -> None:
+        try:
+            do()
+        except _Left as why:
+            self._moments.append(Moment(name, str(why), None))
+            self._stop()
+
+    def _turn_both_ways(self) -> None:
         """Take control, turn both ways, stop."""
-        with self._enabled() as control:
-            self._add('control', control, control.drive.following)
-            for name, speed in (('forward', self._speed), ('reverse', -self._speed)):
-                if speed >= self._least:
-                    reached = self._reach(control, speed)
-                    self._add(name, control, reached, f'{control.drive.snapshot.actual:.4g}')
-            self._stop(control, 'stopped')
+        self._enable()
+        self._add('control', self._control.drive.following)
+        for name, speed in (('forward', self._speed), ('reverse', -self._speed)):
+            if speed >= self._least:
+                reached = self._reach(speed)
+                self._add(name, reached, self._shown, speed)
+        begun = time.monotonic()
+        self._stop()
+        self._add('stopped', True)
+        self._ramp = time.monotonic() - begun
 
-    def leave_alone(self) -> None:
+    def _leave_alone(self) -> None:
         """Let the line be silent while the motor turns: the drive has to stop it."""
-        with self._enabled() as control:
-            timeout = control.drive.state.timeout
-            seconds = timeout.seconds
-            if not (timeout.stops_motor and 0 < seconds <= _LONGEST_TIMEOUT):
-                self._leave_out('silence', 'no time-out that stops it was read back')
-                return
-            self._reach(control, self._speed)
-            self._left = True
-        seconds += _LONGER
-        self._screen.say(f'the line is silent for {seconds:g} s: the drive has to stop the motor')
-        until = time.monotonic() + seconds
-        early = False
-        while time.monotonic() < until and not early:
-            early = self._is_enter() or self._signals.next(_PERIOD) is not None
-        with self._session() as control:
-            try:
-                status = control.offline.read_status()
-                if early:
-                    self._leave_out('silence', 'ended by Enter')
-                else:
-                    self._add('silence', control, not _runs(status))
-            finally:
-                control.connect_as_controlled()
-            try:
-                if status.faulted:
-                    control.finish(control.drive.acknowledge())
-                    now = control.offline.read_status()
-                    self._add('acknowledged', control, not (now.faulted or now.driven))
-            finally:
-                self._stop(control)
+        self._enable()
+        timeout = self._control.drive.state.timeout
+        if not (timeout.stops_motor and 0 < timeout.seconds <= _LONGEST_TIMEOUT):
+            raise _Left('no time-out that stops the motor was read back')
+        self._reach(self._speed)
+        # one that stops it by the ramp takes as long as the driver's stop
+        seconds = timeout.seconds + self._ramp + _LONGER
+        self._control.screen.say(f'the line is silent for {seconds:.0f} s: the drive has to stop')
+        with self._muted(Cause.STOPPED_BECAUSE, Cause.STOPPED_BECAUSE_OF_FAULT, *_WITHOUT_POWER):
+            status = self._asleep(lambda: self._let(seconds))
+            if status is None:
+                raise _Left('no answer after it')
+            self._add('silence', not status.driven)
+            self._stop()
+        if status.faulted:
+            self._control.finish(self._control.drive.acknowledge())
+            now = self._control.offline.read_status()
+            self._add('acknowledged', not (now.faulted or now.driven))
 
-    def stop_by_hand(self, name: str, what: str, again: str) -> None:
+    def _stop_by_hand(self, name: str, what: str, again: str) -> None:
         """Let a person stop the motor; nothing may turn it afterwards."""
-        if not self._wanted(f'{what} while it turns'):
-            self._leave_out(name)
-            return
-        with self._enabled() as control:
-            self._reach(control, self._speed)
-            self._screen.say(f'{what} now')
-            if not self._until_done(control, lambda: control.drive.following):
-                self._leave_out(name)
-                return
-            self._add(name, control, self._stands(control))
-            if again:
-                self._screen.say(f'{again}, then press Enter')
-                self._during(control, lambda: True)
-            # a set-point that comes now turns nothing
-            until = time.monotonic() + _TURNS_AGAIN
+        self._require_yes(f'{what} while it turns')
+        self._enable()
+        self._reach(self._speed)
+        self._control.screen.say(f'{what} now ({_ENTER}: leave it out)')
+        self._until(lambda: not self._control.drive.following)
+        self._wait_until_it_stands()
+        self._add(name, True)
+        if again:
+            self._control.screen.say(f'{again}, then press {_ENTER}')
+            self._enter_within(_BY_HAND)
+        begun, turned = time.monotonic(), False
+        while time.monotonic() < begun + _TURNS_AGAIN:
+            self._pause()
+            turned |= self._turns
+        known = not math.isnan(self._control.drive.snapshot.frequency)
+        self._add(f'after {name}', not turned if known else None)
 
-            def stands() -> bool:
-                return not abs(control.drive.snapshot.frequency) > 0
-
-            self._during(
-                control, lambda: stands() and time.monotonic() < until, give=self._speed
-            )
-            self._add(f'after {name}', control, stands())
-
-    def switch_off(self) -> None:
+    def _switch_off(self) -> None:
         """Let the mains go while the motor turns: does it run by itself afterwards."""
-        if not self._wanted('switch the drive off and on while it turns: it may start by itself'):
-            self._leave_out('power')
-            return
-        with self._enabled() as control:
-            self._reach(control, self._speed)
-            self._screen.say('switch the drive off now')
-            if not self._until_done(control, lambda: control.drive.snapshot.connected):
-                self._leave_out('power')
-                return
-            keeps_run = control.drive.model.profile.keeps_run
-            self._left = True
-        self._screen.say('switch it on now: it is looked at as soon as it answers')
-        with self._session() as control:
-            try:
-                status = self._first_status(control)
-                saw = 'it runs by itself' if _runs(status) else 'it does not run'
-                right = keeps_run is None or keeps_run == _runs(status)
-                self._add('power', control, right, saw)
-            finally:
-                control.connect_as_controlled()
-                self._stop(control)
+        self._require_yes('switch the drive off and on while it turns: it may start by itself')
+        self._enable()
+        self._reach(self._speed)
+        with self._muted(*_WITHOUT_POWER):
+            runs = self._runs_with_power()
+        drive = self._control.drive
+        keeps_run = drive.model.profile.keeps_run
+        saw = 'it runs by itself' if runs else 'it does not run'
+        self._add('power', keeps_run is None or keeps_run == runs, saw)
+
+    def _runs_with_power(self) -> bool:
+        """Return whether the drive runs by itself when its power is back; it is stopped then."""
+        drive, screen = self._control.drive, self._control.screen
+        screen.say(f'switch the drive off now, and press {_ENTER} once its display is dark')
+        self._enter_within(_BY_HAND, self._speed)
+        self._let(_LOST_WITHIN)
+        if drive.snapshot.connected:
+            raise _Left('it answered on')
+        screen.say(
+            f'switch it on, and press {_ENTER} once its display is up: if the motor turns by '
+            f'itself, {_ENTER} stops it'
+        )
+        try:
+            status = self._asleep(lambda: self._enter_within(_BY_HAND))
+        except Ended:
+            screen.say(
+                'the drive may start the motor by itself when its power comes back: open the '
+                f'{self._enable_input} first, or run nfo-sinus stop as soon as it has power'
+            )
+            raise
+        until = time.monotonic() + _CONNECTS_WITHIN
+        while not drive.snapshot.connected and time.monotonic() < until:
+            self._pause()
+        if status is None or status.faulted:
+            raise _Left('not seen: it did not answer at once, or shows a fault of the line')
+        return status.driven and status.from_bus
 
     # --- what they are made of ----------------------------------------------------------------
 
-    @contextlib.contextmanager
-    def _session(self) -> Iterator[ControlSession]:
-        with Session(self._options, writes=True) as session:
-            yield ControlSession(session, self._screen, self._signals, MUTE)
+    def _choose_speed(self) -> None:
+        """
+        Choose how fast the motor turns.
 
-    @contextlib.contextmanager
-    def _enabled(self) -> Iterator[ControlSession]:
-        """Enable the motor; it is stopped however the block ends, unless it was left."""
-        with self._session() as control:
-            control.require_ready()
-            mode = self._choose_speed(control.offline)
-            settings = {
-                'control_method': self._options.control_method, 'expected_control_mode': mode
-            }
-            # given by number, what it depends on is set, too
-            timeout = control.command(**settings).settings.wanted_drive_timeout
-            drive = control.command(**settings, drive_timeout=timeout)
-            self._left = False
-            try:
-                control.connect()
-                control.enable()
-                yield control
-            finally:
-                if not (self._left or drive.identity is None):
-                    self._stop(control)
-
-    def _choose_speed(self, offline: OfflineDrive) -> str:
-        """Choose how fast the motor turns; return the control mode of the drive."""
-        mode = offline.do(offline.state.read_control_mode)
-        unit = QUANTITIES[mode].unit if mode in offline.model.profile.setpoints else ''
-        if unit not in ('Hz', 'rpm'):
-            raise CliError(
-                f'the drive is in control mode {mode}: a motor is turned here by a frequency or a '
-                'speed alone'
-            )
+        :raises CliError: its control mode is no frequency and no speed.
+        """
+        offline = self._control.offline
+        self._mode = mode = offline.do(offline.state.read_control_mode)
+        modes = offline.model.profile.setpoints
+        self._unit = unit = QUANTITIES[mode].unit if mode in modes else ''
         limits = offline.do(lambda: read_limits(offline.state, mode))
-        part = _PART * limits.nominal
-        self._speed, self._least = min(part, _MOST) if unit == 'Hz' else part, limits.least
+        if unit not in ('Hz', 'rpm') or (unit == 'rpm' and not math.isfinite(limits.nominal)):
+            raise CliError(
+                f'the drive is in control mode {mode}: set '
+                f'{offline.model.key(Role.CONTROL_MODE) or "it"} so that its set-point is a '
+                'frequency or a speed whose nominal value it tells'
+            )
+        most = _MOST
+        if unit == 'rpm':
+            key = offline.model.key(Role.NOMINAL_FREQUENCY)
+            known = float(offline.measure(key)) if key else 0.0
+            most = _MOST / known * limits.nominal if known else math.inf
+        self._speed, self._least = min(_PART * limits.nominal, most), limits.least
         if self._speed < self._least:
             raise CliError(f'the motor may turn no slower than {self._least:g} {unit}')
-        return mode
 
-    def _reach(self, control: ControlSession, speed: float) -> bool:
-        """Turn at a speed for a while; return whether the drive shows that it is reached."""
-        drive, begun, near_since = control.drive, time.monotonic(), math.inf
+    @property
+    def _shown(self) -> str:
+        return f'{self._control.drive.snapshot.actual:.4g} {self._unit}'
 
-        def goes_on() -> bool:
-            nonlocal near_since
-            now = time.monotonic()
-            near = abs(drive.snapshot.actual - speed) <= _NEAR * abs(speed)
+    @property
+    def _turns(self) -> bool:
+        """The motor turns, as far as the drive tells."""
+        snapshot = self._control.drive.snapshot
+        driven = snapshot.status is not None and snapshot.status.driven
+        return driven or abs(snapshot.frequency) > _STILL
+
+    def _enable(self) -> None:
+        self._check()
+        try:
+            self._control.enable()
+        except DriveError as error:
+            raise _Left(f'it cannot be enabled: {say(error)}') from None
+
+    def _reach(self, speed: float) -> bool | None:
+        """
+        Turn at a speed for a while; return whether that is reached, ``None`` if it only rises.
+
+        :raises _Left: something has stopped the motor meanwhile.
+        """
+        drive = self._control.drive
+        most, rose_at, near_since = 0.0, time.monotonic(), math.inf
+        while drive.following:
+            now, actual = time.monotonic(), drive.snapshot.actual
+            near = abs(actual - speed) <= _NEAR * abs(speed)
             near_since = min(near_since, now) if near else math.inf
-            return drive.following and now < min(near_since + _HOLDS, begun + _REACHES)
+            if now > near_since + _HOLDS:
+                return True
+            if not near and now > rose_at + _RISES_WITHIN:
+                return None if most > 0 else False
+            along = actual * math.copysign(1, speed)
+            if along > most + _NEAR * abs(speed):
+                most, rose_at = along, now
+            self._pause(speed)
+        raise _Left(f'it was stopped before: {self._why_stopped}')
 
-        if not self._during(control, goes_on, give=speed):
-            raise Ended('Enter', 0)
-        if not drive.following:
-            raise CliError(f'the motor was stopped meanwhile: {drive.state.describe()}')
-        return near_since < math.inf
+    @property
+    def _why_stopped(self) -> str:
+        reported = self._control.reported
+        return say(reported[-1]) if reported else self._control.drive.state.describe()
 
-    def _stands(self, control: ControlSession) -> bool:
-        """Wait until the motor stands; return whether it does."""
-        until = time.monotonic() + _STANDS
+    def _asleep(self, wait: Callable[[], object]) -> InverterStatus | None:
+        """
+        Have no request sent while a function waits; return the status after it.
 
-        def turns() -> bool:
-            status = control.drive.snapshot.status
-            return status is not None and status.driven and time.monotonic() < until
+        It is read before anything is written; ``None``: the drive does not answer at once.
+        """
+        drive, over = self._control.drive, threading.Event()
 
-        return self._during(control, turns) and time.monotonic() < until
+        async def sleep() -> InverterStatus:
+            # the worker itself waits: nothing else is sent meanwhile
+            over.wait(2 * _BY_HAND)
+            return await drive.state.reader.read(Priority.STOP)
 
-    def _during(
-        self, control: ControlSession, condition: Callable[[], bool], give: float | None = None
-    ) -> bool:
-        """Wait while a condition holds, with a set-point; return whether Enter has not ended it."""
-        while condition():
-            if self._is_enter():
-                return False
-            if give is not None:
-                control.drive.set_setpoint(give)
-            control.pause(_PERIOD)
-        return True
+        reading = drive.run(sleep)
+        try:
+            wait()
+        finally:
+            over.set()
+        try:
+            return self._control.finish(reading)
+        except DriveError:
+            return None
 
-    def _until_done(self, control: ControlSession, condition: Callable[[], bool]) -> bool:
-        """Turn while a person has something to do; return whether it is done."""
-        until = time.monotonic() + _BY_HAND
-        self._during(
-            control, lambda: condition() and time.monotonic() < until, give=self._speed
-        )
-        return not condition()
+    def _pause(self, give: float | None = None) -> None:
+        """Let a moment go by, with a set-point or without (Ended: by a signal, or by Enter)."""
+        if give is not None:
+            self._control.drive.set_setpoint(give)
+        self._control.pause(_PERIOD)
+        self._check()
 
-    def _stop(self, control: ControlSession, name: str = '') -> None:
-        """Stop the motor, and give control back (CliError: the stop is not confirmed)."""
-        confirmed = control.stop()
-        if name and confirmed:
-            self._add(name, control, self._stands(control))
-        if not confirmed or not control.give_back(_STANDS):
-            raise CliError('look whether the motor turns; nfo-sinus stop tries again')
+    def _check(self) -> None:
+        """Go on only if nothing has asked for the end, also while something else was awaited."""
+        name = self._control.interrupted
+        if name:
+            raise Ended(name, INTERRUPTED, name)
+        if _typed():
+            raise Ended(_ENTER, _DONE)
 
-    def _first_status(self, control: ControlSession) -> InverterStatus:
-        """Return the first status of a drive that is switched on."""
-        until = time.monotonic() + _BY_HAND + _STARTS
-        while True:
+    def _let(self, seconds: float) -> None:
+        """Let some time go by."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            self._pause()
+
+    def _enter_within(self, seconds: float, give: float | None = None) -> bool:
+        """Wait for Enter, which ends nothing here; return whether it came in time."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
             try:
-                return control.offline.read_status()
-            except DriveError:
-                if time.monotonic() > until:
+                self._pause(give)
+            except Ended as end:
+                if end.signal:
                     raise
-            control.pause(_PERIOD)
+                return True
+        return False
 
-    def _add(self, name: str, control: ControlSession, right: bool, saw: str = '') -> None:
+    def _until(self, condition: Callable[[], bool]) -> None:
+        """
+        Turn until a person has done something.
+
+        :raises _Left: it is left out.
+        """
+        until = time.monotonic() + _BY_HAND
+        while not condition():
+            if time.monotonic() > until:
+                raise _Left(f'nothing happened in {_BY_HAND:g} s')
+            if self._enter_within(_PERIOD, self._speed):
+                raise _Left('left out')
+
+    def _require_yes(self, what: str) -> None:
+        """
+        Ask whether a step is to be done.
+
+        :raises _Left: it is not.
+        """
+        self._check()
+        with contextlib.suppress(OSError, termios.error):
+            # what was typed before the question is no answer
+            termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
+        self._control.screen.say(f'{what[0].upper()}{what[1:]}? [y/N]')
+        until = time.monotonic() + _BY_HAND
+        while time.monotonic() < until:
+            self._control.pause(_PERIOD)
+            typed = _typed()
+            if typed:
+                if typed.strip().lower() in (b'y', b'yes'):
+                    return
+                raise _Left('left out')
+        raise _Left(f'no answer for {_BY_HAND:g} s')
+
+    def _stop(self) -> None:
+        """
+        Stop the motor, and wait until it stands.
+
+        :raises CliError: the stop is not confirmed, or the motor turns on.
+        """
+        if not self._control.stop():
+            raise CliError(
+                f'the stop is NOT confirmed: open the {self._enable_input}, or use the emergency '
+                'stop, if the motor turns; nfo-sinus stop tries again'
+            )
+        self._wait_until_it_stands()
+
+    def _wait_until_it_stands(self) -> None:
+        until = time.monotonic() + _STANDS
+        while self._turns:
+            if time.monotonic() > until:
+                shown = self._control.drive.state.describe()
+                raise CliError(f'the motor does not come to a standstill ({shown})')
+            self._pause()
+
+    def _give_back(self) -> None:
+        """At the end: stop the motor, however this is ended, and give control back."""
+        control = self._control
+        if not control.stop():
+            control.screen.say(
+                f'the stop is NOT confirmed: open the {self._enable_input}, or use the emergency '
+                'stop, if the motor turns; nfo-sinus stop tries again'
+            )
+        elif control.give_back(_STANDS):
+            control.screen.say(say(control.answer))
+
+    @contextlib.contextmanager
+    def _muted(self, *causes: Cause) -> Iterator[None]:
+        """Have nothing said of what a step leads to by itself."""
+        self._mute |= set(causes)
+        try:
+            yield
+        finally:
+            self._mute -= set(causes)
+
+    def _add(
+        self, name: str, right: bool | None, saw: str = '', speed: float = math.nan
+    ) -> None:
         """Record what the drive shows now."""
-        offline, words = control.offline, {}
+        offline, words = self._control.offline, {}
         for key in filter(offline.params.reaches, self._keys):
             read = functools.partial(offline.params.read_data, key, Priority.SERVICE)
             # what it refuses now is not seen
@@ -356,30 +506,22 @@ class _Turning:
                 words[key] = struct.unpack(f'>{len(data) // 2}h', data)
         offline.read_status()
         saw = ', '.join(filter(None, (saw, offline.state.describe())))
-        self.moments.append(Moment(name, saw, right, words))
+        hertz = speed if self._unit == 'Hz' else math.nan
+        self._moments.append(Moment(name, saw, right, hertz, words))
 
-    def _leave_out(self, name: str, why: str = 'left out') -> None:
-        self.moments.append(Moment(name, why, None))
 
-    def _wanted(self, what: str) -> bool:
-        """Ask whether a step is to be done; Enter leaves it out."""
-        print(f'{what[0].upper()}{what[1:]}? [y/N] ', end='', file=sys.stderr, flush=True)
-        until = time.monotonic() + _BY_HAND
-        while time.monotonic() < until:
-            if select.select([sys.stdin], [], [], _PERIOD)[0]:
-                return sys.stdin.readline().strip().lower() in ('y', 'yes')
-            if self._signals.next(0.0) is not None:
-                raise Ended('Ctrl-C', INTERRUPTED)
-        return False
+def _typed() -> bytes:
+    """
+    Return what was typed, at once.
 
-    @staticmethod
-    def _is_enter() -> bool:
-        """Return whether Enter was pressed, or there is no operator any more."""
+    :raises Ended: the terminal is gone.
+    """
+    try:
         if not select.select([sys.stdin], [], [], 0.0)[0]:
-            return False
-        sys.stdin.readline()
-        return True
-
-
-def _runs(status: InverterStatus) -> bool:
-    return status.driven and status.from_bus
+            return b''
+        typed = os.read(sys.stdin.fileno(), 4096)
+    except (OSError, ValueError):
+        typed = b''
+    if not typed:
+        raise Ended('the terminal is gone', INTERRUPTED, 'SIGHUP')
+    return typed

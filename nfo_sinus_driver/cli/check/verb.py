@@ -6,20 +6,38 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 import contextlib
 import math
+import os
 from pathlib import Path
 import sys
 
 from nfo_sinus_driver.catalog import Family, load_family
 from nfo_sinus_driver.cli.check import report
 from nfo_sinus_driver.cli.check.readings import Reading, Seen, Verdict, look, table, turned
-from nfo_sinus_driver.cli.check.sight import ClassicSight, ModbusSight, Register, Sight
+from nfo_sinus_driver.cli.check.sight import (
+    BlockSight,
+    CanopenSight,
+    ClassicSight,
+    ModbusSight,
+    MovitracSight,
+    Register,
+    Sight,
+)
 from nfo_sinus_driver.cli.check.turn import Moment, agreed, turn
-from nfo_sinus_driver.cli.check.wire import FIRST, ClassicWire, SerialWire, TcpWire, Wire
+from nfo_sinus_driver.cli.check.wire import (
+    FIRST,
+    CanWire,
+    ClassicWire,
+    MovitracWire,
+    SerialWire,
+    TcpWire,
+    Wire,
+)
 from nfo_sinus_driver.cli.console import (
     CliError,
+    OutputLost,
     UsageError,
     as_json,
     can_ask,
@@ -29,7 +47,10 @@ from nfo_sinus_driver.cli.console import (
 )
 from nfo_sinus_driver.cli.options import Verb, add_flag
 from nfo_sinus_driver.cli.session import Session
-from nfo_sinus_driver.link import BusSettings, PortError
+from nfo_sinus_driver.drive import DriveSettings
+from nfo_sinus_driver.drive.known.settings import TELEGRAM_WORDS
+from nfo_sinus_driver.link import PROTOCOLS, BusSettings, PortError
+from nfo_sinus_driver.link.canopen.link import can_port_of
 from nfo_sinus_driver.link.modbus.tcp import host_and_port
 from nfo_sinus_driver.link.ports.port import port_of
 from nfo_sinus_driver.link.ports.tcp_connection import Connection, TcpConnection, TracedConnection
@@ -37,7 +58,15 @@ from nfo_sinus_driver.link.ports.trace import Trace
 
 #: The silence before a request, until it is known how short it may be, s.
 _GAP = 0.02
-_PROTOCOLS = ('modbus_rtu', 'modbus_ascii', 'modbus_tcp', 'classic')
+#: What looks at a drive by each protocol.
+_SIGHTS: Mapping[str, type[Sight]] = {
+    **dict.fromkeys(('modbus_rtu', 'modbus_ascii', 'modbus_tcp'), ModbusSight),
+    'classic': ClassicSight,
+    'movitrac': MovitracSight,
+    'canopen': CanopenSight,
+}
+#: Those by which the motor is turned.
+_TURNS_BY = ('modbus_rtu', 'modbus_ascii', 'modbus_tcp', 'classic')
 #: So near are two values that are the same.
 _SAME = 0.02
 #: Functions that drives may have or not, each as a request that changes nothing.
@@ -51,8 +80,8 @@ class Check(Verb):
     """
     Ask a drive what it shows of the readings of its manual; without --turn nothing is written.
 
-    The exit status is 0 if it contradicts none, 1 if it does or a motor does not what it should,
-    and 2 if nothing answers.
+    The exit status is 0 if it contradicts none, 1 if it does or the motor did not do what it
+    should, and 2 if nothing answers.
     """
 
     failed = _NONE_ANSWERS
@@ -70,11 +99,10 @@ class Check(Verb):
 
     def main(self, options: argparse.Namespace) -> int:
         """Ask, and report."""
-        if options.protocol not in _PROTOCOLS:
-            spoken = ', '.join(_PROTOCOLS)
-            raise UsageError(f'check asks by {spoken} alone, not by {options.protocol}')
         if options.report is not None and options.report.exists():
             raise UsageError(f'{options.report} exists: name another file')
+        if options.report is not None and not os.access(options.report.parent, os.W_OK):
+            raise UsageError(f'{options.report.parent} is no folder that can be written to')
         try:
             settings = BusSettings(
                 options.port, options.protocol, options.baud_rate, options.char_format
@@ -83,12 +111,20 @@ class Check(Verb):
             raise UsageError(str(error)) from None
         if options.turn and not can_ask():
             raise UsageError('--turn needs a terminal: Enter stops the motor')
+        model, protocol = load_family(options.model), options.protocol
+        telegram = _telegram(options)
+        if options.turn and (telegram or options.protocol not in _TURNS_BY):
+            raise UsageError('--turn turns a motor over Modbus and Classic alone, not by a PLC')
         _require_standstill(options)
-        model = load_family(options.model)
+        if telegram:
+            model = load_family(options.model, telegram, options.telegram_words)
+            protocol = f'{telegram}_{options.telegram_words or TELEGRAM_WORDS[0]}'
         try:
             with _wire(settings, options) as (wire, set_gap):
-                is_classic = options.protocol == 'classic'
-                sight = ClassicSight(wire, model) if is_classic else ModbusSight(wire, model)
+                sight = (
+                    BlockSight(wire, model, options.block_address) if telegram
+                    else _SIGHTS[options.protocol](wire, model)
+                )
                 if not sight.parameters:
                     raise UsageError(f'no registers of a {model.name} are known by this protocol')
                 timing = sight.timing(set_gap)
@@ -96,42 +132,63 @@ class Check(Verb):
                     registers = list(sight.registers(step))
                 if not any(one.words or one.refused_with for one in registers):
                     raise CliError('the drive does not answer any more')
-                functions = '' if is_classic else _functions(sight)
-                seen = list(look(sight, options.protocol))
+                functions = _functions(sight) if type(sight) is ModbusSight else ''
+                seen = list(look(sight, protocol))
         except (PortError, OSError) as error:
             raise CliError(str(error)) from error
         asks = can_ask() and not options.no_questions and not options.json
-        seen += _questions(model, registers, options.protocol, asks=asks)
-        moments, status = _turn(options, model) if options.turn else ([], 0)
-        seen += turned(moments, model.name, options.protocol)
+        seen += _questions(model, registers, protocol, asks=asks)
+        moments, status = _turn(options, model, protocol) if options.turn else ([], 0)
+        seen += turned(moments, model.name, protocol)
         facts = {
             # a file of one's own may be named after its owner
             'model': model.name if '/' not in options.family else 'described by a file',
-            'protocol': options.protocol, 'functions': functions,
+            'protocol': protocol, 'functions': functions,
             'baud_rate': settings.line.baud_rate, 'char_format': settings.line.char_format,
         }
         document = report.document(sight, facts, seen, registers, timing, moments)
-        if options.report is not None:
-            try:
-                options.report.write_text(as_json(document, indent=1) + '\n', encoding='utf-8')
-            except OSError as error:
-                raise CliError(f'{options.report}: {error.strerror}') from error
-        if options.json:
-            put(as_json(document, indent=1))
-        else:
-            for line in report.screen(seen, registers, timing, functions, moments):
-                put(line)
+        try:
+            if options.json:
+                put(as_json(document, indent=1))
+            else:
+                for line in report.screen(seen, registers, timing, functions, moments):
+                    put(line)
+        except OutputLost:
+            # the terminal is gone, which may have ended the turning
+            if not status:
+                raise
+        finally:
+            if options.report is not None:
+                _write(options.report, as_json(document, indent=1) + '\n')
         return status or int(any(one.verdict is Verdict.CONTRADICTED for one in seen))
 
 
-def _turn(options: argparse.Namespace, model: Family) -> tuple[list[Moment], int]:
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding='utf-8')
+    except OSError as error:
+        raise CliError(f'{path}: {error.strerror}') from error
+
+
+def _telegram(options: argparse.Namespace) -> str:
+    """Return the control method by which a PLC reaches the drive; nothing: there is none."""
+    settings = DriveSettings(
+        model=options.model, family=options.family, control_method=options.control_method
+    )
+    through_plc = settings.goes_through_plc(PROTOCOLS[options.protocol])
+    return settings.method if through_plc else ''
+
+
+def _turn(
+    options: argparse.Namespace, model: Family, protocol: str
+) -> tuple[list[Moment], int]:
     """Turn the motor, if the operator has typed the word for it."""
     if not agreed(model):
         remark('nothing was turned')
         return [], 0
     rows = [one for one in table() if one.part == 'turn']
     return turn(
-        options, model, [one.shows for one in rows if one.fits(model.name, options.protocol)]
+        options, model, [one.shows for one in rows if one.fits(model.name, protocol)]
     )
 
 
@@ -167,6 +224,14 @@ def _wire(
         with contextlib.closing(connection):
             yield TcpWire(connection, options.address, first), None
         return
+    if options.protocol == 'canopen':
+        can = can_port_of(options.port, settings.line, options.trace)
+        can.open()
+        try:
+            yield CanWire(can, options.address, first), None
+        finally:
+            can.close()
+        return
     try:
         port = port_of(options.port, settings.line, options.trace)
     except ValueError as error:
@@ -174,9 +239,11 @@ def _wire(
     port.open()
     try:
         gap = max(_GAP, load_family(options.model).profile.gap)
-        wire: SerialWire | ClassicWire
+        wire: SerialWire | ClassicWire | MovitracWire
         if options.protocol == 'classic':
             wire = ClassicWire(port, options.address, gap, first)
+        elif options.protocol == 'movitrac':
+            wire = MovitracWire(port, options.address, gap, first)
         else:
             ascii_frames = options.protocol == 'modbus_ascii'
             wire = SerialWire(port, options.address, gap, first, ascii_frames=ascii_frames)

@@ -12,6 +12,7 @@ import struct
 import time
 from typing import NamedTuple, Protocol
 
+from nfo_sinus_driver.link.canopen.can import CanPort, Frame
 from nfo_sinus_driver.link.ports.port import Port
 from nfo_sinus_driver.link.ports.tcp_connection import Connection
 
@@ -20,11 +21,19 @@ FIRST, _LAST = 0.5, 0.05
 #: The longest answer of Modbus.
 _MOST = 260
 _CONNECTS_WITHIN = 5.0
+#: From one request to a gateway or PLC to the next at least, s, for it has other work [C118].
+_EVERY = 0.02
 #: Exceptions of a gateway: no path to the drive, or no answer of it.
 _OF_GATEWAY = (b'\x0a', b'\x0b')
 #: What a Classic drive answers where there is no such parameter, and how long a REPLY is.
 NAK = b'\x15'
 _REPLY = 14
+#: Start delimiters of the MOVITRAC: what asks, and how long the answer is that each begins.
+_ENQUIRY, _NACK = 0xB5, 0xF3
+_ANSWERS = {0xC8: 8, 0xAC: 12, _NACK: 3}
+#: What SDO frames begin with, of the client and of the server; an abort.
+_REQUESTS, _ANSWERED = 0x600, 0x580
+_UPLOAD, _ABORT, _ABORTED = b'\x40', b'\x80', 5
 #: How much is added to the sum of a frame that is to be none.
 _SPOILED = 0x0101
 
@@ -33,8 +42,8 @@ class Answer(NamedTuple):
     """
     What came for one request.
 
-    :ivar pdu: function and data, on Classic what :class:`ClassicWire` says; nothing: no frame that
-        belongs to the request.
+    :ivar pdu: function and data, on other lines than Modbus what their wire says; nothing: no frame
+        that belongs to the request.
     :ivar frame: every byte that came.
     :ivar first: from the last byte sent to the first that came, s; infinite: none did.
     """
@@ -45,7 +54,9 @@ class Answer(NamedTuple):
 
     @property
     def refused_with(self) -> int | None:
-        """The exception code, if it is a refusal."""
+        """The exception code, if it is a refusal; of CANopen the abort code."""
+        if len(self.pdu) == _ABORTED and self.pdu[:1] == _ABORT:
+            return int.from_bytes(self.pdu[1:], 'big')
         return self.pdu[1] if len(self.pdu) == 2 and self.pdu[0] & 0x80 else None
 
 
@@ -159,6 +170,54 @@ class ClassicWire(_OnPort):
         return Answer(word, frame, first)
 
 
+class MovitracWire(_OnPort):
+    """
+    A drive on the line of a MOVITRAC.
+
+    A request is the index of a parameter, in two bytes; an answer its four or eight bytes, or F3h
+    and a return code.
+    """
+
+    def ask(self, pdu: bytes, *, spoiled: bool = False) -> Answer:
+        """Send an ENQUIRY, and return what came."""
+        head = bytes((_ENQUIRY, self._unit)) + pdu
+        total = sum(head) + (_SPOILED if spoiled else 0) & 0xFF
+        frame, first = self._send(head + bytes((total,)), lambda came: bool(_summed(came)))
+        body = _summed(frame)
+        # a refusal does not say of what
+        if body[:1] == bytes((_NACK,)):
+            return Answer(body, frame, first)
+        return Answer(body[3:] if body[1:3] == pdu else b'', frame, first)
+
+
+class CanWire:
+    """
+    A node on a CAN bus.
+
+    A request is an object, index and sub-index, in three bytes; an answer 40h and its bytes, the
+    low one first, or 80h and the abort code. What is longer than four bytes is none.
+    """
+
+    has_sum = False
+
+    def __init__(self, port: CanPort, unit: int, first: float) -> None:
+        self._port = port
+        self._unit = unit
+        self._first = first
+
+    def ask(self, pdu: bytes, *, spoiled: bool = False) -> Answer:
+        """Send a request to read, and return what came about that object."""
+        place = pdu[1::-1] + pdu[2:]
+        self._port.send(Frame(_REQUESTS + self._unit, _UPLOAD + place + bytes(4)))
+        sent = time.monotonic()
+        until = sent + self._first
+        while time.monotonic() < until:
+            for identifier, data, *_ in self._port.receive(until):
+                if identifier == _ANSWERED + self._unit and data[1:4] == place and len(data) == 8:
+                    return Answer(_from_sdo(data), data, time.monotonic() - sent)
+        return Answer(b'', b'', float('inf'))
+
+
 class TcpWire:
     """A drive behind a Modbus TCP gateway, whose own refusals are no answer of the drive."""
 
@@ -169,6 +228,8 @@ class TcpWire:
         self._unit = unit
         self._first = first
         self._number = 0
+        #: When the last request was sent.
+        self._sent = float('-inf')
         #: What has come and is no whole frame yet.
         self._rest = b''
         connection.open()
@@ -181,8 +242,9 @@ class TcpWire:
         """Send a request, and return what came; what came for one before is passed over."""
         self._number = self._number % 0xFFFF + 1
         head = struct.pack('>HHHB', self._number, 0, len(pdu) + 1, self._unit)
+        time.sleep(max(0.0, self._sent + _EVERY - time.monotonic()))
         self._connection.write(head + pdu)
-        sent = time.monotonic()
+        self._sent = sent = time.monotonic()
         until = sent + self._first
         while data := self._connection.read(until):
             now = time.monotonic()
@@ -198,6 +260,22 @@ class TcpWire:
 
 def _end_of(frames: bytes) -> int:
     return 6 + int.from_bytes(frames[4:6], 'big')
+
+
+def _summed(frame: bytes) -> bytes:
+    """Return the answer of a MOVITRAC without its sum, nothing if it is none."""
+    whole = bool(frame) and len(frame) == _ANSWERS.get(frame[0])
+    return frame[:-1] if whole and sum(frame[:-1]) & 0xFF == frame[-1] else b''
+
+
+def _from_sdo(data: bytes) -> bytes:
+    command = data[0]
+    if data[:1] == _ABORT:
+        return _ABORT + data[:3:-1]
+    if command & 0xE2 != 0x42:
+        return b''
+    # the count of bytes that are empty, if it is said
+    return _UPLOAD + (data[4 : 8 - (command >> 2 & 3)] if command & 1 else data[4:])
 
 
 def _crc(message: bytes) -> int:

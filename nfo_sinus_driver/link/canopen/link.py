@@ -161,6 +161,17 @@ class _Ambiguous(DamagedAnswer):
     """An answer came that may belong to an earlier request, or to another client."""
 
 
+def can_port_of(port: str, settings: LineSettings, trace: str = '') -> CanPort:
+    """Return what carries frames on a port, as :meth:`CanopenLink.on_port` names it."""
+    if _INTERFACE.fullmatch(port):
+        identifiers = sdo.ANSWERS, sdo.REQUESTS, HEARTBEATS
+        wanted = tuple((identifier, FUNCTION_CODE) for identifier in identifiers)
+        can: CanPort = SocketCan(port, wanted)
+        return TracedCan(can, Trace(trace)) if trace else can
+    of_adapter = replace(settings, baud_rate=_ADAPTER_RATE, char_format='8N1')
+    return LawicelPort(port_of(port, of_adapter, trace), settings.baud_rate)
+
+
 class CanopenLink:
     """
     A client of the default SDO server of each node on one bus; one request at a time.
@@ -238,14 +249,7 @@ class CanopenLink:
             a URL of pyserial.
         :raises ValueError: it is none of them; the message says what to write.
         """
-        if _INTERFACE.fullmatch(port):
-            identifiers = sdo.ANSWERS, sdo.REQUESTS, HEARTBEATS
-            wanted = tuple((identifier, FUNCTION_CODE) for identifier in identifiers)
-            can: CanPort = SocketCan(port, wanted)
-            return cls(TracedCan(can, Trace(trace)) if trace else can, settings)
-        of_adapter = replace(settings, baud_rate=_ADAPTER_RATE, char_format='8N1')
-        serial = port_of(port, of_adapter, trace)
-        return cls(LawicelPort(serial, settings.baud_rate), settings)
+        return cls(can_port_of(port, settings, trace), settings)
 
     @property
     def place(self) -> str:

@@ -228,12 +228,13 @@ class Bench:
         *arguments: object,
         ask: str = '',
         answer: str = '',
-        answers: Sequence[tuple[str, str | Callable[[], str]]] = (),
+        answers: Sequence[tuple[str, str | Callable[[], str] | None]] = (),
     ) -> Done:
         """
         Run it on a terminal, and answer what it asks.
 
-        :param answers: what it asks, one after the other, and what is answered, or done first.
+        :param answers: what it asks, one after the other, and what is answered, or done first;
+            ``None``: the terminal is closed.
         """
         left = list(answers or ([(ask, answer)] if ask else []))
         process, terminal = pty.fork()
@@ -258,6 +259,9 @@ class Bench:
             while left and (at := said.find(left[0][0], seen)) >= 0:
                 wanted, gives = left.pop(0)
                 seen = at + len(wanted)
+                if gives is None:
+                    os.close(terminal)
+                    return Done(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), said, said)
                 os.write(terminal, (gives if isinstance(gives, str) else gives()).encode())
                 deadline = time.monotonic() + PATIENCE
         os.close(terminal)

@@ -117,8 +117,8 @@ def test_without_an_answer_it_ends_with_2(make_bench: MakeBench) -> None:
     bench = make_bench()
     done = bench.run('check', '--address', 9)
     assert done.status == 2 and 'no response from address 9: check' in done.err
-    done = bench.run('check', '--protocol', 'canopen')
-    assert done.status == 2 and 'not by canopen' in done.err
+    done = bench.run('check', '--protocol', 'movitrac')
+    assert done.status == 2 and 'no sinus_g2 is on a line of movitrac' in done.err
 
 
 class _Direct:

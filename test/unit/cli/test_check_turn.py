@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import json
 from pathlib import Path
+import threading
 import time
 from typing import Any
 
@@ -16,7 +17,7 @@ import pytest
 
 from nfo_sinus_driver.simulator.sinus.serial_side import SerialSide
 
-Answers = list[tuple[str, str | Callable[[], str]]]
+Answers = list[tuple[str, str | Callable[[], str] | None]]
 BEGIN = ('Type TURN to begin', 'TURN\n')
 NO_MORE = [('Press STOP', '\n'), ('Open the', '\n'), ('Switch the drive', '\n')]
 
@@ -43,7 +44,9 @@ def with_all(bench: Bench) -> Answers:
         ('Press STOP', 'y\n'), ('STOP at the keypad now', press_stop),
         ('Open the', 'y\n'), (' now', act(bench, 'run', 'off')),
         ('then press Enter', act(bench, 'run', 'on', then='\n')),
-        ('Switch the drive', 'y\n'), ('off now', act(bench, 'power-cycle', 4.0)),
+        ('Switch the drive', 'y\n'),
+        ('display is dark', act(bench, 'power-cycle', 6.0, then='\n')),
+        ('display is up', lambda: time.sleep(6.5) or '\n'),
     ]  # fmt: skip
 
 
@@ -67,7 +70,7 @@ def test_all_of_it(make_bench: MakeBench, tmp_path: Path, options: dict[str, Any
     moments = found(path)
     names = ['control', 'forward', 'reverse', 'stopped', 'silence', 'acknowledged', 'keypad']
     names += ['after keypad', 'input', 'after input', 'power']
-    assert list(moments) == [name for name in names if name in moments]
+    assert list(moments) == [name for name in names if name in moments], done.out
     # an Optimal has no time-out of its own
     left_out = {name for name, moment in moments.items() if moment['as_expected'] is None}
     assert left_out == ({'silence'} if 'model' in options else set()), done.out
@@ -130,9 +133,21 @@ def test_a_motor_that_turns_after_its_input_is_closed_again_is_found_out(
     bench = make_bench(settings=QUICK)
     path = tmp_path / 'report.json'
 
+    def run_on() -> None:
+        # another master that does not give up
+        until = time.monotonic() + 6.0
+        while time.monotonic() < until:
+            with bench.simulator.lock:
+                bench.drive().write_raw('fieldbus.mode', 3)
+                bench.drive().memory.set(bench.drive().control_unit.setpoint_key, 3.0)
+                bench.drive().write_raw('fieldbus.scmd', 0x101)
+            time.sleep(0.02)
+
+    other = threading.Thread(target=run_on)
+
     def closed() -> str:
         bench.simulator.inject('run', 'on', address=1)
-        bench.run_by_bus(3.0)
+        other.start()
         return '\n'
 
     answers: Answers = [
@@ -142,5 +157,77 @@ def test_a_motor_that_turns_after_its_input_is_closed_again_is_found_out(
     done = bench.on_terminal(
         'check', '--turn', '--no-questions', '--report', path, answers=answers
     )
+    other.join()
     assert done.status == 1 and found(path)['after input']['as_expected'] is False, done.out
+
+
+@pytest.mark.parametrize('moment', ['(--drive-timeout)', 'the line is silent'])
+@pytest.mark.parametrize(
+    'typed', ['\n', '\x03', 'abc\x04', b'\xff\n'.decode('latin-1'), None],
+    ids=['enter', 'ctrl-c', 'ctrl-d', 'no letter', 'hangup'],
+)
+def test_whatever_ends_it_the_motor_stands_for_good(
+    make_bench: MakeBench, tmp_path: Path, moment: str, typed: str | None
+) -> None:
+    bench = make_bench(settings=QUICK)
+    path = tmp_path / 'report.json'
+    done = bench.on_terminal(
+        'check', '--turn', '--no-questions', '--report', path, answers=[BEGIN, (moment, typed)]
+    )
+    assert done.status == {'\x03': 130, None: 130}.get(typed, 0), done.out
+    wait_until(lambda: bench.stopped)
+    assert 'Press STOP' not in done.out
+    assert [*found(path)][-1] == 'end'
+    time.sleep(1.0)
     assert bench.stopped
+
+
+def test_enter_while_the_motor_stops_ends_it(make_bench: MakeBench, tmp_path: Path) -> None:
+    bench = make_bench(settings={'control.accel': 0.2, 'control.retard': 30.0})
+    path = tmp_path / 'report.json'
+
+    def on_the_ramp() -> str:
+        wait_until(lambda: bench.state()['frequency'] < -4.5)
+        wait_until(lambda: -4.0 < bench.state()['frequency'] < -0.1)
+        return '\n'
+
+    done = bench.on_terminal(
+        'check', '--turn', '--no-questions', '--report', path,
+        answers=[BEGIN, ('(--drive-timeout)', on_the_ramp)],
+    )  # fmt: skip
+    moments = found(path)
+    assert list(moments)[-2:] == ['reverse', 'end'] and done.status == 0, done.out
+    assert not bench.state()['driven']
+
+
+@pytest.mark.parametrize('settings', [
+    {'control.mode': 'Speed'}, {'motor.f_nom': 40.0}, {'control.accel': 120.0},
+], ids=['by speed', '40 Hz', 'slow ramp'])
+def test_what_is_set_at_the_drive_contradicts_nothing(
+    make_bench: MakeBench, tmp_path: Path, settings: dict[str, Any]
+) -> None:
+    bench = make_bench(settings={**QUICK, **settings})
+    most = 0.0
+    path = tmp_path / 'report.json'
+
+    def look() -> str:
+        nonlocal most
+        for _ in range(40):
+            most = max(most, abs(bench.state()['frequency']))
+            time.sleep(0.05)
+        return ''
+
+    done = bench.on_terminal(
+        'check', '--turn', '--no-questions', '--report', path,
+        answers=[BEGIN, ('(--drive-timeout)', look), *NO_MORE],
+    )  # fmt: skip
+    assert done.status == 0 and 'CONTRADICTED: none' in done.out, done.out
+    assert 'NOT AS EXPECTED' not in done.out and most < 5.5
+    assert bench.stopped
+
+
+def test_a_report_that_cannot_be_written_is_refused_before_anything_turns(
+    make_bench: MakeBench, tmp_path: Path
+) -> None:
+    done = make_bench().run('check', '--report', tmp_path / 'nowhere' / 'report.json')
+    assert done.status == 2 and 'no folder that can be written to' in done.err
