@@ -22,7 +22,6 @@ import os
 import select
 import struct
 import sys
-import termios
 import threading
 import time
 
@@ -437,10 +436,8 @@ class _Turning:
 
         :raises _Left: it is not.
         """
+        # what was typed before the question is no answer
         self._check()
-        with contextlib.suppress(OSError, termios.error):
-            # what was typed before the question is no answer
-            termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
         self._control.screen.say(f'{what[0].upper()}{what[1:]}? [y/N]')
         until = time.monotonic() + _BY_HAND
         while time.monotonic() < until:
