@@ -45,7 +45,8 @@ def test_a_fault_leaves_a_bag_that_says_why(
     told = explained(bag, capsys)
     assert why in told and 'STOPPED, fault: ' in told and 'connected, ' in told, told
     topics = dict(bags.topics(bag))
-    assert {'/nfo_sinus/status', '/nfo_sinus/setpoint', '/nfo_sinus/inv_st'} <= topics.keys()
+    wanted = ('status', 'setpoint', 'inv_st', 'actual_speed', 'telemetry')
+    assert {f'/nfo_sinus/{name}' for name in wanted} <= topics.keys()
     given = [message.data for topic, _, message in bags.read(bag, lambda name: 'setpoint' in name)]
     assert given and set(given) == {20.0}
     stamps = [stamp for _, stamp, _ in bags.read(bag, lambda _: True)]

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+import math
 import time
 
 from builtin_interfaces.msg import Time
@@ -107,6 +108,9 @@ class Reporter:
         topic, stream = node.resolve_topic_name, black_box.stream
         # the same messages as those that are published
         self._keep_status = stream(topic('~/status'), DriveStatus, RELIABLE, self._as_status)
+        self._keep_speed = stream(
+            topic('~/actual_speed'), Float32, RELIABLE, lambda _, speed: float32(speed)
+        )
         self._keep_telemetry = stream(
             topic('~/telemetry'), TelemetryMessage, RELIABLE, self._as_telemetry
         )
@@ -129,6 +133,8 @@ class Reporter:
         """Publish a poll, or what has changed since."""
         self._snapshots(snapshot)
         self._keep_status(snapshot.at, snapshot)
+        if snapshot.polled and not math.isnan(snapshot.speed):
+            self._keep_speed(snapshot.at, snapshot.speed)
 
     def on_telemetry(self, telemetry: Telemetry) -> None:
         """Publish measured values."""
