@@ -29,8 +29,8 @@ NOISY = 2.0
 #: A stop that a fault keeps a drive from taking is not repeated within this, s.
 REFUSED = 0.3
 #: For how long a line is known as one where answers come twice, s, and how much longer eight
-#: requests take there.
-_TWICE_FOR, _LATER_BY = 60.0, 0.15
+#: requests take there, in ASCII, too.
+_TWICE_FOR, _LATER_BY = 60.0, 0.2
 
 #: Reads that acknowledge a fault.
 ACKNOWLEDGING_READS = ('fieldbus.inv_st_with_ack', 'fieldbus.sio_err')
