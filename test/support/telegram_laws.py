@@ -211,10 +211,10 @@ class HJudge(Judge):
         pattern = zsw1 & 0x47
         if not word & 1 << 10:
             yield 'without bit 10 all of it is ignored [C107]'
-        # where nothing is known to stand, or a quick stop whose end was not seen, OperationDisable
-        # is the stop, whatever ZSW1 shows [C116]
-        stands = stood & 0x06 == 0x06
-        if rises & 1 << 0 and stands and pattern not in (0x01, 0x03, 0x07):
+        # OperationDisable is also the stop where nothing stands, as after a port that was gone,
+        # whatever ZSW1 shows [C116]: in a fault, or while switching on is inhibited
+        idle = zsw1 & (1 << 3 | 1 << 6)
+        if rises & 1 << 0 and stood and not idle and pattern not in (0x01, 0x03, 0x07):
             yield 'SwitchON before S2 was shown'
         if rises & 1 << 3 and pattern != 0x03:
             yield 'OperationEnable before S3 was shown'
