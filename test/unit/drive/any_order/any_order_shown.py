@@ -510,8 +510,9 @@ class ShownH(BehindPlc):
 
 
 class ShownDescribed(Shown):
-    """What a drive shows that a file describes."""
+    """What a drive shows that a file describes; its speed is read with each status."""
 
+    times = Times(carried_out=0.08)
     lead = 3
     refuses_stop = True
 
