@@ -12,6 +12,7 @@ import math
 import statistics
 import struct
 import time
+from typing import ClassVar
 
 from nfo_sinus_driver.catalog import Family, Parameter
 from nfo_sinus_driver.cli.check.wire import NAK, Answer, Wire
@@ -67,7 +68,13 @@ class Timing:
 
 
 class Sight(abc.ABC):
-    """One drive, looked at, over one of the protocols."""
+    """
+    One drive, looked at, over one of the protocols.
+
+    :cvar addressing: what its parameters have addresses for.
+    """
+
+    addressing: ClassVar[str]
 
     def __init__(self, wire: Wire, model: Family) -> None:
         self.wire = wire
@@ -88,9 +95,13 @@ class Sight(abc.ABC):
         return self._asked[pdu]
 
     @property
-    @abc.abstractmethod
     def parameters(self) -> Mapping[str, Parameter]:
         """Those that can be read without an effect."""
+        return {
+            parameter.key: parameter
+            for parameter in self.model.values()
+            if parameter.is_readable and self.addressing in parameter.addresses
+        }
 
     @abc.abstractmethod
     def register(self, parameter: Parameter) -> Register:
@@ -130,6 +141,8 @@ class Sight(abc.ABC):
 
 class ModbusSight(Sight):
     """A drive, looked at over Modbus."""
+
+    addressing = 'modbus'
 
     def read(self, register: int, count: int = 1, function: int = HOLDING) -> Answer:
         """Return what a read got."""
@@ -183,6 +196,8 @@ class BlockSight(ModbusSight):
 
     :param start: the first of them.
     """
+
+    addressing = 'telegram1'
 
     def __init__(self, wire: Wire, model: Family, start: int) -> None:
         super().__init__(wire, model)
@@ -244,6 +259,8 @@ class BlockSight(ModbusSight):
 class ClassicSight(Sight):
     """A drive, looked at over Classic; each word has a number of its own."""
 
+    addressing = 'classic'
+
     def word(self, number: int) -> int | None:
         """Return the word with a number, or ``None``."""
         pdu = self.ask(number.to_bytes(2, 'big')).pdu
@@ -252,15 +269,6 @@ class ClassicSight(Sight):
     def is_refused(self, number: int) -> bool:
         """Return whether it answers NAK."""
         return self.ask(number.to_bytes(2, 'big')).pdu == NAK
-
-    @property
-    def parameters(self) -> Mapping[str, Parameter]:
-        """Those that can be read without an effect."""
-        return {
-            parameter.key: parameter
-            for parameter in self.model.values()
-            if parameter.is_readable and 'classic' in parameter.addresses
-        }
 
     def request(self, parameter: Parameter) -> bytes:
         """Return what asks for its first word."""
@@ -283,6 +291,8 @@ class ClassicSight(Sight):
 class MovitracSight(Sight):
     """A MOVITRAC, looked at over its line; each parameter has an index, and 4 or 8 bytes."""
 
+    addressing = 'movitrac'
+
     def value(self, index: int) -> bytes | None:
         """Return the bytes at an index, or ``None`` if they were not answered."""
         answer = self.ask(index.to_bytes(2, 'big'))
@@ -291,15 +301,6 @@ class MovitracSight(Sight):
     def refused_with(self, index: int) -> int | None:
         """Return the code of a refusal, or ``None`` if it was none."""
         return self.ask(index.to_bytes(2, 'big')).refused_with
-
-    @property
-    def parameters(self) -> Mapping[str, Parameter]:
-        """Those that can be read without an effect."""
-        return {
-            parameter.key: parameter
-            for parameter in self.model.values()
-            if parameter.is_readable and 'movitrac' in parameter.addresses
-        }
 
     def request(self, parameter: Parameter) -> bytes:
         """Return what asks for it."""
@@ -321,6 +322,8 @@ class MovitracSight(Sight):
 class CanopenSight(Sight):
     """A node, looked at by objects, each with an index and a sub-index."""
 
+    addressing = 'canopen'
+
     def value(self, index: int, sub_index: int = 0) -> bytes | None:
         """Return the bytes of an object, the low one first, or ``None``."""
         answer = self.ask(struct.pack('>HB', index, sub_index))
@@ -329,15 +332,6 @@ class CanopenSight(Sight):
     def aborted_with(self, index: int, sub_index: int = 0) -> int | None:
         """Return the code of an abort, or ``None`` if it was none."""
         return self.ask(struct.pack('>HB', index, sub_index)).refused_with
-
-    @property
-    def parameters(self) -> Mapping[str, Parameter]:
-        """Those that can be read without an effect."""
-        return {
-            parameter.key: parameter
-            for parameter in self.model.values()
-            if parameter.is_readable and 'canopen' in parameter.addresses
-        }
 
     def request(self, parameter: Parameter) -> bytes:
         """Return what asks for it."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import logging
 from pathlib import Path
 import shutil
+import struct
 import threading
 import time
 from typing import Any
@@ -149,6 +150,8 @@ class BlackBox:
     # --- on its own thread --------------------------------------------------------------------
 
     def _work(self) -> None:
+        # imported now: after a stop that would keep the other motors of the line waiting
+        bags.why_none()
         while self._wait_for_reasons():
             with self._due:
                 reasons, self._reasons = self._reasons, []
@@ -189,7 +192,7 @@ class BlackBox:
             for number, (at, stream, value) in enumerate(found, 1):
                 try:
                     data = stream.make(at, value)
-                except (OverflowError, ValueError):
+                except (OverflowError, ValueError, struct.error):
                     # what could not be published is not in it either
                     continue
                 bag.write(stream.topic, clock + round(at * 1e9), data)
