@@ -15,6 +15,8 @@ from nfo_sinus_driver.cli.options import Verb
 
 #: What many manuals print for the register that is sent as 0.
 _PRINTED_FROM = 40001
+#: What is no register.
+_COILS = ('coil', 'pulse')
 #: What the numbers of a file were taken from.
 _RUNGS = {
     'manual': "from its maker's manual, on no drive yet",
@@ -102,7 +104,7 @@ def notes(family: catalog.Family) -> list[str]:
         )
     parameters = [parameter for parameter in family.values() if 'modbus' in parameter.addresses]
     addresses = [parameter.at('modbus') for parameter in parameters]
-    registers = [address.index for address in addresses if address.space != 'coil']
+    registers = [address.index for address in addresses if address.space not in _COILS]
     if min(registers, default=0) >= _PRINTED_FROM:
         found.append(
             f'its registers are sent as {min(registers)} and above: if the first one that its '

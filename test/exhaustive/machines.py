@@ -127,6 +127,14 @@ class DescribedWithoutHolder(_Described):
     name = 'described, no holder'
 
 
+class DescribedByPulses(_Described):
+    name = 'described, by pulses'
+
+
+class DescribedBySetpoint(_Described):
+    name = 'described, by set-point'
+
+
 EVERY_MACHINE = (
     *MACHINES,
     G2Ascii,
@@ -142,4 +150,6 @@ EVERY_MACHINE = (
     Described,
     DescribedByStates,
     DescribedWithoutHolder,
+    DescribedByPulses,
+    DescribedBySetpoint,
 )

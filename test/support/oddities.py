@@ -203,6 +203,38 @@ ODD: dict[str, dict[str, Any]] = {
             'alarm': {'bit': 7}, 'stopping': {'bit': 4},
         },
     },
+    'pulses of coils': {
+        'control': {
+            'run': [{'pulse': 73}],
+            'stop': [{'pulse': 75}],
+            'reset': [{'pulse': 80}],
+        },
+        'setpoint': {
+            'register': 11, 'factor': 0.1, 'unit': 'Hz', 'most': 60,
+            'direction': {'pulse': True, 'forward': 73, 'reverse': 74},
+        },
+        'status': {**PLAIN['status'], 'reverse': {'bit': 1}},
+        'measured': {'actual_frequency': {'register': 22, 'factor': 0.1}},
+    },
+    'two words to one register': {
+        'control': {
+            'run': [{'register': 10, 'value': 8}],
+            'stop': [{'register': 10, 'value': 4}],
+            'reset': [{'register': 10, 'value': 1}],
+        },
+        'setpoint': {
+            'register': 11, 'factor': 0.1, 'unit': 'Hz', 'most': 60,
+            'direction': {'register': 10, 'forward': 0x80, 'reverse': 0x40, 'alone': True},
+        },
+        'status': {**PLAIN['status'], 'reverse': {'bit': 1}},
+        'measured': {'actual_frequency': {'register': 22, 'factor': 0.1}},
+    },
+    'a set-point that is the command': {
+        'control': {'run_by': 'setpoint', 'reset': [{'register': 10, 'value': 8}]},
+    },
+    'terminals that start': {
+        'control': {'run_by': 'terminals', 'reset': [{'register': 10, 'value': 8}]},
+    },
     'printed from 40001': {
         'line': {'numbering': 40001},
         'control': {

@@ -17,6 +17,7 @@ from concurrent.futures import Future
 import dataclasses
 from dataclasses import dataclass, field
 import math
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from nfo_sinus_driver.bus import Bus
@@ -80,6 +81,11 @@ class Connection:
     plc: Mapping[str, Any] = field(default_factory=dict)
 
 
+def _made_up(name: str) -> str:
+    """Return the path of a file that describes a drive, beside this one."""
+    return str(Path(__file__).with_name(f'{name}.vfd.yaml'))
+
+
 _OLD = {'classic_dialect': 'v5.0'}
 _DRIVECONTROL = {'telegram_words': 'drivecontrol'}
 #: In Speed mode with a motor of four poles.
@@ -117,6 +123,9 @@ CONNECTIONS: Mapping[str, Connection] = {
     'described': Connection('modbus_rtu', shipped('delta_vfd_el'), 'custom'),
     'described, by states': Connection('modbus_rtu', shipped('abb_acs355'), 'custom'),
     'described, no holder': Connection('modbus_rtu', shipped('toshiba_vf_s11'), 'custom'),
+    # each command is a coil that is set; and there is none beside the set-point
+    'described, by pulses': Connection('modbus_rtu', _made_up('by_pulses'), 'custom'),
+    'described, by set-point': Connection('modbus_rtu', _made_up('by_setpoint'), 'custom'),
     'telegram1 g2': Connection('telegram1', method='telegram1'),
     'telegram1 optimal': Connection('telegram1', 'sinus_optimal', 'telegram1'),
     'telegram1 g2, speed': Connection('telegram1', method='telegram1', **_SPEED),

@@ -17,13 +17,16 @@ from nfo_sinus_driver.catalog.declared.description import (
     drive_number,
 )
 from nfo_sinus_driver.catalog.declared.reader import SUFFIX, read
-from nfo_sinus_driver.catalog.declared.register_map import FAULT_KEY, STATUS_KEY
+from nfo_sinus_driver.catalog.declared.register_map import FAULT_KEY, PULSE_KEY, STATUS_KEY
+from nfo_sinus_driver.catalog.declared.registers import PULSES, Place, place_of
 from nfo_sinus_driver.catalog.declared.tables import Code, status_codes
 from nfo_sinus_driver.catalog.declared.yaml_file import DescriptionError
 from nfo_sinus_driver.catalog.profile import Write
 
 __all__ = [
     'FAULT_KEY',
+    'PULSES',
+    'PULSE_KEY',
     'STATUS_KEY',
     'SUFFIX',
     'Await',
@@ -33,6 +36,7 @@ __all__ = [
     'Description',
     'DescriptionError',
     'Direction',
+    'Place',
     'SetBits',
     'SetpointPlace',
     'Shown',
@@ -40,6 +44,7 @@ __all__ = [
     'Steps',
     'Write',
     'drive_number',
+    'place_of',
     'read',
     'status_codes',
 ]

@@ -17,6 +17,7 @@ from nfo_sinus_driver.catalog.declared.description import (
     Steps,
 )
 from nfo_sinus_driver.catalog.declared.register_map import WORD, PlacedCondition, RegisterMap
+from nfo_sinus_driver.catalog.declared.registers import PULSES, Place, place_of
 from nfo_sinus_driver.catalog.declared.settings import Settings
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
 from nfo_sinus_driver.catalog.parameter import Parameter
@@ -24,6 +25,8 @@ from nfo_sinus_driver.catalog.profile import Wait, Write
 
 #: All of them, in the order in which a drive is used.
 NAMES = ('prepare', 'run', 'stop', 'coast', 'quick_stop', 'reset', 'release')
+#: Without a run command, what a file may have of them.
+_WITHOUT_RUN = ('reset',)
 #: Those that wait for nothing: no stop is delayed.
 _AT_ONCE = ('stop', 'coast', 'quick_stop', 'release')
 #: How long a stop may pause between two of its steps in all, s.
@@ -32,11 +35,14 @@ _LONGEST_PAUSE = 0.5
 _LONGEST = 3.0
 #: How long it is waited for a condition where nothing is said, s.
 _WITHIN = 1.0
+#: What runs the motor where there is no run command.
+_RUN_BY = 'setpoint or terminals'
 #: What each kind of step has.
 _KINDS = {
     'value': {'register', 'value'}, 'values': {'register', 'values'},
     'set': {'register', 'set', 'clear'}, 'clear': {'register', 'set', 'clear'},
-    'on': {'coil', 'on'}, 'to': {'parameter', 'to'}, 'wait': {'wait'}, 'until': {'until', 'within'},
+    'on': {'coil', 'on'}, 'pulse': {'pulse'}, 'to': {'parameter', 'to'}, 'wait': {'wait'},
+    'until': {'until', 'within'},
 }
 
 
@@ -82,14 +88,14 @@ class StepReader:
         if not kinds or not set(node.mapping) <= _KINDS[kinds[0]]:
             self._problems.add(
                 node.line,
-                f'a step of {name} does one thing: value, values, set and clear, on, to, wait or '
-                'until',
+                f'a step of {name} does one thing: value, values, set and clear, on, pulse, to, '
+                'wait or until',
             )
             return None
         make = {
             'value': self._put, 'values': self._put_several, 'set': self._change,
-            'clear': self._change, 'on': self._switch, 'to': self._assign, 'wait': self._pause,
-            'until': self._await,
+            'clear': self._change, 'on': self._switch, 'pulse': self._pulse, 'to': self._assign,
+            'wait': self._pause, 'until': self._await,
         }
         return make[kinds[0]](node, name)
 
@@ -140,6 +146,9 @@ class StepReader:
             return None
         return Write(self._map.coil_key(name, node['coil']), int(node.flag('on')))
 
+    def _pulse(self, node: Node, name: str) -> Step:
+        return self._map.pulse(name, node['pulse'])
+
     def _assign(self, node: Node, name: str) -> Step | None:
         key = self._settings.known(node.get('parameter'))
         if not key:
@@ -165,8 +174,8 @@ class StepReader:
         return Await(condition.in_place(self._status), seconds) if condition is not None else None
 
 
-#: A register or a coil as it is sent, and whether it is a coil; or a parameter.
-_Place = tuple[int, bool] | str
+#: What is written as it is sent; or a parameter.
+_Place = Place | str
 
 
 class _RunWord(NamedTuple):
@@ -203,6 +212,12 @@ class CommandLists:
         self._run = self._left_by('run')
         for name in NAMES:
             self.check_pauses(name, self._lists[name], control.get(name).line)
+        if self._control.text('run_by'):
+            self._require_no_command()
+            return
+        for name in ('run', 'stop'):
+            if name not in control:
+                problems.add(control.line, f'control needs {name!r}, or run_by: {_RUN_BY}')
         for name in ('stop', 'coast', 'quick_stop'):
             if name in control:
                 self._check_stop(name)
@@ -230,6 +245,30 @@ class CommandLists:
                         f'{self._control["run"].line}), and the motor would turn',
                     )
 
+    def _require_no_command(self) -> None:
+        """Ensure that the set-point alone runs and stops the motor."""
+        control = self._control
+        for name in NAMES:
+            if name in control and name not in _WITHOUT_RUN:
+                self._problems.add(
+                    control[name].line,
+                    f'{name} cannot stand beside run_by: there is no run command, and set-point 0 '
+                    'is the stop: remove one of both',
+                )
+        for required in control.get('requires').items:
+            if required.flag('write'):
+                self._problems.add(
+                    required.line,
+                    'write: true cannot stand beside run_by: the motor would follow a set-point '
+                    'that is left in the drive; say with text how it is set',
+                )
+        if self._direction is not None:
+            self._problems.add(
+                control['run_by'].line,
+                'run_by goes with a set-point alone: remove direction, and have the sign give it '
+                '(signed: true), if the drive has one',
+            )
+
     def _is_setting(self, step: Step) -> TypeGuard[Write]:
         """Return whether a step writes to a parameter of the table."""
         return isinstance(step, Write) and step.key not in self._made
@@ -240,14 +279,14 @@ class CommandLists:
             yield step.key, hash(step.value), -1
         elif isinstance(step, (Write, SetBits)):
             address = self._made[step.key].at('modbus')
-            coil = address.space == 'coil'
+            kind, first = place_of(address)
             if isinstance(step, SetBits):
-                yield (address.index, coil), step.set, step.set | step.clear
+                yield (kind, first), step.set, step.set | step.clear
                 return
-            count = 1 if coil else address.codec.size // 2
+            count = max(address.codec.size // 2, 1)
             for number in range(count):
                 word = int(step.value) >> 16 * (count - 1 - number) & WORD
-                yield (address.index + number, coil), word, -1
+                yield (kind, first + number), word, -1
 
     def _states(self, steps: Steps) -> Iterator[tuple[_Place, int, int]]:
         """Yield what stands after each word of some steps: where, the bits, and which are known."""
@@ -263,17 +302,21 @@ class CommandLists:
         return {place: (word, known) for place, word, known in self._states(self._lists[name])}
 
     @property
+    def _runs_by(self) -> Direction | None:
+        """The direction whose words run the motor, too."""
+        return None if self._direction is None or self._direction.alone else self._direction
+
+    @property
     def _direction_place(self) -> _Place | None:
         if self._direction is None:
             return None
-        address = self._made[self._direction.key].at('modbus')
-        return address.index, address.space == 'coil'
+        return place_of(self._made[self._direction.key].at('modbus'))
 
     def _run_words(self, place: _Place) -> Iterator[_RunWord]:
         """Yield the words that run the motor there."""
         stop, left, direction = self._left_by('stop').get(place), self._run.get(place), None
-        if self._direction is not None and place == self._direction_place:
-            direction = self._direction
+        if self._runs_by is not None and place == self._direction_place:
+            direction = self._runs_by
             left = left or (direction.forward, -1)
         if left is None or isinstance(place, str):
             return
@@ -289,7 +332,7 @@ class CommandLists:
         for word, known in words:
             sure = known & stop[1]
             # where a stop sets bits that a run does not have, words are numbers
-            numbers = stop[0] & ~word & sure
+            numbers = stop[0] & ~word & sure or place == PULSES
             yield _RunWord(word, 0 if numbers else word & ~stop[0] & sure)
 
     def _check_settings(self) -> None:
@@ -319,7 +362,14 @@ class CommandLists:
         if self._direction is None or self._direction_place is None:
             return
         value, _ = self._run.get(self._direction_place, (None, 0))
-        if value not in (None, self._direction.forward):
+        if self._direction.alone:
+            if value in (None, self._direction.forward, self._direction.reverse):
+                self._problems.add(
+                    self._control['run'].line,
+                    'alone says that run writes another word to the register of the direction, '
+                    'and it writes none: remove alone, or the direction from run',
+                )
+        elif value not in (None, self._direction.forward):
             self._problems.add(
                 self._control['run'].line,
                 f'run leaves {value:X}h where the direction has forward: '
@@ -330,8 +380,9 @@ class CommandLists:
         """Ensure that a stop removes what run has left."""
         line = self._control[name].line
         run, stop, place = dict(self._run), self._left_by(name), self._direction_place
-        if self._direction is not None and place is not None:
-            run.setdefault(place, (self._direction.forward, WORD))
+        way = self._runs_by
+        if way is not None and place is not None:
+            run.setdefault(place, (way.forward, WORD))
         if not run or not stop:
             what = 'run' if not run else name
             self._problems.add(line, f'{what} writes nothing: add a step with a value')
@@ -340,8 +391,8 @@ class CommandLists:
             # edges, which the drive keeps
             return
         runs = [run]
-        if self._direction is not None and place is not None:
-            runs.append({**run, place: (self._direction.reverse, WORD)})
+        if way is not None and place is not None:
+            runs.append({**run, place: (way.reverse, WORD)})
         if not all(
             any(takes_back(left[key], stop[key]) for key in left if key in stop) for left in runs
         ):

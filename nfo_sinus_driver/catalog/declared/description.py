@@ -98,11 +98,13 @@ class Direction:
     The word, or the coil, that gives the direction; both go with the run command.
 
     :ivar key: where it is written.
+    :ivar alone: these words give the direction alone, and the run command is another one there.
     """
 
     key: str
     forward: int
     reverse: int
+    alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -301,6 +303,8 @@ class Description:
     :ivar flags: faults that are bits, the gravest first.
     :ivar identify: the parameters that tell it from other drives, and the numbers by which they do.
     :ivar holder: the parameter that reports who has control, and its values for the line.
+    :ivar run_by: ``setpoint``: there is no run command, and the motor follows each set-point;
+        ``terminals``: while they start it; ``''``: the run command does.
     :ivar stop_disturbs_local: a stop over the line stops a motor that keypad or terminals run.
     :ivar prepare_stops: no run command stands behind ``prepare``.
     :ivar keeps_run: the drive keeps its run command without power; ``None``: the file does not say.
@@ -329,6 +333,7 @@ class Description:
     prepare: Steps = ()
     prepare_stops: bool = False
     keeps_run: bool | None = None
+    run_by: str = ''
     stop_disturbs_local: bool = False
     coast: Steps = ()
     quick_stop: Steps = ()

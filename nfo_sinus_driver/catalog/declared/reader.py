@@ -110,6 +110,7 @@ class _Reader:
         )
         measured, roles = self._measured(settings)
         self._require_one_holder(control, settings)
+        self._require_seen_to_stand(control)
         after_write = tuple(self._after_write(steps, commands))
         identify = dict(self._identify())
         source = root.get('source')
@@ -130,6 +131,7 @@ class _Reader:
             identify=identify,
             **commands.lists(),
             keeps_run=root.flag('keeps_run') if 'keeps_run' in root else None,
+            run_by=control.text('run_by'),
             stop_disturbs_local=control.flag('stop_disturbs_local'),
             after_write=after_write,
             requires=tuple(self._requires(control, settings)),
@@ -232,6 +234,18 @@ class _Reader:
             self._problems.add(
                 control['holder'].line,
                 f'who has control is shown by status {shown_by[0]}, too: remove one of both',
+            )
+
+    def _require_seen_to_stand(self, control: Node) -> None:
+        """Make sure that a motor that terminals run is seen to stand at set-point 0."""
+        if control.text('run_by') != 'terminals':
+            return
+        shown = 'actual_frequency' in self._root.get('measured')
+        if not shown or 'stopping' in self._conditions:
+            self._problems.add(
+                control['run_by'].line,
+                'run_by: terminals needs measured actual_frequency, and no status stopping: the '
+                'frequency alone shows that a motor stands that its terminals go on running',
             )
 
     # --- faults ---
@@ -362,10 +376,18 @@ class _Reader:
         node = setpoint.get('direction')
         if 'forward' not in node:
             return None
-        coil = 'coil' in node
-        if coil == ('register' in node):
-            self._problems.add(node.line, 'direction needs a register or a coil, one of both')
+        coil, pulse = 'coil' in node, node.flag('pulse')
+        if sum((coil, pulse, 'register' in node)) != 1:
+            self._problems.add(
+                node.line, 'direction needs a register or a coil, one of both, or pulse: true'
+            )
             return None
+        if pulse:
+            ways = [self._map.pulse('direction', node[name]) for name in ('forward', 'reverse')]
+            if ways[0] == ways[1]:
+                self._problems.add(node.line, 'forward and reverse have to differ')
+            forward, reverse = (int(way.value) for way in ways)
+            return Direction(ways[0].key, forward, reverse, node.flag('alone'))
         forward, reverse = node.integer('forward') & WORD, node.integer('reverse') & WORD
         if forward == reverse or (coil and {forward, reverse} != {0, 1}):
             self._problems.add(
@@ -374,7 +396,7 @@ class _Reader:
         if coil:
             return Direction(self._map.coil_key('direction', node['coil']), forward, reverse)
         key = self._map.word('direction', node['register'], forward | reverse)
-        return Direction(key, forward, reverse)
+        return Direction(key, forward, reverse, node.flag('alone'))
 
     # --- the rest ---
 

@@ -11,9 +11,10 @@ from fractions import Fraction
 
 from nfo_sinus_driver.catalog.codec import codec_of
 from nfo_sinus_driver.catalog.declared.description import Condition, LineDefaults, StatusPlace
-from nfo_sinus_driver.catalog.declared.registers import Registers, Use
+from nfo_sinus_driver.catalog.declared.registers import PULSES, Registers, Use
 from nfo_sinus_driver.catalog.declared.yaml_file import Node, Problems
 from nfo_sinus_driver.catalog.parameter import Access, Address, Parameter
+from nfo_sinus_driver.catalog.profile import Write
 
 WORD = 0xFFFF
 _SIGN = 0x8000
@@ -22,6 +23,8 @@ _FIELDBUS = 'Fieldbus'
 STATUS_KEY = 'line.status'
 #: The number of the fault, where it stands in no register of the status.
 FAULT_KEY = 'line.fault'
+#: Coils each of which is a command: what is written is the number of the one that is set.
+PULSE_KEY = 'line.pulse'
 _TYPES = {
     'uint16': 'uint16_be', 'int16': 'sint16_be', 'bcd16': 'bcd16', 'bcd32': 'bcd32',
     'uint32': 'uint32_be', 'int32': 'sint32_be',
@@ -201,6 +204,16 @@ class RegisterMap:
         key = f'line.coil_{coil}'
         self._make(key, 'coil', coil, 'uint8', f'coil {node.written}')
         return key
+
+    def pulse(self, what: str, node: Node) -> Write:
+        """Return what sets a coil that is a command by itself."""
+        coil = self.coil(node)
+        self.registers.note_use(Use.PULSE, what, node.line, 'coil', coil)
+        if PULSE_KEY not in self.made:
+            codec = codec_of('uint16_be')
+            address = Address('modbus', *PULSES, None, codec, Fraction(1), '')
+            self.made[PULSE_KEY] = internal(PULSE_KEY, 'pulse of a coil', address, Access.WRITE)
+        return Write(PULSE_KEY, coil)
 
     @property
     def _status_space(self) -> str:

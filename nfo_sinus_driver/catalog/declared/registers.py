@@ -10,6 +10,19 @@ from pathlib import Path
 from typing import NamedTuple
 
 from nfo_sinus_driver.catalog.declared.yaml_file import Problems
+from nfo_sinus_driver.catalog.parameter import Address
+
+#: What is written: a register or a coil; all coils that are pulses are one, with the number of the
+#: one that was set last in it.
+Place = tuple[str, int]
+#: The place of all pulses.
+PULSES: Place = 'pulse', 0
+
+
+def place_of(address: Address) -> Place:
+    """Return what is written at an address, in whatever way that is."""
+    return address.space.partition('_')[0], address.index
+
 
 
 class Use(enum.Enum):
@@ -19,6 +32,8 @@ class Use(enum.Enum):
     COMMAND = enum.auto()
     #: A step writes 0 there: that may be set-point 0.
     ZERO = enum.auto()
+    #: A coil that is a command by being set.
+    PULSE = enum.auto()
     SETPOINT = enum.auto()
     #: A parameter, a measured value, or the set-point where it is read elsewhere.
     VALUE = enum.auto()
@@ -35,6 +50,7 @@ _TOGETHER = frozenset(
         (
             (Use.COMMAND,),
             (Use.ZERO,),
+            (Use.PULSE,),
             (Use.BITS,),
             (Use.COMMAND, Use.ZERO),
             (Use.COMMAND, Use.BITS),

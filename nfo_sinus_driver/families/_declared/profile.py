@@ -132,7 +132,7 @@ class Declared(ControlMethod):
         """
         direction = self._drive.setpoint.direction
         written = {step.key for step in self._drive.run if isinstance(step, Write)}
-        if direction is not None and direction.key not in written:
+        if direction is not None and (direction.alone or direction.key not in written):
             yield Write(direction.key, direction.forward, retry=False)
         yield from _carry_out(self._drive.run, retry=False)
 
@@ -161,16 +161,93 @@ class Declared(ControlMethod):
             return Removal.COMMAND
         return Removal.SETPOINT if setpoint else Removal.NOTHING
 
+    def _require_reset(self) -> None:
+        if not self._drive.reset:
+            raise NotPossible('it has no reset over the line: reset it at its keypad')
+
     def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
         """
         Acknowledge a fault, the run command removed first.
 
         :raises NotPossible: the file has no reset, or the drive keeps its run command.
         """
-        if not self._drive.reset:
-            raise NotPossible('it has no reset over the line: reset it at its keypad')
+        self._require_reset()
         if (yield from self.remove(control_mode)) is not Removal.COMMAND:
             raise NotPossible('the drive refuses the stop: reset it at its keypad')
+        yield from _carry_out(self._drive.reset, holds=True)
+        return ''
+
+
+class BySetpoint(Declared):
+    """
+    Control of a drive without a run command: the motor follows each set-point.
+
+    A stop is set-point 0, at which the motor stands; where terminals start it, it stands driven.
+    """
+
+    means = 'the set-point'
+    reads_run_command = True
+
+    def require_startable(self) -> Steps[None]:
+        """
+        Ensure that the drive follows a set-point, and follows none yet; it only reads.
+
+        :raises NotPossible: as of every drive that is described; or its terminals do not start it.
+        """
+        yield from super().require_startable()
+        if self._drive.run_by != 'terminals':
+            return
+        if not self._drive.facts['running'].holds(int((yield Read(STATUS_KEY)))):
+            name = self._drive.enable_input or 'start terminal'
+            raise NotPossible(f'its terminals do not start it: close the {name}, then enable')
+
+    def take_control(self) -> Steps[None]:
+        """Write set-point 0: nothing else keeps the motor from turning."""
+        yield from self._setpoint.set_to_zero()
+
+    def remove_leftover(self) -> Steps[None]:
+        """Write set-point 0, for one that is left would count once the line has control."""
+        if not self._drive.stop_disturbs_local:
+            yield from try_steps(self._setpoint.zero(retry=True))
+
+    def run(self) -> Steps[None]:
+        """Do nothing: the next set-point runs the motor."""
+        yield from ()
+
+    def stop(self, control_mode: str) -> Steps[None]:
+        """Write set-point 0."""
+        yield from self._stop_by(self._setpoint.zero(retry=False))
+
+    def quick_stop(self, control_mode: str) -> Steps[None]:
+        """Stop as usual: nothing else stops it."""
+        return self.stop(control_mode)
+
+    def has_run_command(self) -> Steps[bool | None]:
+        """Return false: there is none."""
+        yield from ()
+        return False
+
+    def release(self) -> Steps[None]:
+        """Write set-point 0."""
+        if (yield from self.in_control()):
+            yield from self._setpoint.zero(retry=True)
+
+    def remove(self, control_mode: str) -> Steps[Removal]:
+        """Remove the set-point while a fault is active; without one nothing turns."""
+        removed = yield from try_steps(self.zero_setpoint(control_mode))
+        return Removal.COMMAND if removed else Removal.NOTHING
+
+    def acknowledge(self, shown: StatusCode, control_mode: str) -> Steps[str]:
+        """
+        Acknowledge a fault, with set-point 0.
+
+        :raises NotPossible: the file has no reset, or the drive keeps its set-point.
+        """
+        self._require_reset()
+        if (yield from self.remove(control_mode)) is not Removal.COMMAND:
+            raise NotPossible(
+                'the drive keeps a set-point, and the motor would turn: reset it at its keypad'
+            )
         yield from _carry_out(self._drive.reset, holds=True)
         return ''
 
@@ -250,7 +327,7 @@ def profile_of(drive: Description) -> Profile:
         has_enable_input=bool(drive.enable_input) or 'enable_missing' in drive.facts,
         status_word=words_of(drive),
         holders=holders,
-        methods={METHOD: type('Control', (Declared,), members)},
+        methods={METHOD: type('Control', (BySetpoint if drive.run_by else Declared,), members)},
         setpoints={drive.setpoint.mode: target},
         releases='' if drive.stop_mode is None else drive.stop_mode[1],
         active_method=_active_method,

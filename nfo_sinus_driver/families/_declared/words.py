@@ -80,7 +80,7 @@ def words_of(drive: Description) -> Words:
         by_state={},
         code=functools.partial(_code, drive),
         by_frequency=Role.ACTUAL_FREQUENCY in drive.roles and 'stopping' not in drive.facts,
-        runs_by_turning=_runs_by_turning(drive),
+        runs_by_turning=drive.run_by == 'setpoint' or _runs_by_turning(drive),
         sizes=_sizes(drive),
         facts_of=facts,
         unless=drive.facts.get('local'),

@@ -28,10 +28,12 @@ WRITE_MULTIPLE_REGISTERS = 16
 WRITE_AND_READ_REGISTERS = 23
 
 #: The spaces of addresses beside that of registers, which are read by 03 and written by 06 and 16:
-#: those that are written by 16 alone, those that are read by 04, and coils, by 01 and 05.
+#: those that are written by 16 alone, those that are read by 04, and coils, by 01 and 05; and coils
+#: each of which is a command: what is written is the number of the one that is set.
 WRITTEN_BY_16 = 'register_16'
 INPUT = 'input'
 COIL = 'coil'
+PULSE = 'pulse'
 
 _EXCEPTION = 0x80
 _ON = 0xFF00
@@ -270,6 +272,8 @@ def write_of(unit: int, address: Address, data: bytes) -> Write:
     """Return the request that writes."""
     if address.space == COIL:
         return WriteCoil(unit, address.index, data)
+    if address.space == PULSE:
+        return WriteCoil(unit, int.from_bytes(data, 'big'), bytes((1,)))
     return Write(unit, address.index, data, multiple=address.space == WRITTEN_BY_16)
 
 

@@ -14,10 +14,12 @@ from nfo_sinus_driver.catalog.declared import (
     FAULT_KEY,
     STATUS_KEY,
     Description,
+    Place,
     Shown,
     drive_number,
+    place_of,
 )
-from nfo_sinus_driver.simulator._declared.orders import Orders, Place
+from nfo_sinus_driver.simulator._declared.orders import Orders
 from nfo_sinus_driver.simulator._declared.status import Wish, compose
 from nfo_sinus_driver.simulator.control_unit import ControlUnit, Variant, choice
 from nfo_sinus_driver.simulator.memory import Memory, Reason, Refused
@@ -77,6 +79,11 @@ class DeclaredControlUnit(ControlUnit):
         """Where commands are written."""
         return self._orders.places
 
+    @property
+    def pulses(self) -> set[int]:
+        """The coils that are commands by being set."""
+        return self._orders.pulses
+
     def take_word(self, place: Place, word: int) -> None:
         """Take a word, or a coil, that is a command."""
         if not self.obeys and self.variant.in_local != 'keeps':
@@ -92,9 +99,9 @@ class DeclaredControlUnit(ControlUnit):
         if way:
             self._reverse = way < 0
             # the word of the direction may be the run command, too
-            done |= {'run'} if orders.has_run(place) else set()
+            done |= {'run'} if orders.runs_by_direction(place) else set()
         turned_round = self._drive.simulated.reverse
-        if turned_round is not None and place == (turned_round[0], False):
+        if turned_round is not None and place == ('register', turned_round[0]):
             self._turned_round = bool(word & turned_round[1])
         removes = orders.removes_run(place, word)
         self._newest = {place} if done or removes else self._newest | {place}
@@ -144,10 +151,9 @@ class DeclaredControlUnit(ControlUnit):
         parameter = self._drive.parameters[key]
         role = self.memory.model.role_of.get(key)
         address = parameter.at('modbus')
-        if key.startswith('line.r') and address.codec.size == 2:
-            return self.word((address.index, False))
-        if key.startswith('line.coil_'):
-            return self.word((address.index, True))
+        is_register = key.startswith('line.r') and address.codec.size == 2
+        if is_register or key.startswith('line.coil_'):
+            return self.word(place_of(address))
         measured = self._measured(role)
         if measured is None:
             return None
@@ -250,12 +256,12 @@ class DeclaredControlUnit(ControlUnit):
 
     def _truths(self) -> dict[str, bool]:
         motor, fault = self.motor, bool(self.faults)
-        commanded = self._run or 'stopping' not in self._drive.facts
+        commanded = self._runs or 'stopping' not in self._drive.facts
         return {
             'fault': fault,
             'running': motor.driven and commanded,
-            'stopping': motor.driven and not self._run,
-            'quick_stop': motor.driven and self._quick and not self._run,
+            'stopping': motor.driven and not self._runs,
+            'quick_stop': motor.driven and self._quick and not self._runs,
             'ready': not fault and self.run_input,
             'reverse': motor.ramp < 0 or (motor.ramp == 0 and self._reverse and motor.driven),
             'at_setpoint': motor.driven and motor.reached,
@@ -273,12 +279,12 @@ class DeclaredControlUnit(ControlUnit):
         """Run the motor, ramp it to a stop, or let it go."""
         motor = self.motor
         if self.faults:
-            if self._run and self.variant.run_command_in_fault != 'keeps':
+            if self._runs and self.variant.run_command_in_fault != 'keeps':
                 self._drop_run()
             motor.release()
             return
         self._set_ramps()
-        if self._run and self.run_input and self.obeys:
+        if self._runs and self.run_input and self.obeys:
             motor.energise()
             motor.demand = self._demand
         elif motor.driven:
@@ -291,6 +297,15 @@ class DeclaredControlUnit(ControlUnit):
         """Take the run command away; one that is repeated is a new one then."""
         self._run = False
         self._newest.clear()
+        if self._drive.run_by:
+            self.memory.put(self._drive.setpoint.key, 0)
+
+    @property
+    def _runs(self) -> bool:
+        """The motor is commanded to run; by terminals, as long as their input is closed."""
+        if self._drive.run_by == 'setpoint':
+            return self.memory.number(self._drive.setpoint.key) != 0
+        return self._run or self._drive.run_by == 'terminals'
 
     @property
     def _braking(self) -> float:
@@ -313,13 +328,13 @@ class DeclaredControlUnit(ControlUnit):
         number, ramps, motor = self.memory.number, self._drive.simulated, self.motor
         motor.accel = max(_QUICKEST, number(ramps.accel) if ramps.accel else _RAMP)
         motor.retard = max(_QUICKEST, number(ramps.decel) if ramps.decel else _RAMP)
-        if self._quick and not self._run:
+        if self._quick and not self._runs:
             motor.retard = max(_QUICKEST, motor.retard * _QUICKER)
 
     @property
     def settled(self) -> bool:
         """Nothing is left to do: no ramp to a stop ends, and no time-out runs."""
-        return not self._time_out and (self._run or not self.motor.driven)
+        return not self._time_out and (self._runs or not self.motor.driven)
 
     def restart(self) -> None:
         """Forget commands and set-point, unless the file says that the drive keeps them."""
@@ -344,10 +359,10 @@ class DeclaredControlUnit(ControlUnit):
 
     def wait(self, dt: float) -> None:
         """Count how long the motor is braked, and the line is silent: too long, and it stops."""
-        brakes = self.motor.driven and self.motor.at_zero and not self._run
+        brakes = self.motor.driven and self.motor.at_zero and not self._runs
         self._braked_for = self._braked_for + dt if brakes else 0.0
         self._silent_for += dt
-        if self._time_out and self._silent_for > self._time_out and (self._run or self.faults):
+        if self._time_out and self._silent_for > self._time_out and (self._runs or self.faults):
             self._silent_for = 0.0
             self._drop_run()
             lost = [fault.code for fault in self._drive.faults.values() if fault.line]
@@ -378,7 +393,7 @@ class DeclaredControlUnit(ControlUnit):
     def report(self) -> dict[str, Any]:
         """Return what it shows."""
         return {
-            'run_command': self._run,
+            'run_command': self._runs,
             'obeys': self.obeys,
             'status_word': self.status_word,
             'fault_kind': (Kind.FAULT if self.faults else Kind.STATUS).value,

@@ -12,7 +12,8 @@ forward or reverse, differs from any other command there:
 - one that is a run word in them runs;
 - one that is another command, in the bits in which that differs from a run word, but for those of
   the direction, is that, and where it is one by more bits, not the one by fewer;
-- any other takes the run command away, and so do these.
+- any other takes the run command away, and so do these; one that gives the direction alone does
+  not.
 
 A word that is repeated changes nothing: a PLC writes cyclically. A reset counts from its first
 word.
@@ -24,10 +25,17 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from nfo_sinus_driver.catalog import to_words
-from nfo_sinus_driver.catalog.declared import Await, Condition, Description, SetBits, Step, Write
-
-#: The first register or coil of a key, and whether it is a coil.
-Place = tuple[int, bool]
+from nfo_sinus_driver.catalog.declared import (
+    PULSES,
+    Await,
+    Condition,
+    Description,
+    Place,
+    SetBits,
+    Step,
+    Write,
+    place_of,
+)
 
 _RUN, _RESET = 'run', 'reset'
 _WHOLE = 0xFFFF
@@ -92,6 +100,7 @@ class Orders:
     The commands of one drive.
 
     :ivar places: where their words go.
+    :ivar pulses: the coils that are commands by being set.
     """
 
     def __init__(self, drive: Description) -> None:
@@ -104,19 +113,23 @@ class Orders:
             words, shown = rows[_RESET]
             rows[_RESET] = words[:1], shown
         self._directions = _directions(drive)
+        direction = drive.setpoint.direction
+        self._alone = direction is not None and direction.alone
         run, _ = rows.get(_RUN, ((), {}))
         place = run[-1].place if run else None
+        running = () if self._alone else self._directions
         #: What runs the motor by itself, once what comes before it was written.
-        self._runs = [*run[-1:], *(way for way in self._directions if way.place == place)]
+        self._runs = [*run[-1:], *(way for way in running if way.place == place)]
         others = [word for name, (words, _) in rows.items() if name != _RUN for word in words]
         others += run[:-1]
         counts = _union(word.differs(others) for word in self._runs)
         counts |= _union(word.differs(self._runs) for word in self._runs)
         self._runs = [word.by(counts) for word in self._runs]
-        self._directions = tuple(
-            way.by(counts if way.place == place else way.differs(self._directions))
-            for way in self._directions
-        )
+        if not self._alone:
+            self._directions = tuple(
+                way.by(counts if way.place == place else way.differs(self._directions))
+                for way in self._directions
+            )
         self._orders = {
             name: _Order(
                 tuple(
@@ -128,8 +141,9 @@ class Orders:
             )
             for name, (words, shown) in rows.items()
         }
-        self.places = {word.place for words, _ in rows.values() for word in words}
-        self.places |= {way.place for way in self._directions}
+        listed = [*self._directions, *(word for words, _ in rows.values() for word in words)]
+        self.places = {word.place for word in listed}
+        self.pulses = {word.value for word in listed if word.place == PULSES}
 
     def _bits_of(self, word: _Word) -> int:
         """Return the bits by which a word is no run command, whichever way the motor turns."""
@@ -153,7 +167,8 @@ class Orders:
 
     def removes_run(self, place: Place, word: int) -> bool:
         """Return whether a word takes the run command away, whatever it is besides."""
-        return self.has_run(place) and not any(run.fits(place, word) for run in self._runs)
+        stays = (*self._runs, *self._directions) if self._alone else self._runs
+        return self.has_run(place) and not any(known.fits(place, word) for known in stays)
 
     def direction_of(self, place: Place, word: int) -> int:
         """Return which way a word commands: 1 forward, -1 reverse, 0 neither."""
@@ -161,6 +176,10 @@ class Orders:
             if direction.fits(place, word):
                 return way
         return 0
+
+    def runs_by_direction(self, place: Place) -> bool:
+        """Return whether the word of the direction that goes to a place runs the motor, too."""
+        return self.has_run(place) and not self._alone
 
     def has_run(self, place: Place) -> bool:
         """Return whether the run command is in the words that go to a place."""
@@ -180,13 +199,13 @@ def _row(
     """Return the words of a command, and what is waited for before which of them."""
     row: list[_Word] = []
     shown: dict[int, Condition] = {}
-    setpoint = drive.parameters[drive.setpoint.key].at('modbus').index
+    setpoint = place_of(drive.parameters[drive.setpoint.key].at('modbus'))
     for step in steps:
         if isinstance(step, Write):
-            row += (word for word in _words(drive, step) if word.place != (setpoint, False))
+            row += (word for word in _words(drive, step) if word.place != setpoint)
         elif isinstance(step, SetBits):
-            index = drive.parameters[step.key].at('modbus').index
-            row.append(_Word((index, False), step.set, step.set | step.clear, given=True))
+            place = place_of(drive.parameters[step.key].at('modbus'))
+            row.append(_Word(place, step.set, step.set | step.clear, given=True))
         elif isinstance(step, Await):
             shown[len(row)] = step.condition
     return tuple(row), shown
@@ -198,11 +217,13 @@ def _words(drive: Description, step: Write) -> Iterator[_Word]:
     address = parameter.at('modbus')
     if parameter.is_setting:
         return
-    if address.space == 'coil':
-        yield _Word((address.index, True), int(step.value))
+    kind, first = place_of(address)
+    if kind != 'register':
+        # a coil has one bit, and of a pulse the number is the command
+        yield _Word((kind, first), int(step.value), given=kind == 'pulse')
         return
-    for index, word in enumerate(to_words(parameter.encode(step.value)), address.index):
-        yield _Word((index, False), word)
+    for index, word in enumerate(to_words(parameter.encode(step.value)), first):
+        yield _Word((kind, index), word)
 
 
 def _directions(drive: Description) -> tuple[_Word, ...]:
@@ -210,9 +231,9 @@ def _directions(drive: Description) -> tuple[_Word, ...]:
     direction = drive.setpoint.direction
     if direction is None:
         return ()
-    address = drive.parameters[direction.key].at('modbus')
-    place = address.index, address.space == 'coil'
-    return _Word(place, direction.forward), _Word(place, direction.reverse)
+    place = place_of(drive.parameters[direction.key].at('modbus'))
+    ways = direction.forward, direction.reverse
+    return tuple(_Word(place, way, given=place == PULSES) for way in ways)
 
 
 def _union(masks: Iterable[int]) -> int:

@@ -9,7 +9,15 @@ from collections.abc import Mapping, Sequence
 import struct
 
 from nfo_sinus_driver.catalog import Access, Parameter, to_bytes, to_words
-from nfo_sinus_driver.catalog.declared import STATUS_KEY, Copied, Description, Shown
+from nfo_sinus_driver.catalog.declared import (
+    PULSE_KEY,
+    PULSES,
+    STATUS_KEY,
+    Copied,
+    Description,
+    Shown,
+    place_of,
+)
 from nfo_sinus_driver.simulator import modbus
 from nfo_sinus_driver.simulator._declared.control_unit import DeclaredControlUnit
 from nfo_sinus_driver.simulator.drive import SimulatedDrive
@@ -35,24 +43,24 @@ class Server(modbus.Requests):
         self._unit = drive.control_unit
         self._file = file
         self._commands = self._unit.command_places
-        self._at = dict(self._places(file, coils=False))
-        self._coils = dict(self._places(file, coils=True))
+        self._at = self._places(file, 'register', 'input')
+        self._coils = self._places(file, 'coil')
         if file.simulated.loopback:
             self.functions |= {modbus.DIAGNOSTICS}
         # what the file does not write by is refused
         self.functions -= {modbus.WRITE_SINGLE, modbus.WRITE_MULTIPLE} - set(file.line.write)
 
     @staticmethod
-    def _places(file: Description, *, coils: bool) -> Mapping[int, tuple[Parameter, int]]:
+    def _places(file: Description, *kinds: str) -> Mapping[int, tuple[Parameter, int]]:
         """Return by its number which parameter a register or coil is of, and which part of it."""
         found: dict[int, tuple[Parameter, int]] = {}
         for key, parameter in file.parameters.items():
-            address = parameter.at('modbus')
-            if (address.space == 'coil') is not coils or key == STATUS_KEY:
+            kind, first = place_of(parameter.at('modbus'))
+            if kind not in kinds or key == STATUS_KEY:
                 continue
-            for number in range(1 if coils else address.codec.size // 2):
+            for number in range(max(parameter.at('modbus').codec.size // 2, 1)):
                 # a setting rather than the command that writes the same register
-                found.setdefault(address.index + number, (parameter, number))
+                found.setdefault(first + number, (parameter, number))
         return found
 
     # ---- registers ----
@@ -92,8 +100,8 @@ class Server(modbus.Requests):
     def _write_at(self, register: int, words: Sequence[int]) -> int:
         parameter, part = self._at.get(register, (None, 0))
         is_setting = parameter is not None and not parameter.key.startswith('line.r')
-        if (register, False) in self._commands and not is_setting:
-            self._unit.take_word((register, False), words[0])
+        if ('register', register) in self._commands and not is_setting:
+            self._unit.take_word(('register', register), words[0])
             self.drive.command_writes[f'line.r{register:04x}'] += 1
             self._unit.settle()
             return 1
@@ -134,8 +142,10 @@ class Server(modbus.Requests):
         status = self._file.status
         if status.coils and coil in status.registers:
             return self._unit.status_word >> status.shift(coil) & 1
-        if (coil, True) in self._commands:
-            return self._unit.word((coil, True)) & 1
+        if ('coil', coil) in self._commands:
+            return self._unit.word(('coil', coil)) & 1
+        if coil in self._unit.pulses:
+            return 0
         if coil not in self._coils:
             raise Refused(Reason.ADDRESS, f'there is no coil {coil}')
         return self.drive.read_raw(self._coils[coil][0].key) & 1
@@ -144,8 +154,14 @@ class Server(modbus.Requests):
         coil, value = struct.unpack('>HH', data)
         if value not in (0, _ON):
             raise Refused(Reason.VALUE, f'a coil is not written with {value:04X}h')
-        if (coil, True) in self._commands:
-            self._unit.take_word((coil, True), int(value == _ON))
+        if coil in self._unit.pulses:
+            # setting it is the command, and clearing it is none
+            if value == _ON:
+                self._unit.take_word(PULSES, coil)
+                self.drive.command_writes[PULSE_KEY] += 1
+                self._unit.settle()
+        elif ('coil', coil) in self._commands:
+            self._unit.take_word(('coil', coil), int(value == _ON))
             self.drive.command_writes[f'line.coil_{coil}'] += 1
             self._unit.settle()
         elif coil in self._coils:

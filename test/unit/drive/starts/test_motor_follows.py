@@ -122,7 +122,10 @@ def test_a_motor_that_ramps_to_other_set_points_does_not_stop_by_itself(connecti
 # --- after a set-point time-out -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('connection', FOLLOWING)
+# nothing but its set-point stops that one
+@pytest.mark.parametrize(
+    'connection', [name for name in FOLLOWING if name != 'described, by set-point']
+)
 def test_a_motor_that_does_not_slow_down_after_a_time_out_is_stopped(connection: str) -> None:
     with Rig(connection, setpoint_timeout=2.5) as rig:
         rig.turn()

@@ -40,7 +40,11 @@ _NO_OTHER_WAY = {
     'described': 'line.r2000',
     'described, by states': 'line.r0000',
     'described, no holder': 'line.rfa00',
+    'described, by pulses': 'line.pulse',
+    'described, by set-point': 'line.setpoint',
 }
+#: There set-point 0 is the stop.
+_BY_SETPOINT = 'described, by set-point'
 
 
 def steps_of(connection: str, stop: str) -> set[tuple[str, bool]]:
@@ -69,7 +73,7 @@ def goes_wrong(connection: str, stop: str, step: tuple[str, bool], how: str) -> 
             rig.pass_time(0.5)
         follows = rig.drive.settings.follows_setpoints
         wrong = []
-        if rig.turns and (follows or not held or how == 'drop'):
+        if rig.turns and connection != _BY_SETPOINT and (follows or not held or how == 'drop'):
             wrong.append(f'turns at {rig.far.motor.demand:g} Hz')
         if held and how != 'drop':
             if not rig.drive.stop_unconfirmed or not rig.notes.said(Cause.CANNOT_STOP):

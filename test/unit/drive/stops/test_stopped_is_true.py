@@ -234,9 +234,11 @@ _COMMANDS = {
     'described': 'line.r2000',
     'described, by states': 'line.r0000',
     'described, no holder': 'line.rfa00',
+    'described, by pulses': 'line.pulse',
 }
-#: The terminals run the motor there, and nothing of the line does.
-_RUN_COMMANDS = [name for name in CONNECTIONS if name != 'movitrac, by terminals']
+#: The terminals run the motor there, or the set-point, and no command of the line does.
+_WITHOUT = ('movitrac, by terminals', 'described, by set-point')
+_RUN_COMMANDS = [name for name in CONNECTIONS if name not in _WITHOUT]
 
 
 def command_of(connection: str) -> str:
@@ -506,7 +508,8 @@ def test_the_answer_to_a_stop_that_is_not_done_is_the_last_word_on_it(
 #: No manual says of their commands that they can be read, and their status shows the same of a ramp
 #: to set-point 0 as of one to a stop.
 _UNREAD = (
-    'classic v5.0', 'canopen, no DriveStatus', 'described, by states', 'described, no holder'
+    'classic v5.0', 'canopen, no DriveStatus', 'described, by states', 'described, no holder',
+    'described, by pulses',
 )
 _ANSWERED = {
     'stop': lambda drive: drive.stop(),

@@ -1,0 +1,237 @@
+# Copyright 2026 The nfo_sinus_driver authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Ways of being commanded beside a run word: pulses, two words, the set-point, terminals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.described import DescribedRig
+from support.oddities import ODD, PLAIN, described
+
+from nfo_sinus_driver.catalog.declared import DescriptionError
+from nfo_sinus_driver.drive import Cause, DriveError, StopReason
+
+SETPOINT = 'line.setpoint'
+BY_SETPOINT = ('a set-point that is the command', 'terminals that start')
+
+
+def way(tmp_path: Path, name: str, **more: Any) -> DescribedRig:
+    """Return the rig of a drive that is commanded in one of these ways."""
+    rig = DescribedRig(described(tmp_path, **ODD[name]), **more)
+    rig.connect(parameters=True)
+    return rig
+
+
+def test_each_pulse_sets_one_coil_and_a_stop_is_one_of_its_own(tmp_path: Path) -> None:
+    with way(tmp_path, 'pulses of coils') as rig:
+        rig.enable()
+        rig.follow(20.0)
+        rig.follow(-20.0)
+        # 73 forward and 74 reverse run; before them the stop, and none of them twice
+        assert rig.written('line.pulse') [-3:] == [75, 73, 74]
+        rig.answer(rig.drive.stop())
+        assert rig.written('line.pulse')[-1] == 75
+        rig.wait_until(lambda: not rig.far.motor.driven, 10.0)
+        rig.send(20.0)
+        rig.pass_time(3.0)
+        assert not rig.turns and rig.written('line.pulse')[-1] == 75
+
+
+def test_a_direction_of_its_own_is_written_before_the_run_and_does_not_run(tmp_path: Path) -> None:
+    with way(tmp_path, 'two words to one register') as rig:
+        rig.enable()
+        assert rig.written('line.r000a')[-2:] == [0x80, 8]
+        rig.follow(20.0)
+        rig.follow(-20.0)
+        assert rig.written('line.r000a')[-1] == 0x40
+        rig.answer(rig.drive.stop())
+        rig.wait_until(lambda: not rig.far.motor.driven, 10.0)
+        assert rig.written('line.r000a')[-1] == 4
+        # and the next start runs forward again
+        rig.enable()
+        assert rig.written('line.r000a')[-2:] == [0x80, 8]
+        rig.follow(20.0)
+        assert rig.far.motor.frequency > 0
+
+
+@pytest.mark.parametrize('name', BY_SETPOINT)
+def test_nothing_but_set_points_commands_it(tmp_path: Path, name: str) -> None:
+    with way(tmp_path, name) as rig:
+        rig.enable()
+        rig.pass_time(2.0)
+        assert not rig.turns and set(rig.written(SETPOINT)) == {0}
+        rig.follow(20.0)
+        rig.follow(-15.0)
+        for stop in (rig.drive.stop, rig.drive.quick_stop):
+            rig.answer(stop())
+            assert rig.written(SETPOINT)[-1] == 0
+            rig.wait_until(lambda: not rig.turns and rig.far.motor.at_zero, 10.0)
+            assert not rig.drive.stop_unconfirmed
+            rig.assert_only_enable_helps(20.0)
+        assert not rig.written('line.r000a')
+
+
+@pytest.mark.parametrize('name', BY_SETPOINT)
+def test_a_set_point_that_is_left_turns_nothing(tmp_path: Path, name: str) -> None:
+    with way(tmp_path, name) as rig:
+        rig.enable()
+        rig.follow(20.0)
+        rig.kill()
+        rig.begin()
+        rig.connect()
+        rig.wait_until(lambda: not rig.turns, 3.0)
+        rig.assert_only_enable_helps(20.0)
+        rig.lose_the_line()
+        rig.assert_only_enable_helps(20.0)
+        # another master gives one, to a drive that nothing of this driver runs
+        rig.answer(rig.drive.stop())
+        rig.wait_until(lambda: rig.far.motor.at_zero, 10.0)
+        rig.send(None)
+        rig.pass_time(1.0)
+        rig.far.memory.set(SETPOINT, 20.0)
+        rig.far.control_unit.settle()
+        rig.wait_until(lambda: rig.turns, 1.0)
+        rig.wait_until(lambda: not rig.turns, 3.0)
+
+
+@pytest.mark.parametrize('name', BY_SETPOINT)
+def test_no_set_point_outlives_a_fault(tmp_path: Path, name: str) -> None:
+    with way(tmp_path, name) as rig:
+        rig.enable()
+        rig.follow(20.0)
+        rig.far.trip(1)
+        rig.pass_time(1.0)
+        assert rig.far.peek(SETPOINT) == 0
+        rig.far.faults.acknowledge()
+        rig.pass_time(2.0)
+        assert not rig.turns and not rig.drive.following
+        rig.assert_only_enable_helps(20.0)
+
+
+def test_a_stop_that_is_refused_is_repeated_until_the_set_point_is_0(tmp_path: Path) -> None:
+    with way(tmp_path, BY_SETPOINT[0]) as rig:
+        rig.enable()
+        rig.follow(20.0)
+        rig.spoil('refused', SETPOINT, 5)
+        rig.drive.stop()
+        rig.wait_until(lambda: not rig.turns, 5.0)
+        assert rig.far.peek(SETPOINT) == 0
+
+
+def test_terminals_have_to_start_it_first(tmp_path: Path) -> None:
+    with way(tmp_path, 'terminals that start') as rig:
+        rig.far.control_unit.run_input = False
+        rig.far.control_unit.settle()
+        rig.pass_time(1.0)
+        with pytest.raises(DriveError, match='close the start terminal, then enable'):
+            rig.result(rig.drive.enable())
+        assert set(rig.written(SETPOINT)) <= {0}
+        rig.far.control_unit.run_input = True
+        rig.far.control_unit.settle()
+        rig.pass_time(1.0)
+        assert not rig.turns and rig.far.motor.driven
+        rig.enable()
+        rig.follow(20.0)
+
+
+def test_terminals_that_open_end_the_run_and_closing_them_does_not_begin_one(
+    tmp_path: Path,
+) -> None:
+    with way(tmp_path, 'terminals that start') as rig:
+        rig.enable()
+        rig.follow(20.0)
+        rig.far.control_unit.run_input = False
+        rig.far.control_unit.settle()
+        rig.send(20.0)
+        rig.wait_until(lambda: not rig.drive.following, 3.0)
+        rig.pass_time(1.0)
+        assert rig.far.peek(SETPOINT) == 0
+        assert rig.drive.snapshot.stop_reason is not StopReason.NONE
+        assert rig.notes.said(Cause.STOPPED_BECAUSE)
+        rig.far.control_unit.run_input = True
+        rig.far.control_unit.settle()
+        rig.assert_only_enable_helps(20.0)
+
+
+def test_a_frequency_that_stays_with_set_point_0_is_no_stop(tmp_path: Path) -> None:
+    # a least frequency of the drive itself
+    with way(tmp_path, 'terminals that start') as rig:
+        rig.enable()
+        rig.follow(20.0)
+        kept = rig.far.control_unit
+        kind = type(kept)
+        demand = kind._demand.fget
+        try:
+            kind._demand = property(lambda unit: max(demand(unit), 5.0))
+            rig.drive.stop()
+            rig.pass_time(15.0)
+            assert rig.far.motor.frequency == pytest.approx(5.0)
+            assert rig.drive.stop_unconfirmed
+        finally:
+            kind._demand = property(demand)
+
+
+@pytest.mark.parametrize(
+    ('more', 'said'),
+    [
+        ({'run': [{'register': 10, 'value': 1}]}, 'run cannot stand beside run_by'),
+        ({'stop': [{'register': 10, 'value': 0}]}, 'stop cannot stand beside run_by'),
+        ({'requires': [{'parameter': 'ramp.accel', 'value': 5, 'write': True}]}, 'write: true'),
+    ],
+)
+def test_a_run_command_beside_run_by_is_refused(
+    tmp_path: Path, more: dict[str, Any], said: str
+) -> None:
+    control = {'run_by': 'setpoint', **more}
+    with pytest.raises(DescriptionError, match=said):
+        DescribedRig(described(tmp_path, control=control))
+
+
+def test_a_motor_that_terminals_run_has_to_be_seen_to_stand(tmp_path: Path) -> None:
+    control = {'run_by': 'terminals'}
+    for more in ({'measured': {}}, {'status': {**PLAIN['status'], 'stopping': {'bit': 4}}}):
+        with pytest.raises(DescriptionError, match='needs measured actual_frequency'):
+            DescribedRig(described(tmp_path, control=control, **more))
+
+
+@pytest.mark.parametrize(
+    ('setpoint', 'said'),
+    [
+        ({'direction': {'register': 10, 'forward': 1, 'reverse': 2, 'alone': True}}, 'alone says'),
+        ({'direction': {'register': 12, 'forward': 1, 'reverse': 2, 'alone': True}}, 'alone says'),
+        ({'direction': {'pulse': True, 'forward': 1, 'reverse': 1}}, 'have to differ'),
+        ({'direction': {'pulse': True, 'coil': 2, 'forward': 0, 'reverse': 1}}, 'one of both'),
+    ],
+)
+def test_a_direction_that_is_none_is_refused(
+    tmp_path: Path, setpoint: dict[str, Any], said: str
+) -> None:
+    plain = {key: value for key, value in PLAIN['setpoint'].items() if key != 'signed'}
+    with pytest.raises(DescriptionError, match=said):
+        DescribedRig(described(tmp_path, setpoint={**plain, **setpoint}))
+
+
+@pytest.mark.parametrize(
+    ('control', 'said'),
+    [
+        ({'run': [{'pulse': 73}], 'stop': [{'pulse': 73}]}, 'leaves the run command'),
+        ({'run': [{'pulse': 73}], 'stop': [{'register': 10, 'value': 0}]}, 'leaves the run'),
+        (
+            {'prepare': [{'pulse': 73}], 'run': [{'pulse': 73}], 'stop': [{'pulse': 75}]},
+            'prepare gives the run command',
+        ),
+        (
+            {'run': [{'pulse': 3}], 'stop': [{'pulse': 1}], 'reset': [{'coil': 3, 'on': True}]},
+            'in the same coil',
+        ),
+    ],
+)
+def test_pulses_are_checked_as_words_are(
+    tmp_path: Path, control: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(DescriptionError, match=said):
+        DescribedRig(described(tmp_path, control=control))
