@@ -246,7 +246,7 @@ class BySetpoint(Declared):
         self._require_reset()
         if (yield from self.remove(control_mode)) is not Removal.COMMAND:
             raise NotPossible(
-                'the drive keeps a set-point, and the motor would turn: reset it at its keypad'
+                'the drive refuses set-point 0, and would turn the motor: reset it at its keypad'
             )
         yield from _carry_out(self._drive.reset, holds=True)
         return ''
