@@ -56,6 +56,8 @@ _ADAPTER_RATE = 115_200
 _EVERYWHERE = ((0x1000, 0), (0x1001, 0), (0x1018, 0), (0x1018, 1))
 #: The name of a network interface, which no path of a device has.
 _INTERFACE = re.compile(r'[^/:\s]+')
+#: An adapter as python-can names it, by its maker's library: see docs/architecture.md.
+_BY_LIBRARY = re.compile(r'(pcan|kvaser|ixxat|vector):')
 #: Bits of a frame with eight bytes, at least.
 _FRAME_BITS = 108
 #: The longest value that comes in one answer, bytes.
@@ -168,6 +170,12 @@ def can_port_of(port: str, settings: LineSettings, trace: str = '') -> CanPort:
         wanted = tuple((identifier, FUNCTION_CODE) for identifier in identifiers)
         can: CanPort = SocketCan(port, wanted)
         return TracedCan(can, Trace(trace)) if trace else can
+    if _BY_LIBRARY.match(port):
+        raise ValueError(
+            f'port {port!r} names an adapter by the library of its maker: Linux has drivers for '
+            'them that make CAN interfaces. ip -br link show type can lists these: write such as '
+            'can0'
+        )
     of_adapter = replace(settings, baud_rate=_ADAPTER_RATE, char_format='8N1')
     return LawicelPort(port_of(port, of_adapter, trace), settings.baud_rate)
 

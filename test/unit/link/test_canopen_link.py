@@ -268,3 +268,9 @@ def test_a_client_that_writes_sends_ten_heartbeats_a_second() -> None:
 def test_what_is_no_port(port: str) -> None:
     with pytest.raises(ValueError, match='port'):
         CanopenLink.on_port(port, LineSettings(125_000, '8N1'))
+
+
+@pytest.mark.parametrize('port', ['pcan:PCAN_USBBUS1', 'kvaser:0', 'ixxat:0', 'vector:0'])
+def test_an_adapter_by_the_library_of_its_maker_is_refused_with_what_to_write(port: str) -> None:
+    with pytest.raises(ValueError, match='write such as can0'):
+        CanopenLink.on_port(port, LineSettings(125_000, '8N1'))
