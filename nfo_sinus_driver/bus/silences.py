@@ -47,16 +47,14 @@ class _Unit:
 
     :ivar frame_at: when its last valid frame came.
     :ivar asked_at: when it was last sent anything.
-    :ivar silent_since: since when it does not answer; infinite while it does.
-    :ivar gone_since: the same, when the first answer had failed to come, with the time in which the
-        worker did not run: a drive can be exchanged in it.
+    :ivar gone_since: when the first answer had failed to come since it does not answer, with the
+        time in which the worker did not run: a drive can be exchanged in it.
     :ivar there_since: when a silence of it ended that was long enough for a swap.
     :ivar longest: the longest time from one valid frame to the next.
     """
 
     frame_at: float = -math.inf
     asked_at: float = -math.inf
-    silent_since: float = math.inf
     gone_since: float = math.inf
     there_since: float = -math.inf
     longest: float = 0.0
@@ -72,16 +70,11 @@ class _Unit:
         if self.frame_at > -math.inf:
             self.longest = max(self.longest, now - self.frame_at)
         self.frame_at = now
-        self.silent_since = self.gone_since = math.inf
+        self.gone_since = math.inf
 
-    def not_answered(self, failed_at: float, now: float) -> None:
-        """Note that a request was in vain, and when its answer had failed to come."""
-        if self.silent_since == math.inf:
-            self.silent_since, self.gone_since = failed_at, now
-
-    def paused(self, seconds: float) -> None:
-        """Note that nothing was sent for so long."""
-        self.silent_since += seconds
+    def not_answered(self, now: float) -> None:
+        """Note that a request was in vain."""
+        self.gone_since = min(self.gone_since, now)
 
     def take_longest(self) -> float:
         """Return the longest time from one valid frame to the next since the last call."""
@@ -116,6 +109,8 @@ class Silences:
     def __init__(self) -> None:
         #: Of each that was ever asked; other threads look here, too, and add none.
         self._units: dict[int, _Unit] = {}
+        #: The units that do not answer, and since when.
+        self._silent: dict[int, float] = {}
         #: After which silence the drive at a unit is lost, s: all units that have a drive.
         self._lost_after: dict[int, float] = {}
         #: The units asked in vain since the last valid frame, and since when one of them was.
@@ -173,17 +168,19 @@ class Silences:
                 # it was the line: the others may be back with this one, and have to be stopped
                 self._back_at = now
             its.answered(now)
+            self._silent.pop(unit, None)
             self._any_frame_at = now
             self._in_vain.clear()
             self._in_vain_since = math.inf
         elif self.is_missing(unit, now):
             self._pause_ends = now + (silence + seconds) * (1 / _MISSING_SHARE - 1)
-        if is_stop and its.silent_since < math.inf:
+        if is_stop and unit in self._silent:
             self._stops_from = now + (silence + seconds) * (1 / _STOPS_IN_NOISE - 1)
         if error is not None and not isinstance(error, (PortError, Refused)):
             # by then a drive has answered
             failed_at = now - max(seconds - _ANSWERED_WITHIN, 0.0)
-            its.not_answered(failed_at, now)
+            its.not_answered(now)
+            self._silent.setdefault(unit, failed_at)
             self._in_vain.add(unit)
             self._longest_in_vain = max(seconds, self._longest_in_vain)
             self._in_vain_since = min(self._in_vain_since, failed_at)
@@ -202,8 +199,8 @@ class Silences:
 
     def paused(self, seconds: float) -> None:
         """Note that nothing was sent for so long, s, for the worker did not run."""
-        for its in self._units.values():
-            its.paused(seconds)
+        for unit in self._silent:
+            self._silent[unit] += seconds
         self._in_vain_since += seconds
 
     def _of(self, unit: int) -> _Unit:
@@ -231,7 +228,7 @@ class Silences:
 
     def is_silent(self, unit: int) -> bool:
         """Return whether a unit has not answered the last request to it."""
-        return self._of(unit).silent_since < math.inf
+        return unit in self._silent
 
     def silent_since(self, unit: int, *, is_watched: bool) -> float:
         """
@@ -239,7 +236,7 @@ class Silences:
 
         :param is_watched: it would have been asked all the time, were there time for it.
         """
-        since = self._of(unit).silent_since
+        since = self._silent.get(unit, math.inf)
         return min(since, self._in_vain_since) if is_watched and self.is_line_silent else since
 
     @property
@@ -269,7 +266,7 @@ class Silences:
     @property
     def any_silent(self) -> bool:
         """A unit has not answered the last request to it."""
-        return any(its.silent_since < math.inf for its in self._units.values())
+        return bool(self._silent)
 
     def asked_at(self, unit: int | None = None) -> float:
         """Return when a unit, or any, was last sent anything."""
@@ -287,7 +284,7 @@ class Silences:
 
     def lasts(self, unit: int, now: float) -> float:
         """Return for how long a unit has been silent; 0 if it answers."""
-        since = self._of(unit).silent_since
+        since = self._silent.get(unit, math.inf)
         return now - since if since < math.inf else 0.0
 
     def is_missing(self, unit: int, now: float) -> bool:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 import math
+import operator
 from typing import NamedTuple
 
 __all__ = ['Pauses']
@@ -193,21 +194,25 @@ class _Unit:
     probe_at: int = _MANY
     #: What kinds of requests it has ever answered.
     known: set[type[object]] = field(default_factory=set)
+    #: The pauses in force: after its own answer to a read, and to a write; after any answer. They
+    #: are asked for before each request, and hardly ever change: each is worked out then, once.
+    after_own: tuple[float, float] = (0.0, 0.0)
+    after_any: float = 0.0
+
+    def take_pauses(self) -> None:
+        """Work out which pauses are in force, behind what may have changed them."""
+        own = {kind: learner.pause(own=True) for kind, learner in self.learners.items()}
+        after_read = max(pause for (wrote, _), pause in own.items() if not wrote)
+        self.after_own = after_read, max(own.values())
+        self.after_any = max(learner.pause(own=False) for learner in self.learners.values())
 
     def rests_until(self) -> float:
         """Return until when it is asked nothing, s."""
-        pauses = (
-            learner.pause(own=True)
-            for (wrote, _), learner in self.learners.items()
-            if self.wrote or not wrote
-        )
-        return self.answered_at + max(self.gap, *pauses)
+        return self.answered_at + max(self.gap, self.after_own[self.wrote])
 
     def learnt(self) -> float:
         """Return how long after any answer it is asked nothing, s."""
-        if self.in_vain == self.probe_at:
-            return _LONGEST
-        return max(learner.pause(own=False) for learner in self.learners.values())
+        return _LONGEST if self.in_vain == self.probe_at else self.after_any
 
     def kept(self, *, own: bool) -> float:
         """Return the longest pause of a kind that is known to help, s."""
@@ -220,6 +225,9 @@ class _Unit:
         self.lost.clear()
         for learner in self.learners.values():
             learner.in_vain = False
+
+
+_GAP = operator.attrgetter('gap')
 
 
 class Pauses:
@@ -260,7 +268,7 @@ class Pauses:
 
     def silence(self, unit: int) -> float:
         """Return how long the line is silent before a request to a unit, s; 0: as usual."""
-        return max(self._least, *(record.gap for record in self._heard_by(unit)))
+        return max(self._least, self._most(_GAP, unit))
 
     def kept_silent(self, unit: int) -> float:
         """Return how long a request to a unit keeps the line silent before it, s; 0: as usual."""
@@ -275,7 +283,7 @@ class Pauses:
 
     def rests_until(self, unit: int) -> float:
         """Return until when a unit is asked nothing, while others may be."""
-        return max(record.rests_until() for record in self._heard_by(unit))
+        return self._most(_Unit.rests_until, unit)
 
     def ready_at(self, unit: int) -> float:
         """Return when a request to a unit may be sent."""
@@ -312,9 +320,13 @@ class Pauses:
             usual = max(other.kept(own=own) for other in units for own in (True, False))
             for learner, request in lost:
                 learner.count_loss(request, usual)
+            record.take_pauses()
         if record.sent is not None and not lost:
             learner, request = record.sent
-            if learner.count_answer(request):
+            stage, helps = learner.stage, learner.count_answer(request)
+            if learner.stage != stage:
+                record.take_pauses()
+            if helps:
                 self._tell(_learnt(unit, _STAGES[learner.kept]))
         record.sent = None
 
@@ -344,12 +356,13 @@ class Pauses:
         return self._units[unit]
 
     def _learnt(self, unit: int) -> float:
-        return max(record.learnt() for record in self._heard_by(unit))
+        return self._most(_Unit.learnt, unit)
 
-    def _heard_by(self, unit: int) -> Iterable[_Unit]:
+    def _most(self, what: Callable[[_Unit], float], unit: int) -> float:
+        """Return something of a unit; for a broadcast the greatest of all units."""
         if unit == self._broadcast and self._units:
-            return self._units.values()
-        return (self._of(unit),)
+            return max(map(what, self._units.values()))
+        return what(self._of(unit))
 
 
 def _learnt(unit: int, stage: _Stage) -> str:

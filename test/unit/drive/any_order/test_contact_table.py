@@ -76,7 +76,7 @@ class World:
         its = self.silences._of(_UNIT)
         ages = (
             self.away_since, self.due_at, contact['_stop_due_at'], line['_any_frame_at'],
-            its.silent_since, its.gone_since, its.asked_at,
+            line['_silent'].get(_UNIT, math.inf), its.gone_since, its.asked_at,
         )
         there_since = max(line['_line_since'], its.there_since)
         return (
