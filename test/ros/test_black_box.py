@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+import sys
 import time
 
 from bench import Bench, wait_until
@@ -63,6 +64,21 @@ def test_a_stop_that_was_asked_for_leaves_none(bench: Bench) -> None:
     wait_until(lambda: not simulator.state()['driven'], 'it has stopped')
     time.sleep(3.0)
     assert not bags_of(bench)
+
+
+def test_without_a_library_for_bags_it_is_off_and_says_so_once(bench: Bench) -> None:
+    simulator = bench.simulator(*bench.drives.ramps(1))
+    through = sys.executable, str(Path(__file__).with_name('driver_without_bags.py'))
+    driver = bench.driver(*_ON, through=through)
+    client = bench.client().connected()
+    with client.run_at(20.0):
+        simulator.inject('fault', bench.drives.overload.code)
+        wait_until(lambda: not simulator.state()['driven'], 'it has stopped')
+    assert client.call('fault_ack').success
+    off = 'the black box is off: neither rosbag2_py nor rosbags is installed (apt install ros-'
+    assert driver.text.count(off) == 1
+    time.sleep(2.0)
+    assert not bags_of(bench) and 'cannot write' not in driver.text
 
 
 def test_a_folder_that_cannot_be_written_is_one_warning(bench: Bench) -> None:
