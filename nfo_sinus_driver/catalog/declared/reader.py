@@ -98,6 +98,9 @@ class _Reader:
         running = [condition for name, condition in self._conditions.items() if name == 'running']
         of_flags = (condition for condition, _ in flags)
         conditions = [*running, *self._conditions.values(), *of_flags, *steps.awaited()]
+        moving = self._moving
+        # of two places one is read before and after the other, and has to stand still meanwhile
+        conditions.sort(key=lambda condition: condition.register in moving)
         status = self._map.status(conditions, root['status'].get('block'))
         facts = {name: condition.in_place(status) for name, condition in self._conditions.items()}
         self._require_apart(facts)
@@ -174,6 +177,12 @@ class _Reader:
             )
 
     # --- status ---
+
+    @property
+    def _moving(self) -> set[int]:
+        """The registers of measured values."""
+        measured = self._root.get('measured').mapping.values()
+        return {self._map.register(node['register']) for node in measured if 'register' in node}
 
     def _facts(self) -> Iterator[tuple[str, PlacedCondition]]:
         for name, node in self._root['status'].mapping.items():

@@ -4,8 +4,8 @@
 """
 A described drive obeys words that its file does not name, as masters in the field write them.
 
-The words are those of LinuxCNC's vfdb_vfd, vfs11_vfd and mb2hal, of FluidNC, grblHAL and of the
-makers' own examples; what they mean is in the makers' tables of the bits.
+The words are those of LinuxCNC's vfdb_vfd, vfs11_vfd and mb2hal, of FluidNC, grblHAL, Buildbotics
+and of the makers' own examples; what they mean is in the makers' tables of the bits.
 """
 
 from __future__ import annotations
@@ -76,6 +76,15 @@ class Master:
         ('invertek_optidrive_e3', 0, (), 0x0003, 1),
         ('abb_acs355', 0, (0x0476, 0x0477), 0x0C7F, 1),
         ('yaskawa_v1000', 1, (), 0x0011, 1),
+        # Buildbotics' reverse of a Teco is there a direction without a run; a PLC stops one of
+        # Mitsubishi by 0
+        ('teco_e510', 0x2501, (0x0001,), 0x0000, 0),
+        ('teco_e510', 0x2501, (), 0x0003, -1),
+        ('teco_e510', 0x2501, (), 0x0002, 0),
+        ('teco_e510', 0x2501, (0x0001,), 0x0002, 0),
+        ('mitsubishi_fr_d700', 8, (0x0002,), 0x0001, 0),
+        ('mitsubishi_fr_d700', 8, (), 0x0004, -1),
+        ('mitsubishi_fr_d700', 8, (0x0002,), 0x0000, 0),
         # the bit of a quick stop is no command of the file
         ('schneider_atv12', 8501, (0x0006, 0x0007, 0x000F), 0x000B, 0),
     ],
@@ -122,6 +131,8 @@ def test_a_word_that_is_repeated_changes_nothing(
         ('siemens_v20', 99, 0x04FE),
         ('siemens_v20', 99, 0x0CFE),
         ('invt_gd20', 0x2000, 7),
+        ('teco_e510', 0x2501, 8),
+        ('mitsubishi_fr_d700', 1, 1),
     ],
 )
 def test_a_reset_counts_from_its_first_word_and_once(name: str, register: int, word: int) -> None:

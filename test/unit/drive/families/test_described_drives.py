@@ -147,6 +147,34 @@ def test_a_wj200_that_is_silent_after_its_reset_is_not_lost() -> None:
         rig.follow(20.0)
 
 
+def test_a_fr_d700_that_restarts_in_place_of_an_answer_has_no_fault_afterwards() -> None:
+    """Its reset is a restart, and QiTech's program awaits no answer; three tries end with that."""
+    with DescribedRig(SHIPPED['mitsubishi_fr_d700'], lost_after=2.0) as rig:
+        rig.connect()
+        rig.far.trip(16)
+        rig.pass_time(1.0)
+
+        def meet(key: str, data: bytes | None) -> None:
+            if key == 'line.r0001' and data is not None and rig.line.state == 'whole':
+                rig.line.state = 'deaf'
+
+        def restart(asked: Asked) -> None:
+            if rig.line.state == 'deaf':
+                rig.line.state = 'silent'
+
+        rig.meet, rig.told = meet, restart
+        acknowledged = rig.drive.acknowledge()
+        rig.pass_time(1.1)
+        assert len(rig.written('line.r0001')) == 3
+        rig.line.mend()
+        rig.meet, rig.told = (lambda key, data: None), (lambda asked: None)
+        assert 'did not answer' in rig.answer(acknowledged)
+        rig.pass_time(3.0)
+        assert len(rig.written('line.r0001')) == 3 and not rig.far.faults
+        assert rig.drive.state.contact.connected and not rig.notes.said(Cause.LOST)
+        rig.assert_only_enable_helps(20.0)
+
+
 @pytest.mark.parametrize('name', SHIPPED)
 def test_a_local_drive_is_not_run(name: str) -> None:
     with DescribedRig(SHIPPED[name]) as rig:

@@ -70,6 +70,26 @@ def test_one_that_never_turns_is_stopped(rig: DescribedRig) -> None:
         assert rig.notes.said(Cause.STOPPED_BY_ITSELF)
 
 
+@pytest.mark.parametrize('register', [22, 40])
+def test_a_frequency_that_is_another_one_each_time_is_no_damage(
+    tmp_path: Path, register: int
+) -> None:
+    """The status beside it is what has to stand still while both are read."""
+    measured = {'register': register, 'type': 'int16', 'factor': 0.01}
+    runs = {'register': register, 'except': [0]}
+    file = described(
+        tmp_path, status={'register': 20, 'running': runs, 'fault': {'bit': 3}},
+        measured={'actual_frequency': measured},
+    )
+    with DescribedRig(file, parameters={'ramp.accel': 10.0, 'ramp.decel': 10.0}) as rig:
+        rig.connect()
+        rig.enable()
+        rig.follow(40.0)
+        assert 'stop' in rig.answer(rig.drive.stop())
+        rig.wait_until(lambda: not rig.far.motor.turning, 15.0)
+        assert not rig.notes.said(Cause.LOST)
+
+
 def test_a_slow_ramp_is_no_stop(tmp_path: Path) -> None:
     file = described(tmp_path, **BY_FREQUENCY['frequency'])
     with DescribedRig(file, parameters={'ramp.accel': 60.0, 'ramp.decel': 10.0}) as rig:
