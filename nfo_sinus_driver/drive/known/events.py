@@ -314,13 +314,11 @@ class Cause(enum.Enum):
     """`on_jam` is `warn`. Stop the motor, free what is stuck; or let the driver stop it: `on_jam:
     stop`"""
     JAM_UNSEEN = (
-        'no jam is noticed: for {seconds:.0f} s current and speed were not both measured within '
-        'jam_time ({jam_time:g} s); lower poll_rate, so that the line has time for telemetry, or '
-        'raise jam_time'
+        'no jam is noticed: current and speed were not measured in a row for {seconds:.0f} s; '
+        'lower poll_rate, so that the line has time for telemetry'
     )
     """The line is too full for `telemetry_rate`, or the drive does not tell its current (NaN in
-    `~/telemetry`). Lower `poll_rate` of the drives of the line, raise `jam_time`; or set
-    `jam_current` to 0"""
+    `~/telemetry`). Lower `poll_rate` of all drives of the line; or set `jam_current` to 0"""
     JAM_NOT_JUDGED = (
         'no jam is noticed: in control mode {mode} no speed is controlled; set jam_current to 0'
     )

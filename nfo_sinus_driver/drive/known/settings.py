@@ -409,8 +409,6 @@ class DriveSettings:
         self._require_measured()
         self._require_own_addresses()
         settings['on_jam'].check(self.on_jam)
-        if self.jam_current > 0:
-            self._require_jam_possible()
         if self.expected_control_mode == SPEED.mode and not self.nominal_speed:
             self._require_no_speed_mode()
         self._check_drive_timeout()
@@ -418,6 +416,8 @@ class DriveSettings:
             # what a family decides was checked above
             if declared.low is not None:
                 declared.check(getattr(self, name))
+        if self.jam_current:
+            self._require_jam_possible()
 
     def _require_no_speed_mode(self) -> None:
         if _has_speed_mode(self.model, self.method):

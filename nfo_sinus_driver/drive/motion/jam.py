@@ -13,7 +13,8 @@ which changes; that of a jammed one keeps within a range (:class:`..known.moveme
 it has to: ``jam_time`` where the motor has been beyond ``jam_speed`` in that direction; after a
 start or a turn at least as long as the slowest ramp takes to show.
 
-A pair without a number is a break, and so is a pause between two of more than ``jam_time``.
+Three pairs in a row tell it at least. A pair without a number is a break, and so is a pause between
+two that is longer than a full line makes.
 """
 
 from __future__ import annotations
@@ -33,6 +34,10 @@ from nfo_sinus_driver.link import NoData, Refused
 
 #: How much slower than its set-point a jammed motor is at least: this share of it.
 _FAR_BELOW = 0.5
+#: How many pairs in a row tell a jam: one or two impossible values stop no motor.
+_PAIRS = 3
+#: The longest pause between two pairs, s; or ``jam_time``, if that is longer.
+_PAUSE = 5.0
 #: For how long nothing could be judged when that is reported, s; and that many times ``jam_time``.
 _UNSEEN_FOR, _UNSEEN_TIMES = 10.0, 2
 
@@ -96,7 +101,7 @@ class JamCheck:
     def _break(self) -> None:
         """Note that it is not jammed."""
         self._still = Still()
-        self._since = math.inf
+        self._since, self._pairs = math.inf, 0
         self.jammed = None
 
     def check(self) -> Report | None:
@@ -131,7 +136,7 @@ class JamCheck:
             return False
         self._current, self._speed = current, speed
         before, self._at = self._at, min(current.at, speed.at)
-        if self._at - before > self._state.settings.jam_time:
+        if self._at - before > max(_PAUSE, self._state.settings.jam_time):
             self._break()
         elif not math.isnan(current.value + speed.value):
             self._seen_at = self._at
@@ -148,11 +153,11 @@ class JamCheck:
         if not (current > settings.jam_current and size < slowest):
             self._break()
             return None
-        self._since = min(self._since, self._at)
+        self._since, self._pairs = min(self._since, self._at), self._pairs + 1
         _, unit = COMPARED[self._setpoint.control_mode]
         still_since = self._still.note(size, self._at, STEP * unit)
         needed = settings.jam_time if self._passed else max(settings.jam_time, FALLS_WITHIN)
-        if self._at - still_since < needed:
+        if self._at - still_since < needed or self._pairs < _PAIRS:
             return None
         report = Report(
             Cause.JAMMED,
@@ -173,9 +178,9 @@ class JamCheck:
 
     def _check_unseen(self, now: float) -> None:
         """Report that nothing can be judged, where that lasts."""
-        jam_time, seconds = self._state.settings.jam_time, now - self._seen_at
-        if seconds > max(_UNSEEN_FOR, _UNSEEN_TIMES * jam_time):
-            self._report_once(Report(Cause.JAM_UNSEEN, seconds=seconds, jam_time=jam_time))
+        seconds = now - self._seen_at
+        if seconds > max(_UNSEEN_FOR, _UNSEEN_TIMES * self._state.settings.jam_time):
+            self._report_once(Report(Cause.JAM_UNSEEN, seconds=seconds))
 
     def _report_once(self, report: Report) -> None:
         if not self._reported:

@@ -317,6 +317,18 @@ def test_a_value_that_is_missing_in_between_is_a_break(wrong: str) -> None:
         stops_in_jam(rig, 6.0)
 
 
+def test_two_values_that_cannot_be_stop_no_motor() -> None:
+    # on this line they come further apart than jam_time
+    with rig_with('classic', jam_time=1.0, poll_rate=0.0) as rig:
+        run(rig)
+        rig.far.motor.load = BLOCKED
+        begun = len(rig.notes.telemetry)
+        stops_in_jam(rig, 20.0)
+        measured = rig.notes.telemetry[begun:]
+        assert measured[1].at - measured[0].at > 1.0
+        assert sum(told.values[Role.OUTPUT_CURRENT] > 4.0 for told in measured) >= 3
+
+
 def test_that_nothing_can_be_judged_is_said_once() -> None:
     with rig_with() as rig:
         run(rig)
