@@ -525,7 +525,7 @@ class DriveSettings:
         if self.jam_time < least - 1e-9:
             raise ValueError(
                 f'jam_time {self.jam_time:g} s: with this telemetry_rate and poll_rate at least '
-                f'{least:g} s, in which current and speed are measured twice'
+                f'{least:g} s, so that current and speed are measured three times'
             )
 
     def _require_jam_measured(self) -> None:
