@@ -92,3 +92,18 @@ def test_a_family_that_does_not_measure_its_current_is_refused(tmp_path: Path) -
         assert driver.wait() == 2
         reason = 'jam_current: movitrac31 with control_method function_bits measures no current'
         assert f'{reason}; set jam_current to 0' in driver.text
+
+
+def test_a_plc_that_does_not_show_the_current_is_refused_at_configure(tmp_path: Path) -> None:
+    with own_domain() as domain, Bench(domain, tmp_path, CONNECTIONS['telegram1_h']) as bench:
+        bench.simulator()
+        bench.driver(
+            '-p', 'telemetry_rate:=2.0', '-p', 'jam_current:=4.0', '-p', 'jam_speed:=8.0'
+        )
+        client = bench.client()
+        reason = 'jam_current is set, and this drive does not tell its current ('
+        wait_until(lambda: reason in bench.log, 'the reason')
+        assert client.state() in ('unconfigured', 'configuring')
+        # and is tried again, as whatever keeps it from the drive
+        assert client.set_parameters(jam_current=0.0).successful
+        client.connected()

@@ -4,9 +4,9 @@
 """
 Whether the motor is jammed: it takes much current, and hardly turns.
 
-Judged is what is measured anyway, each pair of a current and a speed once. A pair tells of a jam
-while the set-points of the last second have one direction and are beyond ``jam_speed``, and the
-motor turns at less than that and than half of them: one that is asked to be slow is not jammed.
+What is measured anyway is judged, each pair of a current and a speed once. A pair shows a jam while
+the set-points of the last second have one direction and are beyond ``jam_speed``, and the motor
+turns at less than that and than half of them: one that is asked to be slow is not jammed.
 
 A motor on its ramp takes much current, too, and is slow at first. It is told apart by its speed,
 which changes; that of a jammed one keeps within a range (:class:`..known.movement.Still`). How long
