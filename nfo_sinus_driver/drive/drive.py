@@ -191,6 +191,11 @@ class Drive:
         return self._controller is not None and self._controller.stop_overdue
 
     @property
+    def jammed(self) -> Report | None:
+        """How the enabled motor is jammed, where that does not stop it."""
+        return None if self._controller is None else self._controller.jam.jammed
+
+    @property
     def end_unconfirmed(self) -> str:
         """What is said where the driver ends, and no stop was confirmed."""
         return self.settings.end_unconfirmed(self._bus.protocol)
@@ -258,13 +263,16 @@ class Drive:
         """
         if not self._poller.begun:
             await self._connect(retry)
-            if parameters:
-                try:
+            try:
+                if self._controller is not None:
+                    await self._controller.jam.require_measured()
+                if parameters:
                     await self.parameters.read_now([kept.key for kept in self.model.kept])
-                except BaseException:
-                    # no poller watches it yet
-                    self._set_disconnected(_LEFT)
-                    raise
+            except BaseException:
+                # no poller watches it yet
+                self._set_disconnected(_LEFT)
+                raise
+            if parameters:
                 self._parameters_task = self._bus.spawn(self.parameters.watch_now())
             self._poller.begin()
             self._error_log_monitor.begin()

@@ -1217,6 +1217,22 @@ LAWS = (
         ('test_described_direction.py', '-k', 'starts_anew'),
     ),
     Mutant(
+        8,
+        'two impossible values of a current or a speed stop a motor as jammed',
+        'JamCheck._judge',
+        ' or self._pairs < _PAIRS',
+        '',
+        ('test_jam.py', '-k', 'two_values'),
+    ),
+    Mutant(
+        8,
+        'values with a long pause between stop a motor as jammed',
+        'JamCheck._take_pair',
+        'if self._at - before > max(_PAUSE, self._state.settings.jam_time):',
+        'if False:',
+        ('test_jam.py', '-k', 'too_full'),
+    ),
+    Mutant(
         3,
         'a drive goes on although the one that it stops with has stopped',
         'Controller._notify_stop',

@@ -40,6 +40,10 @@ _SETTINGS = {
     'expected_control_mode': '',
     'drive_timeout': -1.0,
     'lost_after': 1.0,
+    'jam_current': 0.0,
+    'jam_speed': 0.0,
+    'jam_time': 2.0,
+    'on_jam': 'warn',
     'shutdown_timeout': 4.0,
     'frame_id': '',
 }

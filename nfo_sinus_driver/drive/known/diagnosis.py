@@ -169,7 +169,7 @@ _LIFE_STOOD = 0.2
 #: A motor that is caught turns at no more than this share of its speed before.
 _CAUGHT = 0.95
 #: How long a condition has to be absent before it is reported again, s.
-_AGAIN_AFTER = 10.0
+AGAIN_AFTER = 10.0
 
 
 class Conditions:
@@ -189,7 +189,7 @@ class Conditions:
             name = (report.cause, status.code if report.cause is Cause.ALARM else 0)
             before = self._last_at.get(name, -math.inf)
             self._last_at[name] = status.at
-            if status.at - before > _AGAIN_AFTER:
+            if status.at - before > AGAIN_AFTER:
                 self._state.notify(severity, report)
         self._unnamed = status.kind is Kind.ALARM and not status.listed.remedy
 

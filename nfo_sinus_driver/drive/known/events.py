@@ -304,6 +304,32 @@ class Cause(enum.Enum):
     CURRENT_LIMITED = 'the current limit holds the motor back ({status}). {limit.remedy}'
     """Nothing is stopped. Check the mechanics, use a longer ramp or a lower set-point"""
 
+    JAMMED = (
+        'its motor has taken {current:.3g} A at {speed:.3g} {unit} for {seconds:.1f} s '
+        '(jam_current {jam_current:g} A, jam_speed {jam_speed:g} {unit}): free what is stuck'
+    )
+    """`on_jam` is `stop`. Switch off, free what is stuck; enable. If nothing was, raise
+    `jam_current` or lower `jam_speed` ([a jam](faults_and_stops.md#a-motor-that-is-jammed))"""
+    JAM_SEEN = 'jammed: {why}; nothing is stopped, for on_jam is warn'
+    """`on_jam` is `warn`. Stop the motor, free what is stuck; or let the driver stop it: `on_jam:
+    stop`"""
+    JAM_UNSEEN = (
+        'no jam is noticed: current and speed were not measured in a row for {seconds:.0f} s; '
+        'lower poll_rate, so that the line has time for telemetry'
+    )
+    """The line is too full for `telemetry_rate`, or the drive does not tell its current (NaN in
+    `~/telemetry`). Lower `poll_rate` of all drives of the line; or set `jam_current` to 0"""
+    JAM_NOT_JUDGED = (
+        'no jam is noticed: in control mode {mode} no speed is controlled; set jam_current to 0'
+    )
+    """`jam_current` is for the control modes Freque and Speed"""
+    JAM_NOT_MEASURED = (
+        'jam_current is set, and this drive does not tell its current ({why}): make it do so, or '
+        'set jam_current to 0'
+    )
+    """Configure is refused. Behind a PLC: its longer telegram, or a mailbox; else `jam_current: 0`
+    """
+
     # --- It does not stop
     CANNOT_STOP = f'CANNOT STOP THE MOTOR: {{why}}; retrying. {_EMERGENCY}'
     """Retried until confirmed. Use the enable input or the emergency stop; then remove the cause"""

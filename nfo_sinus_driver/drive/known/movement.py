@@ -38,6 +38,7 @@ __all__ = [
     'Direction',
     'Fall',
     'Standing',
+    'Still',
 ]
 
 STANDSTILL = 0.5
@@ -82,6 +83,21 @@ class Standing:
         """Note whether it stood at a moment, s; return since when it does."""
         self.since = min(self.since, at) if stands else math.inf
         return self.since
+
+
+class Still:
+    """A size that keeps within a range: that of a motor on its ramp does not."""
+
+    def __init__(self) -> None:
+        self._low, self._high = math.inf, -math.inf
+        self._since = math.inf
+
+    def note(self, size: float, at: float, step: float = STEP) -> float:
+        """Note a size; return since when the range of all sizes has not grown by a step, s."""
+        if size < self._low - step or size > self._high + step:
+            self._low, self._high = min(self._low, size), max(self._high, size)
+            self._since = at
+        return self._since
 
 
 class Direction:

@@ -24,7 +24,7 @@ from nfo_sinus_driver.catalog import (
     usual_family,
 )
 from nfo_sinus_driver.catalog.finding import find
-from nfo_sinus_driver.catalog.status import SPEED
+from nfo_sinus_driver.catalog.status import QUANTITIES, SPEED
 from nfo_sinus_driver.link import ADDRESSES, PROTOCOLS, LineProtocol
 from nfo_sinus_driver.setting import UNCONFIGURED, setting, settings_of
 
@@ -224,6 +224,30 @@ class DriveSettings:
         'enabled',
         zero='none',
     )
+    jam_current: float = setting(
+        0.0,
+        'a motor that takes more than this and turns slower than jam_speed for jam_time, although '
+        'its set-point is at least twice its speed, is jammed; one that becomes faster is not; '
+        'measured at telemetry_rate',
+        0, 10000, unit='A', zero='off',
+    )
+    jam_speed: float = setting(
+        0.0,
+        'with jam_current: in the unit of actual in ~/status, Hz or rpm; no set-point of this size '
+        'or less counts',
+        0, 32767, zero='not given',
+    )
+    jam_time: float = setting(
+        2.0,
+        'with jam_current: for how long without a break; after a start or a turn at least 5 s, for '
+        'a slow ramp shows no sooner',
+        0.1, 600, unit='s', also='at least two periods of telemetry_rate and of poll_rate',
+    )
+    on_jam: str = setting(
+        'warn',
+        'what the driver does when the motor is jammed: warn, or stop, until the next enable',
+        choices=('warn', 'stop'),
+    )
     shutdown_timeout: float = setting(
         4.0,
         'how long an exit or a cleanup waits for the drive to confirm that it stops',
@@ -384,6 +408,7 @@ class DriveSettings:
         _one_of('expected_control_mode', self.expected_control_mode, ('', *modes))
         self._require_measured()
         self._require_own_addresses()
+        settings['on_jam'].check(self.on_jam)
         if self.expected_control_mode == SPEED.mode and not self.nominal_speed:
             self._require_no_speed_mode()
         self._check_drive_timeout()
@@ -391,6 +416,8 @@ class DriveSettings:
             # what a family decides was checked above
             if declared.low is not None:
                 declared.check(getattr(self, name))
+        if self.jam_current:
+            self._require_jam_possible()
 
     def _require_no_speed_mode(self) -> None:
         if _has_speed_mode(self.model, self.method):
@@ -466,6 +493,58 @@ class DriveSettings:
                 raise ValueError(
                     f'measured: {self.model} measures no {name!r}: choose of {", ".join(known)}'
                 )
+
+    def _require_jam_possible(self) -> None:
+        """Make sure that a jam can be told from what is measured."""
+        if not self.jam_speed > 0:
+            raise ValueError(
+                'jam_current needs jam_speed: set it too, in the unit of actual in ~/status, such '
+                'as a tenth of the usual set-point'
+            )
+        self._require_jam_measured_often()
+        if self.method == MONITOR:
+            raise ValueError(
+                'jam_current with control_method monitor: the driver does not run this motor and '
+                'knows no set-point of it; set jam_current to 0'
+            )
+        if not self.follows_setpoints:
+            raise ValueError(
+                f'jam_current with reference {self.reference}: the driver does not know how fast '
+                'the motor is to turn; set reference to fieldbus, or jam_current to 0'
+            )
+        if self.model != AUTO:
+            self._require_jam_measured()
+
+    def _require_jam_measured_often(self) -> None:
+        if not self.telemetry_rate:
+            raise ValueError(
+                'jam_current needs telemetry_rate, at which the current is measured: set it to 2, '
+                'or jam_current to 0'
+            )
+        least = 2 / min(self.telemetry_rate, self.poll_rate or math.inf)
+        if self.jam_time < least - 1e-9:
+            raise ValueError(
+                f'jam_time {self.jam_time:g} s: with this telemetry_rate and poll_rate at least '
+                f'{least:g} s, so that current and speed are measured three times'
+            )
+
+    def _require_jam_measured(self) -> None:
+        family = load_family(self.model, self.method, self.telegram_words, self.telegram_speed)
+        modes = (self.expected_control_mode,) if self.expected_control_mode else QUANTITIES
+        speeds = [QUANTITIES[mode].role for mode in modes if QUANTITIES[mode].hertz]
+        if not speeds:
+            raise ValueError(
+                f'jam_current with expected_control_mode {self.expected_control_mode}: no speed '
+                'is controlled, so a slow motor says nothing; set jam_current to 0'
+            )
+        lacking = 'current' if Role.OUTPUT_CURRENT not in family.roles else ''
+        if family.roles.keys().isdisjoint(speeds):
+            lacking = ' and '.join(filter(None, (lacking, 'speed')))
+        if lacking:
+            raise ValueError(
+                f'jam_current: {self.model} with control_method {self.method} measures no '
+                f'{lacking}; set jam_current to 0'
+            )
 
     @property
     def own_parameters(self) -> tuple[str, ...]:

@@ -38,6 +38,7 @@ class StopReason(enum.IntEnum):
     ACKNOWLEDGE = 20
     NOT_ENABLED = 21
     STOP_WITH = 22
+    JAM = 23
     OTHER = 255
 
 
@@ -80,6 +81,7 @@ _CAUSES: Mapping[StopReason, tuple[Cause, ...]] = {
     StopReason.ENABLE_FAILED: (Cause.ENABLE_FAILED,),
     StopReason.ACKNOWLEDGE: (Cause.ACKNOWLEDGE_REQUESTED,),
     StopReason.STOP_WITH: (Cause.STOPPED_WITH,),
+    StopReason.JAM: (Cause.JAMMED,),
     StopReason.NOT_ENABLED: (Cause.RUNS_UNASKED, Cause.FOUND_RUNNING),
 }
 _REASON_OF = {cause: reason for reason, causes in _CAUSES.items() for cause in causes}

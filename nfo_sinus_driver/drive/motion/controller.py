@@ -32,6 +32,7 @@ from nfo_sinus_driver.drive.known.exclusive_access import ExclusiveAccess
 from nfo_sinus_driver.drive.known.steps import run_steps
 from nfo_sinus_driver.drive.known.stop_reason import StopReason, reason_of
 from nfo_sinus_driver.drive.motion.following import FollowingCheck
+from nfo_sinus_driver.drive.motion.jam import JamCheck
 from nfo_sinus_driver.drive.motion.setpoint import Setpoint
 from nfo_sinus_driver.drive.motion.starting import Prepare, StartSequence
 from nfo_sinus_driver.drive.motion.stopping import StopSequence
@@ -77,6 +78,8 @@ class Controller:
         self._starting = StartSequence(state, method)
         self._sequence = StopSequence(state, method, look)
         self._following = FollowingCheck(state, setpoint)
+        #: Whether the motor is jammed.
+        self.jam = JamCheck(state, setpoint)
         #: A set-point that the drive refused: when, and why.
         self._refusal: tuple[float, Report] | None = None
         #: The last status that was checked.
@@ -126,6 +129,7 @@ class Controller:
         """Clean up after the state that was left."""
         if before is ControlState.ENABLED:
             self._setpoint.stop_following()
+            self.jam.rest()
         elif before is ControlState.ENABLING:
             if not self._control.enabled and self._enabling is not self._bus.current:
                 self._bus.cancel(self._enabling)
@@ -243,6 +247,7 @@ class Controller:
         try:
             if self._refusal is not None:
                 self._explain_refusal(await self._state.reader.read(Priority.SERVICE))
+            await self.jam.prepare()
             return await self._starting.check()
         except Exception as error:
             self._control.dispatch(ControlEvent.REFUSED)
@@ -261,6 +266,7 @@ class Controller:
                 target = self.method.setpoint_target(targets[control_mode])
             self._setpoint.follow(control_mode, limits, target)
             self._following.begin()
+            self.jam.begin()
         except Exception as error:
             # whatever went wrong, a run command may be active by now
             self._sequence.start(Report(Cause.ENABLE_FAILED, why=report_of(error)))
@@ -678,7 +684,7 @@ class Controller:
         if self._control.enabled:
             reason = self._why_stopped(status) or self._why_slower(status, before)
             if reason is None and self._state.settings.follows_setpoints:
-                reason = self._following.check()
+                reason = self._following.check() or self.jam.check()
         elif not self._control.stop_owed:
             reason = self._why_stopped_again(status)
         if reason is not None:

@@ -25,7 +25,7 @@ from nfo_sinus_driver.drive.motion.setpoint import NO_TURN, Setpoint, sign
 #: From here on a motor counts as turning backwards, Hz: slip and measuring errors show less.
 _BACKWARDS = 2.0
 #: How long a drive may take to begin to follow another set-point, s.
-_REACTION = 1.0
+REACTION = 1.0
 #: Slip, its compensation and overshoot exceed a set-point by this share of it and this much, Hz.
 _BEYOND = 0.1
 _BEYOND_BY = 3.0
@@ -43,7 +43,7 @@ _NEARLY = 0.05
 #: such speed.
 _STEADY_FOR, _STEADY = 8.0, 0.1
 #: What is compared with set-points, and what one of its units is for 1 Hz of a four-pole motor.
-_COMPARED = {FREQUENCY.mode: (FREQUENCY.role, 1.0), SPEED.mode: (SPEED.role, 30.0)}
+COMPARED = {FREQUENCY.mode: (FREQUENCY.role, 1.0), SPEED.mode: (SPEED.role, 30.0)}
 
 
 class _Shown(NamedTuple):
@@ -89,12 +89,12 @@ class FollowingCheck:
     def check(self) -> Report | None:
         """Return why the last measurement has to stop the motor; report what else is wrong."""
         measured = self._state.measurements.turned
-        role, unit = _COMPARED.get(self._setpoint.control_mode, (None, 1.0))
+        role, unit = COMPARED.get(self._setpoint.control_mode, (None, 1.0))
         actual = self._state.measurements.last(role)
         if measured.at <= max(self._at, self._setpoint.following_since):
             return None
         self._at = measured.at
-        least, most = self._setpoint.range_since(measured.at - _REACTION)
+        least, most = self._setpoint.range_since(measured.at - REACTION)
         frequency = measured.value
         self._signed = self._signed or frequency < 0
         cause = None

@@ -58,6 +58,7 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
     denied: Counter[str] = Counter()
     by_mailbox = [role for role in FAST if state.params.by_mailbox(key_of(role))]
     fast = [role for role in FAST if role not in by_mailbox]
+    current = key_of(Role.OUTPUT_CURRENT)
     # what is too slow for the polls
     unpolled = [role for role in _POLLED if state.params.by_mailbox(key_of(role))]
     scale = state.settings.method_class.unfollowed_scale if unpolled else ()
@@ -78,6 +79,8 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
             values[key] = NAN
             # over Classic it refuses everything so while it tunes
             denied[key] += error.code in _NONE_SUCH and not state.tuning
+        if key == current:
+            measurements.take_value(Role.OUTPUT_CURRENT, values[key])
 
     def take_polled(role: Role) -> None:
         above, below = map(values.get, scale, (NAN, NAN)) if scale else (1.0, 1.0)
@@ -95,7 +98,9 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
             try:
                 keys = map(key_of, (*fast, *unpolled))
                 named = state.measured_keys
-                for key in dict.fromkeys((*keys, *(due if first else (due[0],)), *named)):
+                # by a mailbox it would be read too seldom to tell a jam
+                needed = (current,) if state.settings.jam_current else ()
+                for key in dict.fromkeys((*keys, *needed, *(due if first else (due[0],)), *named)):
                     await measure(key)
                 for role in unpolled:
                     take_polled(role)
@@ -111,7 +116,7 @@ async def watch_telemetry(state: DriveState, yields: Callable[[], bool]) -> None
                 # the poll reports it if the drive is lost, or has to be recognised anew
                 state.missed()
                 values.update(dict.fromkeys((*map(key_of, FAST), *state.measured_keys), NAN))
-                for role in unpolled:
+                for role in (*unpolled, Role.OUTPUT_CURRENT):
                     measurements.take_value(role, NAN)
         period = 1 / rate if rate else _OFF_PERIOD
         await state.bus.sleep(period - (state.bus.now() - started))

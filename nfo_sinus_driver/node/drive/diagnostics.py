@@ -65,6 +65,9 @@ def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str
         why = managed.why_silent or 'the log of the node says what to check'
         return DiagnosticStatus.ERROR, f'not connected: {why}'
     level = _LEVELS[snapshot.kind]
+    jammed = managed.drive.jammed
+    if jammed and snapshot.kind is not Kind.FAULT:
+        return DiagnosticStatus.WARN, f'jammed: {managed.wording.say(jammed)}'
     if snapshot.kind is not Kind.STATUS:
         return level, f'{snapshot.text}: {snapshot.description}. {snapshot.remedy}'
     if drift := managed.drive.parameters.drift:
