@@ -57,6 +57,8 @@ class Counting:
         self._power = math.nan, math.nan
         #: What the driver had counted of the line.
         self._line_errors = 0
+        #: A request was in vain since the last status.
+        self._missed = False
 
     @property
     def _both(self) -> tuple[Figures, Figures]:
@@ -71,6 +73,7 @@ class Counting:
         connects = math.isnan(self._at)
         if not connects and at > self._at:
             self._pass_time(at - self._at)
+            self._take_silence(at - self._at)
         # a status that is published again has the moment of the first time
         if connects or at > self._at:
             self._at = at
@@ -90,27 +93,29 @@ class Counting:
             figures.powered += passed
             if self._running:
                 figures.running += passed
-            if seconds > figures.longest_silence:
-                figures.longest_silence = seconds
 
     def _disconnect(self, snapshot: Snapshot) -> None:
         """Count a loss; what the drive does from now on is not known."""
-        silence = snapshot.at - self._at
-        if 0 < silence <= _LONGEST_GAP:
-            for figures in self._both:
-                figures.longest_silence = max(figures.longest_silence, silence)
+        self._take_silence(snapshot.at - self._at)
         if snapshot.stop is not self._stop:
             self._take_stop(snapshot)
         self._name_fault()
         self._at, self._running, self._open = math.nan, False, False
         self._power = math.nan, math.nan
 
+    def _take_silence(self, seconds: float) -> None:
+        """Keep a time without a status, if a request was in vain meanwhile."""
+        if self._missed and 0 < seconds <= _LONGEST_GAP:
+            for figures in self._both:
+                figures.longest_silence = max(figures.longest_silence, seconds)
+        self._missed = False
+
     def _take_run(self, runs: bool, snapshot: Snapshot, *, connects: bool) -> None:
         """Count a start and a stop; each stop once, by the first reason for it."""
         begins = runs and (not self._running or snapshot.stop is None)
         if connects:
-            # of one that was lost the stop is counted
-            self._open = runs and None in (self._stop, snapshot.stop)
+            # of one that was lost the stop is counted; one that was found running may stand by now
+            self._open = self._stop is None if snapshot.stop is not None else runs
         elif begins and not self._open:
             # it may be on its ramp to a stop yet
             self._open = True
@@ -215,12 +220,13 @@ class Counting:
 
     def take_line_errors(self, count: int) -> None:
         """
-        Count the errors of the line while the drive is connected.
+        Count the errors of the line while the drive is connected, before the status after them.
 
         :param count: what the driver has counted so far; a drive without power answers nothing.
         """
         new, self._line_errors = count - self._line_errors, count
         if new > 0 and not math.isnan(self._at):
+            self._missed = True
             for figures in self._both:
                 figures.line_errors += new
 

@@ -58,7 +58,8 @@ class Figures:
     :ivar energy: mJ; ``None``: nothing tells it.
     :ivar highest: the highest of what was measured, by the names in :data:`HIGHEST`.
     :ivar line_errors: requests without an answer, and damaged answers.
-    :ivar longest_silence: the longest time between two statuses, s.
+    :ivar longest_silence: the longest time between two statuses, or to a loss, in which a request
+        was in vain, s.
     """
 
     since: float

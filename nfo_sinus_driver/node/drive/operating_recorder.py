@@ -41,6 +41,8 @@ _T = TypeVar('_T')
 _PERIOD, _KEEP_PERIOD = 1.0, 60.0
 #: So many statuses wait to be counted at most.
 _MOST = 30_000
+#: A shorter time without a status is no silence, s.
+_LEAST_SILENCE = 0.2
 #: How long counting waits for a file, s: until then all of it waits.
 _LONGEST_LOAD = 10.0
 #: How often a file that cannot be used is tried at once before that is a warning: the driver
@@ -85,6 +87,7 @@ class OperatingRecorder:
         #: What the bus has put here, in its order, and whether the drive was connected.
         self._waiting: deque[Snapshot | Telemetry | _Connected | int] = deque(maxlen=_MOST)
         self._connected = False
+        self._last_at = 0.0
         #: One thread after the other has what follows.
         self._turn = threading.Lock()
         self._drive = _Connected('', '')
@@ -119,6 +122,9 @@ class OperatingRecorder:
         if snapshot.connected is not self._connected:
             self._connected = snapshot.connected
             self._note_connection()
+        elif snapshot.connected and snapshot.at > self._last_at + _LEAST_SILENCE:
+            self._waiting.append(self._line_errors())
+        self._last_at = snapshot.at
         self._waiting.append(snapshot)
 
     def take_telemetry(self, telemetry: Telemetry) -> None:
