@@ -37,9 +37,13 @@ class Counting:
     Counts into a record; all moments are of one steady clock, s.
 
     :param wall: returns the wall time of such a moment, s since 1970.
+    :param stop: the newest report of a stop of the drive that was connected before.
+    :ivar stop: the newest report of a stop.
     """
 
-    def __init__(self, record: Record, wall: Callable[[float], float]) -> None:
+    def __init__(
+        self, record: Record, wall: Callable[[float], float], stop: Report | None = None
+    ) -> None:
         self.record = record
         self._wall = wall
         #: When the last status came; NaN: the drive is not connected.
@@ -47,8 +51,7 @@ class Counting:
         self._running = False
         #: The motor runs, and no stop of that run was counted.
         self._open = False
-        #: The newest report of a stop.
-        self._stop: Report | None = None
+        self.stop = stop
         #: In which direction the motor turned last; 0: not known.
         self._direction = 0
         #: A fault that may get another name: code, text, and when it came.
@@ -78,7 +81,7 @@ class Counting:
         if connects or at > self._at:
             self._at = at
         runs = status.driven and not status.unknown
-        if runs is not self._running or snapshot.stop is not self._stop or connects:
+        if runs is not self._running or snapshot.stop is not self.stop or connects:
             self._take_run(runs, snapshot, connects=connects)
         if runs:
             self._take_direction(snapshot)
@@ -97,7 +100,7 @@ class Counting:
     def _disconnect(self, snapshot: Snapshot) -> None:
         """Count a loss; what the drive does from now on is not known."""
         self._take_silence(snapshot.at - self._at)
-        if snapshot.stop is not self._stop:
+        if snapshot.stop is not self.stop:
             self._take_stop(snapshot)
         self._name_fault()
         self._at, self._running, self._open = math.nan, False, False
@@ -115,21 +118,21 @@ class Counting:
         begins = runs and (not self._running or snapshot.stop is None)
         if connects:
             # of one that was lost the stop is counted; one that was found running may stand by now
-            self._open = self._stop is None if snapshot.stop is not None else runs
+            self._open = self.stop is None if snapshot.stop is not None else runs
         elif begins and not self._open:
             # it may be on its ramp to a stop yet
             self._open = True
             for figures in self._both:
                 figures.starts += 1
-        if snapshot.stop is not self._stop:
+        if snapshot.stop is not self.stop:
             self._take_stop(snapshot)
         if not runs and self._open:
             self._count_stop(StopReason.NONE)
         self._running = runs
 
     def _take_stop(self, snapshot: Snapshot) -> None:
-        self._stop = snapshot.stop
-        if self._stop is not None and self._open:
+        self.stop = snapshot.stop
+        if self.stop is not None and self._open:
             self._count_stop(snapshot.stop_reason)
 
     def _count_stop(self, reason: StopReason) -> None:

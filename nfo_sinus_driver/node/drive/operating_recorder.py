@@ -23,7 +23,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from nfo_sinus_driver.drive import Snapshot, Telemetry
+from nfo_sinus_driver.drive import Report, Snapshot, Telemetry
 from nfo_sinus_driver.node.drive.callers import Call
 from nfo_sinus_driver.node.drive.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import messages
@@ -92,6 +92,9 @@ class OperatingRecorder:
         self._turn = threading.Lock()
         self._drive = _Connected('', '')
         self._counting: Counting | None = None
+        #: Why the drive that was connected before was stopped last.
+        self._stop_before: Report | None = None
+        self._ended = False
         self._file: RecordFile | None = None
         self._loading: Future[Record | None] | None = None
         self._loading_since = 0.0
@@ -182,8 +185,9 @@ class OperatingRecorder:
     def _change_drive(self, drive: _Connected) -> None:
         """Go on with the record of another drive, once it was read."""
         before, file, data = self._counting, self._file, b''
-        if before is not None and self._is_loaded:
-            data = before.record.encoded()
+        if before is not None:
+            self._stop_before = before.stop
+            data = before.record.encoded() if self._is_loaded else b''
         self._drive, self._counting, self._is_loaded = drive, None, False
         self._failures = 0
         if not drive.serial:
@@ -218,7 +222,9 @@ class OperatingRecorder:
     def _begin(self, kept: Record | None) -> None:
         """Count from now on, into the record that was kept if there is one."""
         record = kept or Record.begun(*self._drive, now=time.time())
-        self._counting = Counting(record, lambda at: time.time() - time.monotonic() + at)
+        self._counting = Counting(
+            record, lambda at: time.time() - time.monotonic() + at, self._stop_before
+        )
 
     def _take_from_disk(self) -> None:
         """Take what was read or written meanwhile."""
@@ -310,7 +316,9 @@ class OperatingRecorder:
         with self._turn:
             self._count()
             counting = self._counting
-            if counting is None:
+            if self._ended:
+                answer.message = 'no shift was begun: this driver is ending'
+            elif counting is None:
                 answer.message = 'no shift was begun: no drive has been connected yet'
             else:
                 ended = counting.record.begin_shift(time.time())
@@ -326,6 +334,7 @@ class OperatingRecorder:
     def end(self) -> None:
         """Begin to keep all that was counted; the bus and the queue have ended."""
         with self._turn:
+            self._ended = True
             self._count()
             counting, file = self._counting, self._file
             if counting is not None:

@@ -19,7 +19,7 @@ from support.rig import Rig
 from nfo_sinus_driver.catalog import Kind, Role
 from nfo_sinus_driver.drive import Cause, Report, Snapshot, Telemetry
 from nfo_sinus_driver.operating_record.counting import Counting
-from nfo_sinus_driver.operating_record.figures import Figures, Record, decoded
+from nfo_sinus_driver.operating_record.figures import Fault, Figures, Record, decoded
 
 FLOATS = st.floats(-1e6, 1e6) | st.just(math.nan)
 STOPS = [None, Report(Cause.FAULT), Report(Cause.STOP_REQUESTED, by='a'), Report(Cause.LOST)]
@@ -138,7 +138,33 @@ def test_what_was_counted_before_a_file_could_be_read_is_not_lost(
     assert whole.total.powered == sum(part.total.powered for part in parts)
     assert whole.total.stops.total() == sum(part.total.stops.total() for part in parts)
     assert is_more(whole.shift, whole.total)
+    for code, fault in whole.total.faults.items():
+        each = [part.total.faults.get(code, Fault()).count for part in parts]
+        assert fault.count == sum(each)
     assert whole.total.since == parts[0].total.since
+
+
+def test_a_shift_that_was_begun_before_the_file_could_be_read_goes_on() -> None:
+    kept, beside = Record.begun('a drive', '', 0.0), Record.begun('a drive', '', 100.0)
+    kept.shift.starts = kept.total.starts = 5
+    beside.shift.starts = beside.total.starts = 2
+    assert kept.followed_by(beside).shift.starts == 7
+    beside.begin_shift(200.0)
+    beside.shift.starts, beside.total.starts = 1, 3
+    whole = kept.followed_by(beside)
+    assert (whole.shift.since, whole.shift.starts, whole.total.starts) == (200.0, 1, 8)
+
+
+def test_a_start_while_an_older_stop_is_shown_counts_once() -> None:
+    counting = Counting(Record.begun('a drive', '', 0.0), lambda at: at)
+    before, shown = STOPS[1], seen()
+    history = [
+        ('stands', before), ('runs', before), ('runs', None), ('runs', None), ('stands', STOPS[2])
+    ]
+    for at, (which, stop) in enumerate(history):
+        counting.take_status(dataclasses.replace(shown[which], at=float(at), stop=stop))
+    assert counting.record.total.starts == 1
+    assert dict(counting.record.total.stops) == {'FAULT': 1, 'STOP': 1}
 
 
 def test_a_file_of_another_version_lacks_a_figure_and_has_another() -> None:
