@@ -150,7 +150,11 @@ def test_while_the_disk_does_not_answer_it_goes_on_and_nothing_is_lost(
     assert again.call_begin_shift().success
     again.pass_time(3)
     again.answer()
-    again.pass_time(70)
+    again.pass_time(1)
+    # with what was kept before, and at once
+    assert again.published[-1].stored
+    assert kept()['a_family one'].total.powered == (4 + 28) * 10**9
+    again.pass_time(69)
     newest = again.published[-1]
     assert newest.stored and 60 < newest.total.powered_time * 3600 <= 101
     again.end()
@@ -179,6 +183,25 @@ def test_each_drive_at_one_place_has_its_own(recorded: Recorded) -> None:
     assert found['a_family /dev/ttyUSB0 3'].serial == ''
     (said,) = recorded.said
     assert 'no serial number can be read' in said
+
+
+def test_what_is_not_written_yet_of_one_drive_never_goes_to_the_file_of_another(
+    recorded: Recorded
+) -> None:
+    recorded.pass_time(3)
+    recorded.waiting = []
+    # one minute is being written, and the next one waits for that
+    recorded.pass_time(130)
+    recorded.lose()
+    recorded.drive.identity = Identity(serial='two')
+    recorded.pass_time(2)
+    recorded.answer()
+    recorded.pass_time(3)
+    found = kept()
+    assert found['a_family one'].total.powered == 132 * 10**9
+    assert found['a_family two'].total.powered < 5 * 10**9
+    assert found['a_family two'].serial == 'two'
+    assert recorded.published[-1].serial_number == 'two'
 
 
 def test_a_disk_that_is_full_is_one_warning_until_it_has_room(

@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
 import contextlib
+import logging
 import threading
 import time
 from typing import NamedTuple, TypeVar
@@ -36,6 +37,7 @@ from nfo_sinus_driver.operating_record.maintenance import Limit, limits
 from nfo_sinus_driver.state_folder import in_background
 
 _T = TypeVar('_T')
+_log = logging.getLogger(__name__)
 
 #: How often it is counted, and how often published and kept where nothing happens, s.
 _PERIOD, _KEEP_PERIOD = 1.0, 60.0
@@ -190,6 +192,7 @@ class OperatingRecorder:
             data = before.record.encoded() if self._is_loaded else b''
         self._drive, self._counting, self._is_loaded = drive, None, False
         self._failures = 0
+        self._show_anew()
         if not drive.serial:
             self._log.info(
                 f'the operating record is that of {drive.drive}, for no serial number can be read: '
@@ -244,6 +247,7 @@ class OperatingRecorder:
                     self._begin(kept)
                 elif kept is not None:
                     self._counting.continue_from(kept)
+                    self._show_anew()
         if self._saving is not None and self._saving.done():
             saving, self._saving = self._saving, None
             try:
@@ -252,6 +256,10 @@ class OperatingRecorder:
             except OSError as error:
                 self._failures = max(self._failures, _TRIES - 1)
                 self._fail(error)
+
+    def _show_anew(self) -> None:
+        """Publish and keep it at once; what was not kept yet is old."""
+        self._shown = self._unsaved = b''
 
     def _fail(self, error: OSError) -> None:
         self._failures += 1
@@ -313,6 +321,19 @@ class OperatingRecorder:
 
     def _on_begin_shift(self, _: Trigger.Request, answer: Trigger.Response) -> Trigger.Response:
         call = Call(self._node, '~/begin_shift')
+        try:
+            self._begin_shift(answer)
+        except Exception as error:
+            # an exception that leaves a service callback would end the executor
+            name = self._node.get_fully_qualified_name()
+            _log.exception('error in a service of %s', name)
+            answer.message = f'error in the driver: {error}'
+        self._queue.put(self._work)
+        call.find()
+        call.log(answer.message, success=answer.success)
+        return answer
+
+    def _begin_shift(self, answer: Trigger.Response) -> None:
         with self._turn:
             self._count()
             counting = self._counting
@@ -322,14 +343,9 @@ class OperatingRecorder:
                 answer.message = 'no shift was begun: no drive has been connected yet'
             else:
                 ended = counting.record.begin_shift(time.time())
-                # publish it now, and not once in a minute
-                self._shown = b''
+                self._show_anew()
                 answer.success = True
                 answer.message = f'a shift has begun; the one before: {_summary(ended)}'
-        self._queue.put(self._work)
-        call.find()
-        call.log(answer.message, success=answer.success)
-        return answer
 
     def end(self) -> None:
         """Begin to keep all that was counted; the bus and the queue have ended."""
@@ -348,7 +364,9 @@ class OperatingRecorder:
             if counting is None or file is None:
                 return
             if loading is not None and not is_loaded:
-                kept = loading.result()
+                kept = None
+                with contextlib.suppress(DamagedRecord):
+                    kept = loading.result()
                 if kept is not None:
                     counting.continue_from(kept)
             if is_loaded or loading is not None:
