@@ -122,7 +122,6 @@ def test_a_late_subscriber_gets_it_and_it_is_published_at_a_stop(bench: Bench) -
 
 def test_a_damaged_file_is_put_aside_and_the_motor_runs(bench: Bench) -> None:
     bench.simulator()
-    bench.driver().end()
     driver = bench.driver()
     listening(bench).wait_for('operating_record', lambda m: m.stored, 'a record')
     driver.end()
