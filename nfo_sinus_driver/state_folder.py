@@ -1,7 +1,7 @@
 # Copyright 2026 The nfo_sinus_driver authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A folder with a file for each drive in which something has to be put back, even after a kill."""
+"""Files that outlive the program, each with one writer; and what is put back in a drive."""
 
 from __future__ import annotations
 
@@ -97,33 +97,15 @@ class StateFolder:
             return
         if not taken and os.path.lexists(path):
             raise OSError(f'{path} belongs to another program that runs')
-        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        new = path.with_name(f'{path.name}.{os.urandom(8).hex()}')
-        descriptor = os.open(new, _CREATE, 0o600)
-        try:
-            _lock(descriptor)
-            os.write(descriptor, json.dumps({'drive': drive, 'borrowed': borrowed}).encode())
-            os.fsync(descriptor)
-            new.rename(path)
-        except BaseException:
-            os.close(descriptor)
-            with contextlib.suppress(OSError):
-                new.unlink()
-            raise
-        self._hold(drive, descriptor)
+        content = json.dumps({'drive': drive, 'borrowed': borrowed}).encode()
+        self._hold(drive, _replace(path, content))
         _sync(path.parent)
 
     def _take(self, drive: str, path: Path) -> int | None:
         """Return the file of a drive, locked; ``None``: none is there, or it is another's."""
         if drive not in self._locked:
-            try:
-                descriptor = os.open(path, _OPEN)
-            except FileNotFoundError:
-                return None
-            is_file = stat.S_ISREG(os.fstat(descriptor).st_mode)
-            # another program may just have replaced or removed it
-            if not (is_file and _lock(descriptor) and _is(path, descriptor)):
-                os.close(descriptor)
+            descriptor = _open(path)
+            if descriptor is None:
                 return None
             self._hold(drive, descriptor)
         return self._locked[drive]
@@ -146,11 +128,98 @@ def state_path() -> Path:
     raise OSError('neither XDG_STATE_HOME nor HOME is the path of a folder')
 
 
-def _path(drive: str) -> Path:
-    """Return the file of a drive (OSError: there is no folder for it)."""
+def readable_name(drive: str) -> str:
+    """Return the name of a file for a drive, which no other drive has."""
     digest = hashlib.sha256(drive.encode()).hexdigest()[:16]
     readable = re.sub('[^A-Za-z0-9]+', '_', drive)[:60].strip('_')
-    return state_path() / f'{readable}-{digest}.json'
+    return f'{readable}-{digest}'
+
+
+class OwnFile:
+    """
+    A file that belongs to one program as long as that has it; used by one thread at a time.
+
+    :raises OSError: by each method; the file is what it was then.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._descriptor: int | None = None
+
+    def take(self) -> bytes:
+        """Return its content, of a new one nothing (OSError: another program has it, too)."""
+        if self._descriptor is None:
+            self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            with contextlib.suppress(FileExistsError):
+                os.close(os.open(self.path, _CREATE, 0o600))
+            self._descriptor = _open(self.path)
+        if self._descriptor is None:
+            raise OSError(f'{self.path} belongs to another program that runs')
+        size = os.fstat(self._descriptor).st_size
+        return os.pread(self._descriptor, size, 0)
+
+    def replace(self, data: bytes) -> None:
+        """Replace its content, as a whole; on the disk once it is done."""
+        if self._descriptor is None:
+            raise OSError(f'{self.path} is not taken')
+        before, self._descriptor = self._descriptor, _replace(self.path, data)
+        os.close(before)
+        _sync(self.path.parent)
+
+    def put_aside(self, path: Path) -> None:
+        """Give what is there another name, and begin with an empty file."""
+        self.path.rename(path)
+        self.close()
+        self.take()
+
+    def close(self) -> None:
+        """Leave it to other programs."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+
+def _path(drive: str) -> Path:
+    """Return the file of a drive (OSError: there is no folder for it)."""
+    return state_path() / f'{readable_name(drive)}.json'
+
+
+def _open(path: Path) -> int | None:
+    """Open a file, and lock it; ``None``: none is there, or it is another program's."""
+    try:
+        descriptor = os.open(path, _OPEN)
+    except FileNotFoundError:
+        return None
+    is_file = stat.S_ISREG(os.fstat(descriptor).st_mode)
+    # another program may just have replaced or removed it
+    if not (is_file and _lock(descriptor) and _is(path, descriptor)):
+        os.close(descriptor)
+        return None
+    return descriptor
+
+
+def _replace(path: Path, content: bytes) -> int:
+    """Write a file, all of it or nothing; return it open and locked."""
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    new = path.with_name(f'{path.name}.{os.urandom(8).hex()}')
+    descriptor = os.open(new, _CREATE, 0o600)
+    try:
+        _lock(descriptor)
+        _write_all(descriptor, content)
+        os.fsync(descriptor)
+        new.rename(path)
+    except BaseException:
+        os.close(descriptor)
+        with contextlib.suppress(OSError):
+            new.unlink()
+        raise
+    return descriptor
+
+
+def _write_all(descriptor: int, content: bytes) -> None:
+    """Write all of it: a disk that is nearly full takes a part without an error."""
+    while content:
+        content = content[os.write(descriptor, content):]
 
 
 def _lock(descriptor: int) -> bool:

@@ -27,6 +27,7 @@ from nfo_sinus_driver.cli.console import (
     signals_handled,
 )
 from nfo_sinus_driver.cli.families import Family
+from nfo_sinus_driver.cli.history import History
 from nfo_sinus_driver.cli.monitor import Monitor
 from nfo_sinus_driver.cli.options import (
     DEFAULTS,
@@ -83,7 +84,7 @@ VERBS: dict[str, Verb] = {
     type(verb).__name__.lower(): verb
     for verb in (
         Scan(), Info(), List(), Get(), Set(), Dump(), Load(), Diff(), Errors(), Monitor(),
-        Check(), Family(), Completion(), Ack(), Run(), Stop(),
+        Check(), History(), Family(), Completion(), Ack(), Run(), Stop(),
     )
 }
 

@@ -24,12 +24,13 @@ _TOOL = runpy.run_path(str(ROOT / 'tools' / 'troubleshooting_page.py'))
 nodes, texts = _TOOL['nodes'], _TOOL['texts']
 #: Modules whose ``ValueError`` no operator reads: it is of a table, which every test loads, or of
 #: the file of a drive, and is reported with its line; of a frame that no request makes; of what the
-#: node asks before.
+#: node asks before; of an operating record, which is put aside with a message of its own.
 NEVER_SHOWN = {
     *(f'catalog/{name}.py' for name in ('codec', 'family', 'table')),
     *(f'catalog/declared/{name}.py' for name in ('register_map', 'yaml_file')),
     *(f'link/canopen/{name}.py' for name in ('lawicel', 'sdo')),
     *(f'link/pairs/{name}.py' for name in ('classic', 'movitrac')),
+    *(f'operating_record/{name}.py' for name in ('figures', 'files')),
     *('drive/known/drive_state.py', 'drive/motion/setpoint.py', 'node/messages/messages.py'),
 }
 REFUSALS = {(str(Refused(n)),) for n in (1, 2, 3, 4, 5, 6, 8, 10, 11)}

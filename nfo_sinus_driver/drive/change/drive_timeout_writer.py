@@ -102,9 +102,8 @@ class DriveTimeoutWriter:
     def _name_of_drive(self) -> str:
         """Return what tells this drive from all others: its serial number, or its place."""
         state = self._state
-        serial = state.nameplate.identity.serial.strip() if state.nameplate.identity else ''
-        # zeros are no number of one drive
-        known = (serial,) if serial.strip('0') else (self._memory.line, state.settings.address)
+        serial = state.nameplate.identity.own_serial if state.nameplate.identity else ''
+        known = (serial,) if serial else (self._memory.line, state.settings.address)
         return ' '.join(map(str, (state.model.name, *known)))
 
     async def _is(self, key: str, value: Value) -> bool:

@@ -52,6 +52,12 @@ class Identity:
             return self.software
         return f'{self.firmware:.2f} / {self.motor_firmware}'
 
+    @property
+    def own_serial(self) -> str:
+        """The serial number where it tells the drive from all others; zeros are none."""
+        serial = self.serial.strip()
+        return serial if serial.strip('0') else ''
+
     def __str__(self) -> str:
         known = {'': self.model, 'firmware ': self.versions, 'serial ': self.serial}
         return ', '.join(f'{name}{value}' for name, value in known.items() if value)

@@ -52,8 +52,12 @@ def array(stamp: Time, *statuses: DiagnosticStatus) -> DiagnosticArray:
     return DiagnosticArray(header=Header(stamp=stamp), status=statuses)
 
 
-def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str]:
-    """Return the level of one drive's diagnosis, and its message for the operator."""
+def drive_verdict(managed: ManagedDrive, snapshot: Snapshot, due: str) -> tuple[bytes, str]:
+    """
+    Return the level of one drive's diagnosis, and its message for the operator.
+
+    :param due: the maintenance that is due.
+    """
     if managed.drive.stop_overdue:
         message = 'the stop is NOT confirmed: use the enable input or the emergency stop'
         return DiagnosticStatus.ERROR, message
@@ -73,6 +77,8 @@ def drive_verdict(managed: ManagedDrive, snapshot: Snapshot) -> tuple[bytes, str
     if drift := managed.drive.parameters.drift:
         message = f'{snapshot.text}; {len(drift)} parameters differ from the parameter file'
         return DiagnosticStatus.WARN, message
+    if due:
+        return DiagnosticStatus.WARN, f'{snapshot.text}; maintenance is due: {due}'
     return level, snapshot.text
 
 
@@ -82,8 +88,14 @@ def drive_status(
     managed: ManagedDrive,
     snapshot: Snapshot,
     verdict: tuple[bytes, str],
+    maintenance: str,
 ) -> DiagnosticStatus:
-    """Return the diagnosis of one drive (verdict: from :func:`drive_verdict`)."""
+    """
+    Return the diagnosis of one drive.
+
+    :param verdict: from :func:`drive_verdict`.
+    :param maintenance: how far each limit of it is.
+    """
     drive = managed.drive
     identity, parameters = drive.identity, drive.parameters
     code = '' if snapshot.status is None else str(snapshot.status.code)
@@ -99,6 +111,7 @@ def drive_status(
         'control method': snapshot.control_method,
         'control mode': snapshot.control_mode,
         'parameters': parameters.progress,
+        'maintenance': maintenance,
         'differs from the parameter file': ', '.join(str(change) for change in parameters.drift),
         'enabled': str(snapshot.enabled),
         'setpoint': _quantity(snapshot.setpoint, snapshot.unit),

@@ -26,6 +26,7 @@ from nfo_sinus_driver.node.drive.callers import Call
 from nfo_sinus_driver.node.drive.commands import CommandServices, ErrorLogServices, TuningServices
 from nfo_sinus_driver.node.drive.lifecycle import Lifecycle
 from nfo_sinus_driver.node.drive.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
+from nfo_sinus_driver.node.drive.operating_recorder import OperatingRecorder
 from nfo_sinus_driver.node.drive.other_lines import OtherLines, drive_of, is_elsewhere, stop_of
 from nfo_sinus_driver.node.drive.reporter import Reporter
 from nfo_sinus_driver.node.drive.setpoints import Setpoints
@@ -43,6 +44,7 @@ from nfo_sinus_driver.node.parameters.factory_settings import with_factory_addre
 from nfo_sinus_driver.node.parameters.parameter_names import did_you_mean
 from nfo_sinus_driver.node.parameters.settings import DRIVE_SETTINGS
 from nfo_sinus_driver.node.ros.rclpy_internals import overrides_of
+from nfo_sinus_driver.operating_record.maintenance import limits
 from nfo_sinus_driver.setting import DISABLED
 
 _log = logging.getLogger(__name__)
@@ -51,6 +53,12 @@ _log = logging.getLogger(__name__)
 _LONGEST_STOP = 10.0
 
 _Transition = Callable[['DriveNode', LifecycleState], TransitionCallbackReturn]
+
+
+def _require_own(values: Mapping[str, Any]) -> None:
+    """Make sure that settings of the node alone make sense, or raise a ValueError."""
+    require_factors(values)
+    limits(values.get('maintenance', ()))
 
 
 def _guarded(transition: _Transition) -> _Transition:
@@ -88,7 +96,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         family = overrides_of(self).get('family')
         known = with_factory_address(DRIVE_SETTINGS, None if family is None else family.value)
         values = declare(self, known)
-        require_factors(values)
+        _require_own(values)
         joint = Joint(
             lambda: self.get_parameter('joint_name').value or self.get_name(),
             lambda: self.get_parameter('gear_ratio').value,
@@ -96,8 +104,12 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._drive_parameters = DriveParameters(self)
         queue, follow = context.publish_queue, self._drive_parameters.note_changes
         wording = Wording(self)
+        #: What the drive has done.
+        self.operating_record = record = OperatingRecorder(
+            self, queue, context.memory.line, lambda: self.managed
+        )
         reporter = Reporter(
-            self, queue, context.black_box, wording, joint, lambda: self.managed, follow
+            self, queue, context.black_box, wording, joint, record, lambda: self.managed, follow
         )
         #: The drive of the node.
         self.managed = ManagedDrive(
@@ -360,7 +372,7 @@ class DriveNode(LifecycleNodeMixin, Node):
             return self.managed.settings
         values = dataclasses.asdict(self.managed.settings)
         del values['retries']
-        require_factors(changed)
+        _require_own(changed)
         self._require_same_scale(changed)
         # not read_only for rclpy, so that a dump can be loaded
         autostart = self.get_parameter('autostart').value

@@ -32,6 +32,7 @@ from nfo_sinus_driver.drive import Cause, Event, LogEntry, Report, Severity, Sna
 from nfo_sinus_driver.node.bags.black_box import BlackBox
 from nfo_sinus_driver.node.drive import diagnostics
 from nfo_sinus_driver.node.drive.managed_drive import ManagedDrive
+from nfo_sinus_driver.node.drive.operating_recorder import OperatingRecorder
 from nfo_sinus_driver.node.messages import messages
 from nfo_sinus_driver.node.messages.messages import Joint
 from nfo_sinus_driver.node.messages.serialized import Stamped, float32
@@ -59,6 +60,7 @@ class Reporter:
     Its ``on_…`` methods are called by the bus and only put something into the queue; everything
     else runs on the queue's thread.
 
+    :param record: the operating record of the drive.
     :param managed: returns the drive; not called before the queue works.
     :param follow: called by the bus with the parameters that have new values.
     """
@@ -70,6 +72,7 @@ class Reporter:
         black_box: BlackBox,
         wording: Wording,
         joint: Joint,
+        record: OperatingRecorder,
         managed: Callable[[], ManagedDrive],
         follow: Callable[[Collection[str]], None],
     ) -> None:
@@ -77,6 +80,7 @@ class Reporter:
         self._queue = queue
         self._wording = wording
         self._joint = joint
+        self._record = record
         self._managed = managed
         self._follow = follow
         self._log = node.get_logger()
@@ -132,6 +136,7 @@ class Reporter:
     def on_snapshot(self, snapshot: Snapshot) -> None:
         """Publish a poll, or what has changed since."""
         self._snapshots(snapshot)
+        self._record.take_status(snapshot)
         self._keep_status(snapshot.at, snapshot)
         if snapshot.polled and not math.isnan(snapshot.speed):
             self._keep_speed(snapshot.at, snapshot.speed)
@@ -139,6 +144,7 @@ class Reporter:
     def on_telemetry(self, telemetry: Telemetry) -> None:
         """Publish measured values."""
         self._queue.put(lambda: self._publish_telemetry(telemetry))
+        self._record.take_telemetry(telemetry)
         self._keep_telemetry(telemetry.at, telemetry)
 
     def on_parameters(self, keys: Collection[str]) -> None:
@@ -260,7 +266,8 @@ class Reporter:
 
     def _diagnose(self, snapshot: Snapshot) -> None:
         """Publish the diagnosis of the drive if it has changed."""
-        if diagnostics.drive_verdict(self._managed(), snapshot) != self._verdict:
+        verdict = diagnostics.drive_verdict(self._managed(), snapshot, self._record.due)
+        if verdict != self._verdict:
             stamp = _message(self._stamps.now())
             array = diagnostics.array(stamp, self._diagnosis_of(snapshot))
             self._diagnostics.publish(array)
@@ -297,9 +304,14 @@ class Reporter:
 
     def _diagnosis_of(self, snapshot: Snapshot) -> DiagnosticStatus:
         managed = self._managed()
-        self._verdict = diagnostics.drive_verdict(managed, snapshot)
+        self._verdict = diagnostics.drive_verdict(managed, snapshot, self._record.due)
         return diagnostics.drive_status(
-            self._diagnosis, self._whole_name, managed, snapshot, self._verdict
+            self._diagnosis,
+            self._whole_name,
+            managed,
+            snapshot,
+            self._verdict,
+            self._record.maintenance,
         )
 
 

@@ -14,8 +14,12 @@ from nfo_sinus_msgs.msg import (
     BusStatistics,
     DriveStatus,
     ErrorLogEntry,
+    FaultCount,
     InvSt,
     Measured,
+    OperatingFigures,
+    OperatingRecord,
+    StopCount,
     Telemetry as TelemetryMessage,
 )
 from sensor_msgs.msg import JointState
@@ -24,8 +28,16 @@ from std_msgs.msg import Header
 from nfo_sinus_driver.bus import Statistics
 from nfo_sinus_driver.catalog import Fact, Family, Kind, Role, State
 from nfo_sinus_driver.catalog.status import FREQUENCY, QUANTITIES, SPEED
-from nfo_sinus_driver.drive import Drive, InverterStatus, LogEntry, Snapshot, Telemetry
+from nfo_sinus_driver.drive import (
+    Drive,
+    InverterStatus,
+    LogEntry,
+    Snapshot,
+    StopReason,
+    Telemetry,
+)
 from nfo_sinus_driver.node.messages.scale import Scale
+from nfo_sinus_driver.operating_record.figures import HIGHEST, Figures, Record
 
 _CONTROL_MODES = {mode: getattr(DriveStatus, mode.upper().replace('-', '_')) for mode in QUANTITIES}
 #: A method without a constant is a family's own: CUSTOM.
@@ -159,6 +171,50 @@ def bus_statistics(statistics: Statistics, silent_drives: list[str], stamp: Time
         silent_drives=silent_drives,
         round_trip_median=statistics.round_trip_median,
     )
+
+
+def operating_record(record: Record, stamp: Time, *, stored: bool) -> OperatingRecord:
+    """Return the OperatingRecord message of a record."""
+    return OperatingRecord(
+        header=Header(stamp=stamp),
+        drive=record.drive,
+        serial_number=record.serial,
+        stored=stored,
+        energy_source=record.energy_source,
+        total=_operating_figures(record.total),
+        shift=_operating_figures(record.shift),
+    )
+
+
+def _operating_figures(figures: Figures) -> OperatingFigures:
+    stops = [
+        StopCount(stop_reason=StopReason[name], name=name, count=count)
+        for name, count in sorted(figures.stops.items())
+        if name in StopReason.__members__
+    ]
+    faults = [
+        FaultCount(code=code, text=fault.text, count=fault.count, last=_wall_time(fault.last))
+        for code, fault in sorted(figures.faults.items())
+    ]
+    highest = {f'highest_{name}': figures.highest.get(name, math.nan) for name in HIGHEST}
+    return OperatingFigures(
+        since=_wall_time(figures.since),
+        powered_time=figures.powered_time,
+        running_time=figures.running_time,
+        starts=figures.starts,
+        reversals=figures.reversals,
+        stops=stops,
+        faults=faults,
+        energy=figures.energy_kwh,
+        line_errors=figures.line_errors,
+        longest_silence=figures.longest_silence,
+        **highest,
+    )
+
+
+def _wall_time(seconds: float) -> Time:
+    whole = math.floor(seconds)
+    return Time(sec=whole, nanosec=int((seconds - whole) * 1e9))
 
 
 _RPM = 2 * math.pi / 60

@@ -49,6 +49,13 @@ _OF_NODE = (
         name='apply_parameters',
     ),
     Setting('', 'frame_id of the headers', name='frame_id'),
+    Setting(
+        [''],
+        'what is due after so many hours or starts of ~/operating_record, each NAME=FIGURE:LIMIT, '
+        'such as fan=powered_time:80000, with powered_time (h), running_time (h) or starts; then '
+        'a warning in /diagnostics, and once in the log, says so',
+        zero='nothing', name='maintenance',
+    ),
 )
 
 BUS_SETTINGS = {

@@ -43,7 +43,7 @@ from nfo_sinus_driver.signals import ENDING, HeldSignals, OtherProcess, signal_n
 
 #: Threads that callbacks of one drive may keep waiting: one for each of its callback groups, but
 #: more for ``~/enable``.
-_GROUPS_OF_A_DRIVE = 16 + CALLS_OF_ENABLE
+_GROUPS_OF_A_DRIVE = 17 + CALLS_OF_ENABLE
 _GROUPS_OF_THE_BUS = 6
 #: With many threads and a busy one among them, this keeps the bus on time, s.
 _SWITCH_INTERVAL = 0.0002
@@ -131,11 +131,16 @@ class DriverProcess:
         self._context.bus.close()
         self._context.publish_queue.close()
         self._context.black_box.close()
+        records = [node.operating_record for node in self._drives]
+        for record in records:
+            record.end()
         self._context.setpoint_subscriber.close(_LAST_CALLBACK)
         end_all(self._executors, _LAST_CALLBACK)
         deadline = time.monotonic() + _LAST_CALLBACK
         for node in self._drives:
             node.lifecycle.join(max(0.0, deadline - time.monotonic()))
+        for record in records:
+            record.join(max(0.0, deadline - time.monotonic()))
         return confirmed
 
     def _stop_motors(self, why: str) -> bool:
