@@ -42,12 +42,14 @@ class BusContext:
     :ivar retries: how often a request without an answer is repeated.
     :ivar memory: keeps what is to be put back in the drives.
     :ivar black_box: keeps the last minute of the line.
+    :ivar introspection: what is published of calls that are no commands.
     """
 
     bus: Bus
     retries: int
     memory: Memory
     black_box: BlackBox
+    introspection: str
     publish_queue: PublishQueue = field(default_factory=PublishQueue)
     setpoint_subscriber: SetpointSubscriber = field(default_factory=SetpointSubscriber)
     graph_watch: GraphWatch = field(default_factory=GraphWatch)

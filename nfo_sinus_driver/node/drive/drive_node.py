@@ -22,7 +22,7 @@ from rosgraph_msgs.msg import Clock
 
 from nfo_sinus_driver.drive import Cause, Drive, DriveError, DriveSettings, Report
 from nfo_sinus_driver.node.drive.bus_context import BusContext
-from nfo_sinus_driver.node.drive.callers import Call
+from nfo_sinus_driver.node.drive.callers import Call, publish_calls
 from nfo_sinus_driver.node.drive.commands import CommandServices, ErrorLogServices, TuningServices
 from nfo_sinus_driver.node.drive.lifecycle import Lifecycle
 from nfo_sinus_driver.node.drive.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
@@ -131,6 +131,7 @@ class DriveNode(LifecycleNodeMixin, Node):
         commands = CommandServices(self, self.managed)
         ErrorLogServices(self, self.managed, commands, reporter.stamp)
         TuningServices(self, self.managed, reporter.stamp)
+        publish_calls(self, context.introspection)
         context.add(self.managed)
         context.diagnose.append(reporter.diagnosis)
 

@@ -26,6 +26,7 @@ from nfo_sinus_driver.node.bags import bags
 from nfo_sinus_driver.node.bags.black_box import BlackBox
 from nfo_sinus_driver.node.drive import diagnostics
 from nfo_sinus_driver.node.drive.bus_context import BusContext
+from nfo_sinus_driver.node.drive.callers import publish_calls
 from nfo_sinus_driver.node.drive.setpoint_checks import Origin
 from nfo_sinus_driver.node.line.all_drives import AllDrives
 from nfo_sinus_driver.node.messages import messages
@@ -33,7 +34,7 @@ from nfo_sinus_driver.node.messages.stamps import Stamps
 from nfo_sinus_driver.node.parameters.declaring import coerce, declare
 from nfo_sinus_driver.node.parameters.factory_settings import line_of
 from nfo_sinus_driver.node.parameters.parameter_names import require_parameter
-from nfo_sinus_driver.node.parameters.settings import BLACK_BOX, BUS_SETTINGS
+from nfo_sinus_driver.node.parameters.settings import BLACK_BOX, BUS_SETTINGS, INTROSPECTION
 from nfo_sinus_driver.node.ros.qos import RELIABLE
 from nfo_sinus_driver.node.ros.rclpy_internals import given_to, overrides_of
 from nfo_sinus_driver.setting import Setting
@@ -68,7 +69,9 @@ class BusNode(Node):
     def __init__(self, overrides: Sequence[Parameter] = (), single_name: str = '') -> None:
         super().__init__(NAME, parameter_overrides=list(overrides))
         known = dict(BUS_SETTINGS)
-        own = declare(self, {name: known.pop(name) for name in ('drives', BLACK_BOX.name)})
+        own = declare(self, {
+            name: known.pop(name) for name in ('drives', BLACK_BOX.name, INTROSPECTION.name)
+        })
         self.drive_names: list[str] = list(own['drives'])
         names = [single_name] if single_name else self.drive_names
         settings = BusSettings(**self._declare_line(known, _families_of(names)))
@@ -78,8 +81,12 @@ class BusNode(Node):
         memory = StateFolder(settings.port)
         self._whole_name = self.get_fully_qualified_name().lstrip('/')
         box = self._black_box(own[BLACK_BOX.name])
-        self.bus_context = BusContext(Bus(link, limit), settings.retries, memory, box)
+        introspection = own[INTROSPECTION.name]
+        self.bus_context = BusContext(
+            Bus(link, limit), settings.retries, memory, box, introspection
+        )
         AllDrives(self, self.bus_context)
+        publish_calls(self, introspection)
         self.bus_context.subscribe(self, {'~/setpoint_all': (Float32, self._on_setpoint_all)})
         publish_queue = self.bus_context.publish_queue
         self.bus_context.bus.on_mute(

@@ -17,6 +17,13 @@ BLACK_BOX = Setting(
     'for, each fault and each loss',
     0, 600, unit='s', zero='nothing', change=FIXED, name='black_box',
 )
+INTROSPECTION = Setting(
+    'off',
+    'what is published of the calls of services that are no commands, on SERVICE/_service_event of '
+    'this node and those of its drives: who called and when, or request and answer, too; calls of '
+    'commands are published whole in any case',
+    choices=('off', 'metadata', 'contents'), change=FIXED, name='introspection',
+)
 _OF_NODE = (
     Setting(
         True, 'configure and activate by itself, and try until it works',
@@ -52,6 +59,7 @@ _OF_NODE = (
 )
 
 BUS_SETTINGS = {
-    **settings_of(BusSettings), _DRIVES.name: _DRIVES, BLACK_BOX.name: BLACK_BOX
+    **settings_of(BusSettings),
+    **{setting.name: setting for setting in (_DRIVES, BLACK_BOX, INTROSPECTION)},
 }
 DRIVE_SETTINGS = {**settings_of(DriveSettings), **{setting.name: setting for setting in _OF_NODE}}
