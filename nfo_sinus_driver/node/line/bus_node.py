@@ -29,6 +29,7 @@ from nfo_sinus_driver.node.drive.bus_context import BusContext
 from nfo_sinus_driver.node.drive.callers import publish_calls
 from nfo_sinus_driver.node.drive.setpoint_checks import Origin
 from nfo_sinus_driver.node.line.all_drives import AllDrives
+from nfo_sinus_driver.node.line.joint_commands import JointCommands, message_type
 from nfo_sinus_driver.node.messages import messages
 from nfo_sinus_driver.node.messages.stamps import Stamps
 from nfo_sinus_driver.node.parameters.declaring import coerce, declare
@@ -88,6 +89,8 @@ class BusNode(Node):
         AllDrives(self, self.bus_context)
         publish_calls(self, introspection)
         self.bus_context.subscribe(self, {'~/setpoint_all': (Float32, self._on_setpoint_all)})
+        if (type_ := message_type()) is not None:
+            JointCommands(self, self.bus_context, type_)
         publish_queue = self.bus_context.publish_queue
         self.bus_context.bus.on_mute(
             lambda seconds: publish_queue.put(lambda: self._log_mute(seconds))
