@@ -69,6 +69,7 @@ class BusContext:
     :ivar memory: keeps what is to be put back in the drives.
     :ivar black_box: keeps the last minute of the line.
     :ivar introspection: what is published of calls that are no commands.
+    :ivar bond: each drive's node has a bond while it is active.
     """
 
     bus: Bus
@@ -76,6 +77,7 @@ class BusContext:
     memory: Memory
     black_box: BlackBox
     introspection: str
+    bond: bool
     publish_queue: PublishQueue = field(default_factory=PublishQueue)
     setpoint_subscriber: SetpointSubscriber = field(default_factory=SetpointSubscriber)
     graph_watch: GraphWatch = field(default_factory=GraphWatch)

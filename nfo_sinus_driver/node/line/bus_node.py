@@ -35,7 +35,13 @@ from nfo_sinus_driver.node.messages.stamps import Stamps
 from nfo_sinus_driver.node.parameters.declaring import coerce, declare
 from nfo_sinus_driver.node.parameters.factory_settings import line_of
 from nfo_sinus_driver.node.parameters.parameter_names import require_parameter
-from nfo_sinus_driver.node.parameters.settings import BLACK_BOX, BUS_SETTINGS, INTROSPECTION
+from nfo_sinus_driver.node.parameters.settings import (
+    BLACK_BOX,
+    BOND,
+    BUS_SETTINGS,
+    DRIVES,
+    INTROSPECTION,
+)
 from nfo_sinus_driver.node.ros.qos import RELIABLE
 from nfo_sinus_driver.node.ros.rclpy_internals import given_to, overrides_of
 from nfo_sinus_driver.setting import Setting
@@ -71,9 +77,10 @@ class BusNode(Node):
         super().__init__(NAME, parameter_overrides=list(overrides))
         known = dict(BUS_SETTINGS)
         own = declare(self, {
-            name: known.pop(name) for name in ('drives', BLACK_BOX.name, INTROSPECTION.name)
+            setting.name: known.pop(setting.name)
+            for setting in (DRIVES, BLACK_BOX, INTROSPECTION, BOND)
         })
-        self.drive_names: list[str] = list(own['drives'])
+        self.drive_names: list[str] = list(own[DRIVES.name])
         names = [single_name] if single_name else self.drive_names
         settings = BusSettings(**self._declare_line(known, _families_of(names)))
         self._port = settings.port
@@ -84,7 +91,7 @@ class BusNode(Node):
         box = self._black_box(own[BLACK_BOX.name])
         introspection = own[INTROSPECTION.name]
         self.bus_context = BusContext(
-            Bus(link, limit), settings.retries, memory, box, introspection
+            Bus(link, limit), settings.retries, memory, box, introspection, own[BOND.name]
         )
         AllDrives(self, self.bus_context)
         publish_calls(self, introspection)
