@@ -75,7 +75,7 @@ class JointCommands:
             raise ValueError(f'it has {len(names)} joint_names, but {len(message.values)} values')
         if not names:
             raise ValueError('it names no joint')
-        joints = [self._joint(name) for name in names]
+        joints = self._joints(names)
         if len(set(names)) != len(names):
             raise ValueError(f'a joint stands twice in {", ".join(names)}')
         timeouts = [joint.setpoint_timeout for joint in joints if joint.setpoint_timeout]
@@ -88,16 +88,19 @@ class JointCommands:
             for joint, velocity in zip(joints, message.values, strict=True)
         ]
 
-    def _joint(self, name: str) -> JointInput:
-        found = [joint for joint in self._context.joints if joint.joint_name == name]
-        if len(found) != 1:
-            every = ', '.join(joint.joint_name for joint in self._context.joints)
-            is_here = 'more than one' if found else 'no'
-            raise ValueError(
-                f'there is {is_here} joint {name} on this line, which has {every}: joint_name of a '
-                'drive is the name to use'
-            )
-        return found[0]
+    def _joints(self, names: Sequence[str]) -> list[JointInput]:
+        """Return the joints of these names, or a ValueError which one is none of this line."""
+        here: dict[str, list[JointInput]] = {}
+        for joint in self._context.joints:
+            here.setdefault(joint.joint_name, []).append(joint)
+        for name in names:
+            found = here.get(name, ())
+            if len(found) != 1:
+                raise ValueError(
+                    f'there is {"more than one" if found else "no"} joint {name} on this line, '
+                    f'which has {", ".join(here)}: joint_name of a drive is the name to use'
+                )
+        return [here[name][0] for name in names]
 
     def _setpoint(self, joint: JointInput, velocity: float) -> float:
         if not math.isfinite(velocity):
