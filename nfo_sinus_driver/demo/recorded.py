@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from nfo_sinus_driver.node.bags import bags
+from nfo_sinus_driver.node.drive.callers import COMMANDS
 
 _EVENT = '/_service_event'
 _STATUS = 'nfo_sinus_msgs/msg/DriveStatus'
@@ -313,6 +314,8 @@ def _is_of(drives: Sequence[str], topic: str) -> bool:
         return True
     node, _, name = topic.removesuffix(_EVENT).rpartition('/')
     if topic.endswith(_EVENT):
+        if name not in COMMANDS:
+            return False
         return node in drives or node in {f'{drive.rpartition("/")[0]}/{_BUS}' for drive in drives}
     return node in drives and name in _READ
 

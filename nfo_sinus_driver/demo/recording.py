@@ -21,6 +21,7 @@ from std_msgs.msg import Float32
 from std_srvs.srv import SetBool, Trigger
 
 from nfo_sinus_driver.node.bags import bags
+from nfo_sinus_driver.node.bags.type_definitions import class_of
 from nfo_sinus_driver.node.ros.qos import LATCHED, NEWEST, RELIABLE, ROSOUT, newest
 
 _EVENT = '_service_event'
@@ -36,7 +37,7 @@ def topics_of(*drives: str) -> dict[str, tuple[type, QoSProfile]]:
     """Return what is recorded of drives: topics, types, and the quality that publishers offer."""
     found: dict[str, tuple[type, QoSProfile]] = {}
     for drive in drives:
-        line = f'{drive.rpartition("/")[0]}/nfo_sinus_bus'
+        line = _line_of(drive)
         found |= {
             f'{drive}/setpoint': (Float32, NEWEST),
             f'{drive}/status': (DriveStatus, RELIABLE),
@@ -55,6 +56,11 @@ def topics_of(*drives: str) -> dict[str, tuple[type, QoSProfile]]:
             f'{line}/statistics': (BusStatistics, RELIABLE),
         }
     return {**found, '/diagnostics': (DiagnosticArray, RELIABLE), '/rosout': (Log, ROSOUT)}
+
+
+def _line_of(drive: str) -> str:
+    """Return the full name of the bus node of a drive."""
+    return f'{drive.rpartition("/")[0]}/nfo_sinus_bus'
 
 
 def replay_warning(*drives: str) -> str:
@@ -104,10 +110,16 @@ class Recorder(Node):
             self._bag = bags.create(folder, remarks)
         except OSError as error:
             raise RecordingError(f'no bag can be written to {folder}: {error}') from error
-        for topic, (type_, qos) in topics_of(*drives).items():
+        known = topics_of(*drives)
+        for topic, (type_, qos) in known.items():
             self._record(topic, type_, qos)
+        #: The nodes whose calls are recorded, and the topics that are recorded already.
+        self._nodes = {*drives, *map(_line_of, drives)}
+        self._recorded = set(known)
         # not by the clock of a simulation, which may stand
-        self.create_timer(_FLUSH, self._flush, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_FLUSH, self._flush, clock=steady)
+        self.create_timer(_FLUSH, self._record_calls, clock=steady)
 
     @property
     def silent(self) -> list[str]:
@@ -156,6 +168,15 @@ class Recorder(Node):
 
         deep = newest(_DEPTH, qos.reliability, qos.durability)
         self.create_subscription(type_, topic, write, deep, raw=True)
+
+    def _record_calls(self) -> None:
+        """Record what nodes publish of their calls (``introspection``), as soon as it is found."""
+        for topic, types in self.get_topic_names_and_types():
+            service, _, last = topic.rpartition('/')
+            of_these = last == _EVENT and service.rpartition('/')[0] in self._nodes
+            if of_these and topic not in self._recorded:
+                self._recorded.add(topic)
+                self._record(topic, class_of(types[0]), RELIABLE)
 
     def _hear(self, drive: str) -> None:
         if drive in self._silent:

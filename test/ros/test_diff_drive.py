@@ -231,17 +231,25 @@ def _faults(simulator: Simulated, _: Client) -> None:
     simulator.inject('fault', 5, address=1)
 
 
+def _is_lost(simulator: Simulated, _: Client) -> None:
+    simulator.inject('silence', 3600.0, address=1)
+
+
 def _is_stopped(_: Simulated, left: Client) -> None:
     assert left.call('stop').success
 
 
 @needs('parameters', 'fast')
-@pytest.mark.parametrize('happens', [_faults, _is_stopped])
+@pytest.mark.parametrize('happens', [_faults, _is_lost, _is_stopped])
 def test_a_wheel_that_stops_stops_the_other_whatever_the_controller_sends(
     bench: Bench, happens: Callable[[Simulated, Client], None]
 ) -> None:
-    simulator, _, parts = start(bench)
+    simulator, every_drive, parts = start(bench)
     left, right = bench.client('/left_wheel'), bench.client('/right_wheel')
+
+    def turning() -> bool:
+        return any(simulator.state(unit)['turning'] for unit in (1, 2))
+
     with Hardware(left, parts, _RATE):
         command(parts, _SPEED)
         wait_until(lambda: reached(parts, _SPEED), 'both wheels turn')
@@ -252,12 +260,19 @@ def test_a_wheel_that_stops_stops_the_other_whatever_the_controller_sends(
             and status.stop_text.startswith('it stops with /left_wheel: '),
             'the other one stops with it',
         )
-        for address in (1, 2):
-            wait_until(lambda a=address: not simulator.state(a)['turning'], 'it stands')
-        holds_for(
-            A_WHILE, lambda: not any(simulator.state(unit)['turning'] for unit in (1, 2)),
-            'no command moves either',
-        )
+        # it is back, or was never gone
+        simulator.inject('silence', 0.0, address=1)
+        wait_until(lambda: not turning(), 'both stand')
+        left.connected()
+        assert left.call('fault_ack').success or happens is not _faults
+        holds_for(A_WHILE, lambda: not turning(), 'no command moves either')
+    # what was sent before the enable starts nothing, and the enable alone neither
+    wait_until(lambda: every_drive.call('enable_all').success, 'both can be enabled')
+    holds_for(A_WHILE, lambda: not turning(), 'no set-point is fresh')
+    parts = components(_FOLDER / 'robot.urdf')
+    with Hardware(left, parts, _RATE):
+        command(parts, _SPEED)
+        wait_until(lambda: reached(parts, _SPEED), 'a fresh one moves both')
 
 
 @needs('parameters', 'fast')

@@ -29,6 +29,14 @@ def test_they_are_there(domain: int) -> None:
         assert rclpy_internals.change_state_service(node).srv_type is ChangeState
         assert callable(rclpy_internals.change_state_service(node).callback)
         assert rclpy_internals.state_label(node) == 'unconfigured'
+        # to let one of these publish its calls fails, and may end the process in C
+        assert {
+            service.service_name.rpartition('/')[2]
+            for service in filter(rclpy_internals.is_made_by_rcl, node.services)
+        } == {
+            'change_state', 'get_state', 'get_available_states', 'get_available_transitions',
+            'get_transition_graph', 'get_type_description',
+        }
         node.declare_parameter('shown', 1, ParameterDescriptor(read_only=True))
         with rclpy_internals.writable(node, 'shown'):
             assert node.set_parameters([Parameter('shown', value=2)])[0].successful

@@ -47,6 +47,7 @@ ON_NOBLE = {
 #: What is left out where it is not installed: apt has none of them, or none that is new enough.
 #: The driver says so, a test is skipped.
 OPTIONAL = {
+    'examples/controller_stopper.py': {'controller_manager_msgs'},
     'nfo_sinus_driver/node/bags/by_rosbags.py': {'rosbags'},
     'test/ros/stand_ins/rosbag2_py.py': {'rosbags'},
 }

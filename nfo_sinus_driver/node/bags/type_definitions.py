@@ -15,7 +15,7 @@ from ament_index_python.packages import get_package_share_directory
 _RULE = '=' * 80 + '\n'
 #: The type of a field that is a message of some package, at the beginning of a line.
 _NESTED = re.compile(r'^\s*([A-Za-z]\w*(?:/\w+)+|[A-Z]\w*)(?:\[[^\]]*\])?\s+\w', re.MULTILINE)
-_INCLUDE = re.compile(r'^#include .*\n', re.MULTILINE)
+_INCLUDE = re.compile(r'^#include "(.*)\.idl"\n', re.MULTILINE)
 
 #: What ROS makes of a service for its introspection; no package installs it as a file.
 _EVENT_TYPE = """\
@@ -68,13 +68,13 @@ def _event_definition(name: str) -> str:
     package, _, event = name.split('/')
     service = event.removesuffix('_Event')
     parts = {name: _EVENT_TYPE.format(package=package, service=service)}
-    for used in (
-        f'{package}/srv/{service}',
-        'service_msgs/msg/ServiceEventInfo',
-        'builtin_interfaces/msg/Time',
-    ):
+    waiting = [f'{package}/srv/{service}', 'service_msgs/msg/ServiceEventInfo']
+    while waiting:
+        used = waiting.pop(0)
+        text = _file(used, '.idl').read_text()
         # all that is included is here, and not every reader skips the line
-        parts[used] = _INCLUDE.sub('', _file(used, '.idl').read_text())
+        parts[used] = _INCLUDE.sub('', text)
+        waiting += [included for included in _INCLUDE.findall(text) if included not in parts]
     return ''.join(f'{_RULE}IDL: {used}\n{text}\n' for used, text in parts.items())
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import logging
 import threading
 import time
-from typing import Any
+from typing import Any, Protocol
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
@@ -34,6 +34,32 @@ _log = logging.getLogger(__name__)
 _LONGEST_GATHERING = 0.1
 
 
+class JointInput(Protocol):
+    """What takes the set-points of a joint of a line."""
+
+    @property
+    def joint_name(self) -> str:
+        """Its name in messages."""
+
+    @property
+    def setpoint_timeout(self) -> float:
+        """After how long a set-point is old, s; 0: never."""
+
+    @property
+    def follows(self) -> bool:
+        """The motor follows set-points."""
+
+    @property
+    def how_to_enable(self) -> str:
+        """What to call so that it does."""
+
+    def setpoint(self, velocity: float) -> float:
+        """Return the set-point for a velocity, rad/s; a ValueError says why there is none."""
+
+    def take(self, value: float, origin: Origin) -> None:
+        """Take a set-point in the unit of the drive."""
+
+
 @dataclass
 class BusContext:
     """
@@ -42,12 +68,16 @@ class BusContext:
     :ivar retries: how often a request without an answer is repeated.
     :ivar memory: keeps what is to be put back in the drives.
     :ivar black_box: keeps the last minute of the line.
+    :ivar introspection: what is published of calls that are no commands.
+    :ivar bond: each drive's node has a bond while it is active.
     """
 
     bus: Bus
     retries: int
     memory: Memory
     black_box: BlackBox
+    introspection: str
+    bond: bool
     publish_queue: PublishQueue = field(default_factory=PublishQueue)
     setpoint_subscriber: SetpointSubscriber = field(default_factory=SetpointSubscriber)
     graph_watch: GraphWatch = field(default_factory=GraphWatch)
@@ -56,6 +86,8 @@ class BusContext:
     drives: list[ManagedDrive] = field(default_factory=list)
     #: The functions that take a set-point for all drives of the line, one for each drive.
     on_setpoint_all: list[Callable[[Float32, Origin], None]] = field(default_factory=list)
+    #: What takes the set-points of each joint.
+    joints: list[JointInput] = field(default_factory=list)
     #: The functions that return the diagnosis of each drive, called by the publish queue.
     diagnose: list[Callable[[], DiagnosticStatus]] = field(default_factory=list)
 

@@ -13,14 +13,24 @@ import time
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node, NodeNameNonExistentError
-from rclpy.service import Service
 from rclpy.service_introspection import ServiceIntrospectionState
 
 from nfo_sinus_driver.node.ros.qos import RELIABLE
+from nfo_sinus_driver.node.ros.rclpy_internals import is_made_by_rcl
 
 #: Within what time the middleware knows of a new client, s, and how often that is checked.
 _KNOWN_WITHIN = 0.5
 _LOOK_PERIOD = 0.02
+#: The services that start or stop a motor, or may: what `plot --explain` tells of.
+COMMANDS = frozenset((
+    'enable', 'stop', 'quick_stop', 'rapid_stop', 'fault_ack',
+    'stop_all', 'disable_all', 'enable_all',
+))
+_STATES = {
+    'off': ServiceIntrospectionState.OFF,
+    'metadata': ServiceIntrospectionState.METADATA,
+    'contents': ServiceIntrospectionState.CONTENTS,
+}
 
 
 class Call:
@@ -87,8 +97,16 @@ class Call:
         return bool(found)
 
 
-def publish_calls(node: Node, service: Service) -> None:
-    """Publish each call of a service and its answer, so that a bag has them."""
-    service.configure_introspection(
-        node.get_clock(), RELIABLE, ServiceIntrospectionState.CONTENTS
-    )
+def publish_calls(node: Node, others: str) -> None:
+    """
+    Publish the calls of the services that a node has by now, so that a bag has them.
+
+    Those of commands are published whole, those of the others as the setting ``introspection``
+    says, but for services that rcl makes itself: of the lifecycle and ``~/get_type_description``.
+    A service whose calls are not published has no publisher for them.
+    """
+    for service in node.services:
+        name = service.service_name.rpartition('/')[2]
+        state = _STATES['contents' if name in COMMANDS else others]
+        if state is not ServiceIntrospectionState.OFF and not is_made_by_rcl(service):
+            service.configure_introspection(node.get_clock(), RELIABLE, state)

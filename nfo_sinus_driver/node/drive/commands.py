@@ -27,7 +27,6 @@ from rclpy.callback_groups import (
     ReentrantCallbackGroup,
 )
 from rclpy.node import Node
-from rclpy.service import Service
 from std_srvs.srv import SetBool, Trigger
 
 from nfo_sinus_driver.drive import (
@@ -40,7 +39,7 @@ from nfo_sinus_driver.drive import (
     Snapshot,
     Tuned,
 )
-from nfo_sinus_driver.node.drive.callers import Call, publish_calls
+from nfo_sinus_driver.node.drive.callers import Call
 from nfo_sinus_driver.node.drive.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages import messages
 from nfo_sinus_driver.node.messages.messages import inv_st
@@ -72,22 +71,20 @@ class CommandServices:
         # several, for a disable must not wait for an enable that waits for a start delay; but not
         # any number, for each keeps a thread that other drives may need
         group = BoundedCallbackGroup(CALLS_OF_ENABLE)
-        enable = node.create_service(
+        node.create_service(
             SetBool, '~/enable', self._on_enable, qos_profile=COMMANDS, callback_group=group
         )
-        stop = self.offer('~/stop', _stop, _LONGEST_STOP)
-        quick_stop = self.offer('~/quick_stop', _quick_stop, _LONGEST_STOP)
-        rapid_stop = self.offer('~/rapid_stop', _rapid_stop, _LONGEST_STOP)
-        acknowledge = self.offer('~/fault_ack', _acknowledge, _LONGEST_STOP)
-        for service in (enable, stop, quick_stop, rapid_stop, acknowledge):
-            publish_calls(node, service)
+        self.offer('~/stop', _stop, _LONGEST_STOP)
+        self.offer('~/quick_stop', _quick_stop, _LONGEST_STOP)
+        self.offer('~/rapid_stop', _rapid_stop, _LONGEST_STOP)
+        self.offer('~/fault_ack', _acknowledge, _LONGEST_STOP)
         self.offer(
             '~/refresh_parameters',
             lambda *_: managed.require_kept().parameters.refresh(),
             _LONGEST_REFRESH,
         )
 
-    def offer(self, name: str, command: _Command, timeout: float) -> Service:
+    def offer(self, name: str, command: _Command, timeout: float) -> None:
         """Offer a service that answers when a command is done, or after a time-out, s."""
 
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -97,7 +94,7 @@ class CommandServices:
             )
 
         group = MutuallyExclusiveCallbackGroup()
-        return self._node.create_service(
+        self._node.create_service(
             Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
         )
 

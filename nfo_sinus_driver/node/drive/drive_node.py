@@ -21,8 +21,9 @@ from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 
 from nfo_sinus_driver.drive import Cause, Drive, DriveError, DriveSettings, Report
+from nfo_sinus_driver.node.drive.bond import Bond
 from nfo_sinus_driver.node.drive.bus_context import BusContext
-from nfo_sinus_driver.node.drive.callers import Call
+from nfo_sinus_driver.node.drive.callers import Call, publish_calls
 from nfo_sinus_driver.node.drive.commands import CommandServices, ErrorLogServices, TuningServices
 from nfo_sinus_driver.node.drive.lifecycle import Lifecycle
 from nfo_sinus_driver.node.drive.managed_drive import ONLY_UNCONFIGURED, ManagedDrive
@@ -139,10 +140,12 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._applied_to: Drive | None = None
         self.add_on_set_parameters_callback(self._check_settings)
         self.add_post_set_parameters_callback(self._take_settings)
+        self._bond = Bond(self, queue, self._is_there) if context.bond else None
         self._setpoints = Setpoints(self, context, self.managed, joint)
         commands = CommandServices(self, self.managed)
         ErrorLogServices(self, self.managed, commands, reporter.stamp)
         TuningServices(self, self.managed, reporter.stamp)
+        publish_calls(self, context.introspection)
         context.add(self.managed)
         context.diagnose.append(reporter.diagnosis)
 
@@ -159,7 +162,15 @@ class DriveNode(LifecycleNodeMixin, Node):
         self._ending = True
         self.lifecycle.end()
         self._setpoints.be_quiet(True)
+        if self._bond is not None:
+            # the queue may end before it would be told
+            self._bond.beat()
         return self.managed.drive.stop_for_good(patience, Report(Cause.DRIVER_ENDS, by=why))
+
+    def _is_there(self) -> bool:
+        """The node is active, as far as nav2's lifecycle manager goes by its bond."""
+        # a deactivation may fail, and takes as long as the stop
+        return self.lifecycle.state in ('active', 'deactivating') and not self._ending
 
     def _stop_others(self, why: Report) -> None:
         """Stop the drives that stop with this one; called on the bus."""

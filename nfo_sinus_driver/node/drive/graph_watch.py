@@ -8,18 +8,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 
-from nfo_sinus_msgs.msg import Setpoint
 from rclpy.node import Node
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float32
 
 #: How often the graph should be checked, s.
 PERIOD = 5.0
 #: How a message of each type is written; the value is harmless.
 _WRITTEN = {
-    Float32: '{data: 0.0}',
-    Setpoint: '{value: 0.0, unit: 0}',
-    JointState: '{name: [joint], velocity: [0.0]}',
+    'std_msgs/msg/Float32': '{data: 0.0}',
+    'nfo_sinus_msgs/msg/Setpoint': '{value: 0.0, unit: 0}',
+    'sensor_msgs/msg/JointState': '{name: [joint], velocity: [0.0]}',
+    'control_msgs/msg/JointCommand':
+        '{joint_names: [joint], interface_name: velocity, values: [0.0]}',
 }
 #: The name of a node of which only a publisher is known yet.
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'
@@ -84,7 +83,7 @@ class GraphWatch:
                 node.get_logger().warning(
                     f'{other} publishes {topic} as {publisher.topic_type}, which never arrives '
                     f'here: publish it as {wanted}, such as by ros2 topic pub -r 10 {topic} '
-                    f"{wanted} '{_WRITTEN[type_]}'"
+                    f"{wanted} '{_WRITTEN[wanted]}'"
                 )
         return found
 

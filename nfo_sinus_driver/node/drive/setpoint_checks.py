@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 import math
+import time
 from typing import NamedTuple
 
 #: So many changes from one source to another within so many s are two at once: one that hands over
@@ -55,6 +57,61 @@ class Sources:
         if len(self._changes) < _CHANGES or now - self._changes[0][0] > _WITHIN:
             return frozenset()
         return frozenset().union(*(topics for _, topics in self._changes))
+
+
+class Old(NamedTuple):
+    """
+    Why a stamp is not of now.
+
+    :ivar kind: ``old``, ``ahead``, or ``repeated``.
+    """
+
+    kind: str
+    text: str
+
+
+class Freshness:
+    """
+    Whether the stamps of messages are of now.
+
+    One that is to come would be fresh until then. It is the clock that is wrong. One that is
+    repeated for longer than the time-out by the clock of this machine is not of now, whatever that
+    of the node shows.
+
+    :param clock: returns what the clock of the node shows, ns.
+    """
+
+    def __init__(self, clock: Callable[[], int]) -> None:
+        self._clock = clock
+        self._repeated = Repeated()
+
+    def why_not(self, made: int, timeout: float) -> Old | None:
+        """
+        Return why a stamp is not within a time-out of now; 0 is now.
+
+        :param made: ns; the type of the message can have moments that are none for rclpy.
+        :param timeout: s; 0: every stamp is of now.
+        """
+        if not (made and timeout):
+            return None
+        clock = self._clock()
+        age = (clock - made) / 1e9
+        if age > timeout:
+            return Old('old', f'it was made {age:.1f} s ago')
+        if age < -timeout:
+            return Old(
+                'ahead',
+                f'its stamp is {-age:.1f} s ahead of the clock of this node: set the clocks of '
+                'both computers alike by NTP, such as chrony, and use_sim_time of both nodes',
+            )
+        repeated = self._repeated.age(made, clock, time.monotonic())
+        if repeated <= timeout:
+            return None
+        return Old(
+            'repeated',
+            f'for {repeated:.1f} s none has come with a newer stamp: an old one is repeated, or '
+            'the clock of its publisher stands, as /clock at pause',
+        )
 
 
 class Repeated:

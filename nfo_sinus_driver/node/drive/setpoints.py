@@ -19,11 +19,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 
 from nfo_sinus_driver.catalog.status import FREQUENCY, PROCESS_VALUE, SPEED, TORQUE
-from nfo_sinus_driver.drive import DriveError
+from nfo_sinus_driver.drive import Cause, DriveError, Report
 from nfo_sinus_driver.drive.known.settings import MONITOR
 from nfo_sinus_driver.node.drive.bus_context import BusContext
 from nfo_sinus_driver.node.drive.managed_drive import ManagedDrive
-from nfo_sinus_driver.node.drive.setpoint_checks import Origin, Repeated, Sources
+from nfo_sinus_driver.node.drive.setpoint_checks import Freshness, Origin, Sources
 from nfo_sinus_driver.node.messages.messages import Joint, control_mode, require_whole
 from nfo_sinus_driver.node.messages.serialized import float32
 from nfo_sinus_driver.node.ros.log_limit import LogLimit
@@ -44,7 +44,6 @@ class Setpoints:
     def __init__(
         self, node: Node, context: BusContext, managed: ManagedDrive, joint: Joint
     ) -> None:
-        self._clock = node.get_clock()
         self._log = node.get_logger()
         self._managed = managed
         self._joint = joint
@@ -61,7 +60,7 @@ class Setpoints:
         self._keep = context.black_box.stream(
             node.resolve_topic_name('~/setpoint'), Float32, NEWEST, lambda _, value: float32(value)
         )
-        self._repeated = Repeated()
+        self._freshness = Freshness(lambda: node.get_clock().now().nanoseconds)
         context.subscribe(
             node,
             {
@@ -71,13 +70,14 @@ class Setpoints:
             },
         )
         context.on_setpoint_all.append(self._on_setpoint_all)
+        context.joints.append(self)
 
     def be_quiet(self, quiet: bool) -> None:
         """Log, or do not log, that set-points arrive while the drive is not enabled."""
         self._logged_idle = quiet
 
     def _on_setpoint(self, message: Float32, origin: Origin) -> None:
-        self._take(self._managed.scale.of_drive(message.data), origin)
+        self.take(self._managed.scale.of_drive(message.data), origin)
 
     def _on_setpoint_all(self, message: Float32, origin: Origin) -> None:
         # a monitored drive takes no part in commands for all
@@ -97,7 +97,7 @@ class Setpoints:
             self._ignore('unit', f'set-point in {unit} ignored: the control mode is {mode}')
             return
         if self._is_of_now(message.header.stamp):
-            self._take(message.value, origin)
+            self.take(message.value, origin)
 
     def _on_joint_command(self, message: JointState, origin: Origin) -> None:
         if not self._managed.active:
@@ -124,46 +124,55 @@ class Setpoints:
         except ValueError as error:
             self._ignore('joint', f'joint command ignored: {error}')
             return
-        self._take(value, origin)
+        self.take(value, origin)
 
     def _is_of_now(self, stamp: Time) -> bool:
         """
-        Return whether a stamp is within ``setpoint_timeout`` of the node's clock; 0 is now.
+        Return whether a stamp is within ``setpoint_timeout`` of the node's clock; log why not.
 
-        One that is to come would be fresh until then. It is the clock that is wrong, which is
-        reported once, until a stamp is right again. One that is repeated for longer than that by
-        the clock of this machine is not of now, whatever that of the node shows.
+        A clock that is wrong is reported once, until a stamp is right again.
         """
-        timeout = self._managed.settings.setpoint_timeout
-        # the type of the message can have moments that are none for rclpy
         made = stamp.sec * 10**9 + stamp.nanosec
-        if not (made and timeout):
-            return True
-        clock = self._clock.now().nanoseconds
-        age = (clock - made) / 1e9
-        if abs(age) <= timeout:
+        old = self._freshness.why_not(made, self.setpoint_timeout)
+        if old is None or old.kind == 'repeated':
             self._was_ahead = False
-            repeated = self._repeated.age(made, clock, time.monotonic())
-            if repeated <= timeout:
-                return True
-            self._ignore(
-                'repeated',
-                f'set-point ignored: for {repeated:.1f} s none has come with a newer stamp: an old '
-                'one is repeated, or the clock of its publisher stands, as /clock at pause',
-            )
-            return False
-        if age > 0:
-            self._ignore('old', f'set-point ignored: it was made {age:.1f} s ago')
-        elif not self._was_ahead:
-            self._was_ahead = self._ignore(
-                'ahead',
-                f'set-point ignored: its stamp is {-age:.1f} s ahead of the clock of this node: '
-                'set the clocks of both computers alike by NTP, such as chrony, and use_sim_time '
-                'of both nodes',
-            )
-        return False
+        if old is not None and not (old.kind == 'ahead' and self._was_ahead):
+            is_logged = self._ignore(old.kind, f'set-point ignored: {old.text}')
+            self._was_ahead = self._was_ahead or (old.kind == 'ahead' and is_logged)
+        return old is None
 
-    def _take(self, value: float, origin: Origin) -> None:
+    # --- as one of the joints of the line -----------------------------------------------------
+
+    @property
+    def joint_name(self) -> str:
+        """The name of the output shaft in messages."""
+        return self._joint.name
+
+    @property
+    def setpoint_timeout(self) -> float:
+        """After how long a set-point is old, s; 0: never."""
+        return self._managed.settings.setpoint_timeout
+
+    @property
+    def follows(self) -> bool:
+        """The motor follows set-points."""
+        return self._managed.active and self._managed.drive.following
+
+    @property
+    def how_to_enable(self) -> str:
+        """What to call so that the motor follows set-points."""
+        return self._managed.wording.enable
+
+    def setpoint(self, velocity: float) -> float:
+        """Return the set-point for a velocity, rad/s; a ValueError says why there is none."""
+        settings = self._managed.settings
+        if not settings.follows_setpoints:
+            why = Report(Cause.OWN_REFERENCE, reference=settings.reference)
+            raise ValueError(self._managed.wording.say(why))
+        return self._joint.setpoint(velocity, self._managed.drive)
+
+    def take(self, value: float, origin: Origin) -> None:
+        """Take a set-point in the unit of the drive, or log why it is ignored."""
         if not self._managed.active:
             return
         if not math.isfinite(value):

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 from nfo_sinus_driver.drive import Cause, DriveError, Report
 from nfo_sinus_driver.drive.broadcast import broadcast_stop
 from nfo_sinus_driver.node.drive.bus_context import BusContext
-from nfo_sinus_driver.node.drive.callers import Call, publish_calls
+from nfo_sinus_driver.node.drive.callers import Call
 from nfo_sinus_driver.node.drive.managed_drive import ManagedDrive
 from nfo_sinus_driver.node.messages.wording import NodeError
 from nfo_sinus_driver.node.ros.executor import received_at
@@ -48,10 +48,9 @@ class AllDrives:
         ):
             group = MutuallyExclusiveCallbackGroup()
             answer = self._safe(name, callback)
-            service = node.create_service(
+            node.create_service(
                 Trigger, name, answer, qos_profile=COMMANDS, callback_group=group
             )
-            publish_calls(node, service)
 
     def _safe(
         self, name: str, callback: _Callback

@@ -26,14 +26,22 @@ from nfo_sinus_driver.node.bags import bags
 from nfo_sinus_driver.node.bags.black_box import BlackBox
 from nfo_sinus_driver.node.drive import diagnostics
 from nfo_sinus_driver.node.drive.bus_context import BusContext
+from nfo_sinus_driver.node.drive.callers import publish_calls
 from nfo_sinus_driver.node.drive.setpoint_checks import Origin
 from nfo_sinus_driver.node.line.all_drives import AllDrives
+from nfo_sinus_driver.node.line.joint_commands import JointCommands, message_type
 from nfo_sinus_driver.node.messages import messages
 from nfo_sinus_driver.node.messages.stamps import Stamps
 from nfo_sinus_driver.node.parameters.declaring import coerce, declare
 from nfo_sinus_driver.node.parameters.factory_settings import line_of
 from nfo_sinus_driver.node.parameters.parameter_names import require_parameter
-from nfo_sinus_driver.node.parameters.settings import BLACK_BOX, BUS_SETTINGS
+from nfo_sinus_driver.node.parameters.settings import (
+    BLACK_BOX,
+    BOND,
+    BUS_SETTINGS,
+    DRIVES,
+    INTROSPECTION,
+)
 from nfo_sinus_driver.node.ros.qos import RELIABLE
 from nfo_sinus_driver.node.ros.rclpy_internals import given_to, overrides_of
 from nfo_sinus_driver.setting import Setting
@@ -68,8 +76,11 @@ class BusNode(Node):
     def __init__(self, overrides: Sequence[Parameter] = (), single_name: str = '') -> None:
         super().__init__(NAME, parameter_overrides=list(overrides))
         known = dict(BUS_SETTINGS)
-        own = declare(self, {name: known.pop(name) for name in ('drives', BLACK_BOX.name)})
-        self.drive_names: list[str] = list(own['drives'])
+        own = declare(self, {
+            setting.name: known.pop(setting.name)
+            for setting in (DRIVES, BLACK_BOX, INTROSPECTION, BOND)
+        })
+        self.drive_names: list[str] = list(own[DRIVES.name])
         names = [single_name] if single_name else self.drive_names
         settings = BusSettings(**self._declare_line(known, _families_of(names)))
         self._port = settings.port
@@ -78,9 +89,15 @@ class BusNode(Node):
         memory = StateFolder(settings.port)
         self._whole_name = self.get_fully_qualified_name().lstrip('/')
         box = self._black_box(own[BLACK_BOX.name])
-        self.bus_context = BusContext(Bus(link, limit), settings.retries, memory, box)
+        introspection = own[INTROSPECTION.name]
+        self.bus_context = BusContext(
+            Bus(link, limit), settings.retries, memory, box, introspection, own[BOND.name]
+        )
         AllDrives(self, self.bus_context)
+        publish_calls(self, introspection)
         self.bus_context.subscribe(self, {'~/setpoint_all': (Float32, self._on_setpoint_all)})
+        if (type_ := message_type()) is not None:
+            JointCommands(self, self.bus_context, type_)
         publish_queue = self.bus_context.publish_queue
         self.bus_context.bus.on_mute(
             lambda seconds: publish_queue.put(lambda: self._log_mute(seconds))

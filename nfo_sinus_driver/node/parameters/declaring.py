@@ -73,7 +73,8 @@ def _coerced(setting: Setting, given: object) -> SettingValue:
     """
     Return a value in the type of its setting.
 
-    An integer for a double is taken, and so is 5.0 for 5; 8E1, eighty in YAML, is a text.
+    An integer for a double is taken, and so is 5.0 for 5; 8E1, eighty in YAML, is a text, and so
+    is off, which is false in YAML.
     """
     value = given
     wanted = type(setting.default)
@@ -86,6 +87,8 @@ def _coerced(setting: Setting, given: object) -> SettingValue:
         value = int(given)
     elif type(given) is float and setting.name == 'char_format':
         value = _FORMATS_THAT_ARE_NUMBERS.get(given, given)
+    elif given is False and 'off' in setting.choices:
+        value = 'off'
     if type(value) is not wanted or not _only_strings(value):
         what = 'is empty' if given is None else f'is {given!r} ({_type_of(given)})'
         raise ValueError(f'{setting.name} {what}: write {_as(wanted, given)}')

@@ -10,12 +10,25 @@ from nfo_sinus_driver.link import BusSettings
 from nfo_sinus_driver.setting import DISABLED, FIXED, START_ONLY, Setting, settings_of
 
 #: Settings of the nodes alone.
-_DRIVES = Setting(['nfo_sinus'], 'the names of the drive nodes', change=FIXED, name='drives')
+DRIVES = Setting(['nfo_sinus'], 'the names of the drive nodes', change=FIXED, name='drives')
 BLACK_BOX = Setting(
     60.0,
     'how much of the past is kept in memory, and written to a bag at each stop that was not asked '
     'for, each fault and each loss',
     0, 600, unit='s', zero='nothing', change=FIXED, name='black_box',
+)
+INTROSPECTION = Setting(
+    'off',
+    'what is published of the calls of services that are no commands, on SERVICE/_service_event of '
+    'this node and those of its drives: who called and when, or request and answer, too; calls of '
+    'commands are published whole in any case',
+    choices=('off', 'metadata', 'contents'), change=FIXED, name='introspection',
+)
+BOND = Setting(
+    False,
+    "each drive's node has a bond with nav2's lifecycle manager while it is active (topic bond), "
+    'for a bond_timeout of the manager above 0',
+    change=FIXED, name='bond',
 )
 _OF_NODE = (
     Setting(
@@ -59,6 +72,7 @@ _OF_NODE = (
 )
 
 BUS_SETTINGS = {
-    **settings_of(BusSettings), _DRIVES.name: _DRIVES, BLACK_BOX.name: BLACK_BOX
+    **settings_of(BusSettings),
+    **{setting.name: setting for setting in (DRIVES, BLACK_BOX, INTROSPECTION, BOND)},
 }
 DRIVE_SETTINGS = {**settings_of(DriveSettings), **{setting.name: setting for setting in _OF_NODE}}

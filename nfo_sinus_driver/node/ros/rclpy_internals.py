@@ -37,6 +37,12 @@ def change_state_service(node: LifecycleNodeMixin) -> Service:
     return node._service_change_state
 
 
+def is_made_by_rcl(service: Service) -> bool:
+    """Return whether rclpy does not know the type of a service, so that it publishes no calls."""
+    package = service.srv_type.__module__.partition('.')[0]
+    return package in ('lifecycle_msgs', 'type_description_interfaces')
+
+
 @contextlib.contextmanager
 def writable(node: Node, name: str) -> Iterator[None]:
     """Make a parameter that is read-only for clients writable meanwhile."""
