@@ -15,7 +15,7 @@ import sys
 
 from nfo_sinus_driver.catalog import Family, load_family
 from nfo_sinus_driver.cli.check import report
-from nfo_sinus_driver.cli.check.readings import Reading, Seen, Verdict, look, table, turned
+from nfo_sinus_driver.cli.check.readings import Reading, Seen, look, table, turned
 from nfo_sinus_driver.cli.check.sight import (
     BlockSight,
     CanopenSight,
@@ -26,6 +26,7 @@ from nfo_sinus_driver.cli.check.sight import (
     Sight,
 )
 from nfo_sinus_driver.cli.check.turn import Moment, agreed, turn
+from nfo_sinus_driver.cli.check.verdict import Verdict
 from nfo_sinus_driver.cli.check.wire import (
     FIRST,
     CanWire,
