@@ -134,7 +134,7 @@ def turned(
         moment = next((one for one in moments if one.name == reading.moment), None)
         words = moment.words.get(reading.shows) if moment is not None else None
         if moment is None or moment.as_expected is None or not words:
-            why = 'not answered' if moment is None or moment.as_expected is not None else moment.saw
+            why = 'not answered' if moment is None or moment.words else moment.saw
             yield Seen(reading, *not_seen(f'{reading.moment}: {why}'))
             continue
         ranges = reading.words or (_around(_COUNTS_A_HERTZ * moment.hertz),)
