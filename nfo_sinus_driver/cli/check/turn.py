@@ -13,7 +13,7 @@ silent, the worker of the bus sleeps: what wakes it is Enter, or the end of that
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Coroutine, Iterator, Mapping
 import contextlib
 from dataclasses import dataclass, field
 import functools
@@ -24,6 +24,7 @@ import struct
 import sys
 import threading
 import time
+from typing import Any, TypeVar
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family, Role
@@ -35,6 +36,8 @@ from nfo_sinus_driver.cli.session import Session
 from nfo_sinus_driver.drive import Cause, DriveError, InverterStatus
 from nfo_sinus_driver.drive.motion.starting import read_limits
 from nfo_sinus_driver.signals import HeldSignals
+
+_T = TypeVar('_T')
 
 #: The fastest that the motor turns, Hz, and which part of what is nominal.
 _MOST, _PART = 5.0, 0.1
@@ -62,7 +65,7 @@ _NEVER_SILENT = {
     'canopen': 'a CAN line has the heartbeat of this computer, by whose end other drives may stop, '
     'too: it is not withheld',
 }
-_NO_STOP_KEY = 'no key of its keypad stops a motor that the bus runs'
+_NO_STOP_KEY = 'no manual says that a key of its keypad stops a motor that the bus runs'
 #: What is said at other places, or is expected.
 _MUTE = (Cause.FOUND_RUNNING, Cause.FAULT_APPEARED)
 #: What a drive that is switched off leads to.
@@ -564,12 +567,19 @@ class _Turning:
             read = functools.partial(offline.params.read_data, key, Priority.SERVICE)
             # what it refuses now is not seen
             with contextlib.suppress(DriveError):
-                data = offline.do(read)
+                data = self._read(read, speed)
                 words[key] = struct.unpack(f'>{len(data) // 2}h', data)
-        offline.read_status()
+        self._read(lambda: offline.state.reader.read(Priority.SERVICE), speed)
         saw = ', '.join(filter(None, (saw, offline.state.describe())))
         hertz = speed if self._unit == 'Hz' else math.nan
         self._moments.append(Moment(name, saw, right, hertz, words))
+
+    def _read(self, command: Callable[[], Coroutine[Any, Any, _T]], speed: float) -> _T:
+        """Return what a drive tells; the motor turns on at a speed meanwhile, NaN: at none."""
+        reading = self._control.drive.run(command)
+        while not reading.done():
+            self._pause(None if math.isnan(speed) else speed)
+        return reading.result()
 
 
 def _typed() -> bytes:

@@ -23,7 +23,7 @@ def _active_method(status: Status | None) -> Steps[str]:
 PROFILE = Profile(
     title='MOVITRAC 31',
     enable_input='enable terminal (43 from the factory)',
-    # they count in manual operation alone, in which the line runs no motor [M4 §4, P870]
+    # the keypad is an option, of whose keys [M4] says nothing
     has_stop_key=False,
     status_word=words.STATUS_WORD,
     # of a drive that is only watched

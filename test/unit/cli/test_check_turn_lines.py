@@ -13,7 +13,7 @@ import threading
 import time
 from typing import Any, NamedTuple
 
-from cli_bench import QUICK, Bench, Done, MakeBench, wait_until
+from cli_bench import PATIENCE, QUICK, Bench, Done, MakeBench, wait_until
 import pytest
 from test_check_turn import BEGIN, NO_MORE, Answers, act, found, with_all
 from test_through_plc_cli import behind_plc
@@ -111,7 +111,7 @@ def test_all_of_it_over(make_bench: MakeBench, tmp_path: Path, line: Line) -> No
     else:
         # it has its time-out, too, when its power is back
         assert left_out <= {'keypad', 'power'}, done.out
-        assert 'no key' in moments['keypad']['saw'] and 'STOP at' not in done.out
+        assert 'no manual' in moments['keypad']['saw'] and 'STOP at' not in done.out
         assert {'silence', 'acknowledged'} <= {*moments}
     assert {'forward', 'reverse', 'stopped', 'input', 'after input', 'power'} <= {*moments}
     assert moments['reverse']['saw'].startswith('-') and done.status == 0
@@ -343,3 +343,21 @@ def test_a_motor_that_turns_after_its_input_is_closed_is_stopped_before_the_next
     )  # fmt: skip
     assert done.status == 1 and trial.moments['after input']['as_expected'] is False, done.out
     assert turning == [False]
+
+
+def test_enter_counts_while_the_drive_is_read(make_bench: MakeBench, tmp_path: Path) -> None:
+    trial = Trial(make_bench, tmp_path, ALL['rtu'])
+    bench, silent = trial.bench, threading.Event()
+
+    def fall_silent() -> None:
+        # what is read at the speed
+        if not silent.is_set() and bench.drive().peek('status.frq_act') == 5.0:
+            bench.drive().silence(5.0)
+            silent.set()
+
+    bench.on_read('fieldbus.mode', fall_silent)
+    done = trial.turn((SETS_TIMEOUT, lambda: '\n' if silent.wait(PATIENCE) else 'never'))
+    # not only once it answers
+    assert [*trial.moments] == ['control', 'end'], done.out
+    assert trial.moments['end']['saw'] == 'by Enter', done.out
+    wait_until(lambda: trial.stands)
