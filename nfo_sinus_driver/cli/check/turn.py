@@ -546,7 +546,11 @@ class _Turning:
         control = self._control
         if not control.stop():
             control.screen.say(self._not_confirmed)
-        elif control.give_back(_STANDS):
+            return
+        if self._turns:
+            # a slow ramp takes its time
+            control.screen.say(say(control.answer))
+        if control.give_back(_STANDS):
             control.screen.say(say(control.answer))
 
     @contextlib.contextmanager
