@@ -368,3 +368,18 @@ def test_enter_counts_while_the_drive_is_read(make_bench: MakeBench, tmp_path: P
     assert [*trial.moments] == ['control', 'end'], done.out
     assert trial.moments['end']['saw'] == 'by Enter', done.out
     wait_until(lambda: trial.stands)
+
+
+def test_a_drive_that_does_not_tell_what_5_hz_are_is_refused(
+    make_bench: MakeBench, tmp_path: Path
+) -> None:
+    trial = Trial(make_bench, tmp_path, ALL['rtu'], settings={'control.mode': 'Speed'})
+    read_raw = trial.bench.drive().read_raw
+
+    def read(key: str) -> int:
+        return 0 if key == 'motor.f_nom' else read_raw(key)
+
+    trial.bench.drive().read_raw = read  # type: ignore[method-assign]
+    done = trial.turn()
+    assert done.status == 1 and 'how many rpm are 5 Hz' in done.out, done.out
+    assert trial.bench.state()['command_writes'] == {}
