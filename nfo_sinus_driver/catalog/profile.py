@@ -559,6 +559,7 @@ class Profile:
     :ivar title: what its maker calls it.
     :ivar enable_input: what its manual calls the input that lets the motor run, with its terminal.
     :ivar has_enable_input: it is known to have one.
+    :ivar has_stop_key: it is known to have a key that stops a motor which the bus runs.
     :ivar status_word: what its status word means.
     :ivar holders: who has control, by the value of the control source.
     :ivar methods: the ways to command it, by name; the first one is the usual one.
@@ -633,6 +634,7 @@ class Profile:
     active_method: Callable[[Status | None], Steps[str]]
     enable_input: str = 'enable input'
     has_enable_input: bool = True
+    has_stop_key: bool = True
     broadcast_stop: Write | None = None
     names_itself: bool = False
     product: Callable[[], Steps[Product]] | None = None

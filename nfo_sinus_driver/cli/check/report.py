@@ -11,9 +11,10 @@ import math
 from typing import Any
 
 from nfo_sinus_driver.catalog import Role
-from nfo_sinus_driver.cli.check.readings import Seen, Verdict
+from nfo_sinus_driver.cli.check.readings import Seen
 from nfo_sinus_driver.cli.check.sight import Register, Sight, Timing
 from nfo_sinus_driver.cli.check.turn import Moment
+from nfo_sinus_driver.cli.check.verdict import Verdict
 from nfo_sinus_driver.version import VERSION
 
 #: So many registers with something odd are on the screen; the file has all.

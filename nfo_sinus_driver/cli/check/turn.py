@@ -13,7 +13,7 @@ silent, the worker of the bus sleeps: what wakes it is Enter, or the end of that
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Coroutine, Iterator, Mapping
 import contextlib
 from dataclasses import dataclass, field
 import functools
@@ -24,6 +24,7 @@ import struct
 import sys
 import threading
 import time
+from typing import Any, TypeVar
 
 from nfo_sinus_driver.bus import Priority
 from nfo_sinus_driver.catalog import Family, Role
@@ -36,6 +37,8 @@ from nfo_sinus_driver.drive import Cause, DriveError, InverterStatus
 from nfo_sinus_driver.drive.motion.starting import read_limits
 from nfo_sinus_driver.signals import HeldSignals
 
+_T = TypeVar('_T')
+
 #: The fastest that the motor turns, Hz, and which part of what is nominal.
 _MOST, _PART = 5.0, 0.1
 #: For how long it is held at that, and without any rise before it counts as not reached, s; what is
@@ -47,13 +50,22 @@ _LONGEST_TIMEOUT, _LONGER = 10.0, 2.0
 _STANDS, _TURNS_AGAIN = 60.0, 3.0
 #: How long a person may take, s.
 _BY_HAND = 120.0
-#: A motor that turns more slowly stands, Hz.
-_STILL = 0.2
+#: A motor that turns more slowly than this share of its set-point stands, and one that turns faster
+#: than that is not the one that was told to.
+_STILL, _TOO_FAST = 0.04, 2.0
+#: How often a motor that turns on is stopped again, s.
+_AGAIN = 2.0
 #: By when a drive without power is lost, and by when one with power is connected again, s.
 _LOST_WITHIN, _CONNECTS_WITHIN = 3.0, 30.0
 _PERIOD = 0.05
 _WORD = 'TURN'
 _ENTER = 'Enter'
+#: Lines that are not made silent, and why.
+_NEVER_SILENT = {
+    'canopen': 'a CAN line has the heartbeat of this computer, by whose end other drives may stop, '
+    'too: it is not withheld',
+}
+_NO_STOP_KEY = 'no manual says that a key of its keypad stops a motor that the bus runs'
 #: What is said at other places, or is expected.
 _MUTE = (Cause.FOUND_RUNNING, Cause.FAULT_APPEARED)
 #: What a drive that is switched off leads to.
@@ -80,28 +92,43 @@ class Moment:
 
 
 class _Left(Exception):
-    """A step cannot be done, for a reason; the next one can."""
+    """
+    A step cannot be done, for a reason; the next one can.
+
+    :ivar right: as :attr:`Moment.as_expected`.
+    """
+
+    def __init__(self, why: str, right: bool | None = None) -> None:
+        super().__init__(why)
+        self.right = right
 
 
-def agreed(model: Family) -> bool:
+def agreed(model: Family, protocol: str) -> bool:
     """Say what is going to happen; return whether the operator has typed the word for it."""
     profile = model.profile
-    by_hand = ['you press STOP at the keypad', f'you open the {profile.enable_input}']
-    steps = [
+    by_itself = [
         'the bus takes control, and sets the time-out of the drive if it has one',
         'the motor turns forward, in reverse where it can, and is stopped',
-        'it turns, and the line falls silent: the drive has to stop it (where it has a time-out)',
-        *(f'it turns, and {step}' for step in by_hand[: 1 + profile.has_enable_input]),
-        'it turns, and you switch the drive off and on',
     ]
+    if protocol not in _NEVER_SILENT:
+        by_itself.append(
+            'it turns, and the line falls silent: the drive has to stop it (where it has a '
+            'time-out)'
+        )
+    by_hand = []
+    if profile.has_stop_key:
+        by_hand.append('it turns, and you press STOP at the keypad')
+    if profile.has_enable_input:
+        by_hand.append(f'it turns, and you open the {profile.enable_input}')
+    by_hand.append('it turns, and you switch the drive off and on')
     for line in (
         '',
         f'The motor turns now, at {_MOST:g} Hz at most: take its load off, and have the emergency '
         'stop in reach.',
         f'{_ENTER} stops it at any moment. If this computer or the cable fails, only the time-out '
         'of the drive does, if it has one, and the emergency stop.',
-        *(f'  {number}. {step}' for number, step in enumerate(steps, 1)),
-        'From step 4 on each is asked for.',
+        *(f'  {number}. {step}' for number, step in enumerate((*by_itself, *by_hand), 1)),
+        f'From step {len(by_itself) + 1} on each is asked for.',
     ):
         print(line, file=sys.stderr)
     print(f'Type {_WORD} to begin ({_ENTER}: nothing turns): ', end='', file=sys.stderr, flush=True)
@@ -150,8 +177,7 @@ class _Turning:
     ) -> None:
         self._options = options
         self._control = control
-        self._enable_input = model.profile.enable_input
-        self._has_enable_input = model.profile.has_enable_input
+        self._profile = model.profile
         self._mute = mute
         self._keys = keys
         self._moments = moments
@@ -176,12 +202,9 @@ class _Turning:
             control.connect()
             self._step('forward', self._turn_both_ways)
             self._step('silence', self._leave_alone)
-            by_hand = [('keypad', 'press STOP at the keypad', '')]
-            if self._has_enable_input:
-                named = self._enable_input
-                by_hand.append(('input', f'open the {named}', f'close the {named} again'))
-            for name, what, again in by_hand:
-                self._step(name, functools.partial(self._stop_by_hand, name, what, again))
+            self._step('keypad', self._press_stop)
+            if self._profile.has_enable_input:
+                self._step('input', self._open_input)
             self._step('power', self._switch_off)
         finally:
             if drive.identity is not None:
@@ -193,7 +216,7 @@ class _Turning:
         try:
             do()
         except _Left as why:
-            self._moments.append(Moment(name, str(why), None))
+            self._moments.append(Moment(name, str(why), why.right))
             self._stop()
 
     def _turn_both_ways(self) -> None:
@@ -211,6 +234,8 @@ class _Turning:
 
     def _leave_alone(self) -> None:
         """Let the line be silent while the motor turns: the drive has to stop it."""
+        if why := _NEVER_SILENT.get(self._options.protocol):
+            raise _Left(why)
         self._enable()
         timeout = self._control.drive.state.timeout
         if not (timeout.stops_motor and 0 < timeout.seconds <= _LONGEST_TIMEOUT):
@@ -230,15 +255,29 @@ class _Turning:
             now = self._control.offline.read_status()
             self._add('acknowledged', not (now.faulted or now.driven))
 
+    def _press_stop(self) -> None:
+        if not self._profile.has_stop_key:
+            raise _Left(_NO_STOP_KEY)
+        self._stop_by_hand('keypad', 'press STOP at the keypad', '')
+
+    def _open_input(self) -> None:
+        named = self._profile.enable_input
+        self._stop_by_hand('input', f'open the {named}', f'close the {named} again')
+
     def _stop_by_hand(self, name: str, what: str, again: str) -> None:
         """Let a person stop the motor; nothing may turn it afterwards."""
         self._require_yes(f'{what} while it turns')
         self._enable()
         self._reach(self._speed)
         self._control.screen.say(f'{what} now ({_ENTER}: leave it out)')
-        self._until(lambda: not self._control.drive.following)
-        self._wait_until_it_stands()
-        self._add(name, True)
+        if self._stopped_by_hand():
+            self._wait_until_it_stands()
+            # a fault stops it, too
+            self._add(name, None if self._faulted else True)
+        else:
+            self._stop()
+            self._require_yes(f'the motor turned on, and is stopped now. Had you done it ({what})')
+            self._add(name, False, 'the motor turned on')
         if again:
             self._control.screen.say(f'{again}, then press {_ENTER}')
             self._enter_within(_BY_HAND)
@@ -246,8 +285,10 @@ class _Turning:
         while time.monotonic() < begun + _TURNS_AGAIN:
             self._pause()
             turned |= self._turns
-        known = not math.isnan(self._control.drive.snapshot.frequency)
+        known = not math.isnan(self._control.drive.snapshot.actual)
         self._add(f'after {name}', not turned if known else None)
+        if turned:
+            self._stop()
 
     def _switch_off(self) -> None:
         """Let the mains go while the motor turns: does it run by itself afterwards."""
@@ -278,7 +319,7 @@ class _Turning:
         except Ended:
             screen.say(
                 'the drive may start the motor by itself when its power comes back: open the '
-                f'{self._enable_input} first, or run nfo-sinus stop as soon as it has power'
+                f'{self._profile.enable_input} first, or run nfo-sinus stop as soon as it has power'
             )
             raise
         until = time.monotonic() + _CONNECTS_WITHIN
@@ -311,7 +352,13 @@ class _Turning:
         if unit == 'rpm':
             key = offline.model.key(Role.NOMINAL_FREQUENCY)
             known = float(offline.measure(key)) if key else 0.0
-            most = _MOST / known * limits.nominal if known else math.inf
+            if not known > 0:
+                raise CliError(
+                    f'the drive does not tell how many {unit} are {_MOST:g} Hz: set '
+                    f'{offline.model.key(Role.CONTROL_MODE) or "it"} so that its set-point is a '
+                    'frequency'
+                )
+            most = _MOST / known * limits.nominal
         self._speed, self._least = min(_PART * limits.nominal, most), limits.least
         if self._speed < self._least:
             raise CliError(f'the motor may turn no slower than {self._least:g} {unit}')
@@ -325,7 +372,9 @@ class _Turning:
         """The motor turns, as far as the drive tells."""
         snapshot = self._control.drive.snapshot
         driven = snapshot.status is not None and snapshot.status.driven
-        return driven or abs(snapshot.frequency) > _STILL
+        # on its ramp to a stop a drive may deny that it drives the motor
+        still = _STILL * self._speed
+        return driven or abs(snapshot.actual) > still or abs(snapshot.frequency) > _STILL * _MOST
 
     def _enable(self) -> None:
         self._check()
@@ -348,13 +397,13 @@ class _Turning:
             near_since = min(near_since, now) if near else math.inf
             if now > near_since + _HOLDS:
                 return True
-            if not near and now > rose_at + _RISES_WITHIN:
-                return None if most > 0 else False
             along = actual * math.copysign(1, speed)
+            if not near and now > rose_at + _RISES_WITHIN:
+                return None if max(most, along) > _STILL * abs(speed) else False
             if along > most + _NEAR * abs(speed):
                 most, rose_at = along, now
             self._pause(speed)
-        raise _Left(f'it was stopped before: {self._why_stopped}')
+        raise _Left(f'it was stopped before: {self._why_stopped}', right=False)
 
     @property
     def _why_stopped(self) -> str:
@@ -386,6 +435,7 @@ class _Turning:
 
     def _pause(self, give: float | None = None) -> None:
         """Let a moment go by, with a set-point or without (Ended: by a signal, or by Enter)."""
+        self._check()
         if give is not None:
             self._control.drive.set_setpoint(give)
         self._control.pause(_PERIOD)
@@ -398,6 +448,11 @@ class _Turning:
             raise Ended(name, INTERRUPTED, name)
         if _typed():
             raise Ended(_ENTER, _DONE)
+        if abs(self._control.drive.snapshot.actual) > _TOO_FAST * self._speed:
+            raise CliError(
+                f'the motor turns at {self._shown}, and was told {self._speed:.4g} {self._unit} at '
+                'most: it is stopped'
+            )
 
     def _let(self, seconds: float) -> None:
         """Let some time go by."""
@@ -417,18 +472,15 @@ class _Turning:
                 return True
         return False
 
-    def _until(self, condition: Callable[[], bool]) -> None:
-        """
-        Turn until a person has done something.
-
-        :raises _Left: it is left out.
-        """
+    def _stopped_by_hand(self) -> bool:
+        """Turn until a person has stopped the motor; false: it is left out, or nothing happened."""
         until = time.monotonic() + _BY_HAND
-        while not condition():
-            if time.monotonic() > until:
-                raise _Left(f'nothing happened in {_BY_HAND:g} s')
+        while time.monotonic() < until:
+            if not self._control.drive.following:
+                return True
             if self._enter_within(_PERIOD, self._speed):
-                raise _Left('left out')
+                return False
+        return False
 
     def _require_yes(self, what: str) -> None:
         """
@@ -456,29 +508,49 @@ class _Turning:
         :raises CliError: the stop is not confirmed, or the motor turns on.
         """
         if not self._control.stop():
-            raise CliError(
-                f'the stop is NOT confirmed: open the {self._enable_input}, or use the emergency '
-                'stop, if the motor turns; nfo-sinus stop tries again'
-            )
+            raise CliError(self._not_confirmed)
         self._wait_until_it_stands()
 
+    @property
+    def _not_confirmed(self) -> str:
+        return (
+            f'the stop is NOT confirmed: open the {self._profile.enable_input}, or use the '
+            'emergency stop, if the motor turns; nfo-sinus stop tries again'
+        )
+
+    @property
+    def _faulted(self) -> bool:
+        status = self._control.drive.snapshot.status
+        return status is not None and status.faulted
+
     def _wait_until_it_stands(self) -> None:
-        until = time.monotonic() + _STANDS
+        """
+        Wait until the motor stands; one that turns on is stopped again, for others may command it.
+
+        :raises CliError: a stop is not confirmed, or the motor turns on.
+        """
+        until, again = time.monotonic() + _STANDS, time.monotonic() + _AGAIN
         while self._turns:
-            if time.monotonic() > until:
+            now = time.monotonic()
+            if now > until:
                 shown = self._control.drive.state.describe()
                 raise CliError(f'the motor does not come to a standstill ({shown})')
+            if now > again:
+                again = now + _AGAIN
+                if not self._control.stop():
+                    raise CliError(self._not_confirmed)
             self._pause()
 
     def _give_back(self) -> None:
         """At the end: stop the motor, however this is ended, and give control back."""
         control = self._control
         if not control.stop():
-            control.screen.say(
-                f'the stop is NOT confirmed: open the {self._enable_input}, or use the emergency '
-                'stop, if the motor turns; nfo-sinus stop tries again'
-            )
-        elif control.give_back(_STANDS):
+            control.screen.say(self._not_confirmed)
+            return
+        if self._turns:
+            # a slow ramp takes its time
+            control.screen.say(say(control.answer))
+        if control.give_back(_STANDS):
             control.screen.say(say(control.answer))
 
     @contextlib.contextmanager
@@ -499,12 +571,19 @@ class _Turning:
             read = functools.partial(offline.params.read_data, key, Priority.SERVICE)
             # what it refuses now is not seen
             with contextlib.suppress(DriveError):
-                data = offline.do(read)
+                data = self._read(read, speed)
                 words[key] = struct.unpack(f'>{len(data) // 2}h', data)
-        offline.read_status()
+        self._read(lambda: offline.state.reader.read(Priority.SERVICE), speed)
         saw = ', '.join(filter(None, (saw, offline.state.describe())))
         hertz = speed if self._unit == 'Hz' else math.nan
         self._moments.append(Moment(name, saw, right, hertz, words))
+
+    def _read(self, command: Callable[[], Coroutine[Any, Any, _T]], speed: float) -> _T:
+        """Return what a drive tells; the motor turns on at a speed meanwhile, NaN: at none."""
+        reading = self._control.drive.run(command)
+        while not reading.done():
+            self._pause(None if math.isnan(speed) else speed)
+        return reading.result()
 
 
 def _typed() -> bytes:

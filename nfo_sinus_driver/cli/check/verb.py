@@ -15,7 +15,7 @@ import sys
 
 from nfo_sinus_driver.catalog import Family, load_family
 from nfo_sinus_driver.cli.check import report
-from nfo_sinus_driver.cli.check.readings import Reading, Seen, Verdict, look, table, turned
+from nfo_sinus_driver.cli.check.readings import Reading, Seen, look, table, turned
 from nfo_sinus_driver.cli.check.sight import (
     BlockSight,
     CanopenSight,
@@ -26,6 +26,7 @@ from nfo_sinus_driver.cli.check.sight import (
     Sight,
 )
 from nfo_sinus_driver.cli.check.turn import Moment, agreed, turn
+from nfo_sinus_driver.cli.check.verdict import Verdict
 from nfo_sinus_driver.cli.check.wire import (
     FIRST,
     CanWire,
@@ -65,8 +66,6 @@ _SIGHTS: Mapping[str, type[Sight]] = {
     'movitrac': MovitracSight,
     'canopen': CanopenSight,
 }
-#: Those by which the motor is turned.
-_TURNS_BY = ('modbus_rtu', 'modbus_ascii', 'modbus_tcp', 'classic')
 #: So near are two values that are the same.
 _SAME = 0.02
 #: Functions that drives may have or not, each as a request that changes nothing.
@@ -113,8 +112,11 @@ class Check(Verb):
             raise UsageError('--turn needs a terminal: Enter stops the motor')
         model, protocol = load_family(options.model), options.protocol
         telegram = _telegram(options)
-        if options.turn and (telegram or options.protocol not in _TURNS_BY):
-            raise UsageError('--turn turns a motor over Modbus and Classic alone, not by a PLC')
+        if options.turn and telegram:
+            raise UsageError(
+                '--turn turns no motor behind a PLC: the PLC commands the drive, and stops it when '
+                'this computer is gone; turn it by the program of the PLC'
+            )
         _require_standstill(options)
         if telegram:
             model = load_family(options.model, telegram, options.telegram_words)
@@ -183,7 +185,7 @@ def _turn(
     options: argparse.Namespace, model: Family, protocol: str
 ) -> tuple[list[Moment], int]:
     """Turn the motor, if the operator has typed the word for it."""
-    if not agreed(model):
+    if not agreed(model, options.protocol):
         remark('nothing was turned')
         return [], 0
     rows = [one for one in table() if one.part == 'turn']

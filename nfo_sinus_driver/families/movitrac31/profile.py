@@ -23,6 +23,8 @@ def _active_method(status: Status | None) -> Steps[str]:
 PROFILE = Profile(
     title='MOVITRAC 31',
     enable_input='enable terminal (43 from the factory)',
+    # the keypad is an option, of whose keys [M4] says nothing
+    has_stop_key=False,
     status_word=words.STATUS_WORD,
     # of a drive that is only watched
     holders=RemoteSetpoint.holders,

@@ -16,9 +16,9 @@ import pytest
 from support.described import SHIPPED
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli.check.readings import Verdict
 from nfo_sinus_driver.cli.check.sight import ModbusSight
 from nfo_sinus_driver.cli.check.verb import Check, _questions
+from nfo_sinus_driver.cli.check.verdict import Verdict
 from nfo_sinus_driver.cli.check.wire import Answer
 from nfo_sinus_driver.simulator.family import simulated_drive
 

@@ -14,8 +14,9 @@ from cli_bench import MakeBench
 import pytest
 
 from nfo_sinus_driver.catalog import load_family
-from nfo_sinus_driver.cli.check.readings import Verdict, look, table
+from nfo_sinus_driver.cli.check.readings import look, table
 from nfo_sinus_driver.cli.check.sight import MovitracSight
+from nfo_sinus_driver.cli.check.verdict import Verdict
 from nfo_sinus_driver.cli.check.wire import Answer
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.movitrac import Nack

@@ -18,8 +18,9 @@ from test_through_plc_cli import behind_plc
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.check import sight as sight_module
-from nfo_sinus_driver.cli.check.readings import Verdict, look, table
+from nfo_sinus_driver.cli.check.readings import look, table
 from nfo_sinus_driver.cli.check.sight import BlockSight
+from nfo_sinus_driver.cli.check.verdict import Verdict
 from nfo_sinus_driver.cli.check.wire import Answer
 from nfo_sinus_driver.simulator.family import simulated_drive
 from nfo_sinus_driver.simulator.modbus import Requests

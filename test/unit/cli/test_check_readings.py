@@ -13,8 +13,9 @@ import pytest
 
 from nfo_sinus_driver.catalog import load_family
 from nfo_sinus_driver.cli.check import readings
-from nfo_sinus_driver.cli.check.readings import Verdict, look, table
+from nfo_sinus_driver.cli.check.readings import look, table
 from nfo_sinus_driver.cli.check.sight import ClassicSight, ModbusSight
+from nfo_sinus_driver.cli.check.verdict import Verdict
 from nfo_sinus_driver.cli.check.wire import NAK, Answer, TcpWire
 from nfo_sinus_driver.simulator.classic import Wrong
 from nfo_sinus_driver.simulator.family import simulated_drive
