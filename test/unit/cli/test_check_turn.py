@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import json
 from pathlib import Path
 import threading
@@ -55,11 +55,19 @@ def found(path: Path) -> dict[str, Any]:
     return {moment['name']: moment for moment in moments}
 
 
-@pytest.mark.parametrize('options', [
-    {'settings': QUICK},
-    {'settings': QUICK, 'protocol': 'classic'},
-    {'model': 'sinus_optimal', 'serial_numbers': []},
-], ids=['rtu', 'classic', 'optimal'])
+def shares(cells: Mapping[str, Any], *always: str) -> list[Any]:
+    """Return the cells of a product, of which these run before every commit: each takes long."""
+    return [
+        pytest.param(cell, id=name, marks=[pytest.mark.slow] * (name not in always))
+        for name, cell in cells.items()
+    ]
+
+
+@pytest.mark.parametrize('options', shares({
+    'rtu': {'settings': QUICK},
+    'classic': {'settings': QUICK, 'protocol': 'classic'},
+    'optimal': {'model': 'sinus_optimal', 'serial_numbers': []},
+}, 'rtu'))
 def test_all_of_it(make_bench: MakeBench, tmp_path: Path, options: dict[str, Any]) -> None:
     bench = make_bench(**options)
     path = tmp_path / 'report.json'
@@ -161,14 +169,21 @@ def test_a_motor_that_turns_after_its_input_is_closed_again_is_found_out(
     assert done.status == 1 and found(path)['after input']['as_expected'] is False, done.out
 
 
-@pytest.mark.parametrize('moment', ['(--drive-timeout)', 'the line is silent'])
-@pytest.mark.parametrize(
-    'typed', ['\n', '\x03', 'abc\x04', b'\xff\n'.decode('latin-1'), None],
-    ids=['enter', 'ctrl-c', 'ctrl-d', 'no letter', 'hangup'],
-)
+ENDINGS = {
+    'enter': '\n', 'ctrl-c': '\x03', 'ctrl-d': 'abc\x04', 'no letter': b'\xff\n'.decode('latin-1'),
+    'hangup': None,
+}
+_MOMENTS = '(--drive-timeout)', 'the line is silent'
+
+
+@pytest.mark.parametrize('end', shares(
+    {f'{name}-{moment}': (moment, typed) for moment in _MOMENTS for name, typed in ENDINGS.items()},
+    *(f'{name}-{_MOMENTS[0]}' for name in ENDINGS), f'ctrl-c-{_MOMENTS[1]}',
+))
 def test_whatever_ends_it_the_motor_stands_for_good(
-    make_bench: MakeBench, tmp_path: Path, moment: str, typed: str | None
+    make_bench: MakeBench, tmp_path: Path, end: tuple[str, str | None]
 ) -> None:
+    moment, typed = end
     bench = make_bench(settings=QUICK)
     path = tmp_path / 'report.json'
     done = bench.on_terminal(
@@ -200,9 +215,10 @@ def test_enter_while_the_motor_stops_ends_it(make_bench: MakeBench, tmp_path: Pa
     assert not bench.state()['driven']
 
 
-@pytest.mark.parametrize('settings', [
-    {'control.mode': 'Speed'}, {'motor.f_nom': 40.0}, {'control.accel': 120.0},
-], ids=['by speed', '40 Hz', 'slow ramp'])
+@pytest.mark.parametrize('settings', shares({
+    'by speed': {'control.mode': 'Speed'}, '40 Hz': {'motor.f_nom': 40.0},
+    'slow ramp': {'control.accel': 120.0},
+}, 'by speed'))
 def test_what_is_set_at_the_drive_contradicts_nothing(
     make_bench: MakeBench, tmp_path: Path, settings: dict[str, Any]
 ) -> None:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from cli_bench import PATIENCE, QUICK, Bench, Done, MakeBench, wait_until
 import pytest
-from test_check_turn import BEGIN, NO_MORE, Answers, act, found, with_all
+from test_check_turn import BEGIN, ENDINGS, NO_MORE, Answers, act, found, shares, with_all
 from test_through_plc_cli import behind_plc
 
 from nfo_sinus_driver.simulator.movitrac31.control_unit import MovitracControlUnit
@@ -54,8 +54,8 @@ LINES = {
 }
 #: What is tried to leave the motor turning, over the first version's line, too.
 ALL = {'rtu': Line({}, (), _G2_RAMPS, 'status.frq_set'), **LINES}
-each_line = pytest.mark.parametrize('line', LINES.values(), ids=LINES)
-each_of_all = pytest.mark.parametrize('line', ALL.values(), ids=ALL)
+each_line = pytest.mark.parametrize('line', shares(LINES, 'movitrac'))
+each_of_all = pytest.mark.parametrize('line', shares(ALL, 'canopen'))
 
 
 class Trial:
@@ -125,10 +125,6 @@ def test_behind_a_plc_it_is_refused(make_bench: MakeBench) -> None:
     assert bench.state()['command_writes'] == {}
 
 
-ENDINGS = {
-    'enter': '\n', 'ctrl-c': '\x03', 'ctrl-d': 'abc\x04', 'no letter': b'\xff\n'.decode('latin-1'),
-    'hangup': None,
-}
 _BY_HAND = 'Press STOP', 'STOP at the keypad now'
 #: By hand Enter leaves a step out.
 _ENDS = [
@@ -138,7 +134,11 @@ _ENDS = [
 ]
 
 
-@pytest.mark.parametrize(('name', 'asked', 'ends'), _ENDS)
+# before every commit each line, each ending and each question
+@pytest.mark.parametrize(('name', 'asked', 'ends'), [
+    pytest.param(*ends, marks=[pytest.mark.slow] * (number % 6 > 0 and ends is not _ENDS[-1]))
+    for number, ends in enumerate(_ENDS)
+])
 def test_whatever_ends_it_the_motor_stands_over(
     make_bench: MakeBench, tmp_path: Path, name: str, asked: tuple[str, ...], ends: str
 ) -> None:
@@ -223,7 +223,7 @@ def test_a_trip_is_no_stop_by_hand(make_bench: MakeBench, tmp_path: Path, line: 
     wait_until(lambda: trial.stands)
 
 
-@pytest.mark.parametrize('did', [True, False], ids=['done', 'not done'])
+@pytest.mark.parametrize('did', shares({'done': True, 'not done': False}, 'not done'))
 def test_an_input_that_does_not_stop_the_motor_is_found_out(
     make_bench: MakeBench, tmp_path: Path, *, did: bool
 ) -> None:
@@ -257,7 +257,7 @@ def test_a_time_out_of_a_movitrac_that_stops_nothing_is_found_out(
     wait_until(lambda: trial.stands)
 
 
-@pytest.mark.parametrize('name', ['canopen', 'ds402'])
+@pytest.mark.parametrize('name', shares({'canopen': 'canopen', 'ds402': 'ds402'}, 'ds402'))
 def test_stopped_is_a_motor_that_stands(
     make_bench: MakeBench, tmp_path: Path, name: str
 ) -> None:
