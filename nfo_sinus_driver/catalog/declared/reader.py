@@ -256,6 +256,13 @@ class _Reader:
                 'run_by: terminals needs measured actual_frequency, and no status stopping: the '
                 'frequency alone shows that a motor stands that its terminals go on running',
             )
+        running = self._conditions.get('running')
+        if running is not None and not running.coil and running.register in self._moving:
+            self._problems.add(
+                running.line,
+                'run_by: terminals needs a running that shows the terminals at set-point 0, too: '
+                'that of a measured value shows no run then, and each enable would be refused',
+            )
 
     # --- faults ---
 
@@ -403,7 +410,8 @@ class _Reader:
                 node.line, 'forward and reverse have to differ; of a coil they are 0 and 1'
             )
         if coil:
-            return Direction(self._map.coil_key('direction', node['coil']), forward, reverse)
+            key = self._map.coil_key('direction', node['coil'])
+            return Direction(key, forward, reverse, node.flag('alone'))
         key = self._map.word('direction', node['register'], forward | reverse)
         return Direction(key, forward, reverse, node.flag('alone'))
 

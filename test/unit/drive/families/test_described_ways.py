@@ -235,3 +235,115 @@ def test_pulses_are_checked_as_words_are(
 ) -> None:
     with pytest.raises(DescriptionError, match=said):
         DescribedRig(described(tmp_path, control=control))
+
+
+def changed(name: str, **control: Any) -> dict[str, Any]:
+    """Return what a drive that is commanded in one of these ways differs in, with other lists."""
+    return {**ODD[name], 'control': {**ODD[name]['control'], **control}}
+
+
+def directed(name: str, **direction: Any) -> dict[str, Any]:
+    """Return the same with another direction."""
+    setpoint = ODD[name]['setpoint']
+    return {'setpoint': {**setpoint, 'direction': {**setpoint['direction'], **direction}}}
+
+
+PULSES, WORDS = 'pulses of coils', 'two words to one register'
+
+
+@pytest.mark.parametrize(
+    ('name', 'key', 'step', 'prepare', 'stop'),
+    [
+        (PULSES, 'line.pulse', {'pulse': 70}, 70, 75),
+        (WORDS, 'line.r000a', {'register': 10, 'value': 0x200}, 0x200, 4),
+    ],
+)
+def test_a_command_that_is_not_the_stop_leaves_a_run_of_before_standing(
+    tmp_path: Path, name: str, key: str, step: Any, prepare: int, stop: int
+) -> None:
+    # a drive may ignore the stop before the line has control, and has it right behind
+    with DescribedRig(described(tmp_path, **changed(name, prepare=[step]))) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        behind = rig.written(key)
+        assert behind[behind.index(prepare) :][1] == stop
+    with DescribedRig(
+        described(tmp_path, **changed(name, prepare=[step, *ODD[name]['control']['stop']]))
+    ) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        assert rig.written(key).count(stop) == 3, 'at the connect, and once before and in prepare'
+
+
+@pytest.mark.parametrize('name', ['stop', 'coast', 'quick_stop'])
+@pytest.mark.parametrize('way', [73, 74])
+def test_a_stop_gives_no_run_command_for_a_moment(tmp_path: Path, name: str, way: int) -> None:
+    steps = [{'pulse': way}, {'pulse': 75}]
+    with pytest.raises(DescriptionError, match=f'{name} gives the run command'):
+        DescribedRig(described(tmp_path, **changed(PULSES, **{name: steps})))
+
+
+@pytest.mark.parametrize('name', ['stop', 'coast', 'quick_stop'])
+def test_nor_does_one_of_words(tmp_path: Path, name: str) -> None:
+    steps = [{'register': 10, 'value': 1}, {'register': 10, 'value': 0}]
+    control = {**PLAIN['control'], name: steps}
+    with pytest.raises(DescriptionError, match=f'{name} gives the run command'):
+        DescribedRig(described(tmp_path, control=control))
+
+
+def test_pulses_that_run_need_a_pulse_that_stops(tmp_path: Path) -> None:
+    run, stop = [{'register': 10, 'value': 1}], [{'register': 10, 'value': 0}]
+    with pytest.raises(DescriptionError, match='stop leaves the run command standing'):
+        DescribedRig(described(tmp_path, **changed(PULSES, run=run, stop=stop)))
+
+
+@pytest.mark.parametrize(
+    ('more', 'said'),
+    [
+        (directed(WORDS, forward=4), 'stop writes 4h, and a direction that is alone is no command'),
+        (directed(WORDS, reverse=1), 'reset writes 1h'),
+        (
+            changed(WORDS, run=[{'register': 10, 'value': 0x40}, {'register': 10, 'value': 8}]),
+            'run writes 40h',
+        ),
+        (
+            changed(
+                WORDS, run=[{'register': 10, 'set': 8}], stop=[{'register': 10, 'clear': 8}]
+            ),
+            'run sets or clears bits',
+        ),
+        (
+            changed(
+                WORDS, run=[{'register': 10, 'value': 8}], stop=[{'register': 10, 'value': 0}]
+            ),
+            'stop has no bit of its own',
+        ),
+        (
+            {
+                'setpoint': {
+                    'register': 11, 'factor': 0.1, 'unit': 'Hz', 'most': 60,
+                    'direction': {'coil': 4, 'forward': 0, 'reverse': 1, 'alone': True},
+                },
+            },
+            'remove alone',
+        ),
+        (changed(PULSES) | directed(PULSES, alone=True, forward=75, reverse=82), 'stop writes 4Bh'),
+    ],
+)
+def test_a_direction_of_its_own_is_no_command(
+    tmp_path: Path, more: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(DescriptionError, match=said):
+        DescribedRig(described(tmp_path, **{**ODD[WORDS], **more}))
+
+
+def test_a_way_to_end_a_run_command_is_none_of_a_set_point(tmp_path: Path) -> None:
+    stop_mode = {'parameter': 'ramp.accel', 'coasts': 5}
+    with pytest.raises(DescriptionError, match='stop_mode cannot stand beside run_by'):
+        DescribedRig(described(tmp_path, **changed(BY_SETPOINT[0], stop_mode=stop_mode)))
+
+
+def test_a_frequency_does_not_show_what_the_terminals_do(tmp_path: Path) -> None:
+    status = {'register': 20, 'running': {'register': 22, 'except': [0]}, 'fault': {'bit': 3}}
+    with pytest.raises(DescriptionError, match='shows the terminals at set-point 0'):
+        DescribedRig(described(tmp_path, **{**ODD[BY_SETPOINT[1]], 'status': status}))
