@@ -154,12 +154,15 @@ class FollowingCheck:
 
     def _stands(self, frequency: float, at: float) -> bool:
         """
-        Return whether it stands against all recent set-points, where only its turning shows a run.
+        Return whether it stands against all recent set-points, where nothing but its turning shows
+        that it runs by them.
 
         A motor that passes standstill on its way to the other direction stands for a moment.
         """
         status = self._state.status
-        hidden = status is not None and status.may_run and not status.runs
+        # where the set-point is the command, terminals may show a run
+        is_command = self._setpoint.is_command
+        hidden = status is not None and status.may_run and (is_command or not status.runs)
         since = self._standing.note_standing(at, hidden and frequency == 0)
         least, most = self._setpoint.range_since(at - STANDS_FOR)
         wanted = max(least, -most) * self._state.measurements.turning.hertz

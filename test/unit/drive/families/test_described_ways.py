@@ -347,3 +347,88 @@ def test_a_frequency_does_not_show_what_the_terminals_do(tmp_path: Path) -> None
     status = {'register': 20, 'running': {'register': 22, 'except': [0]}, 'fault': {'bit': 3}}
     with pytest.raises(DescriptionError, match='shows the terminals at set-point 0'):
         DescribedRig(described(tmp_path, **{**ODD[BY_SETPOINT[1]], 'status': status}))
+
+
+@pytest.mark.parametrize('name', BY_SETPOINT)
+@pytest.mark.parametrize('after', [0.0, 1.0, 4.0])
+def test_a_motor_that_has_stopped_by_itself_is_not_started_by_the_same_set_point(
+    tmp_path: Path, name: str, after: float
+) -> None:
+    # the set-point is written again now and then: after a power cycle, or another master's stop
+    with way(tmp_path, name) as rig:
+        rig.enable()
+        rig.follow(20.0)
+        rig.pass_time(after)
+        rig.far.memory.set(SETPOINT, 0)
+        rig.far.control_unit.settle()
+        rig.wait_until(lambda: rig.far.motor.at_zero, 2.0)
+        written = rig.written(SETPOINT)
+        rig.wait_until(lambda: not rig.drive.following, 4.0)
+        assert set(rig.written(SETPOINT)[len(written) :]) <= {0}
+        assert rig.notes.said(Cause.STOPPED_BY_ITSELF)
+        rig.pass_time(6.0)
+        assert not rig.turns
+        rig.assert_only_enable_helps(20.0)
+
+
+def test_a_set_point_that_is_the_command_is_written_again_while_the_motor_turns(
+    tmp_path: Path,
+) -> None:
+    with way(tmp_path, BY_SETPOINT[0]) as rig:
+        rig.enable()
+        rig.follow(20.0)
+        rig.far.memory.set(SETPOINT, 15.0)
+        rig.far.control_unit.settle()
+        rig.pass_time(6.0)
+        assert rig.far.motor.frequency == pytest.approx(20.0)
+        # a 0 starts nothing, and some drives stop where nothing is written
+        rig.send(0.0)
+        rig.pass_time(1.0)
+        zeros = rig.written(SETPOINT).count(0)
+        rig.pass_time(6.0)
+        assert rig.written(SETPOINT).count(0) == zeros + 1
+
+
+@pytest.mark.parametrize(
+    ('unit', 'measured', 'said'),
+    [
+        ('Hz', {}, 'needs measured actual_frequency, which'),
+        ('Hz', {'actual_speed': {'register': 23}}, 'needs measured actual_frequency, which'),
+        ('rpm', {}, 'needs measured actual_frequency or actual_speed, which'),
+    ],
+)
+def test_a_run_by_set_points_whose_end_does_not_show_is_refused(
+    tmp_path: Path, unit: str, measured: dict[str, Any], said: str
+) -> None:
+    setpoint = {**PLAIN['setpoint'], 'unit': unit}
+    more = {**ODD[BY_SETPOINT[0]], 'setpoint': setpoint, 'measured': measured}
+    with pytest.raises(DescriptionError, match=said):
+        DescribedRig(described(tmp_path, **more))
+
+
+def test_a_speed_shows_the_end_of_a_run_by_set_points_in_rpm(tmp_path: Path) -> None:
+    more = {
+        **ODD[BY_SETPOINT[0]],
+        'setpoint': ODD['rpm']['setpoint'],
+        'measured': {'actual_speed': {'register': 23, 'type': 'int16'}},
+    }
+    with DescribedRig(described(tmp_path, **more)) as rig:
+        rig.connect()
+        rig.enable()
+        rig.follow(20.0)
+        rig.far.memory.set(SETPOINT, 0)
+        rig.far.control_unit.settle()
+        rig.wait_until(lambda: not rig.drive.following, 4.0)
+        assert rig.notes.said(Cause.STOPPED_BY_ITSELF)
+
+
+def test_terminals_that_are_closed_are_no_run_of_an_earlier_session(tmp_path: Path) -> None:
+    with way(tmp_path, BY_SETPOINT[1]) as rig:
+        assert not rig.notes.said(Cause.FOUND_RUNNING)
+        rig.enable()
+        rig.follow(20.0)
+        rig.kill()
+        rig.begin()
+        rig.connect()
+        assert rig.notes.said(Cause.FOUND_RUNNING)
+        rig.wait_until(lambda: not rig.turns, 3.0)
