@@ -432,3 +432,53 @@ def test_terminals_that_are_closed_are_no_run_of_an_earlier_session(tmp_path: Pa
         rig.connect()
         assert rig.notes.said(Cause.FOUND_RUNNING)
         rig.wait_until(lambda: not rig.turns, 3.0)
+
+
+@pytest.mark.parametrize('name', BY_SETPOINT)
+@pytest.mark.parametrize('vary', [0.0, 3.0])
+@pytest.mark.parametrize('how', ['enable input', 'power'])
+def test_a_run_that_has_ended_does_not_begin_again_by_set_points(
+    tmp_path: Path, name: str, vary: float, how: str
+) -> None:
+    with way(tmp_path, name) as rig:
+        rig.enable()
+        rig.keep(lambda: rig.drive.set_setpoint(20.0 + vary * (rig.clock.now * 7 % 1)))
+        rig.wait_until(lambda: rig.far.motor.frequency > 19.0, 5.0)
+        rig.pass_time(2.0)
+        if how == 'power':
+            rig.far.power_cycle(0.05)
+        else:
+            rig.far.set_run_input(False)
+            rig.pass_time(0.3)
+            rig.far.set_run_input(True)
+        rig.wait_until(lambda: not rig.drive.following, 0.5)
+        rig.wait_until(lambda: not rig.turns, 0.5)
+        rig.pass_time(6.0)
+        assert not rig.turns
+        rig.assert_only_enable_helps(20.0)
+
+
+@pytest.mark.parametrize('name', BY_SETPOINT)
+def test_a_turn_through_standstill_is_no_end_of_a_run(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # it still turns the other way a second after the set-points have another sign
+    slow = {'ramp.accel': 3.0, 'ramp.decel': 3.0}
+    with way(tmp_path, name, parameters=slow) as rig:
+        kind = type(rig.far.control_unit)
+        demand = kind._demand.fget
+        from_then = [0.0]
+        monkeypatch.setattr(
+            kind, '_demand',
+            property(lambda unit: demand(unit) if rig.clock.now >= from_then[0] else 0.0),
+        )
+        rig.enable()
+        for frequency in (20.0, -20.0, 3.0, -5.0, 20.0, 0.0, 20.0):
+            # some drives stand for a while before they turn round
+            from_then[0] = rig.clock.now + 1.8
+            rig.send(frequency)
+            rig.pass_time(1.85)
+            rig.far.control_unit.settle()
+            rig.pass_time(2.0)
+            assert rig.drive.following
+            assert rig.far.motor.frequency == pytest.approx(frequency, abs=0.3)
