@@ -206,6 +206,7 @@ class SetpointTarget:
     :ivar older_most: as ``most``, of the family's :class:`OlderDialect`.
     :ivar followed: the parameter that reports what the drive follows, from any source; ``''``:
         :attr:`key` does.
+    :ivar is_command: it is the run command, too: the motor follows it without another one.
     """
 
     key: str
@@ -217,6 +218,7 @@ class SetpointTarget:
     ends: tuple[str, str] | None = None
     older_most: float = math.inf
     followed: str = ''
+    is_command: bool = False
 
     @property
     def least(self) -> float:

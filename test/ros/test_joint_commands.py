@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
+import logging
 import math
 import threading
+from types import SimpleNamespace
 from typing import Any
 
 from bench import A_WHILE, Bench, Client, holds_for, wait_until
@@ -16,7 +18,7 @@ from connections import needs
 import pytest
 from std_msgs.msg import Header
 
-from nfo_sinus_driver.node.line.joint_commands import message_type
+from nfo_sinus_driver.node.line.joint_commands import JointCommands, message_type
 
 _TOPIC = '/nfo_sinus_bus/joint_command'
 #: Left and right; on the right the motor is the mirror image, and the joint has a name of its own.
@@ -166,3 +168,48 @@ def test_without_the_message_there_is_no_such_topic(bench: Bench) -> None:
     client.connected()
     found = dict(client.node.get_subscriber_names_and_types_by_node('nfo_sinus_bus', '/'))
     assert (_TOPIC in found) == (message_type() is not None)
+
+
+class Wheel:
+    """A joint, with what it was given."""
+
+    setpoint_timeout = 0.0
+    how_to_enable = 'call it'
+
+    def __init__(self, name: str, *, follows: bool) -> None:
+        self.joint_name, self.follows = name, follows
+        self.taken: list[float] = []
+
+    def setpoint(self, velocity: float) -> float:
+        return 2 * velocity
+
+    def take(self, value: float, origin: object) -> None:
+        self.taken.append(value)
+
+
+@pytest.mark.parametrize(('values', 'taken'), [
+    ((0.0, 0.0), [0.0]), ((-0.0, 5.0), [0.0]), ((5.0, 0.0), []), ((5.0, 5.0), []),
+])
+def test_a_joint_that_follows_takes_a_zero_whatever_the_others_do(
+    values: tuple[float, float], taken: list[float]
+) -> None:
+    # without setpoint_timeout nothing else would end its last set-point
+    wheels = Wheel('left', follows=True), Wheel('right', follows=False)
+    give: list[Any] = []
+    context: Any = SimpleNamespace(
+        joints=wheels, subscribe=lambda node, topics: give.extend(topics.values())
+    )
+    now = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=10**9))
+    node: Any = SimpleNamespace(
+        get_logger=lambda: logging.getLogger('line'), get_clock=lambda: now,
+        resolve_topic_name=lambda name: name,
+    )
+    JointCommands(node, context, object)
+    ((_, on_message),) = give
+    stamp = SimpleNamespace(sec=0, nanosec=0)
+    on_message(SimpleNamespace(
+        joint_names=['left', 'right'], interface_name='velocity', values=values,
+        header=SimpleNamespace(stamp=stamp),
+    ), None)
+    assert wheels[0].taken == taken
+    assert not wheels[1].taken

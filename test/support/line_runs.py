@@ -51,6 +51,8 @@ _UNTOLD: Mapping[str, tuple[str, ...]] = {
     'sinus_optimal': ('fieldbus.mode',),
     'movitrac31': ('special.software_system', 'serial.pc_timeout', 'serial.control_mode'),
     CONNECTIONS['described'].model: ('serial.timeout', 'serial.fault'),
+    CONNECTIONS['described, by pulses'].model: ('serial.timeout',),
+    CONNECTIONS['described, by set-point'].model: ('serial.timeout',),
 }
 #: On these lines a damaged frame is none, or is sent again: what noise costs there are answers, as
 #: if so many bytes had to be whole.
@@ -93,6 +95,8 @@ KINDS: Mapping[str, Kind] = {
     'classic 4': Kind('classic', 4),
     'movitrac 4': Kind('movitrac', 4),
     'described 4': Kind('described', 4),
+    'by pulses 4': Kind('described, by pulses', 4),
+    'by set-point 4': Kind('described, by set-point', 4),
     'optimal 4': Kind('optimal', 4),
     'plc 2': Kind('telegram1 g2', 2),
 }

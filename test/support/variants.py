@@ -68,4 +68,7 @@ def stopping_at_timeout(model: str, method: str) -> dict[str, Any]:
 
 def stop_registers(model: str) -> frozenset[tuple[str, int]]:
     """Return what the stop of a file writes, by the keys of the parameters."""
-    return frozenset((step.key, int(step.value)) for step in _file(model).stop)
+    file = _file(model)
+    if file.run_by:
+        return frozenset({(file.setpoint.key, 0)})
+    return frozenset((step.key, int(step.value)) for step in file.stop)

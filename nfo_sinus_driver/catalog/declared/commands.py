@@ -29,6 +29,8 @@ NAMES = ('prepare', 'run', 'stop', 'coast', 'quick_stop', 'reset', 'release')
 _WITHOUT_RUN = ('reset',)
 #: Those that wait for nothing: no stop is delayed.
 _AT_ONCE = ('stop', 'coast', 'quick_stop', 'release')
+#: Those that stop the motor.
+_STOPS = ('stop', 'coast', 'quick_stop')
 #: How long a stop may pause between two of its steps in all, s.
 _LONGEST_PAUSE = 0.5
 #: Longer than a start may take no other pauses, s.
@@ -218,25 +220,39 @@ class CommandLists:
         for name in ('run', 'stop'):
             if name not in control:
                 problems.add(control.line, f'control needs {name!r}, or run_by: {_RUN_BY}')
-        for name in ('stop', 'coast', 'quick_stop'):
+        for name in _STOPS:
             if name in control:
                 self._check_stop(name)
-        for name in ('prepare', 'reset', 'release'):
-            self.require_no_run(name, self._lists[name], control.get(name).line)
+        for name in NAMES:
+            if name != 'run':
+                self.require_no_run(name, self._lists[name], control.get(name).line)
         self._check_settings()
         self._check_direction()
 
     def lists(self) -> dict[str, Any]:
         """Return them by name, and whether no run command stands behind prepare."""
         run, left = self._run, self._left_by('prepare')
-        stops = bool(run) and all(key in left and takes_back(run[key], left[key]) for key in run)
+        stops = bool(run) and all(
+            place in left and self._ends(place, run[place], left[place]) for place in run
+        )
         return {**self._lists, 'prepare_stops': stops}
 
+    def _ends(self, place: _Place, run: tuple[int, int], left: tuple[int, int]) -> bool:
+        """Return whether a word ends the run: where each is a command by itself, the stop alone."""
+        if place == PULSES or (self._is_alone and place == self._direction_place):
+            return left == self._left_by('stop').get(place)
+        return takes_back(run, left)
+
     def require_no_run(self, name: str, steps: Steps, line: int) -> None:
-        """Ensure that no step of what is no run command gives one, not for a moment."""
+        """
+        Ensure that no step of what is no run command gives one, not for a moment.
+
+        Those of a stop may have the bits of run, for another one stops the motor meanwhile.
+        """
         for place, word, known in self._states(steps):
             for run in self._run_words(place):
-                by_bits = run.bits and word & known & run.bits == run.bits
+                bits = 0 if name in _STOPS else run.bits
+                by_bits = bits and word & known & bits == bits
                 if by_bits or (known == -1 and word == run.word):
                     what = f'the bits {run.bits:X}h' if by_bits else f'{word:X}h'
                     self._problems.add(
@@ -262,6 +278,12 @@ class CommandLists:
                     'write: true cannot stand beside run_by: the motor would follow a set-point '
                     'that is left in the drive; say with text how it is set',
                 )
+        if 'stop_mode' in control:
+            self._problems.add(
+                control['stop_mode'].line,
+                'stop_mode cannot stand beside run_by: it says how a stop ends a run command, and '
+                'set-point 0 is the stop: remove it',
+            )
         if self._direction is not None:
             self._problems.add(
                 control['run_by'].line,
@@ -304,7 +326,12 @@ class CommandLists:
     @property
     def _runs_by(self) -> Direction | None:
         """The direction whose words run the motor, too."""
-        return None if self._direction is None or self._direction.alone else self._direction
+        return None if self._is_alone else self._direction
+
+    @property
+    def _is_alone(self) -> bool:
+        """The direction is a word of its own, which neither runs nor stops the motor."""
+        return self._direction is not None and self._direction.alone
 
     @property
     def _direction_place(self) -> _Place | None:
@@ -369,12 +396,37 @@ class CommandLists:
                     'alone says that run writes another word to the register of the direction, '
                     'and it writes none: remove alone, or the direction from run',
                 )
+            self._check_alone(self._direction, self._direction_place)
         elif value not in (None, self._direction.forward):
             self._problems.add(
                 self._control['run'].line,
                 f'run leaves {value:X}h where the direction has forward: '
                 f'{self._direction.forward:X}h; it has to run forward',
             )
+
+    def _check_alone(self, direction: Direction, place: _Place) -> None:
+        """Ensure that a direction of its own is no command, and does not end one."""
+        run, stop = self._run.get(place, (0, 0)), self._left_by('stop').get(place, (WORD, 0))
+        if run[0] and not stop[0] & ~run[0]:
+            self._problems.add(
+                self._control['stop'].line,
+                'stop has no bit of its own, so that a direction that is alone, which clears the '
+                'bits of run as stop does, would stop the motor: add the run bits to forward and '
+                'reverse, and remove alone',
+            )
+        for name in NAMES:
+            written = [word for step in self._lists[name] for word in self._words(step)]
+            for word, known in ((word, known) for at, word, known in written if at == place):
+                if known != -1:
+                    said = 'sets or clears bits, and a direction that is alone clears all others'
+                elif word in (direction.forward, direction.reverse):
+                    said = f'writes {word:X}h, and a direction that is alone is no command'
+                else:
+                    continue
+                self._problems.add(
+                    self._control[name].line,
+                    f'{name} {said}: give it a word of its own, or remove alone',
+                )
 
     def _check_stop(self, name: str) -> None:
         """Ensure that a stop removes what run has left."""
@@ -393,7 +445,9 @@ class CommandLists:
         runs = [run]
         if way is not None and place is not None:
             runs.append({**run, place: (way.reverse, WORD)})
-        if not all(
+        # a direction by pulses runs whatever stands in a register
+        pulsed = way is not None and place == PULSES
+        if (pulsed and PULSES not in stop) or not all(
             any(takes_back(left[key], stop[key]) for key in left if key in stop) for left in runs
         ):
             self._problems.add(

@@ -55,6 +55,8 @@ _MODES = {quantity.unit: quantity.mode for quantity in (FREQUENCY, SPEED)}
 _FLAGS_FROM = 100
 _MOST_FAULTS = 64
 _OF_STATUS = ('register', 'block', 'table')
+#: What shows that the motor turns beside a frequency, by the unit of set-points.
+_TURNS: Mapping[str, Sequence[str]] = {FREQUENCY.unit: (), SPEED.unit: ('actual_speed',)}
 #: What a drive cannot be at once; of the rest that holds at once the graver one counts.
 _EXCLUSIVE = (('ready', 'inhibited'), ('ready', 'fault'), ('running', 'inhibited'))
 
@@ -246,15 +248,30 @@ class _Reader:
             )
 
     def _require_seen_to_stand(self, control: Node) -> None:
-        """Make sure that a motor that terminals run is seen to stand at set-point 0."""
+        """Make sure that a motor that no run command runs is seen to stand."""
+        measured = self._root.get('measured')
+        turns = ('actual_frequency', *_TURNS[self._root['setpoint'].text('unit')])
+        if control.text('run_by') == 'setpoint' and not any(name in measured for name in turns):
+            self._problems.add(
+                control['run_by'].line,
+                f'run_by: setpoint needs measured {" or ".join(turns)}, which alone shows that '
+                'the motor has stopped: a set-point would start it again',
+            )
         if control.text('run_by') != 'terminals':
             return
-        shown = 'actual_frequency' in self._root.get('measured')
+        shown = 'actual_frequency' in measured
         if not shown or 'stopping' in self._conditions:
             self._problems.add(
                 control['run_by'].line,
                 'run_by: terminals needs measured actual_frequency, and no status stopping: the '
                 'frequency alone shows that a motor stands that its terminals go on running',
+            )
+        running = self._conditions.get('running')
+        if running is not None and not running.coil and running.register in self._moving:
+            self._problems.add(
+                running.line,
+                'run_by: terminals needs a running that shows the terminals at set-point 0, too: '
+                'that of a measured value shows no run then, and each enable would be refused',
             )
 
     # --- faults ---
@@ -403,7 +420,8 @@ class _Reader:
                 node.line, 'forward and reverse have to differ; of a coil they are 0 and 1'
             )
         if coil:
-            return Direction(self._map.coil_key('direction', node['coil']), forward, reverse)
+            key = self._map.coil_key('direction', node['coil'])
+            return Direction(key, forward, reverse, node.flag('alone'))
         key = self._map.word('direction', node['register'], forward | reverse)
         return Direction(key, forward, reverse, node.flag('alone'))
 

@@ -616,7 +616,7 @@ class Controller:
         """
         state, status = self._state, self._state.status
         if await self.in_control(Priority.SERVICE):
-            turns = status is not None and (status.runs_by_bus or abs(status.frequency) > 0)
+            turns = status is not None and await self._was_started(status)
             found = None
             # the stop of a drive that was lost may be confirmed, and its ramp not be over
             if turns and not (self._control.stopping or self._lost_in_use):
@@ -669,6 +669,13 @@ class Controller:
         """Return whether a status is a reason to stop."""
         follows = self._control.enabled and status.at >= self._control.since
         return follows and self._why_stopped(status) is not None
+
+    async def _was_started(self, status: InverterStatus) -> bool:
+        """Return whether the motor turns, or shows the run of a command that came over the bus."""
+        if abs(status.frequency) > 0 or not status.stands_running:
+            return abs(status.frequency) > 0 or status.runs_by_bus
+        # terminals may start it, too
+        return self._stands_running(status) or bool(await self._read_run_command())
 
     def on_status(self, status: InverterStatus) -> bool:
         """Check a status, and stop the motor if it says so; return whether that was reported."""

@@ -75,6 +75,8 @@ class FollowingCheck:
         self._wrong_polls = 0
         #: Against its set-points.
         self._standing = Standing()
+        #: It has turned by all recent set-points, which are the command.
+        self._has_begun = False
         #: The speed from which the drive slows it down, below its set-points.
         self._falls_from = 0.0
         self._reported = self._scale_reported = False
@@ -102,7 +104,7 @@ class FollowingCheck:
             cause = Cause.NOT_SLOWER_AFTER_TIME_OUT
         elif role is not None and self._has_not_changed(frequency, measured.at, unit):
             cause = Cause.NOTHING_CHANGES
-        elif self._stands(frequency, measured.at):
+        elif self._has_ended(frequency, measured.at) or self._stands(frequency, measured.at):
             cause = Cause.STOPPED_BY_ITSELF
         elif role is not None and self._turns_back(frequency, measured.at, least, most):
             cause = Cause.TURNS_BACKWARDS
@@ -152,14 +154,35 @@ class FollowingCheck:
             return False
         return self._after_expiry.has_ended(abs(frequency), at)
 
+    def _has_ended(self, frequency: float, at: float) -> bool:
+        """
+        Return whether a run has ended whose only command are the set-points, which go on.
+
+        A drive whose enable input was open for a moment, or its power off, would run again. One
+        that stands on its way to the other direction has not begun in that.
+        """
+        least, most = self._setpoint.range_since(at - REACTION)
+        direction = 1 if least > 0 else -1
+        wanted = max(least, -most) * self._state.measurements.turning.hertz
+        status = self._state.status
+        if not self._setpoint.is_command or status is None or wanted <= _BACKWARDS:
+            self._has_begun = False
+            return False
+        begun = self._has_begun
+        self._has_begun = status.driven and (begun or direction * frequency > _BACKWARDS)
+        return begun and not self._has_begun
+
     def _stands(self, frequency: float, at: float) -> bool:
         """
-        Return whether it stands against all recent set-points, where only its turning shows a run.
+        Return whether it stands against all recent set-points, where nothing but its turning shows
+        that it runs by them.
 
         A motor that passes standstill on its way to the other direction stands for a moment.
         """
         status = self._state.status
-        hidden = status is not None and status.may_run and not status.runs
+        # where the set-point is the command, terminals may show a run
+        is_command = self._setpoint.is_command
+        hidden = status is not None and status.may_run and (is_command or not status.runs)
         since = self._standing.note_standing(at, hidden and frequency == 0)
         least, most = self._setpoint.range_since(at - STANDS_FOR)
         wanted = max(least, -most) * self._state.measurements.turning.hertz

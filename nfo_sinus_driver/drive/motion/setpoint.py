@@ -174,6 +174,11 @@ class Setpoint:
         return self._target is None or self._target.directed
 
     @property
+    def is_command(self) -> bool:
+        """There is no run command beside it."""
+        return self._target is not None and self._target.is_command
+
+    @property
     def age(self) -> float:
         """How long ago the newest valid set-point came, s; NaN if none did since the enable."""
         at = self._request.at
@@ -316,7 +321,12 @@ class Setpoint:
         before, since = self._written.get(address, (b'', -math.inf))
         if data != before or since == -math.inf:
             return False
-        return self._is_once(address) or self._bus.now() - since < self._rewrite_period
+        if self._is_once(address) or self._bus.now() - since < self._rewrite_period:
+            return True
+        # one that is the command would start a motor that has stopped by itself
+        status = self._state.status
+        starts = self.is_command and self._wanted != 0
+        return starts and status is not None and not status.driven
 
     def _is_once(self, address: Address) -> bool:
         """Return whether this address is written only once."""

@@ -307,7 +307,7 @@ def _active_method(status: Status | None) -> Steps[str]:
 
 def profile_of(drive: Description) -> Profile:
     """Return the profile of a drive that a file describes."""
-    target = target_of(drive.setpoint)
+    target = target_of(drive.setpoint, is_command=bool(drive.run_by))
     members = {
         '__doc__': f'Control of {drive.title}.',
         '_drive': drive,

@@ -45,12 +45,13 @@ class SizeAndDirection(Target, DirectedTarget):
     """A set-point whose size stands beside a direction."""
 
 
-def target_of(place: SetpointPlace) -> Target:
-    """Return where set-points go that a file describes."""
+def target_of(place: SetpointPlace, *, is_command: bool) -> Target:
+    """Return where set-points go that a file describes; ``is_command``: nothing else runs it."""
     nominal = math.inf if place.nominal is None else place.nominal
     if place.direction is None:
         return Target(
-            place.key, place.most, forward_only=not place.reverses, nominal=nominal, place=place
+            place.key, place.most, forward_only=not place.reverses, nominal=nominal,
+            is_command=is_command, place=place,
         )
     way = place.direction
     return SizeAndDirection(

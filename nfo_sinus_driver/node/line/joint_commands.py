@@ -4,8 +4,10 @@
 """
 Set-points for several drives of a line in one message: all that it names get theirs, or none does.
 
-A robot with one wheel that follows turns on the spot. ``control_msgs/JointCommand`` is in
-control_msgs from 5.10 on; where it is not installed, there is no such topic.
+A robot with one wheel that follows turns on the spot. But a joint that follows takes a 0 whatever
+the others do: otherwise it goes on turning, for as long as its set-points may be old.
+``control_msgs/JointCommand`` is in control_msgs from 5.10 on; where it is not installed, there is
+no such topic.
 """
 
 from __future__ import annotations
@@ -57,9 +59,10 @@ class JointCommands:
         idle = [joint for joint, _ in values if not joint.follows]
         if not idle:
             self._logged_idle = False
-            for joint, value in values:
+        for joint, value in values:
+            if not idle or (value == 0 and joint.follows):
                 joint.take(value, origin)
-        elif not self._logged_idle:
+        if idle and not self._logged_idle:
             self._logged_idle = True
             self._log.info(
                 f'messages of {self._topic} arrive, but no joint that they name moves before all '

@@ -12,6 +12,7 @@ from typing import Any
 from nfo_sinus_driver.catalog import Kind, Role, to_words
 from nfo_sinus_driver.catalog.declared import (
     FAULT_KEY,
+    PULSES,
     STATUS_KEY,
     Description,
     Place,
@@ -90,7 +91,8 @@ class DeclaredControlUnit(ControlUnit):
             if self.variant.in_local == 'refuses':
                 raise Refused(Reason.STATE, 'the line has no control')
             return
-        if place in self._newest and self._words.get(place) == word:
+        is_repeated = place in self._newest and self._words.get(place) == word
+        if is_repeated and place != PULSES:
             # a PLC writes cyclically
             return
         self._words[place] = word

@@ -12,11 +12,11 @@ forward or reverse, differs from any other command there:
 - one that is a run word in them runs;
 - one that is another command, in the bits in which that differs from a run word, but for those of
   the direction, is that, and where it is one by more bits, not the one by fewer;
-- any other takes the run command away, and so do these; one that gives the direction alone does
-  not.
+- any other takes the run command away, and so do these.
 
 A word that is repeated changes nothing: a PLC writes cyclically. A reset counts from its first
-word.
+word. Pulses, and words beside a direction that is alone, are that command and no other: nothing but
+a stop takes the run command away. A pulse that is repeated is another one.
 """
 
 from __future__ import annotations
@@ -167,8 +167,10 @@ class Orders:
 
     def removes_run(self, place: Place, word: int) -> bool:
         """Return whether a word takes the run command away, whatever it is besides."""
-        stays = (*self._runs, *self._directions) if self._alone else self._runs
-        return self.has_run(place) and not any(known.fits(place, word) for known in stays)
+        if place == PULSES or self._alone:
+            # each is a command by itself, and nothing but the stop ends another one
+            return False
+        return self.has_run(place) and not any(known.fits(place, word) for known in self._runs)
 
     def direction_of(self, place: Place, word: int) -> int:
         """Return which way a word commands: 1 forward, -1 reverse, 0 neither."""

@@ -10,8 +10,13 @@ and of the makers' own examples; what they mean is in the makers' tables of the 
 
 from __future__ import annotations
 
+from pathlib import Path
+import struct
+from typing import Any
+
 import pytest
 from support.described import SHIPPED
+from support.oddities import ODD, described
 
 from nfo_sinus_driver.catalog import Kind
 from nfo_sinus_driver.simulator._declared.control_unit import DeclaredControlUnit
@@ -171,3 +176,36 @@ def test_a_run_word_that_goes_on_is_a_new_one_after_a_fault_took_it() -> None:
     assert not master.turns
     master.write(0x2000, 0x12)
     assert master.turns == 1
+
+
+@pytest.mark.parametrize(
+    ('name', 'run', 'reset', 'stop'),
+    [('pulses of coils', 73, 80, 75), ('two words to one register', 8, 1, 4)],
+)
+def test_a_command_by_itself_is_no_other_one(
+    tmp_path: Path, name: str, run: int, reset: int, stop: int
+) -> None:
+    drive = simulated_drive(str(described(tmp_path, **ODD[name])), run_command_in_fault='keeps')
+    server: Any = drive.servers['modbus']
+
+    def write(word: int) -> None:
+        if name == 'pulses of coils':
+            server._carry_out(5, struct.pack('>HH', word, 0xFF00))
+        else:
+            server.write(10, (word,))
+        drive.advance(0.1)
+
+    write(run)
+    assert drive.motor.driven
+    # neither does it stop the motor, nor is the second one of two none
+    for _ in range(2):
+        drive.trip(1)
+        drive.advance(0.1)
+        assert not drive.motor.driven
+        write(reset)
+        assert not drive.control_unit.faults and drive.motor.driven
+        if name != 'pulses of coils':
+            write(0x80)
+    write(stop)
+    drive.advance(1.0)
+    assert not drive.motor.driven

@@ -235,3 +235,250 @@ def test_pulses_are_checked_as_words_are(
 ) -> None:
     with pytest.raises(DescriptionError, match=said):
         DescribedRig(described(tmp_path, control=control))
+
+
+def changed(name: str, **control: Any) -> dict[str, Any]:
+    """Return what a drive that is commanded in one of these ways differs in, with other lists."""
+    return {**ODD[name], 'control': {**ODD[name]['control'], **control}}
+
+
+def directed(name: str, **direction: Any) -> dict[str, Any]:
+    """Return the same with another direction."""
+    setpoint = ODD[name]['setpoint']
+    return {'setpoint': {**setpoint, 'direction': {**setpoint['direction'], **direction}}}
+
+
+PULSES, WORDS = 'pulses of coils', 'two words to one register'
+
+
+@pytest.mark.parametrize(
+    ('name', 'key', 'step', 'prepare', 'stop'),
+    [
+        (PULSES, 'line.pulse', {'pulse': 70}, 70, 75),
+        (WORDS, 'line.r000a', {'register': 10, 'value': 0x200}, 0x200, 4),
+    ],
+)
+def test_a_command_that_is_not_the_stop_leaves_a_run_of_before_standing(
+    tmp_path: Path, name: str, key: str, step: Any, prepare: int, stop: int
+) -> None:
+    # a drive may ignore the stop before the line has control, and has it right behind
+    with DescribedRig(described(tmp_path, **changed(name, prepare=[step]))) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        behind = rig.written(key)
+        assert behind[behind.index(prepare) :][1] == stop
+    with DescribedRig(
+        described(tmp_path, **changed(name, prepare=[step, *ODD[name]['control']['stop']]))
+    ) as rig:
+        rig.connect(parameters=True)
+        rig.enable()
+        assert rig.written(key).count(stop) == 3, 'at the connect, and once before and in prepare'
+
+
+@pytest.mark.parametrize('name', ['stop', 'coast', 'quick_stop'])
+@pytest.mark.parametrize('way', [73, 74])
+def test_a_stop_gives_no_run_command_for_a_moment(tmp_path: Path, name: str, way: int) -> None:
+    steps = [{'pulse': way}, {'pulse': 75}]
+    with pytest.raises(DescriptionError, match=f'{name} gives the run command'):
+        DescribedRig(described(tmp_path, **changed(PULSES, **{name: steps})))
+
+
+@pytest.mark.parametrize('name', ['stop', 'coast', 'quick_stop'])
+def test_nor_does_one_of_words(tmp_path: Path, name: str) -> None:
+    steps = [{'register': 10, 'value': 1}, {'register': 10, 'value': 0}]
+    control = {**PLAIN['control'], name: steps}
+    with pytest.raises(DescriptionError, match=f'{name} gives the run command'):
+        DescribedRig(described(tmp_path, control=control))
+
+
+def test_pulses_that_run_need_a_pulse_that_stops(tmp_path: Path) -> None:
+    run, stop = [{'register': 10, 'value': 1}], [{'register': 10, 'value': 0}]
+    with pytest.raises(DescriptionError, match='stop leaves the run command standing'):
+        DescribedRig(described(tmp_path, **changed(PULSES, run=run, stop=stop)))
+
+
+@pytest.mark.parametrize(
+    ('more', 'said'),
+    [
+        (directed(WORDS, forward=4), 'stop writes 4h, and a direction that is alone is no command'),
+        (directed(WORDS, reverse=1), 'reset writes 1h'),
+        (
+            changed(WORDS, run=[{'register': 10, 'value': 0x40}, {'register': 10, 'value': 8}]),
+            'run writes 40h',
+        ),
+        (
+            changed(
+                WORDS, run=[{'register': 10, 'set': 8}], stop=[{'register': 10, 'clear': 8}]
+            ),
+            'run sets or clears bits',
+        ),
+        (
+            changed(
+                WORDS, run=[{'register': 10, 'value': 8}], stop=[{'register': 10, 'value': 0}]
+            ),
+            'stop has no bit of its own',
+        ),
+        (
+            {
+                'setpoint': {
+                    'register': 11, 'factor': 0.1, 'unit': 'Hz', 'most': 60,
+                    'direction': {'coil': 4, 'forward': 0, 'reverse': 1, 'alone': True},
+                },
+            },
+            'remove alone',
+        ),
+        (changed(PULSES) | directed(PULSES, alone=True, forward=75, reverse=82), 'stop writes 4Bh'),
+    ],
+)
+def test_a_direction_of_its_own_is_no_command(
+    tmp_path: Path, more: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(DescriptionError, match=said):
+        DescribedRig(described(tmp_path, **{**ODD[WORDS], **more}))
+
+
+def test_a_way_to_end_a_run_command_is_none_of_a_set_point(tmp_path: Path) -> None:
+    stop_mode = {'parameter': 'ramp.accel', 'coasts': 5}
+    with pytest.raises(DescriptionError, match='stop_mode cannot stand beside run_by'):
+        DescribedRig(described(tmp_path, **changed(BY_SETPOINT[0], stop_mode=stop_mode)))
+
+
+def test_a_frequency_does_not_show_what_the_terminals_do(tmp_path: Path) -> None:
+    status = {'register': 20, 'running': {'register': 22, 'except': [0]}, 'fault': {'bit': 3}}
+    with pytest.raises(DescriptionError, match='shows the terminals at set-point 0'):
+        DescribedRig(described(tmp_path, **{**ODD[BY_SETPOINT[1]], 'status': status}))
+
+
+@pytest.mark.parametrize('name', BY_SETPOINT)
+@pytest.mark.parametrize('after', [0.0, 1.0, 4.0])
+def test_a_motor_that_has_stopped_by_itself_is_not_started_by_the_same_set_point(
+    tmp_path: Path, name: str, after: float
+) -> None:
+    # the set-point is written again now and then: after a power cycle, or another master's stop
+    with way(tmp_path, name) as rig:
+        rig.enable()
+        rig.follow(20.0)
+        rig.pass_time(after)
+        rig.far.memory.set(SETPOINT, 0)
+        rig.far.control_unit.settle()
+        rig.wait_until(lambda: rig.far.motor.at_zero, 2.0)
+        written = rig.written(SETPOINT)
+        rig.wait_until(lambda: not rig.drive.following, 4.0)
+        assert set(rig.written(SETPOINT)[len(written) :]) <= {0}
+        assert rig.notes.said(Cause.STOPPED_BY_ITSELF)
+        rig.pass_time(6.0)
+        assert not rig.turns
+        rig.assert_only_enable_helps(20.0)
+
+
+def test_a_set_point_that_is_the_command_is_written_again_while_the_motor_turns(
+    tmp_path: Path,
+) -> None:
+    with way(tmp_path, BY_SETPOINT[0]) as rig:
+        rig.enable()
+        rig.follow(20.0)
+        rig.far.memory.set(SETPOINT, 15.0)
+        rig.far.control_unit.settle()
+        rig.pass_time(6.0)
+        assert rig.far.motor.frequency == pytest.approx(20.0)
+        # a 0 starts nothing, and some drives stop where nothing is written
+        rig.send(0.0)
+        rig.pass_time(1.0)
+        zeros = rig.written(SETPOINT).count(0)
+        rig.pass_time(6.0)
+        assert rig.written(SETPOINT).count(0) == zeros + 1
+
+
+@pytest.mark.parametrize(
+    ('unit', 'measured', 'said'),
+    [
+        ('Hz', {}, 'needs measured actual_frequency, which'),
+        ('Hz', {'actual_speed': {'register': 23}}, 'needs measured actual_frequency, which'),
+        ('rpm', {}, 'needs measured actual_frequency or actual_speed, which'),
+    ],
+)
+def test_a_run_by_set_points_whose_end_does_not_show_is_refused(
+    tmp_path: Path, unit: str, measured: dict[str, Any], said: str
+) -> None:
+    setpoint = {**PLAIN['setpoint'], 'unit': unit}
+    more = {**ODD[BY_SETPOINT[0]], 'setpoint': setpoint, 'measured': measured}
+    with pytest.raises(DescriptionError, match=said):
+        DescribedRig(described(tmp_path, **more))
+
+
+def test_a_speed_shows_the_end_of_a_run_by_set_points_in_rpm(tmp_path: Path) -> None:
+    more = {
+        **ODD[BY_SETPOINT[0]],
+        'setpoint': ODD['rpm']['setpoint'],
+        'measured': {'actual_speed': {'register': 23, 'type': 'int16'}},
+    }
+    with DescribedRig(described(tmp_path, **more)) as rig:
+        rig.connect()
+        rig.enable()
+        rig.follow(20.0)
+        rig.far.memory.set(SETPOINT, 0)
+        rig.far.control_unit.settle()
+        rig.wait_until(lambda: not rig.drive.following, 4.0)
+        assert rig.notes.said(Cause.STOPPED_BY_ITSELF)
+
+
+def test_terminals_that_are_closed_are_no_run_of_an_earlier_session(tmp_path: Path) -> None:
+    with way(tmp_path, BY_SETPOINT[1]) as rig:
+        assert not rig.notes.said(Cause.FOUND_RUNNING)
+        rig.enable()
+        rig.follow(20.0)
+        rig.kill()
+        rig.begin()
+        rig.connect()
+        assert rig.notes.said(Cause.FOUND_RUNNING)
+        rig.wait_until(lambda: not rig.turns, 3.0)
+
+
+@pytest.mark.parametrize('name', BY_SETPOINT)
+@pytest.mark.parametrize('vary', [0.0, 3.0])
+@pytest.mark.parametrize('how', ['enable input', 'power'])
+def test_a_run_that_has_ended_does_not_begin_again_by_set_points(
+    tmp_path: Path, name: str, vary: float, how: str
+) -> None:
+    with way(tmp_path, name) as rig:
+        rig.enable()
+        rig.keep(lambda: rig.drive.set_setpoint(20.0 + vary * (rig.clock.now * 7 % 1)))
+        rig.wait_until(lambda: rig.far.motor.frequency > 19.0, 5.0)
+        rig.pass_time(2.0)
+        if how == 'power':
+            rig.far.power_cycle(0.05)
+        else:
+            rig.far.set_run_input(False)
+            rig.pass_time(0.3)
+            rig.far.set_run_input(True)
+        rig.wait_until(lambda: not rig.drive.following, 0.5)
+        rig.wait_until(lambda: not rig.turns, 0.5)
+        rig.pass_time(6.0)
+        assert not rig.turns
+        rig.assert_only_enable_helps(20.0)
+
+
+@pytest.mark.parametrize('name', BY_SETPOINT)
+def test_a_turn_through_standstill_is_no_end_of_a_run(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # it still turns the other way a second after the set-points have another sign
+    slow = {'ramp.accel': 3.0, 'ramp.decel': 3.0}
+    with way(tmp_path, name, parameters=slow) as rig:
+        kind = type(rig.far.control_unit)
+        demand = kind._demand.fget
+        from_then = [0.0]
+        monkeypatch.setattr(
+            kind, '_demand',
+            property(lambda unit: demand(unit) if rig.clock.now >= from_then[0] else 0.0),
+        )
+        rig.enable()
+        for frequency in (20.0, -20.0, 3.0, -5.0, 20.0, 0.0, 20.0):
+            # some drives stand for a while before they turn round
+            from_then[0] = rig.clock.now + 1.8
+            rig.send(frequency)
+            rig.pass_time(1.85)
+            rig.far.control_unit.settle()
+            rig.pass_time(2.0)
+            assert rig.drive.following
+            assert rig.far.motor.frequency == pytest.approx(frequency, abs=0.3)
