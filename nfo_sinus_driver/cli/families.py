@@ -80,7 +80,9 @@ def notes(family: catalog.Family) -> list[str]:
             'direction commanded, and no value while others command. Add reverse to status (the '
             'sign of another register will do: {register: R, bit: 15}), or a type with a sign'
         )
-    if profile.status_word.runs_by_turning:
+    if target.is_command:
+        found.append('it has no run command: nothing but set-point 0 stops it over the line')
+    elif profile.status_word.runs_by_turning:
         found.append(
             'its status shows a run only while the motor turns: that an enable has been carried '
             'out shows with the first set-point that is not 0; use a bit that says so, if there is '
@@ -92,13 +94,14 @@ def notes(family: catalog.Family) -> list[str]:
             'add identify, with a register whose numbers its manual gives (type, size, software), '
             'such as identify: [{register: 0x0000, values: [2, 4, 6]}]'
         )
-    if not method.coasts:
+    if not method.coasts and not target.is_command:
         found.append('it has no coast: quick_stop is an ordinary stop, or a quick ramp')
     if not family.key(catalog.Role.COMMUNICATION_TIMEOUT):
         found.append('it has no time-out of its own: the motor runs on when the driver is gone')
     if profile.keeps_run is None:
+        command = 'set-point' if target.is_command else 'run command'
         found.append(
-            'does its run command survive a power cycle? Look in the manual, or try it without the '
+            f'does its {command} survive a power cycle? Look in the manual, or try it without the '
             'motor, and add keeps_run: true or keeps_run: false; with true a silence of 0.4 s '
             'stops the motor'
         )
