@@ -9,10 +9,10 @@ Without I/O; time is in seconds of one steady clock.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 import math
-import operator
 from typing import NamedTuple
 
 __all__ = ['Pauses']
@@ -227,9 +227,6 @@ class _Unit:
             learner.in_vain = False
 
 
-_GAP = operator.attrgetter('gap')
-
-
 class Pauses:
     """
     The pauses of one line.
@@ -258,17 +255,19 @@ class Pauses:
         self._line_end = line_end
         self._least = least
         self._broadcast = broadcast
-        self._units: dict[int, _Unit] = {}
+        self._units: defaultdict[int, _Unit] = defaultdict(_Unit)
         #: When the last answer came.
         self._answered_at = -math.inf
 
     def require(self, unit: int, gap: float) -> None:
         """Have the line silent for so long, s, before each request to a unit."""
-        self._of(unit).gap = gap
+        self._units[unit].gap = gap
 
     def silence(self, unit: int) -> float:
         """Return how long the line is silent before a request to a unit, s; 0: as usual."""
-        return max(self._least, self._most(_GAP, unit))
+        if unit == self._broadcast and self._units:
+            return max(self._least, *(record.gap for record in self._units.values()))
+        return max(self._least, self._units[unit].gap)
 
     def kept_silent(self, unit: int) -> float:
         """Return how long a request to a unit keeps the line silent before it, s; 0: as usual."""
@@ -283,7 +282,9 @@ class Pauses:
 
     def rests_until(self, unit: int) -> float:
         """Return until when a unit is asked nothing, while others may be."""
-        return self._most(_Unit.rests_until, unit)
+        if unit == self._broadcast and self._units:
+            return max(record.rests_until() for record in self._units.values())
+        return self._units[unit].rests_until()
 
     def ready_at(self, unit: int) -> float:
         """Return when a request to a unit may be sent."""
@@ -291,7 +292,7 @@ class Pauses:
 
     def round(self, units: Iterable[int]) -> float:
         """Return how much of a round in which each unit is asked once is pauses, s."""
-        asked = [self._of(unit) for unit in units]
+        asked = [self._units[unit] for unit in units]
         silences = sum(max(self._least, record.gap, record.kept(own=False)) for record in asked)
         return max((silences, *(record.kept(own=True) for record in asked)))
 
@@ -299,7 +300,7 @@ class Pauses:
 
     def sent(self, unit: int, now: float, *, writes: bool) -> None:
         """Note a request at the moment when it begins."""
-        record = self._of(unit)
+        record = self._units[unit]
         record.writes, record.sent = writes, None
         line = now - self._answered_at
         if line < _NEARLY * _LONGEST:
@@ -309,7 +310,7 @@ class Pauses:
 
     def answered(self, unit: int, kind: type[object], now: float) -> None:
         """Note that a unit has answered the last request to it."""
-        record = self._of(unit)
+        record = self._units[unit]
         self._answered_at = record.answered_at = now
         record.wrote = record.writes
         record.known.add(kind)
@@ -332,7 +333,7 @@ class Pauses:
 
     def unanswered(self, unit: int, kind: type[object]) -> None:
         """Note that a unit has not answered the last request to it."""
-        record = self._of(unit)
+        record = self._units[unit]
         sent, record.sent = record.sent, None
         if record.in_vain >= record.probe_at:
             record.probe_at *= 2
@@ -350,19 +351,10 @@ class Pauses:
         for record in self._units.values():
             record.forget()
 
-    def _of(self, unit: int) -> _Unit:
-        if unit not in self._units:
-            self._units[unit] = _Unit()
-        return self._units[unit]
-
     def _learnt(self, unit: int) -> float:
-        return self._most(_Unit.learnt, unit)
-
-    def _most(self, what: Callable[[_Unit], float], unit: int) -> float:
-        """Return something of a unit; for a broadcast the greatest of all units."""
         if unit == self._broadcast and self._units:
-            return max(map(what, self._units.values()))
-        return what(self._of(unit))
+            return max(record.learnt() for record in self._units.values())
+        return self._units[unit].learnt()
 
 
 def _learnt(unit: int, stage: _Stage) -> str:

@@ -36,7 +36,7 @@ def test_what_is_in_force_is_what_was_learnt(
             pauses.answered(unit, int, now)
             answered[unit] = now
         for number in UNITS:
-            record = pauses._of(number)
+            record = pauses._units[number]
             learners = record.learners.items()
             pause = max(
                 learner.pause(own=True)
