@@ -33,7 +33,7 @@ _ALL = typed('ros2')
 _OF_OTHERS = (
     'diagnostic_aggregator', 'rqt_robot_monitor', 'foxglove_bridge', 'plotjuggler',
     'nav2_lifecycle_manager', '/lifecycle_manager', 'nfo_sinus_cpp_client', 'ros2 security',
-    'ros2 daemon', 'nav2_msgs',
+    'ros2 daemon', 'nav2_msgs', 'control_msgs',
 )
 _OURS = [command for command in _ALL if not any(other in command.text for other in _OF_OTHERS)]
 #: What commands and shows a running drive by the names of its node.
