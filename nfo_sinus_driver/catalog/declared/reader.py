@@ -248,15 +248,24 @@ class _Reader:
             )
 
     def _require_seen_to_stand(self, control: Node) -> None:
-        """Make sure that a motor that no run command runs is seen to stand."""
+        """Make sure that a motor is seen to stand that no run command runs, or none that shows."""
         measured = self._root.get('measured')
         turns = ('actual_frequency', *_TURNS[self._root['setpoint'].text('unit')])
-        if control.text('run_by') == 'setpoint' and not any(name in measured for name in turns):
-            self._problems.add(
-                control['run_by'].line,
-                f'run_by: setpoint needs measured {" or ".join(turns)}, which alone shows that '
-                'the motor has stopped: a set-point would start it again',
-            )
+        running = self._conditions.get('running')
+        moves = running is not None and not running.coil and running.register in self._moving
+        if not any(name in measured for name in turns):
+            shows = f'measured {" or ".join(turns)}, which alone shows that the motor has stopped'
+            if control.text('run_by') == 'setpoint':
+                self._problems.add(
+                    control['run_by'].line,
+                    f'run_by: setpoint needs {shows}: a set-point would start it again',
+                )
+            elif moves and running is not None and 'actual_speed' in measured:
+                self._problems.add(
+                    running.line,
+                    f'a running that is a measured value needs {shows}: it would start again by '
+                    'itself',
+                )
         if control.text('run_by') != 'terminals':
             return
         shown = 'actual_frequency' in measured
@@ -266,8 +275,7 @@ class _Reader:
                 'run_by: terminals needs measured actual_frequency, and no status stopping: the '
                 'frequency alone shows that a motor stands that its terminals go on running',
             )
-        running = self._conditions.get('running')
-        if running is not None and not running.coil and running.register in self._moving:
+        if moves and running is not None:
             self._problems.add(
                 running.line,
                 'run_by: terminals needs a running that shows the terminals at set-point 0, too: '

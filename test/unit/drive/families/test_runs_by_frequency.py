@@ -13,6 +13,7 @@ from support.described import DescribedRig
 from support.oddities import PLAIN, described
 
 from nfo_sinus_driver.catalog import load_family
+from nfo_sinus_driver.catalog.declared import DescriptionError
 from nfo_sinus_driver.cli.families import notes
 from nfo_sinus_driver.drive import Cause
 
@@ -88,6 +89,29 @@ def test_a_frequency_that_is_another_one_each_time_is_no_damage(
         assert 'stop' in rig.answer(rig.drive.stop())
         rig.wait_until(lambda: not rig.far.motor.turning, 15.0)
         assert not rig.notes.said(Cause.LOST)
+
+
+def test_a_speed_alone_does_not_show_that_a_motor_stands_against_set_points_in_hz(
+    tmp_path: Path,
+) -> None:
+    status = {**PLAIN['status'], 'running': {'register': 23, 'except': [0]}}
+    speed = {'actual_speed': {'register': 23, 'type': 'int16'}}
+    with pytest.raises(DescriptionError, match='a running that is a measured value needs measured'):
+        DescribedRig(described(tmp_path, status=status, measured=speed))
+    setpoint = {
+        'register': 11, 'type': 'int16', 'factor': 1, 'unit': 'rpm', 'most': 1800, 'signed': True,
+    }
+    # as of a set-point in rpm it does
+    with DescribedRig(
+        described(tmp_path, status=status, measured=speed, setpoint=setpoint)
+    ) as rig:
+        rig.connect()
+        rig.enable()
+        rig.follow(20.0)
+        rig.far.control_unit._run = False
+        rig.far.control_unit.settle()
+        rig.wait_until(lambda: not rig.drive.following, 6.0)
+        assert rig.notes.said(Cause.STOPPED_BY_ITSELF)
 
 
 def test_a_slow_ramp_is_no_stop(tmp_path: Path) -> None:
