@@ -122,15 +122,19 @@ class Bench:
         return not state['driven'] and not state['turning'] and state['source'] == 'stop'
 
     def run_by_bus(self, hertz: float = 10.0) -> None:
-        """Let the motor run as if another master had commanded it."""
+        """Let the motor run as if another master had commanded it, until it turns that fast."""
+        self.command_by_bus(hertz)
+        # no longer on its ramp, which may bring it to its current limit
+        wait_until(lambda: abs(self.state()['frequency'] - hertz) < 0.1)
+
+    def command_by_bus(self, hertz: float) -> None:
+        """Command the motor as another master would."""
         with self.simulator.lock:
             drive = self.drive()
             drive.write_raw('fieldbus.mode', _BUS)
             optimal = drive.model.name == 'sinus_optimal'
             drive.memory.set(drive.control_unit.setpoint_key, hertz)
             drive.write_raw('fieldbus.smode' if optimal else 'fieldbus.scmd', _RUN)
-        # no longer on its ramp, which may bring it to its current limit
-        wait_until(lambda: abs(self.state()['frequency'] - hertz) < 0.1)
 
     def writes(self) -> list[bytes]:
         """Every request so far that writes."""

@@ -337,7 +337,9 @@ def test_a_motor_that_turns_after_its_input_is_closed_is_stopped_before_the_next
 
     def closed() -> str:
         bench.simulator.inject('run', 'on', address=1)
-        bench.run_by_bus(3.0)
+        bench.command_by_bus(3.0)
+        # it may be stopped before it turns that fast
+        wait_until(lambda: bench.state()['turning'])
         return '\n'
 
     def asked() -> str:
