@@ -482,3 +482,20 @@ def test_a_turn_through_standstill_is_no_end_of_a_run(
             rig.pass_time(2.0)
             assert rig.drive.following
             assert rig.far.motor.frequency == pytest.approx(frequency, abs=0.3)
+
+
+def test_a_small_set_point_is_not_repeated_to_a_motor_that_another_master_has_stopped(
+    tmp_path: Path,
+) -> None:
+    # too small for a run that is seen to end: it is stopped when it has stood for 2 s
+    with way(tmp_path, BY_SETPOINT[0]) as rig:
+        rig.enable()
+        rig.send(1.5)
+        rig.pass_time(2.0)
+        assert rig.turns
+        rig.far.memory.set(SETPOINT, 0.0)
+        rig.far.control_unit.settle()
+        turned = []
+        rig.judge(lambda: turned.append(rig.turns))
+        rig.pass_time(5.0)
+        assert not any(turned) and not rig.drive.following
