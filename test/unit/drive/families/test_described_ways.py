@@ -491,7 +491,8 @@ def test_a_small_set_point_is_not_repeated_to_a_motor_that_another_master_has_st
     with way(tmp_path, BY_SETPOINT[0]) as rig:
         rig.enable()
         rig.send(1.5)
-        rig.pass_time(2.0)
+        # a second before it would be written again
+        rig.pass_time(4.0)
         assert rig.turns
         rig.far.memory.set(SETPOINT, 0.0)
         rig.far.control_unit.settle()
