@@ -616,7 +616,7 @@ class Controller:
         """
         state, status = self._state, self._state.status
         if await self.in_control(Priority.SERVICE):
-            turns = status is not None and await self._was_started(status)
+            turns = status is not None and self._was_started(status)
             found = None
             # the stop of a drive that was lost may be confirmed, and its ramp not be over
             if turns and not (self._control.stopping or self._lost_in_use):
@@ -670,12 +670,11 @@ class Controller:
         follows = self._control.enabled and status.at >= self._control.since
         return follows and self._why_stopped(status) is not None
 
-    async def _was_started(self, status: InverterStatus) -> bool:
+    def _was_started(self, status: InverterStatus) -> bool:
         """Return whether the motor turns, or shows the run of a command that came over the bus."""
-        if abs(status.frequency) > 0 or not status.stands_running:
-            return abs(status.frequency) > 0 or status.runs_by_bus
-        # terminals may start it, too
-        return self._stands_running(status) or bool(await self._read_run_command())
+        # terminals may start one that stands. Whose run it is would take a read ahead of the stop
+        runs = status.runs_by_bus and not status.stands_running
+        return abs(status.frequency) > 0 or runs or self._stands_running(status)
 
     def on_status(self, status: InverterStatus) -> bool:
         """Check a status, and stop the motor if it says so; return whether that was reported."""

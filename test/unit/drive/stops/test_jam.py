@@ -422,3 +422,21 @@ def test_a_drive_that_does_not_tell_its_current_is_not_connected(
         with raises(Cause.JAM_NOT_MEASURED):
             rig.result(rig.drive.connect())
         assert not rig.drive.snapshot.connected
+
+
+@pytest.mark.parametrize(
+    'connection', ['rtu', 'classic', Connection('modbus_rtu', shipped('delta_ms300'), 'custom')],
+    ids=['rtu', 'classic', 'described'],
+)
+def test_a_motor_that_is_found_running_is_stopped_though_its_drive_is_refused(
+    connection: str | Connection,
+) -> None:
+    with Rig(connection, jam_current=4.0, jam_speed=5.0, telemetry_rate=2.0) as rig:
+        rig.turn()
+        rig.kill()
+        rig.begin()
+        key = rig.drive.model.key(Role.OUTPUT_CURRENT)
+        rig.meet = lambda asked, data: 'none such' if asked == key else None
+        with raises(Cause.JAM_NOT_MEASURED):
+            rig.result(rig.drive.connect())
+        rig.wait_until(lambda: not rig.turns, 3.0)

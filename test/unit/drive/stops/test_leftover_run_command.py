@@ -105,3 +105,21 @@ def test_directions_of_a_movitrac_do_not_wait_for_remote_control(mode: str) -> N
         rig.far.set_from_keypad(CONTROL_MODE, 'Remote control')
         never_driven(rig)
         rig.pass_time(3.0)
+
+
+def test_no_read_in_vain_goes_before_the_stop_of_a_motor_that_is_found_standing() -> None:
+    # its direction is left in the function bits, and at set-point 0 it shows a run
+    with Rig('movitrac') as rig:
+        rig.turn(20.0)
+        rig.send(0.0)
+        rig.wait_until(lambda: rig.far.motor.frequency == 0.0, 10.0)
+        rig.pass_time(1.0)
+        rig.kill()
+        rig.begin()
+        rig.meet = lambda key, data: (
+            'unheard' if key == 'fieldbus.function_bits' and data is None else None
+        )
+        rig.drive.connect()
+        rig.pass_time(0.5)
+        # both directions
+        assert not int(rig.far.peek('fieldbus.function_bits')) & 0x3
