@@ -678,6 +678,15 @@ class Profile:
     line_words: Mapping[Value, str] = field(default_factory=dict)
     cuts_off: Mapping[str, Value] = field(default_factory=dict)
 
+    @property
+    def may_run_again(self) -> bool:
+        """
+        A drive that was without power for a moment would run again.
+
+        By the run command that it keeps; or by the next set-point, where that is the command.
+        """
+        return bool(self.keeps_run) or any(at.is_command for at in self.setpoints.values())
+
     def seen_by(self, method: str) -> Profile:
         """Return the same as one of its control methods sees it."""
         own = self.methods.get(method)

@@ -1218,6 +1218,14 @@ LAWS = (
     ),
     Mutant(
         2,
+        'a drive that was off is run again by the next set-point, where that is the command',
+        'Profile.may_run_again',
+        'return bool(self.keeps_run) or any(at.is_command for at in self.setpoints.values())',
+        'return bool(self.keeps_run)',
+        ('test_described_ways.py', '-k', 'has_ended_does_not'),
+    ),
+    Mutant(
+        2,
         'a set-point that is the command is repeated to a motor that has stopped by itself',
         'Setpoint._is_current',
         'return starts and status is not None and not status.driven',

@@ -114,7 +114,7 @@ def explain_stop(state: DriveState, status: InverterStatus, control_mode: str) -
         cause = Cause.DRIVER_PAUSED
     elif not status.may_run:
         cause = Cause.STOPPED_BY_ITSELF
-    elif state.model.profile.keeps_run and state.contact.unheard:
+    elif state.model.profile.may_run_again and state.contact.unheard:
         cause = Cause.MAY_HAVE_RESTARTED
     return cause and state.report(cause, seconds=state.timeout.shortest)
 

@@ -212,7 +212,7 @@ class DriveState:
 
     def may_have_restarted(self, silent: float) -> bool:
         """Return whether a drive that was silent for so long, s, may run again by itself."""
-        return bool(self.model.profile.keeps_run) and silent >= SHORTEST_POWER_OFF
+        return self.model.profile.may_run_again and silent >= SHORTEST_POWER_OFF
 
     def _note_fault(self, before: InverterStatus | None) -> None:
         status = self.status

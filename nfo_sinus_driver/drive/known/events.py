@@ -242,11 +242,11 @@ class Cause(enum.Enum):
     """A short power failure; the drive started again by its old run command. Check its mains,
     enable"""
     MAY_HAVE_RESTARTED = (
-        'the drive did not answer for so long that it may have been switched off and on, and it '
-        'keeps its run command without power: check its mains and the line'
+        'the drive did not answer for so long that it may have been switched off and on, and its '
+        'motor would run again then: check its mains and the line'
     )
-    """The file of the drive says `keeps_run: true`, and no answer came for 0.4 s. Check its mains
-    and the line, enable"""
+    """The file of the drive says `keeps_run: true` or `run_by`, and no answer came for 0.4 s. Check
+    its mains and the line, enable"""
     DRIVE_STARTING = 'the drive is starting ({status}): it was switched off and on; check its mains'
     RESTARTED = 'the drive restarted: its boot-up message was received; check its mains'
     """The drive lost its power. Check its mains, enable"""

@@ -238,4 +238,4 @@ class PollPlan:
     @property
     def _may_restart(self) -> bool:
         """After a moment without power the motor would run again, as if nothing had been."""
-        return bool(self._state.model.profile.keeps_run) and self._setpoint.following
+        return self._state.model.profile.may_run_again and self._setpoint.following

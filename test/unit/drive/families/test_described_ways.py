@@ -446,14 +446,17 @@ def test_a_run_that_has_ended_does_not_begin_again_by_set_points(
         rig.wait_until(lambda: rig.far.motor.frequency > 19.0, 5.0)
         rig.pass_time(2.0)
         if how == 'power':
-            rig.far.power_cycle(0.05)
+            # no drive is back sooner
+            rig.far.power_cycle(0.5)
         else:
             rig.far.set_run_input(False)
             rig.pass_time(0.3)
             rig.far.set_run_input(True)
         rig.wait_until(lambda: not rig.drive.following, 0.5)
-        rig.wait_until(lambda: not rig.turns, 0.5)
-        rig.pass_time(6.0)
+        rig.wait_until(lambda: not rig.turns, 1.0)
+        for _ in range(60):
+            rig.pass_time(0.1)
+            assert not rig.turns
         assert not rig.turns
         rig.assert_only_enable_helps(20.0)
 

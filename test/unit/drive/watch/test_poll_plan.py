@@ -26,7 +26,7 @@ def plan(
     stopping: bool = False,
     following: bool = False,
     enabled: bool = False,
-    keeps_run: str = '',
+    may_run_again: str = '',
     frequency: float = 0.0,
     driven: bool = False,
     own_timeout: float = 0.0,
@@ -50,7 +50,7 @@ def plan(
         settings=SimpleNamespace(poll_rate=10.0, idle_poll_rate=idle_rate, address=1),
         timeout=SimpleNamespace(seconds=own_timeout),
         plc_time=plc_time,
-        model=SimpleNamespace(profile=SimpleNamespace(keeps_run=keeps_run)),
+        model=SimpleNamespace(profile=SimpleNamespace(may_run_again=bool(may_run_again))),
         measurements=SimpleNamespace(frequency=frequency, speed=frequency * 30),
         status=SimpleNamespace(driven=driven),
         pause_before_timeout=lambda pause, seconds: min(pause, seconds or pause),
@@ -76,7 +76,7 @@ def plan(
         # a motor that runs, or is to stop, is watched however low the rate
         ({'active': False, 'following': True}, 0.1, Turn.STATUS, 0.2),
         ({'active': False, 'stopping': True}, 0.1, Turn.STATUS, 0.2),
-        ({'active': False, 'following': True, 'keeps_run': 'x'}, 0.1, Turn.STATUS, 0.1),
+        ({'active': False, 'following': True, 'may_run_again': 'x'}, 0.1, Turn.STATUS, 0.1),
         # an idle one gives its time to others
         ({'idle_rate': 1.0}, 0.5, Turn.STATUS, 0.5),
         ({'idle_rate': 1.0, 'driven': True}, 0.5, Turn.POLL, -0.4),
@@ -105,9 +105,9 @@ def test_turn_and_pause(known: dict[str, Any], since: float, turn: Turn, pause: 
     ('known', 'priority'),
     [
         ({'responsive': False}, Priority.POLL),
-        ({'keeps_run': 'x', 'following': True}, Priority.POLL),
-        ({'keeps_run': 'x', 'responsive': False}, Priority.POLL),
-        ({'keeps_run': 'x', 'following': True, 'responsive': False}, Priority.LOOK),
+        ({'may_run_again': 'x', 'following': True}, Priority.POLL),
+        ({'may_run_again': 'x', 'responsive': False}, Priority.POLL),
+        ({'may_run_again': 'x', 'following': True, 'responsive': False}, Priority.LOOK),
     ],
 )
 def test_a_drive_that_may_restart_by_itself_is_asked_first(
